@@ -128,6 +128,12 @@ _PARSER_WORDS = (
 )
 """Patterns of what the library says that checks the types of options, and what to say instead."""
 
+_VALUE_AS_OPTION = (
+    r"(No such option: --(?:force|torque|stroke|travel|angle|ripple|envelope|material|stiffness|thickness|length)\b).*",
+    r"\1; values of the spec are changed with --set, e.g. --set design.force='60 N'",
+)
+"""Values of a specification that are given as options, which `suggest` has, to a verb that reads one."""
+
 
 def _of_the_parser(error: Any) -> str:
     """Return what is wrong with the command line, and where to look."""
@@ -136,5 +142,7 @@ def _of_the_parser(error: Any) -> str:
         message = re.sub(theirs, ours, message)
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "cfmkit"
+    if context and "set" in {item.name for item in context.command.params}:
+        message = re.sub(*_VALUE_AS_OPTION, message)
     joint = " See" if message.endswith("?") else "; see"
     return f"{message}{joint} '{command} --help'"

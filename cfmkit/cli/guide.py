@@ -56,10 +56,7 @@ def _title(path: Path) -> str:
 def page(name: str) -> GuidePage:
     """Return one page by its name; ``docs/cam.md``, as files link to it, is the page ``cam``.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is none of that name.
+    Raises UsageError if there is none of that name.
     """
     by_name = {guide_page.name: guide_page for guide_page in pages()}
     wanted = name.removeprefix("docs/").partition("#")[0].removesuffix(".md").replace("-", "_")
@@ -100,11 +97,6 @@ def read_terms() -> dict[str, str]:
             name = re.sub(r" \(.*\)", "", word)
             meanings[name] = f"{meanings[name]}; {meaning}" if name in meanings else meaning
     return meanings
-
-
-def list_terms() -> dict[str, list[dict[str, str]]]:
-    """Return the words of the glossary as `cfmkit show` lists names: by word, its records."""
-    return {name: [{"name": name, "meaning": meaning}] for name, meaning in read_terms().items()}
 
 
 def words_for_synonym(word: str) -> tuple[str, ...]:

@@ -67,21 +67,17 @@ def _one_thread() -> None:
         os.environ.setdefault(name, value)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program; return its exit code.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Without the program's name; default: those of the process.
-    """
+def main(
+    arguments: Sequence[str] | None = None,  # without the program's name; default: those of the process
+) -> int:
+    """Run the program; return its exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    streams.prepare()
+    streams.make_tolerant()
     try:
         try:
             return int(_run(given))
         finally:
-            streams.settle()
+            streams.flush()
     except Stopped as stop:  # while it was told how the command has ended
         return int(stop.exit_code)
 

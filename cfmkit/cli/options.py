@@ -31,23 +31,16 @@ def argument(metavar: str, text: str, completed: Callable[[str], list[str]] | No
 
 
 def option(
-    *names: str, text: str, metavar: str | None = None, shown: bool = False, low: int | None = None, **more: Any
+    *names: str,  # as the user writes it
+    # text, metavar: what the help says, and what it calls the value
+    text: str,
+    metavar: str | None = None,
+    shown: bool = False,  # whether the help shows the default
+    # the smallest value. It is checked here and not by typer, whose help would show ``[0<=x<=...]``
+    low: int | None = None,
+    **more: Any,  # what else typer takes
 ) -> Any:
-    """Return the declaration of an option that takes a value.
-
-    Parameters
-    ----------
-    *names : str
-        As the user writes it.
-    text, metavar : str
-        What the help says, and what it calls the value.
-    shown : bool
-        Whether the help shows the default.
-    low : int, optional
-        The smallest value. It is checked here and not by typer, whose help would show ``[0<=x<=...]``.
-    **more
-        What else typer takes.
-    """
+    """Return the declaration of an option that takes a value."""
     check = None if low is None else _require_at_least(low)
     return typer.Option(*names, metavar=metavar, help=text, show_default=shown, callback=check, **more)
 
@@ -87,15 +80,6 @@ NoLock = Annotated[
     flag("--no-lock", text="Do not lock the output folder: no other run may use it (for file systems without locks)."),
 ]
 Fresh = Annotated[bool, flag("--fresh", text="Reuse no results of an earlier run.")]
-Tables = Annotated[
-    str,
-    option(
-        "--table",
-        metavar="csv,parquet",
-        shown=True,
-        text="Formats of the table of points; results.csv is always written. Parquet needs cfmkit\\[table].",
-    ),
-]
 Animate = Annotated[
     Literal["gif", "mp4"] | None,
     option(
@@ -162,10 +146,7 @@ class FigureChoice(Common):
     def form(self) -> FigureForm:
         """Form of the figures.
 
-        Raises
-        ------
-        cfmkit.errors.UsageError
-            If an option is malformed, or figures are both described and refused.
+        Raises UsageError if an option is malformed, or figures are both described and refused.
         """
         from cfmkit.plots.figure_options import form_of
 
@@ -212,6 +193,16 @@ class ComputeOptions(OneSpec, FigureChoice):
 class StudyOptions(ComputeOptions):
     """Options of verbs that evaluate many points."""
 
+    report: WithReport = False
+    table: Annotated[
+        str,
+        option(
+            "--table",
+            metavar="csv,parquet",
+            shown=True,
+            text="Formats of the table of points; results.csv is always written. Parquet needs cfmkit\\[table].",
+        ),
+    ] = "csv"
     jobs: Jobs = None
     cluster: Annotated[
         str | None,
@@ -310,10 +301,7 @@ def read_measured(name: str, options: MeasurementOptions) -> MeasuredCurves:
 def refuse_without_data(options: MeasurementOptions) -> None:
     """Refuse options about a measurement where none is named.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        Naming the first of them.
+    Raises UsageError naming the first of them.
     """
     for name, _ in given_measurement_options(options):
         raise UsageError(f"{name} applies to a measurement: name its file with --data")
@@ -328,10 +316,7 @@ def given_measurement_options(options: MeasurementOptions) -> list[tuple[str, st
 def seconds(text: str) -> float:
     """Return a time budget [s].
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is no time above zero.
+    Raises UsageError if it is no time above zero.
     """
     from cfmkit.families.run_control import read_time
 

@@ -61,7 +61,7 @@ class Terminal:
         """Print blocks to standard output."""
         from cfmkit.documents.terminal import print_blocks
 
-        ascii_only = not streams.speaks_utf8(sys.stdout)
+        ascii_only = not streams.can_encode_all(sys.stdout)
         streams.write_output(print_blocks(blocks, self.width, sys.stdout.isatty(), ascii_only))
 
     def show_page(self, document: Document) -> None:
@@ -72,28 +72,39 @@ class Terminal:
 
     def show_json(self, data: Mapping[str, Any]) -> None:
         """Print one JSON document to standard output."""
-        ascii_only = not streams.speaks_utf8(sys.stdout)
+        ascii_only = not streams.can_encode_all(sys.stdout)
         streams.write_output(json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n")
 
     def complain(self, lines: Sequence[str]) -> None:
         """Print lines to standard error."""
         for line in lines:
-            streams.complain(f"{visible(line)}\n")
+            streams.write_error(f"{visible(line)}\n")
 
     @contextmanager
-    def progress(self) -> Iterator[Report]:
-        """Yield what reports progress: a bar on a terminal, else a line with the time left now and then."""
+    def progress(self, budget: float | None = None) -> Iterator[Report]:
+        """Yield what reports progress: a bar on a terminal, else a line with the time left now and then.
+
+        With a time budget [s] the share of it that is spent counts, where less of the work is done: its end is the end.
+        """
         if self.json or self.quiet:
             yield lambda _fraction, _text: None
             return
-        if not sys.stderr.isatty():
-            yield ProgressLines().report
-            return
-        bar = Bar()
+        start, bar = time.monotonic(), Bar() if sys.stderr.isatty() else None
+        report = ProgressLines().report if bar is None else bar.report
+
+        def report_in_budget(fraction: float, text: str) -> None:
+            spent = 0.0 if budget is None else (time.monotonic() - start) / budget
+            report(max(fraction, min(spent, MAX_SHARE_SPENT)), text)
+
         try:
-            yield bar.report
+            yield report_in_budget
         finally:
-            bar.close()
+            if bar is not None:
+                bar.close()
+
+
+MAX_SHARE_SPENT = 0.99
+"""Share of a time budget that is reported at most while the work goes on."""
 
 
 LINE_EVERY = 10.0
@@ -119,7 +130,7 @@ class ProgressLines:
             self._reported = now
             left = (now - self._start) * (1.0 - self._most) / self._most
             time_left = f", {duration(left)} left" if self._most >= FIRST_ESTIMATE else ""
-            streams.complain(f"{100 * self._most:.0f} %{time_left}: {text}\n")
+            streams.write_error(f"{100 * self._most:.0f} %{time_left}: {text}\n")
 
 
 def duration(seconds: float) -> str:

@@ -36,20 +36,14 @@ long processes take to start and to compile, and not how long a point takes."""
 
 
 class StudyProgress:
-    """A monitor of a study that tells the user, and listens to Ctrl-C.
-
-    Attributes
-    ----------
-    stopped : bool
-        Whether the user asked to stop.
-    """
+    """A monitor of a study that tells the user, and listens to Ctrl-C."""
 
     def __init__(self, terminal: Terminal, things: str = "points") -> None:
         """Know whom to tell, and what is counted."""
         self._things = things
         self._tells = not (terminal.json or terminal.quiet)
         self._bar = Bar() if self._tells and sys.stderr is not None and sys.stderr.isatty() else None
-        self.stopped = False
+        self._stopped = False  # whether the user asked to stop
         self._all = self._done = self._failed = self._reused = 0
         self._start = self._reported = time.monotonic()
         self._first: float | None = None
@@ -73,14 +67,14 @@ class StudyProgress:
 
     def stopping(self) -> bool:
         """Return whether the user asked to stop."""
-        return self.stopped
+        return self._stopped
 
     def _tell(self, now: float) -> None:
         if self._bar is not None:
             text = f"{self._done} of {self._all} {self._things}, {self._sentence(now)}"
             self._bar.show(self._done, self._all, text)
         else:
-            streams.complain(f"{self._done} of {self._all} {self._things}, {self._sentence(now)}\n")
+            streams.write_error(f"{self._done} of {self._all} {self._things}, {self._sentence(now)}\n")
 
     def _sentence(self, now: float) -> str:
         rate = self._rate(now)
@@ -116,14 +110,14 @@ class StudyProgress:
 
     def interrupt(self, number: int, _frame: FrameType | None) -> None:
         """Take Ctrl-C: the first time as a request to stop soon, the second time at once."""
-        if self.stopped:
+        if self._stopped:
             signal.signal(number, signal.SIG_DFL)
             raise Stopped(number)
-        self.stopped = True
+        self._stopped = True
         if self._bar is not None:
             self._bar.close()
             self._bar = None
-        streams.complain(f"stopping after the {self._things} that run now; press Ctrl-C again to end at once\n")
+        streams.write_error(f"stopping after the {self._things} that run now; press Ctrl-C again to end at once\n")
 
     def close(self) -> None:
         """Remove the bar."""
@@ -140,5 +134,5 @@ def watching(terminal: Terminal, things: str = "points") -> Iterator[StudyProgre
         yield monitor
     finally:
         monitor.close()
-        if not monitor.stopped:
+        if not monitor.stopping():
             signal.signal(signal.SIGINT, before)

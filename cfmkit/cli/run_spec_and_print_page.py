@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cfmkit.cli.output_folder import folder_of
 from cfmkit.documents.document import BAD_TONE, Document, Note, Written
 from cfmkit.documents.run_document import RunCommand, complaints_of, data_of, document_of
-from cfmkit.errors import UsageError
 from cfmkit.runs.run import RunTask, carry_out
-from cfmkit.runs.specfile import STDIN_PATH
 
 if TYPE_CHECKING:
-    from cfmkit.cli.options import ComputeOptions, OneSpec
+    from cfmkit.cli.options import ComputeOptions
     from cfmkit.cli.output import Terminal
     from cfmkit.runs.run import FinishedRun, Verb
 
@@ -25,38 +23,23 @@ NO_MOTION = (
 """What is said where a film was requested and there is none."""
 
 
-def execute(verb: Verb, options: ComputeOptions, terminal: Terminal, page: bool = False) -> Document:
-    """Run a verb over the spec that the options name and write the folder."""
-    out = folder_of(options, verb.name)
+def execute(
+    verb: Verb, options: ComputeOptions, terminal: Terminal, page: bool = False, budget: float | None = None
+) -> Document:
+    """Run a verb over the spec that the options name, in a time budget [s] if there is one, and write the folder."""
+    out = folder_of(options.out, options.spec, verb.name)
     wanted = RunTask(options.spec, out, options.changes, options.fidelity, options.seed, not options.no_plots)
     wanted = replace(wanted, page=page, form=options.form, animate=getattr(options, "animate", None))
     if wanted.animate == "mp4":
         from cfmkit.plots.animation import require_ffmpeg
 
         require_ffmpeg()
-    with terminal.progress() as progress:
+    with terminal.progress(budget) as progress:
         outcome = carry_out(verb, wanted, terminal.arguments, progress)
     found = _document(outcome)
     if wanted.animate and f"figures/motion.{wanted.animate}" not in outcome.written:
         return replace(found, complaints=(*found.complaints, NO_MOTION))
     return found
-
-
-def folder_of(options: OneSpec, verb: str) -> str:
-    """Return the output folder: the one requested, or one named after the spec and the verb.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the spec comes from standard input and no folder is given.
-    """
-    if options.out is not None:
-        if not options.out.strip():
-            raise UsageError("--out is empty; give a folder")
-        return options.out
-    if options.spec == STDIN_PATH:
-        raise UsageError("a spec from standard input has no name; give the output folder with --out")
-    return str(Path("cfm-out") / f"{Path(options.spec).stem}-{verb}")
 
 
 def _document(outcome: FinishedRun) -> Document:

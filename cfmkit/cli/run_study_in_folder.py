@@ -1,4 +1,4 @@
-"""Common part of the verbs that evaluate many points: a folder, a journal, an executor."""
+"""Common part of the verbs that evaluate many points: a folder, a journal, an executor, files and the report."""
 
 from __future__ import annotations
 
@@ -8,75 +8,30 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from cfmkit.cli.output_folder import folder_of
+from cfmkit.documents.document import Written
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    from matplotlib.figure import Figure
 
     from cfmkit.cli.options import StudyOptions
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.progress import StudyProgress
-    from cfmkit.errors import ExitCode
-    from cfmkit.specs.spec import Spec
-    from cfmkit.store import Manifest, RunFolder
+    from cfmkit.documents.document import Document
+    from cfmkit.plots.figure_options import FigureForm
+    from cfmkit.store import RunFolder
+    from cfmkit.store.safe_disk_changes import Data
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.journal import Journal
+    from cfmkit.studies.point_evaluation import Study
     from cfmkit.studies.serial_and_cluster_executors import Executor
 
 
-@dataclass(frozen=True)
-class Desk:
-    """Workplace of a study: its folder, its journal, and its progress monitor."""
-
-    folder: RunFolder
-    journal: Journal
-    progress: StudyProgress
-
-
-@dataclass(frozen=True)
-class Made:
-    """Origin of a study, for its manifest."""
-
-    # command, source: the verb, and the specification as it was named
-    command: str
-    source: str
-    spec: Spec  # what it said
-    # seed, points: random seed, and how many points there are
-    seed: int
-    points: int
-
-
-def command_of_a_point(options: StudyOptions, redesigns: bool) -> str:
-    """Return the command that computes a point of a study, but for what the study varies."""
-    spec = options.spec if options.spec != "-" else "SPEC"
-    said = ["design" if redesigns else "analyze", spec, *(part for one in options.changes for part in ("--set", one))]
-    said += ["--fidelity", options.fidelity] if options.fidelity else []
-    return shlex.join(["cfmkit", *said, *(["--seed", str(options.seed)] if options.seed else [])])
-
-
-def commit(place: Desk, made: Made, terminal: Terminal, code: ExitCode) -> Manifest:
-    """Put the files in place with a manifest that says what was run."""
-    from cfmkit.runs.run import family_package
-    from cfmkit.store import stable_hash
-
-    about = {
-        "command": made.command,
-        "arguments": list(terminal.arguments),
-        "seed": made.seed,
-        "spec": {
-            "source": made.source,
-            "sha256": stable_hash(made.spec.model_dump(mode="json")),
-            **family_package(made.spec.family),
-        },
-        "points": made.points,
-        "status": code.name.lower(),
-        "exit_code": int(code),
-    }
-    return place.folder.commit(about)
-
-
 @contextmanager
-def noting(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
+def open_journal(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
     """Yield the open journal of a folder; a signal that ends the block says whether the same command goes on."""
     from cfmkit.cli.failures import Stopped
     from cfmkit.studies.journal import Journal
@@ -93,22 +48,124 @@ def noting(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
             raise
 
 
-def finish(place: Desk, pieces: Sequence[Records]) -> None:
-    """Make the journal small, once every point of a study has its row and the files are in place."""
-    from cfmkit.studies.engine import compact
+@dataclass(frozen=True)
+class StudyFolder:
+    """The output folder of a study, with its journal and what the command line says of it."""
 
-    if all(piece.finished == len(piece) for piece in pieces):
-        compact(place.journal, pieces)
+    verb: str
+    options: StudyOptions
+    terminal: Terminal
+    form: FigureForm
+    in_parquet: bool
+    start: float
+    folder: RunFolder
+    journal: Journal
+    progress: StudyProgress
+
+    def compute(self, work: Work) -> Records:
+        """Return the rows of a study, as far as the user lets it run."""
+        from cfmkit.studies.engine import run
+
+        records = run(work, executor_for(work, self.options), self.journal, self.progress)
+        if records.bug and self.terminal.tracebacks:
+            self.terminal.complain(records.bug.rstrip("\n").split("\n"))
+        return records
+
+    def write_tables(self, outputs: Iterable[tuple[str, Data]]) -> dict[str, bytes]:
+        """Write the files of a study but figures and report; return what these need of them."""
+        kept: dict[str, bytes] = {}
+        for name, data in outputs:
+            if self.options.report or (self.in_parquet and name == "results.csv"):
+                kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
+            self.folder.write(name, data)
+        if self.in_parquet:
+            from cfmkit.tables import read_csv
+            from cfmkit.tables.parquet_writing import parquet
+
+            self.folder.write("results.parquet", parquet(read_csv(kept["results.csv"])))
+        return kept
+
+    def write_pages(
+        self,
+        found: Document,
+        study: Study,
+        varied: Sequence[str],
+        tables: Mapping[str, bytes],
+        pictures: Callable[[], Mapping[str, Callable[[], Figure]]],
+    ) -> None:
+        """Write the figures and the report, as far as they are wanted."""
+        options, form = self.options, self.form
+        makers = pictures() if options.report or not options.no_plots else {}
+        drawn: dict[str, Figure] = {}
+        for stem, make in makers.items() if not options.no_plots else ():
+            figure = form.draw(make)
+            drawn |= {stem: figure} if options.report else {}
+            for name, content in form.write(figure, stem):
+                self.folder.write(name, content)
+        if options.report:
+            from cfmkit.documents import html_of_study
+
+            command = shlex.join(["cfmkit", *self.terminal.arguments])
+            shown = form.select_page_figures(makers, drawn)
+            point = command_of_a_point(options, study.design)
+            page = html_of_study.page(found, study.spec, varied, tables, command, shown, point)
+            self.folder.write(html_of_study.REPORT_NAME, page)
+
+    def commit(self, found: Document, study: Study, seed: int, pieces: Sequence[Records]) -> Written:
+        """Put the files in place with a manifest that says what was run; make the journal of a finished study small."""
+        from cfmkit.runs.run import family_package
+        from cfmkit.store import stable_hash
+        from cfmkit.studies.engine import compact
+
+        spec = study.spec
+        manifest = self.folder.commit(
+            {
+                "command": self.verb,
+                "arguments": list(self.terminal.arguments),
+                "seed": seed,
+                "spec": {
+                    "source": self.options.spec,
+                    "sha256": stable_hash(spec.model_dump(mode="json")),
+                    **family_package(spec.family),
+                },
+                "points": sum(map(len, pieces)),
+                "status": found.exit_code.name.lower(),
+                "exit_code": int(found.exit_code),
+            }
+        )
+        if all(piece.finished == len(piece) for piece in pieces):
+            compact(self.journal, pieces)
+        files = (*manifest.files, "manifest.json")
+        return Written(
+            folder_of(self.options.out, self.options.spec, self.verb), files, time.perf_counter() - self.start
+        )
+
+
+@contextmanager
+def open_study(verb: str, options: StudyOptions, terminal: Terminal, start: float) -> Iterator[StudyFolder]:
+    """Lock the folder and open the journal, to reuse nothing if `fresh`; Ctrl-C asks to stop inside the block."""
+    from cfmkit.cli.progress import watching
+    from cfmkit.store import RunFolder
+
+    form, in_parquet = options.form, wants_parquet(options.table)
+    with (
+        RunFolder(folder_of(options.out, options.spec, verb)) as folder,
+        open_journal(folder, options.fresh) as journal,
+        watching(terminal) as progress,
+    ):
+        yield StudyFolder(verb, options, terminal, form, in_parquet, start, folder, journal, progress)
+
+
+def command_of_a_point(options: StudyOptions, redesigns: bool) -> str:
+    """Return the command that computes a point of a study, but for what the study varies."""
+    spec = options.spec if options.spec != "-" else "SPEC"
+    said = ["design" if redesigns else "analyze", spec, *(part for one in options.changes for part in ("--set", one))]
+    said += ["--fidelity", options.fidelity] if options.fidelity else []
+    return shlex.join(["cfmkit", *said, *(["--seed", str(options.seed)] if options.seed else [])])
 
 
 def wants_parquet(text: str) -> bool:
-    """Return whether ``--table`` names Parquet.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it names anything else than formats, or what is needed for one is not there.
-    """
+    """Return whether ``--table`` names Parquet; UsageError if it names anything else than formats that can be had."""
     wanted = names(text)
     unknown = [name for name in wanted if name not in ("csv", "parquet")]
     if unknown or not wanted:
@@ -120,47 +177,21 @@ def wants_parquet(text: str) -> bool:
     return "parquet" in wanted
 
 
-def as_parquet(results: bytes) -> bytes:
-    """Return results.csv as Parquet."""
-    from cfmkit.tables import read_csv
-    from cfmkit.tables.parquet_writing import parquet
-
-    return parquet(read_csv(results))
-
-
 def names(text: str | None) -> tuple[str, ...]:
     """Return what an option lists with commas."""
     return tuple(name.strip() for name in (text or "").split(",") if name.strip())
 
 
-@contextmanager
-def desk(out: str, terminal: Terminal, fresh: bool = False) -> Iterator[Desk]:
-    """Lock the folder and open the journal, to reuse nothing if `fresh`; Ctrl-C asks to stop inside the block."""
-    from cfmkit.cli.progress import watching
-    from cfmkit.store import RunFolder
-
-    with RunFolder(out) as folder, noting(folder, fresh) as journal, watching(terminal) as progress:
-        yield Desk(folder, journal, progress)
-
-
 def executor_for(work: Work, options: StudyOptions) -> Executor:
-    """Return what gets the points done: processes, a cluster, or this process where that is enough.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If options contradict each other.
-    """
+    """Return what gets the points done: processes, a cluster, or this process; UsageError if options contradict."""
     from cfmkit.studies.pool import Pool
-    from cfmkit.studies.serial_and_cluster_executors import cores, serial
+    from cfmkit.studies.serial_and_cluster_executors import Cluster, cores, serial
 
     timeout = options.timeout_per_point
     if timeout is not None and timeout <= 0:
         raise UsageError(f"--timeout-per-point: {timeout:g} is not allowed: must be > 0")
     jobs = options.jobs or cores()
     if options.cluster is not None:
-        from cfmkit.studies.serial_and_cluster_executors import Cluster
-
         if timeout is not None:
             raise UsageError(
                 "--timeout-per-point works only with processes on this machine: a cluster cannot stop a single point"
@@ -170,21 +201,3 @@ def executor_for(work: Work, options: StudyOptions) -> Executor:
     if timeout is not None:
         return Pool(min(jobs, count), timeout * work.together)
     return serial if min(jobs, count) == 1 else Pool(min(jobs, count))
-
-
-def compute(work: Work, options: StudyOptions, place: Desk) -> Records:
-    """Return the rows of a study, as far as the user lets it run."""
-    from cfmkit.studies.engine import run
-
-    return run(work, executor_for(work, options), place.journal, place.progress)
-
-
-def tracebacks(records: Records, terminal: Terminal) -> None:
-    """Show the first traceback, if the user wants to see it."""
-    if records.bug and terminal.tracebacks:
-        terminal.complain(records.bug.rstrip("\n").split("\n"))
-
-
-def now() -> float:
-    """Return the time of a clock that only runs forward [s]."""
-    return time.perf_counter()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cfmkit.cli.guide import compile_phrases, read_terms, search, words_for_synonym
@@ -37,13 +36,13 @@ def explain_by_meaning(word: str) -> Document | None:
     targets = words_for_synonym(word)
     named = _names(word, targets) if word.strip() else []
     matching_terms = [name for name in read_terms() if name == word or name in targets]
-    if not (matching_terms or targets or named):
-        return None
     meanings = [{"name": name, "meaning": read_terms()[name]} for name in matching_terms]
     names = [{"name": entry.name, "kind": entry.kind, "meaning": entry.meaning} for entry in named]
     headings: dict[str, str] = {}
-    for section in search(word):
+    for section in search(word) if word.strip() else ():
         headings.setdefault(section.page, section.heading)
+    if not (matching_terms or targets or named or headings):
+        return None
     pages = [{"page": name, "section": heading} for name, heading in headings.items()]
 
     def blocks() -> Iterator[Block]:
@@ -90,7 +89,7 @@ def _named_texts() -> tuple[tuple[str, str, str], ...]:
     return tuple(
         (singular, *_name_and_meaning(record))
         for kind, singular in KINDS_OF_NAMES.items()
-        for record in chain.from_iterable(TOPIC_KINDS[kind][0]().values())
+        for record in TOPIC_KINDS[kind].records()
     )
 
 

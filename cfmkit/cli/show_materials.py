@@ -41,13 +41,18 @@ def materials_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, lis
     )
     sources = (
         field("name", "material", wraps=True),
-        field("poisson_ratio", "nu"),
+        Field("nu", lambda item: "" if item["poisson_is_assumed"] else f"{item['poisson_ratio']:.4g}"),
         Field("from ... to", lambda item: _spread(item["scatter"]["poisson_ratio"]), wraps=True),
         Field("density\n[kg/m^3]", lambda item: f"{item['density']:.4g}"),
         Field("from ... to", lambda item: _spread(item["scatter"]["density"]), wraps=True),
         field("source", wraps=True),
     )
-    lasting = [row for name, entry in ASSUMED_DATA.items() for row in assumed_rows(name, entry)]
+    lasting = [
+        {"name": item["name"], "property": "Poisson ratio", "values": f"{item['poisson_ratio']:.4g}", "source": "none"}
+        for item in records
+        if item["poisson_is_assumed"]
+    ]
+    lasting += [row for name, entry in ASSUMED_DATA.items() for row in assumed_rows(name, entry)]
     assumed = (
         field("name", "material", wraps=True),
         field("property", wraps=True),
@@ -91,9 +96,10 @@ def properties(item: Mapping[str, Any]) -> str:
     from cfmkit.stock.assumed_lasting import ASSUMED_DATA
 
     scatter, strength = item["scatter"], item["yield_strength"]
+    spread = _spread(scatter["poisson_ratio"])
     reported = [
         f"E = {item['youngs_modulus'] / 1e9:.4g} GPa ({_range(scatter['youngs_modulus'], 1e9)})",
-        f"nu = {item['poisson_ratio']:.4g} ({_spread(scatter['poisson_ratio'])})",
+        f"nu = {item['poisson_ratio']:.4g} ({'assumed' if item['poisson_is_assumed'] else spread})",
         f"density {item['density']:.4g} kg/m^3 ({_spread(scatter['density'])})",
     ]
     if strength is not None:

@@ -7,18 +7,29 @@ from __future__ import annotations
 
 import re
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cfmkit import families
-from cfmkit.cli.guide import list_terms
+from cfmkit.cli.guide import read_terms
 from cfmkit.cli.show_materials import materials_page_parts, properties
-from cfmkit.cli.show_stock import stock_page_parts
-from cfmkit.documents.document import LABEL_TONE, Document, Field, Span, TextLine, Verbatim, field, line, record_table
+from cfmkit.documents.document import (
+    LABEL_TONE,
+    Document,
+    Field,
+    Span,
+    TextLine,
+    Verbatim,
+    field,
+    line,
+    name_in_words,
+    record_table,
+)
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
+    from cfmkit.curves import Kind
     from cfmkit.documents.document import Block
     from cfmkit.specs.keys_and_schema import Key
 
@@ -26,17 +37,11 @@ if TYPE_CHECKING:
     Section = tuple[str, Sequence[Record], tuple[Field, ...]]
     """Heading, records and what is shown of each."""
 
-    Records = Mapping[str, Sequence[Record]]
-    """By every name under which it is found: what there is to say."""
-
 
 def explain(name: str | None) -> Document:
     """Return what there is to say of a topic, a family, or whatever else has that name; without a name what there is.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is none; the message names the nearest.
+    Raises UsageError if there is none; the message names the nearest.
     """
     if name is None:
         return overview()
@@ -51,7 +56,9 @@ def explain(name: str | None) -> Document:
     topics = [*TOPIC_HEADINGS, *families.names()]
     by_name = "keys, materials, metrics, values, warnings, units, papers and symbols by their names"
     every = f"there are {', '.join(topics)}, and {by_name}"
-    hint = did_you_mean(name, [*topics, *names()]) or every
+    known = names()
+    parts = (part for one in known for part in one.split("_"))  # which lead to all names that have them
+    hint = did_you_mean(name, [*topics, *known, *parts]) or every
     raise UsageError(f"there is nothing to show about {name!r}; {hint}")
 
 
@@ -100,67 +107,48 @@ def overview() -> Document:
 
 def units_page() -> Document:
     """Return the closed list of units, and the dimensions with the unit that files are written in."""
-    from cfmkit.specs.units import DIMENSIONS_BY_NAME, unit_table
-
-    names = ("symbol", "name", "dimension", "si", "input_only")
-    units = [dict(zip(names, entry, strict=True)) for entry in unit_table()]
-    dimensions = [
-        {"name": item.name, "unit": item.unit, "description": item.description, "example": item.example}
-        for item in DIMENSIONS_BY_NAME.values()
-        if item.unit
-    ]
-    unit_columns = (
-        field("symbol", "unit"),
-        field("name"),
-        Field("measures", lambda unit: unit["dimension"].replace("_", " ")),
-        Field("in SI", lambda unit: f"{unit['si']:.12g}"),
-        Field("", lambda unit: "input only" if unit["input_only"] else ""),
-    )
-    dimension_columns = (
-        Field("dimension", lambda item: item["name"].replace("_", " ")),
-        field("unit", "written in"),
-        field("example"),
-        field("description", "meaning", wraps=True),
-    )
     text = "Case-sensitive; combine with *, / and ^: N*mm/rad, kg/m^3. Zero needs no unit."
-    sections = (("units", units, unit_columns), ("dimensions", dimensions, dimension_columns))
-    return _page("units", text, sections, {"units": units, "dimensions": dimensions})
+    data = {kind: TOPIC_KINDS[kind].records() for kind in ("units", "dimensions")}
+    return _page("units", text, [(kind, data[kind], TOPIC_KINDS[kind].fields) for kind in data], data)
 
 
 def metrics_page() -> Document:
     """Return the metrics that every family has."""
-    from cfmkit.metrics import definitions
-    from cfmkit.specs.units import border_unit
-    from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
-
-    records = [
-        {
-            "name": item.name,
-            "unit": border_unit(item.dimension),
-            "definition": item.definition,
-            "per_branch": item.per_branch,
-        }
-        for item in definitions("force")
-    ]
-    records += [
-        {"name": name, "unit": "1", "definition": about, "per_branch": False} for name, about in OF_MANY_PARTS.items()
-    ]
     text = (
         "Evaluated over the requirement's `over`, else analysis.window, else the full travel. Without a branch in "
         "brackets the worst branch counts; force_mean[load] selects one. For torques force_... is called torque_..., "
         "in N*mm over deg. `cfmkit show FAMILY` lists what a family adds."
     )
+    records = _metrics("force")
     return _page("metrics", text, (("", records, METRIC_FIELDS),), {"metrics": records})
 
 
 def references_page() -> Document:
     """Return the papers behind all families, and their BibTeX."""
     records = references()
-    columns = (field("name"), field("family"), field("reference", wraps=True))
-    shown = _page("references", "", (("", records, columns),), {})
+    shown = _page("references", "", (("", records, TOPIC_KINDS["references"].fields),), {})
     bibtex = {record.name: text for record in families.records() if (text := record.bibtex)}
     page = (*shown.body, *(block for text in bibtex.values() for block in (line(""), Verbatim(text.strip() + "\n"))))
     return Document({"references": records, "bibtex": bibtex}, page)
+
+
+def stock_page() -> Document:
+    """Return the sizes in which sheets, wire, pins, bearings and screws are sold."""
+    from cfmkit.stock.stock_series import ALL_SERIES
+
+    records = [asdict(entry) for entry in ALL_SERIES]
+    columns = (
+        Field("stock", lambda entry: " ".join((entry["kind"], *entry["materials"])), wraps=True),
+        field("system"),
+        field("standard", wraps=True),
+        Field("sizes [mm]", lambda entry: ", ".join(f"{1e3 * size:.6g}" for size in entry["sizes"]), wraps=True),
+        field("read", "read in", wraps=True),
+    )
+    text = (
+        "Sizes for `part.stock: metric` and `inch`, as far as a text with them was read: sheets by material, bearings "
+        "by their bore. Materials that are missing have no series here, and their sheets are not rounded."
+    )
+    return _page("stock", text, (("", records, columns),), {"stock": records})
 
 
 def family_page(name: str) -> Document:
@@ -226,19 +214,20 @@ def _default(key: Record) -> str:
 def find_page(name: str) -> Document | None:
     """Return the page on everything that has a name; None if nothing has."""
     sections: list[Section] = []
-    for kind, (records, fields) in TOPIC_KINDS.items():
-        every = records()
-        if entries_of_kind := [entry for key in _keys(kind, name) for entry in every.get(key, ())]:
-            sections.append((kind, entries_of_kind, fields or SPEC_KEY_FIELDS))
+    for heading, kind in TOPIC_KINDS.items():
+        wanted = _keys(heading, name)
+        if named := [record for record in kind.records() if not wanted.isdisjoint(kind.names(record))]:
+            sections.append((heading, named, kind.fields))
     if not sections and (drawn := _symbols(name)):
         sections.append(("symbols", drawn, SYMBOL_FIELDS))
     if not sections:
         return None
-    page = _page(name, "", sections, {kind: entries_of_kind for kind, entries_of_kind, _ in sections})
+    data = {heading: records for heading, records, _ in sections}
+    page = _page(name, "", sections, data)
     papers = {paper.name: paper.bibtex for record in families.records() for paper in record.papers}
-    entries = [papers[entry["name"]] for kind, shown, _ in sections if kind == "references" for entry in shown]
-    more = (block for text in entries for block in (line(""), Verbatim(text + "\n")))
-    return Document({**page.data, **({"bibtex": entries} if entries else {})}, (*page.body, *more))
+    bibtex = [papers[entry["name"]] for entry in data.get("references", ())]
+    more = (block for text in bibtex for block in (line(""), Verbatim(text + "\n")))
+    return Document({**data, **({"bibtex": bibtex} if bibtex else {})}, (*page.body, *more))
 
 
 def _symbols(name: str) -> list[Record]:
@@ -256,7 +245,8 @@ def _symbols(name: str) -> list[Record]:
 
 def names() -> list[str]:
     """Return every name that `find_page` knows, but for the paths of keys and symbols."""
-    return [name for records, _ in TOPIC_KINDS.values() for name in records() if "." not in name]
+    known = (name for kind in TOPIC_KINDS.values() for record in kind.records() for name in kind.names(record))
+    return [name for name in dict.fromkeys(known) if "." not in name]
 
 
 def references() -> list[dict[str, str]]:
@@ -268,11 +258,11 @@ def references() -> list[dict[str, str]]:
     ]
 
 
-def _keys(kind: str, name: str) -> list[str]:
+def _keys(heading: str, name: str) -> set[str]:
     """Return a name as its kind is listed: a metric without its branch, a dimension also by any unit of it."""
-    if kind == "metrics":
-        return [name.partition("[")[0]]
-    return [name.replace(" ", "_"), *_measured_in(name)] if kind == "dimensions" else [name]
+    if heading == "metrics":
+        return {name.partition("[")[0]}
+    return {name.replace(" ", "_"), *_measured_in(name)} if heading == "dimensions" else {name}
 
 
 def _measured_in(unit: str) -> list[str]:
@@ -290,37 +280,31 @@ def _measured_in(unit: str) -> list[str]:
     ]
 
 
-def _gather_records(pairs: Iterator[tuple[str, dict[str, Any]]]) -> Records:
-    records: dict[str, list[dict[str, Any]]] = {}
-    for name, record in pairs:
-        records.setdefault(name, []).append(record)
-    return records
+def _terms() -> list[Record]:
+    return [{"name": name, "meaning": meaning} for name, meaning in read_terms().items()]
 
 
-def _materials() -> Records:
+def _materials() -> list[Record]:
     from cfmkit.stock import MATERIALS_BY_NAME
 
-    return _gather_records(
-        (name, asdict(entry)) for entry in MATERIALS_BY_NAME.values() for name in (entry.name, *entry.aliases)
-    )
+    return [asdict(entry) for entry in dict.fromkeys(MATERIALS_BY_NAME.values())]
 
 
-def _metrics() -> Records:
+def _metrics(effort: Kind | None = None) -> list[Record]:
+    """Return the metrics of curves of an effort, or of any, and those of many parts."""
     from cfmkit.metrics import definitions
     from cfmkit.specs.units import border_unit
     from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
-    definitions_of_metrics = [
-        (definition.name, border_unit(definition.dimension), definition.definition) for definition in definitions(None)
+    of_parts = [(name, "ratio", about, False) for name, about in OF_MANY_PARTS.items()]
+    of_curves = [(item.name, item.dimension, item.definition, item.per_branch) for item in definitions(effort)]
+    return [
+        {"name": name, "unit": border_unit(dimension), "definition": definition, "per_branch": per_branch}
+        for name, dimension, definition, per_branch in (*of_curves, *of_parts)
     ]
-    definitions_of_metrics += [(name, "1", about) for name, about in OF_MANY_PARTS.items()]
-    return _gather_records(
-        (name, {"name": name, "unit": unit, "definition": definition})
-        for name, unit, definition in definitions_of_metrics
-    )
 
 
-def _values() -> Records:
+def _values() -> list[Record]:
     """Return the values of the families, of the causes that they find in a measured loop, and of recordings."""
     from cfmkit.experiment.value_definitions import define_recorded_values
     from cfmkit.specs.units import border_unit
@@ -328,15 +312,15 @@ def _values() -> Records:
     every = families.records()
     values_by_source = [(record.name, {**record.outputs.values, **record.outputs.causes}) for record in every]
     values_by_source.append(("recordings", define_recorded_values("torque") | define_recorded_values("force")))
-    return _gather_records(
-        (key, {"name": key, "family": name, "unit": border_unit(dimension), "definition": definition})
+    return [
+        {"name": key, "family": name, "unit": border_unit(dimension), "definition": definition}
         for name, values in values_by_source
         for key, (dimension, definition) in values.items()
-    )
+    ]
 
 
-def _spec_keys() -> Records:
-    """Return the keys of all specifications by path and by last name; equal ones of several families once."""
+def _spec_keys() -> list[Record]:
+    """Return the keys of all specifications; equal ones of several families once."""
     from cfmkit.specs.keys_and_schema import keys
 
     every = families.records()
@@ -344,17 +328,13 @@ def _spec_keys() -> Records:
     for record in every:
         for key in keys(record.spec_type):
             families_by_key.setdefault(key, []).append(record.name)
-
-    def yield_names() -> Iterator[tuple[str, dict[str, Any]]]:
-        for key, of in families_by_key.items():
-            reported = {"family": "every" if len(of) == len(every) else ", ".join(of)} | asdict(key)
-            for name in {key.path, key.path.rpartition(".")[2].removesuffix("[]")}:
-                yield name, reported
-
-    return _gather_records(yield_names())
+    return [
+        {"family": "every" if len(of) == len(every) else ", ".join(of)} | asdict(key)
+        for key, of in families_by_key.items()
+    ]
 
 
-def _findings() -> Records:
+def _findings() -> list[Record]:
     """Return what a run of a family, of a recording or of a study may warn of."""
     from cfmkit.experiment import calibration, correction, findings
     from cfmkit.studies.findings import STUDY_FINDINGS
@@ -362,75 +342,34 @@ def _findings() -> Records:
     findings_by_source = [(record.name, record.outputs.findings) for record in families.records()]
     findings_by_source += [("recordings", findings.RECORDING_FINDINGS), ("calibrate", calibration.CALIBRATION_FINDINGS)]
     findings_by_source += [("correct", correction.CORRECTION_FINDINGS), *STUDY_FINDINGS.items()]
-    return _gather_records(
-        (key, {"name": key, "family": name, "meaning": meaning})
+    return [
+        {"name": key, "family": name, "meaning": meaning}
         for name, meanings in findings_by_source
         for key, meaning in meanings.items()
-    )
+    ]
 
 
-def _units() -> Records:
+def _units() -> list[Record]:
     from cfmkit.specs.units import unit_table
 
     keys = ("symbol", "name", "dimension", "si", "input_only")
-    entries = [dict(zip(keys, entry, strict=True)) for entry in unit_table()]
-    return _gather_records((str(unit[key]), unit) for unit in entries for key in ("symbol", "name"))
+    return [dict(zip(keys, entry, strict=True)) for entry in unit_table()]
 
 
-def _dimensions() -> Records:
+def _dimensions() -> list[Record]:
     from cfmkit.specs.units import DIMENSIONS_BY_NAME
 
-    return _gather_records(
-        (
-            dimension.name,
-            {
-                "name": dimension.name,
-                "unit": dimension.unit,
-                "meaning": dimension.description,
-                "example": dimension.example,
-            },
-        )
-        for dimension in DIMENSIONS_BY_NAME.values()
-        if dimension.unit
-    )
+    keys = ("name", "unit", "description", "example")
+    return [{key: getattr(item, key) for key in keys} for item in DIMENSIONS_BY_NAME.values() if item.unit]
 
 
-def _references() -> Records:
-    entries = references()
-    return _gather_records(
-        (name, reference)
-        for reference in entries
-        for name in {reference["name"], re.sub(r"-[0-9]{4}$", "", reference["name"])}
-    )
+class TopicKind(NamedTuple):
+    """One kind of things that have names."""
 
+    records: Callable[[], Sequence[Record]]
+    fields: tuple[Field, ...]  # what is shown of each
+    names: Callable[[Record], Collection[str]] = lambda record: (record["name"],)  # under which it is found
 
-_METRIC_FIELDS = (field("name"), field("family"), field("unit"), field("definition", wraps=True))
-TOPIC_KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
-    "terms": (list_terms, (field("name", "word"), field("meaning", wraps=True))),
-    "materials": (
-        _materials,
-        (field("name", "material"), Field("properties", properties, wraps=True), field("source", wraps=True)),
-    ),
-    "metrics": (_metrics, (field("name"), field("unit"), field("definition", wraps=True))),
-    "values": (_values, _METRIC_FIELDS),
-    "keys": (_spec_keys, ()),
-    "findings": (_findings, (field("name"), field("family"), field("meaning", wraps=True))),
-    "units": (
-        _units,
-        (
-            field("symbol", "unit"),
-            field("name"),
-            Field("measures", lambda unit: str(unit["dimension"]).replace("_", " ")),
-            Field("in SI", lambda unit: f"{unit['si']:.12g}"),
-        ),
-    ),
-    "dimensions": (
-        _dimensions,
-        (field("name"), field("unit", "written in"), field("example"), field("meaning", wraps=True)),
-    ),
-    "references": (_references, (field("name"), field("family"), field("reference", wraps=True))),
-}
-"""What is known by name: a heading, the records, and what is shown of each."""
 
 KEY_FIELDS = (
     field("path", "key"),
@@ -438,14 +377,56 @@ KEY_FIELDS = (
     Field("default", _default),
     Field("meaning", lambda key: "; ".join(filter(None, (key["description"], key["allowed"]))), wraps=True),
 )
-SPEC_KEY_FIELDS = (field("path", "key"), field("family", wraps=True), *KEY_FIELDS[1:])
 SYMBOL_FIELDS = (field("name", "symbol"), field("family"), field("key", wraps=True), field("meaning", wraps=True))
 METRIC_FIELDS = (field("name", "metric"), field("unit"), field("definition", wraps=True))
+
+TOPIC_KINDS: Mapping[str, TopicKind] = {
+    "terms": TopicKind(_terms, (field("name", "word"), field("meaning", wraps=True))),
+    "materials": TopicKind(
+        _materials,
+        (field("name", "material"), Field("properties", properties, wraps=True), field("source", wraps=True)),
+        lambda record: (record["name"], *record["aliases"]),
+    ),
+    "metrics": TopicKind(_metrics, METRIC_FIELDS),
+    "values": TopicKind(_values, (field("name"), field("family"), field("unit"), field("definition", wraps=True))),
+    "keys": TopicKind(
+        _spec_keys,
+        (field("path", "key"), field("family", wraps=True), *KEY_FIELDS[1:]),
+        lambda record: {record["path"], record["path"].rpartition(".")[2].removesuffix("[]")},
+    ),
+    "findings": TopicKind(_findings, (field("name"), field("family"), field("meaning", wraps=True))),
+    "units": TopicKind(
+        _units,
+        (
+            field("symbol", "unit"),
+            field("name"),
+            Field("measures", lambda unit: name_in_words(unit["dimension"])),
+            Field("in SI", lambda unit: f"{unit['si']:.12g}"),
+            Field("", lambda unit: "input only" if unit["input_only"] else ""),
+        ),
+        lambda record: (record["symbol"], record["name"]),
+    ),
+    "dimensions": TopicKind(
+        _dimensions,
+        (
+            Field("dimension", lambda item: name_in_words(item["name"])),
+            field("unit", "written in"),
+            field("example"),
+            field("description", "meaning", wraps=True),
+        ),
+    ),
+    "references": TopicKind(
+        references,
+        (field("name"), field("family"), field("reference", wraps=True)),
+        lambda record: {record["name"], re.sub(r"-[0-9]{4}$", "", record["name"])},
+    ),
+}
+"""What is known by name, by its heading."""
 
 TOPIC_HEADINGS: Mapping[str, tuple[str, Callable[[], Document]]] = {
     "units": ("the units that a spec may use, and those that files are written in", units_page),
     "metrics": ("the constant-force metrics: name, unit, definition", metrics_page),
     "materials": ("the named materials, with scatter and source", lambda: _page(*materials_page_parts())),
-    "stock": ("sizes of sheets, wire, pins, bearings and screws that are sold", lambda: _page(*stock_page_parts())),
+    "stock": ("sizes of sheets, wire, pins, bearings and screws that are sold", stock_page),
     "references": ("the papers behind the families", references_page),
 }

@@ -1,4 +1,4 @@
-"""Standard output and error that never end a run: a reader that has left, an encoding that cannot say it."""
+"""Standard output and error that never end a run, not by a closed pipe, nor by a character that cannot be encoded."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from typing import TextIO
 
 
-def prepare() -> None:
-    """Let both streams say whatever they are given, escaped where their encoding cannot; closed ones say nothing."""
+def make_tolerant() -> None:
+    """Make both streams escape characters that their encoding lacks; a stream that is closed discards everything."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
@@ -22,48 +22,45 @@ def prepare() -> None:
 
 
 def write_output(text: str) -> None:
-    """Write to standard output; where its reader has left (``| head``) the rest is dropped.
+    """Write to standard output; if the reading process has ended (``| head``) the rest is dropped.
 
-    Raises
-    ------
-    cfmkit.errors.OutputError
-        If it cannot be written for another reason: a full disk behind a redirection.
+    Raises OutputError if it cannot be written for another reason: a full disk behind a redirection.
     """
     try:
         _write(sys.stdout, text)
     except BrokenPipeError:
-        silence(sys.stdout)
+        discard_output(sys.stdout)
     except OSError as error:
-        silence(sys.stdout)
+        discard_output(sys.stdout)
         raise OutputError(f"cannot write standard output: {reason_of(error)}") from None
 
 
-def complain(text: str) -> None:
-    """Write to standard error, if that is possible; what cannot be seen is escaped."""
+def write_error(text: str) -> None:
+    """Write to standard error, if that is possible; unprintable characters are escaped."""
     try:
         _write(sys.stderr, "\n".join(map(visible, text.split("\n"))))
     except OSError:
-        silence(sys.stderr)
+        discard_output(sys.stderr)
 
 
-def settle() -> None:
-    """Leave nothing in the buffers that could fail when the interpreter ends."""
+def flush() -> None:
+    """Flush both streams, so that nothing is left that could fail when the interpreter ends."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
         except OSError:
-            silence(stream)
+            discard_output(stream)
 
 
-def silence(stream: TextIO) -> None:
-    """Send what a stream still holds, and all that follows, nowhere."""
+def discard_output(stream: TextIO) -> None:
+    """Redirect a stream to the null device, with what its buffer still holds."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
 
 
-def speaks_utf8(stream: TextIO) -> bool:
-    """Return whether a stream takes every character."""
+def can_encode_all(stream: TextIO) -> bool:
+    """Return whether the encoding of a stream has every character."""
     return (stream.encoding or "").lower().replace("-", "") == "utf8"
 
 

@@ -21,21 +21,12 @@ MAX_CHANGES = 8
 
 
 def workflow_commands(
-    entries: Sequence[Entry],
+    entries: Sequence[Entry],  # every specification of a batch
+    # line and column of a requirement of a file, by its number; (0, 0) if it is not known
     place_of: Callable[[str, int], tuple[int, int]],
-    changes: Sequence[MetricChange] = (),
+    changes: Sequence[MetricChange] = (),  # since an earlier batch; those beyond the tolerance are errors
 ) -> Iterator[str]:
-    """Yield one workflow command for each specification with something to say, at the place of its gravest problem.
-
-    Parameters
-    ----------
-    entries : sequence of Entry
-        Every specification of a batch.
-    place_of : callable
-        Line and column of a requirement of a file, by its number; (0, 0) if it is not known.
-    changes : sequence of MetricChange
-        Since an earlier batch; those beyond the tolerance are errors.
-    """
+    """Yield one workflow command for each specification with something to say, at the place of its gravest problem."""
     for one in entries:
         beyond = [change for change in changes if change.spec == one.spec and change.beyond]
         if not one.skipped and (found := _annotation(one, place_of, beyond)):

@@ -31,21 +31,12 @@ MAX_CHANGES = 8
 
 
 def document_of(
-    entries: Sequence[Entry], code: ExitCode, files: Written | None = None, compared: BatchComparison | None = None
+    entries: Sequence[Entry],  # every specification
+    code: ExitCode,  # of the process
+    files: Written | None = None,  # what was written
+    compared: BatchComparison | None = None,  # with an earlier batch
 ) -> Document:
-    """Return the document of a batch.
-
-    Parameters
-    ----------
-    entries : sequence of Entry
-        Every specification.
-    code : ExitCode
-        Of the process.
-    files : Written, optional
-        What was written.
-    compared : BatchComparison, optional
-        With an earlier batch.
-    """
+    """Return the document of a batch."""
     reused = sum(one.reused for one in entries)
     columns = (GridColumn(), GridColumn(wraps=False), GridColumn(wraps=False), GridColumn())
     return Document(

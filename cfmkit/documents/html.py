@@ -25,34 +25,16 @@ REPORT_NAME = "report.html"
 
 
 def page(
-    document: Document,
-    drawn: Mapping[str, Figure | str] = MappingProxyType({}),
+    document: Document,  # what was found
+    drawn: Mapping[str, Figure | str] = MappingProxyType({}),  # the figures by their names, or their SVG
     *,
-    subject: str = "",
-    command: str = "",
-    texts: Sequence[tuple[str, str]] = (),
-    metrics: PageTable | None = None,
-    **more: Any,
+    subject: str = "",  # what it is of, in one line
+    command: str = "",  # how it was started, for whoever wants to repeat it
+    texts: Sequence[tuple[str, str]] = (),  # texts that are folded under a heading
+    metrics: PageTable | None = None,  # every metric, folded
+    **more: Any,  # what the template knows besides: `film`, `points`, `script`, `references`, `bibtex`, `versions`
 ) -> bytes:
-    """Return the page of a document; the same document gives the same bytes.
-
-    Parameters
-    ----------
-    document : Document
-        What was found.
-    drawn : mapping of str to Figure or str
-        The figures by their names, or their SVG.
-    subject : str
-        What it is of, in one line.
-    command : str
-        How it was started, for whoever wants to repeat it.
-    texts : sequence of (str, str)
-        Texts that are folded under a heading.
-    metrics : PageTable, optional
-        Every metric, folded.
-    **more
-        What the template knows besides: `film`, `points`, `script`, `references`, `bibtex`, `versions`.
-    """
+    """Return the page of a document; the same document gives the same bytes."""
     figures = {name: one if isinstance(one, str) else drawing(one, name) for name, one in drawn.items()}
     text: str = template("document.html.j2").render(
         document=document,

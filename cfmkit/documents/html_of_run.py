@@ -25,27 +25,14 @@ if TYPE_CHECKING:
 
 
 def page(
-    report: Report,
-    drawn: Mapping[str, Figure],
-    command: str = "",
-    texts: Sequence[tuple[str, str]] = (),
+    report: Report,  # of any status
+    drawn: Mapping[str, Figure],  # the figures of the result, by their names: the first is the curve
+    command: str = "",  # how the run was started, for whoever wants to repeat it
+    texts: Sequence[tuple[str, str]] = (),  # the specification, under its heading
+    # the command that was run; the commands that apply a remedy of a finding are built from it
     run: RunCommand | None = None,
 ) -> bytes:
-    """Return the page of a run; the same report gives the same bytes.
-
-    Parameters
-    ----------
-    report : Report
-        Of any status.
-    drawn : mapping of str to Figure
-        The figures of the result, by their names: the first is the curve.
-    command : str
-        How the run was started, for whoever wants to repeat it.
-    texts : sequence of (str, str)
-        The specification, under its heading.
-    run : RunCommand, optional
-        The command that was run; the commands that apply a remedy of a finding are built from it.
-    """
+    """Return the page of a run; the same report gives the same bytes."""
     record = family(report.result.spec.family)
     figures = {name: html.drawing(figure, name) for name, figure in drawn.items()}
     slider = _pose_slider(report.result, drawn, figures)

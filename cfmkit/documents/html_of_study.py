@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.arrays import FloatArray
     from cfmkit.documents.document import Document
     from cfmkit.specs.spec import Spec
 
@@ -61,33 +60,15 @@ class StudyPoints(NamedTuple):
 
 
 def page(
-    document: Document,
-    spec: Spec,
-    varied: Sequence[str],
-    files: Mapping[str, bytes],
-    command: str,
-    drawn: Mapping[str, Figure] = MappingProxyType({}),
-    point: str = "cfmkit analyze SPEC",
+    document: Document,  # what the study found
+    spec: Spec,  # what was varied
+    varied: Sequence[str],  # paths of what was varied
+    files: Mapping[str, bytes],  # name -> content of the study's files: results.csv and metrics.json at least
+    command: str,  # how the study was started
+    drawn: Mapping[str, Figure] = MappingProxyType({}),  # the pictures of the study, by their names
+    point: str = "cfmkit analyze SPEC",  # the command that computes one point as the study did, but for what was varied
 ) -> bytes:
-    """Return the page of a study.
-
-    Parameters
-    ----------
-    document : Document
-        What the study found.
-    spec : Spec
-        What was varied.
-    varied : sequence of str
-        Paths of what was varied.
-    files : mapping of str to bytes
-        Name -> content of the study's files: results.csv and metrics.json at least.
-    command : str
-        How the study was started.
-    drawn : mapping of str to Figure
-        The pictures of the study, by their names.
-    point : str
-        The command that computes one point as the study did, but for what was varied.
-    """
+    """Return the page of a study."""
     summary = json.loads(files["metrics.json"])
     head, *points = csv.reader(io.StringIO(files["results.csv"].decode()))
     rows = points[:MOST_POINTS]
@@ -189,43 +170,20 @@ def _curves(content: bytes | None, paths: Sequence[str], cells: Sequence[Sequenc
 
 
 def _simplify_branch(line: list[list[float]]) -> list[list[float]]:
-    """Return a branch without the points that its drawing does not need: no line moves by more than a fifth of a pixel.
+    """Return a branch without the points that its drawing does not need: no line moves by more than `MAX_SHIFT`."""
+    from shapely import LineString
 
-    Of each stretch the point furthest from the line between the ends divides it, until none is further than that.
-    """
     places = np.array(line).T
-    if len(places) < 3:
-        return _round_points(line)
-    span = np.ptp(np.vstack([places, [places[0, 0], 0.0]]), axis=0)
-    pixels = places / np.where(span > 0, span, 1.0) * _DIAGRAM_PIXELS
-    keep = np.zeros(len(places), bool)
-    keep[[0, -1]] = True
-    stretches = [(0, len(places) - 1)]
-    while stretches:
-        first, last = stretches.pop()
-        if last - first < 2:
-            continue
-        away = _distances(pixels[first + 1 : last], pixels[first], pixels[last])
-        furthest = int(np.argmax(away))
-        if away[furthest] > 0.2:
-            middle = first + 1 + furthest
-            keep[middle] = True
-            stretches += [(first, middle), (middle, last)]
-    return _round_points(places[keep].T.tolist())
+    if len(places) > 2:
+        span = np.ptp(np.vstack([places, [places[0, 0], 0.0]]), axis=0)
+        scale = _DIAGRAM_PIXELS / np.where(span > 0, span, 1.0)
+        pixels = LineString(places * scale).simplify(MAX_SHIFT, preserve_topology=False)
+        places = np.array(pixels.coords) / scale
+    return [[float(f"{value:.5g}") for value in along] for along in places.T]
 
 
-def _round_points(line: list[list[float]]) -> list[list[float]]:
-    return [[float(f"{value:.5g}") for value in along] for along in line]
-
-
-def _distances(places: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return how far points are from a straight line between two others, not from its continuation."""
-    along = end - start
-    length = float(along @ along)
-    share = np.clip((places - start) @ along / length, 0.0, 1.0) if length > 0 else np.zeros(len(places))
-    away: FloatArray = np.linalg.norm(places - start - share[:, None] * along, axis=1)
-    return away
-
+MAX_SHIFT = 0.2
+"""Of a line by the points that are left out [pixels]."""
 
 _DIAGRAM_PIXELS = np.array([564.0, 264.0])
 """Width and height of the diagram that study.js draws, without its margins."""

@@ -28,14 +28,10 @@ NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 cannot hold, not even escaped."""
 
 
-def junit(entries: Sequence[Entry]) -> bytes:
-    """Return the XML document.
-
-    Parameters
-    ----------
-    entries : sequence of Entry
-        Every specification of the batch.
-    """
+def junit(
+    entries: Sequence[Entry],  # every specification of the batch
+) -> bytes:
+    """Return the XML document."""
     root = Element("testsuites", name="cfmkit batch")
     for entry in entries:
         root.append(_suite(entry))
@@ -123,10 +119,7 @@ def clean(text: str) -> str:
 def prepare_file(path: str, option: str = "--junit") -> Callable[[bytes], None]:
     """Return what writes a file; its folder is made now, and a folder in its place is reported now.
 
-    Raises
-    ------
-    cfmkit.errors.OutputError
-        If it will not be possible to write it.
+    Raises OutputError if it will not be possible to write it.
     """
     from cfmkit.store import atomic_write
     from cfmkit.store.safe_disk_changes import reporting

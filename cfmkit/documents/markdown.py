@@ -22,16 +22,11 @@ ZERO_WIDTH_SPACE = "&#8203;"
 """A blank of no width: a backslash before it does not keep a page from making a mention of @name."""
 
 
-def summary(entries: Sequence[Entry], compared: BatchComparison | None = None) -> bytes:
-    """Return the summary: one row per specification, what is missed, and what has changed.
-
-    Parameters
-    ----------
-    entries : sequence of Entry
-        Every specification of the batch.
-    compared : BatchComparison, optional
-        With an earlier batch.
-    """
+def summary(
+    entries: Sequence[Entry],  # every specification of the batch
+    compared: BatchComparison | None = None,  # with an earlier batch
+) -> bytes:
+    """Return the summary: one row per specification, what is missed, and what has changed."""
     return ("\n".join(_lines(entries, compared)) + "\n").encode()
 
 

@@ -91,18 +91,12 @@ class RunCommand:
         return command_line("cfmkit", verb, self.source, *(self.words if verb == self.verb else ()), *settings, *folder)
 
 
-def document_of(report: Report, command: RunCommand | None = None, files: Written | None = None) -> Document:
-    """Return the document of a report.
-
-    Parameters
-    ----------
-    report : Report
-        Of any status.
-    command : RunCommand, optional
-        How the run was started; default: remedies are named as options only.
-    files : Written, optional
-        What the run wrote.
-    """
+def document_of(
+    report: Report,  # of any status
+    command: RunCommand | None = None,  # how the run was started; default: remedies are named as options only
+    files: Written | None = None,  # what the run wrote
+) -> Document:
+    """Return the document of a report."""
     spec = report.result.spec
     return Document(
         exit_code=report.exit_code,

@@ -34,18 +34,12 @@ COLUMN_RANKS = {"parts": 4, "variant": 3, "hysteresis": 2, "life": 1}
 """Columns that narrow pages leave out, the largest first."""
 
 
-def document_of(record: Mapping[str, Any], code: ExitCode, files: Written | None = None) -> Document:
-    """Return the document of a search.
-
-    Parameters
-    ----------
-    record : mapping
-        What metrics.json says.
-    code : ExitCode
-        Of the process.
-    files : Written, optional
-        What was written.
-    """
+def document_of(
+    record: Mapping[str, Any],  # what metrics.json says
+    code: ExitCode,  # of the process
+    files: Written | None = None,  # what was written
+) -> Document:
+    """Return the document of a search."""
     proposals = [*record["proposals"], *record["unjudged"]]
     head, _, rest = record["message"].partition("; ")
     notes = [Note("time", rest, whole=True)] if rest and not record["warnings"] else []  # which say the same

@@ -32,30 +32,14 @@ NO_INFLUENCE = 1e-9
 
 
 def document_of(
-    spec: Spec,
-    summary: Mapping[str, Any],
-    dimensions: Mapping[str, str],
-    code: ExitCode,
-    files: Written | None = None,
-    reused: int = 0,
+    spec: Spec,  # what was varied
+    summary: Mapping[str, Any],  # what metrics.json says of it
+    dimensions: Mapping[str, str],  # of its metrics, by name
+    code: ExitCode,  # of the process
+    files: Written | None = None,  # what was written
+    reused: int = 0,  # points that came from the journal
 ) -> Document:
-    """Return the document of a sweep.
-
-    Parameters
-    ----------
-    spec : Spec
-        What was varied.
-    summary : mapping
-        What metrics.json says of it.
-    dimensions : mapping of str to str
-        Of its metrics, by name.
-    code : ExitCode
-        Of the process.
-    files : Written, optional
-        What was written.
-    reused : int
-        Points that came from the journal.
-    """
+    """Return the document of a sweep."""
     counts = summary["points"]
     ends = ", ".join(f"{count} {name_in_words(name)}" for name, count in counts.items() if name != "total")
     again = f" ({reused} from the journal)" if reused else ""

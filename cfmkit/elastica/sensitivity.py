@@ -26,7 +26,14 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.design_derivatives import Equilibria, dual_arrays, effort_slopes, unknown_slopes
+from cfmkit.elastica.mechanics.design_derivatives import (
+    Equilibria,
+    dual_arrays,
+    effort_motions,
+    effort_slopes,
+    force_slopes,
+    unknown_slopes,
+)
 from cfmkit.elastica.mechanics.designs import design_of, make_up, set_up
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.similar_arrays import discretise_alike
@@ -35,7 +42,7 @@ from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results import beam_states, stress_extremes
 from cfmkit.elastica.results.path import N_PLACES, load_displacement, node_motion, node_reaction, strain_energy
 from cfmkit.errors import InputError
-from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, slopes_of
+from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, dual_of_steps, slopes_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -71,9 +78,14 @@ class Gradient:
             If the tangent is singular at a point.
         """
         try:
-            return unknown_slopes(self.at, self.designs)
+            return unknown_slopes(self.at, self.designs, self._forces)
         except np.linalg.LinAlgError:
             raise InputError(SINGULAR_MESSAGE) from None
+
+    @cached_property
+    def _forces(self) -> FloatArray:
+        """Derivatives of the gradient of the functional while free unknowns stay, (p, k, size)."""
+        return force_slopes(self.at, self.designs)
 
     @cached_property
     def stepped(self) -> tuple[Equilibria, ...]:
@@ -96,6 +108,9 @@ class Gradient:
             columns = [load_displacement(at, drive) for (_, drive), at in each if isinstance(drive, Loading)]
             return read_only(np.imag(np.stack(columns, axis=-1)) / COMPLEX_STEP)
         try:
+            if "_forces" in vars(self):  # as by `effort_slopes`, which needs less than these
+                work = np.einsum("ps,pks->pk", effort_motions(self.at, self._rates), self._forces)
+                return read_only(work * self.path.mesh.scales.moment / self.path.mesh.scales.drive)
             return read_only(effort_slopes(self.at, self.designs, self._rates))
         except np.linalg.LinAlgError:
             raise InputError(SINGULAR_MESSAGE) from None
@@ -167,13 +182,19 @@ class Gradient:
 
     def dual_sections(self, elements: Sequence[int], fractions: Any = None) -> beam_states.BeamSections:
         """Return section forces and stresses with their derivatives, as of `dual_states`."""
+        return beam_states.sections_of_width(*self._widths_and_states(elements, fractions))
+
+    def dual_stresses(self, elements: Sequence[int], fractions: Any = None) -> tuple[Any, Any]:
+        """Return bending and axial stress with their derivatives, as of `dual_states`."""
+        return beam_states.stresses_of_width(*self._widths_and_states(elements, fractions))
+
+    def _widths_and_states(self, elements: Sequence[int], fractions: Any) -> tuple[Any, beam_states.BeamStates]:
         states = self.dual_states(elements, fractions)
         names = [self.path.mesh.elements.beam[element] for element in elements]
         each = np.array([[net.beams[name].section.width for name in names] for net, _ in self.designs.networks])
         own = np.array([self.path.network.beams[name].section.width for name in names])
         count = len(states.place) // len(names)
-        width = DualArray(np.repeat(own, count), np.repeat(np.imag(each) / COMPLEX_STEP, count, axis=1))
-        return beam_states.sections_of_width(width, states)
+        return dual_of_steps(np.repeat(own, count), np.repeat(each, count, axis=1)), states
 
     @cached_property
     def _states_by_places(self) -> dict[Any, beam_states.BeamStates]:

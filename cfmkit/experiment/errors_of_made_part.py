@@ -65,8 +65,9 @@ LARGEST_MISFIT = 0.1
 LARGEST_OVERTRAVEL = 1.25
 """Recorded travel over that of the mechanism: beyond it is another part."""
 
-LARGEST_UNCERTAINTY_OF_ZERO = 0.003
-"""Standard deviation of the zero of the force, over the largest force, beyond which it is not fitted."""
+LARGEST_UNCERTAINTY_OF_ZERO = 0.01
+"""Standard deviation of the zero of the force, over the largest force, beyond which it is not fitted: an unknown zero
+is taken to be off by as much."""
 
 USUAL_DEVIATION = 0.1
 """Standard deviation of a modulus or a rate of which nothing else is known, as a share of it."""

@@ -7,21 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.export.arc_outlines import outlines
-from cfmkit.export.contours import OUTLINE_TOLERANCE
-from cfmkit.export.dxf import dxf_bytes, write_dxf
-from cfmkit.export.kerf import with_kerf
-from cfmkit.export.layers import check_name
-from cfmkit.export.points_csv import write_points
-from cfmkit.export.svg import svg_bytes, write_svg
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.export.arc_outlines import Outline
     from cfmkit.export.contours import Drawing
-
-__all__ = ["DEFAULT_FORMATS", "FILE_FORMATS", "OUTLINE_TOLERANCE", "files", "write_dxf", "write_points", "write_svg"]
 
 FILE_FORMATS = ("dxf", "svg", "csv", "stl", "3mf", "step")
 """What `files` can write."""
@@ -30,35 +20,29 @@ DEFAULT_FORMATS = FILE_FORMATS[:3]
 
 
 def files(
-    drawing: Drawing,
+    drawing: Drawing,  # what to draw; its name is the stem of the file names
+    # width of the cut [m]. Adds ``<name>-kerf.dxf``, where all cut contours are moved into the waste by half of it; the
+    # other files always have the true size
     kerf: float | None = None,
+    # largest distance of the arcs from the exact smooth curves [m], and of the triangles of bodies from the arcs;
+    # default: that of the drawing
     tolerance: float | None = None,
-    formats: Sequence[str] = DEFAULT_FORMATS,
+    formats: Sequence[str] = DEFAULT_FORMATS,  # of `FILE_FORMATS`
 ) -> dict[str, bytes]:
     """Return the files of a drawing, by name: DXF, SVG and one CSV per table, and bodies where they are requested.
 
     A drawing without anything on layer `reference` gets a reference square beside it.
 
-    Parameters
-    ----------
-    drawing : Drawing
-        What to draw; its name is the stem of the file names.
-    kerf : float, optional
-        Width of the cut [m]. Adds ``<name>-kerf.dxf``, where all cut contours are moved
-        into the waste by half of it; the other files always have the true size.
-    tolerance : float, optional
-        Largest distance of the arcs from the exact smooth curves [m], and of the triangles of bodies from the arcs;
-        default: that of the drawing.
-    formats : sequence of str
-        Of `FILE_FORMATS`.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the drawing cannot be cut as it is, or not with that kerf; if it has no thickness for a body.
-    cfmkit.errors.UsageError
-        If the library for a format is not installed.
+    Raises GeometryError if the drawing cannot be cut as it is, or not with that kerf; if it has no thickness for a
+    body; UsageError if the library for a format is not installed.
     """
+    from cfmkit.export.arc_outlines import outlines
+    from cfmkit.export.dxf import dxf_bytes
+    from cfmkit.export.kerf import with_kerf
+    from cfmkit.export.layers import check_name
+    from cfmkit.export.points_csv import write_points
+    from cfmkit.export.svg import svg_bytes
+
     tolerance = drawing.tolerance if tolerance is None else tolerance
     stem = check_name(drawing.name, "drawing")
     drawn = outlines(drawing.with_reference_square(), tolerance)

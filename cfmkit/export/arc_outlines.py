@@ -46,24 +46,18 @@ class Outline:
     circle: tuple[complex, float] | None = None
 
 
-def outlines(drawing: Drawing, tolerance: float | None = None) -> tuple[Outline, ...]:
+def outlines(
+    drawing: Drawing,  # what to draw
+    # largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing
+    tolerance: float | None = None,
+) -> tuple[Outline, ...]:
     """Return the contours of a drawing as chains of arcs, checked.
 
     The arcs' direction is kept within a milliradian too, as far as the points allow: on a
     cam the force follows the slope, and arcs 5 um off the profile can lean by ten times that.
 
-    Parameters
-    ----------
-    drawing : Drawing
-        What to draw.
-    tolerance : float, optional
-        Largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If edges do not meet, a closed contour is open, a smooth edge is given by too few
-        points, or a contour that is closed or to be cut crosses itself or another cut.
+    Raises GeometryError if edges do not meet, a closed contour is open, a smooth edge is given by too few points, or a
+    contour that is closed or to be cut crosses itself or another cut.
     """
     if not drawing.contours:
         raise GeometryError(f"the drawing {drawing.name!r} has no contours")
@@ -160,10 +154,7 @@ def check_outlines(outlines: Sequence[Outline]) -> None:
 
     Lines that are neither closed nor cut may cross themselves: nothing follows them.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        With the place.
+    Raises GeometryError with the place.
     """
     from shapely import LineString, Polygon
 
@@ -183,10 +174,7 @@ def check_outlines(outlines: Sequence[Outline]) -> None:
 def check_simple(points: FloatArray, name: str) -> None:
     """Refuse a closed outline (n, 2) [m] that crosses or touches itself.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        With the place.
+    Raises GeometryError with the place.
     """
     from shapely import Polygon
 

@@ -60,18 +60,12 @@ class _Chain:
     modulus: float
 
 
-def beam_deck(title: str, driven: DrivenNetwork, increments: int) -> bytes:
-    """Return a deck of the beams that runs as it is.
-
-    Parameters
-    ----------
-    title : str
-        For its heading.
-    driven : DrivenNetwork
-        Without springs, pins, loads and prescribed displacements of supports.
-    increments : int
-        In which its travel is taken, all alike.
-    """
+def beam_deck(
+    title: str,  # for its heading
+    driven: DrivenNetwork,  # without springs, pins, loads and prescribed displacements of supports
+    increments: int,  # in which its travel is taken, all alike
+) -> bytes:
+    """Return a deck of the beams that runs as it is."""
     return ("\n".join(_Lines(title, driven, increments).lines()) + "\n").encode("ascii", "replace")
 
 

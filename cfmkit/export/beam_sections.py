@@ -54,10 +54,7 @@ class BeamSection:
     def check(self, measured: float, what: str, remedy: str) -> None:
         """Refuse a thickness [m] whose section modulus is not that of the specification.
 
-        Raises
-        ------
-        cfmkit.errors.GeometryError
-            With the beam, the place, both values and a remedy.
+        Raises GeometryError with the beam, the place, both values and a remedy.
         """
         if abs((measured / self.thickness) ** 2 - 1.0) <= SECTION_RTOL:
             return

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.arrays import FloatArray, ShortRepr, read_only
+from cfmkit.arrays import FloatArray, ShortRepr, distinct, read_only
 from cfmkit.export.layers import DRIVEN_LAYER, HELD_LAYER
 from cfmkit.numerics.biarcs import cubic
 
@@ -214,16 +214,11 @@ def mark(shape: FloatArray, driven: bool) -> Contour:
     return Contour((Line(*corners),), layer) if len(corners) == 2 else polygon(corners, layer)
 
 
-def reference_square(size: float = 0.05, corner: tuple[float, float] = (0.0, 0.0)) -> Contour:
-    """Return a square on layer `reference`, with which a user checks the scale of a print.
-
-    Parameters
-    ----------
-    size : float
-        Length of a side [m].
-    corner : (float, float)
-        The lower left corner [m].
-    """
+def reference_square(
+    size: float = 0.05,  # length of a side [m]
+    corner: tuple[float, float] = (0.0, 0.0),  # the lower left corner [m]
+) -> Contour:
+    """Return a square on layer `reference`, with which a user checks the scale of a print."""
     x, y = corner
     return polygon([(x, y), (x + size, y), (x + size, y + size), (x, y + size)], "reference")
 
@@ -351,7 +346,7 @@ def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list
 
 def _chain(edge: Edge, points: int) -> FloatArray:
     if isinstance(edge, Smooth):
-        chosen = np.unique(np.linspace(0, len(edge.points) - 1, points).astype(int))
+        chosen = distinct(np.linspace(0, len(edge.points) - 1, points).astype(int))
         return np.asarray(edge.points[chosen])
     if isinstance(edge, Line):
         return np.array([edge.start, edge.end], dtype=float)

@@ -37,33 +37,17 @@ class SpecifiedPiece:
 
 
 def check_outline(
-    contours: Sequence[Contour],
-    pieces: Sequence[SpecifiedPiece],
-    thinnest: float,
-    fillet: float,
-    holes: Sequence[FloatArray] = (),
+    contours: Sequence[Contour],  # the outline, before any holes are cut that are not of `holes`
+    pieces: Sequence[SpecifiedPiece],  # those of a beam follow each other
+    thinnest: float,  # thickness of the thinnest beam [m]
+    fillet: float,  # radius of inside corners [m]
+    holes: Sequence[FloatArray] = (),  # (n, 2) each: what is cut out of the pieces [m]
 ) -> tuple[BeamSection, ...]:
     """Return the sections between joints of the beams of a part, once its outline has them, and the area of its pieces.
 
     A section is at a joint where it runs on into a piece that is neither its own nor a neighbour of the same beam.
 
-    Parameters
-    ----------
-    contours : sequence of Contour
-        The outline, before any holes are cut that are not of `holes`.
-    pieces : sequence of SpecifiedPiece
-        Those of a beam follow each other.
-    thinnest : float
-        Thickness of the thinnest beam [m].
-    fillet : float
-        Radius of inside corners [m].
-    holes : sequence of (n, 2) arrays
-        What is cut out of the pieces [m].
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        Where the outline differs from the specification.
+    Raises GeometryError where the outline differs from the specification.
     """
     from shapely import LineString, STRtree, polygons
 
@@ -108,10 +92,7 @@ def _is_of(piece: SpecifiedPiece, beam: str) -> bool:
 def _check_area(measured: float, least: float, largest: float) -> None:
     """Refuse an outline that encloses another area than its pieces do, fillets between them included [m2].
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        With the areas.
+    Raises GeometryError with the areas.
     """
     if least * (1.0 - SECTION_RTOL) <= measured <= largest * (1.0 + SECTION_RTOL):
         return
@@ -126,10 +107,7 @@ def _areas(
 ) -> tuple[float, float]:
     """Return the area of the union of polygons less holes [m2]: without fillets, and with all that they may fill.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the union does not exist in numbers of double precision.
+    Raises GeometryError if the union does not exist in numbers of double precision.
     """
     from shapely import GEOSException, Polygon, union_all
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import OutputError
-from cfmkit.export.arc_outlines import Outline, flat_points, outlines
+from cfmkit.export.arc_outlines import Outline, flat_points
 from cfmkit.export.layers import ENGRAVED_LAYER, LayerLook, looks
 from cfmkit.specs.units import to_border
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from types import ModuleType
 
-    from cfmkit.export.contours import Drawing, EngravedText
+    from cfmkit.export.contours import EngravedText
 
 _UNITS_MILLIMETRES, _MEASUREMENT_METRIC = 4, 1
 _COORDINATE_DIGITS = 9  # of coordinates [mm]: a picometre, the scale of rounding errors
@@ -36,26 +36,8 @@ _ALIGN_CENTER, _ALIGN_MIDDLE = 1, 2  # of texts, about their point
 _EZDXF_LOCK = threading.Lock()
 
 
-def write_dxf(drawing: Drawing, tolerance: float | None = None) -> bytes:
-    """Return the drawing as DXF.
-
-    Parameters
-    ----------
-    drawing : Drawing
-        What to draw.
-    tolerance : float, optional
-        Largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the drawing cannot be cut as it is.
-    """
-    return dxf_bytes(outlines(drawing, tolerance), drawing.labels)
-
-
 def dxf_bytes(drawn: Sequence[Outline], labels: Sequence[EngravedText] = ()) -> bytes:
-    """Return outlines and engraved texts as DXF; see `write_dxf`."""
+    """Return outlines and engraved texts as DXF."""
     layers = looks([*(outline.layer for outline in drawn), *(ENGRAVED_LAYER for _ in labels)])
     with _EZDXF_LOCK, _same_bytes(_ezdxf()) as ezdxf:
         document = ezdxf.new("R2010", units=_UNITS_MILLIMETRES)

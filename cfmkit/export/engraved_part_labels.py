@@ -30,16 +30,11 @@ FLATTENING_TOLERANCE = 5e-6
 """Outlines of bodies are flattened within this [m]."""
 
 
-def engrave_labels(drawing: Drawing, name: str) -> Drawing:
-    """Return a drawing with a label on each of its parts that has a held or a driven piece.
-
-    Parameters
-    ----------
-    drawing : Drawing
-        With marks of what is held and driven.
-    name : str
-        Of the specification.
-    """
+def engrave_labels(
+    drawing: Drawing,  # with marks of what is held and driven
+    name: str,  # of the specification
+) -> Drawing:
+    """Return a drawing with a label on each of its parts that has a held or a driven piece."""
     return replace(drawing, labels=tuple(_labels(drawing, name)))
 
 

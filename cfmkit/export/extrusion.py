@@ -51,22 +51,14 @@ class LayeredPolygon:
     faces: tuple[tuple[Any, float], ...]
 
 
-def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[LayeredPolygon, ...]:
+def plates(
+    drawn: Sequence[Outline],  # of the drawing
+    sheet: Sheet,  # how thick it is
+    tolerance: float,  # largest distance of the polygons from the arcs of the outlines [m]
+) -> tuple[LayeredPolygon, ...]:
     """Return what a drawing cuts, with the thickness of every face.
 
-    Parameters
-    ----------
-    drawn : sequence of Outline
-        Of the drawing.
-    sheet : Sheet
-        How thick it is.
-    tolerance : float
-        Largest distance of the polygons from the arcs of the outlines [m].
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If nothing says how thick the parts are, or nothing is to be cut.
+    Raises GeometryError if nothing says how thick the parts are, or nothing is to be cut.
     """
     from shapely import Polygon
 
@@ -89,10 +81,7 @@ def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[La
 def volume(drawing: Drawing) -> float:
     """Return the volume of everything that is cut [m^3].
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        As `plates`.
+    Raises GeometryError as `plates`.
     """
     result = plates(outlines(drawing, drawing.tolerance), drawing.sheet, drawing.tolerance)
     return float(sum(face.area * thickness for plate in result for face, thickness in plate.faces))
@@ -127,10 +116,7 @@ def _faces(part: Any, sheet: Sheet) -> LayeredPolygon:
 def bodies(found: Sequence[LayeredPolygon]) -> tuple[Body, ...]:
     """Return parts as closed surfaces.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If a surface is not closed.
+    Raises GeometryError if a surface is not closed.
     """
     return tuple(_body(plate) for plate in found)
 

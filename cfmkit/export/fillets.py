@@ -24,17 +24,13 @@ TANGENT_ANGLE = math.radians(0.5)
 """Where the direction turns by less than this the edges are tangent: nothing to round [rad]."""
 
 
-def round_inside_corners(contour: Contour, radius: float) -> tuple[Contour, tuple[complex, ...]]:
+def round_inside_corners(
+    contour: Contour,  # its edges meet; material is within it, or around it where it is a hole
+    radius: float,  # of the arcs [m]; 0 leaves all corners
+) -> tuple[Contour, tuple[complex, ...]]:
     """Return a closed contour with rounded inside corners, and the places x + iy [m] of corners that no arc fits.
 
     Corners between lines, and between a line and a smooth edge, are rounded; others count as not fitting.
-
-    Parameters
-    ----------
-    contour : Contour
-        Its edges meet; material is within it, or around it where it is a hole.
-    radius : float
-        Of the arcs [m]; 0 leaves all corners.
     """
     if radius <= 0 or len(contour.edges) < 2:
         return contour, ()

@@ -41,34 +41,18 @@ class GroundFrame:
 
 
 def ground_frame(
-    pads: Mapping[str, FloatArray],
-    moving: Any,
-    covered: Sequence[FloatArray],
-    thickness: float,
-    clearance: float,
+    pads: Mapping[str, FloatArray],  # (4, 2) each: rectangles that stand, by name [m]
+    moving: Any,  # all that anything else covers, at rest and over the travel [m]
+    covered: Sequence[FloatArray],  # (n, 2) each: what else the frame goes around: eyes, pads that slide [m]
+    thickness: float,  # of the frame, in the plane [m]
+    clearance: float,  # between the frame, its bars and what moves [m]
+    # corners of its opening [m]; default: as small as the clearance allows
     inside: tuple[tuple[float, float], tuple[float, float]] | None = None,
 ) -> GroundFrame:
     """Return the frame of a part.
 
-    Parameters
-    ----------
-    pads : mapping of (4, 2) arrays
-        Rectangles that stand, by name [m].
-    moving : shapely geometry
-        All that anything else covers, at rest and over the travel [m].
-    covered : sequence of (n, 2) arrays
-        What else the frame goes around: eyes, pads that slide [m].
-    thickness : float
-        Of the frame, in the plane [m].
-    clearance : float
-        Between the frame, its bars and what moves [m].
-    inside : two points, optional
-        Corners of its opening [m]; default: as small as the clearance allows.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If nothing is held by a pad, if the frame is in the way of what moves, or a pad cannot be reached.
+    Raises GeometryError if nothing is held by a pad, if the frame is in the way of what moves, or a pad cannot be
+    reached.
     """
     from shapely import Polygon, union_all
 

@@ -33,20 +33,13 @@ _POLYLINE_ERROR = 20.0  # of the same where the cut becomes a polyline
 _GEOS_ERROR = 0.011  # shapely's buffer smooths inside corners by 1 % of its distance
 
 
-def with_kerf(outlines: Sequence[Outline], kerf: float) -> tuple[Outline, ...]:
+def with_kerf(
+    outlines: Sequence[Outline],  # a drawing as `cfmkit.export.arc_outlines.outlines` gives it
+    kerf: float,  # width of the cut [m]
+) -> tuple[Outline, ...]:
     """Return the outlines with closed contours on layer `cut` moved into the waste by half the kerf.
 
-    Parameters
-    ----------
-    outlines : sequence of Outline
-        A drawing as `cfmkit.export.arc_outlines.outlines` gives it.
-    kerf : float
-        Width of the cut [m].
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the kerf is not above zero, a contour vanishes or falls into pieces, or cuts meet.
+    Raises GeometryError if the kerf is not above zero, a contour vanishes or falls into pieces, or cuts meet.
     """
     if not (np.isfinite(kerf) and kerf > 0):
         raise GeometryError(f"the kerf must be a length above zero, not {format_short(kerf, 'length')}")

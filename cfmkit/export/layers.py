@@ -50,10 +50,7 @@ def looks(used: Iterable[str]) -> dict[str, LayerLook]:
 def check_name(name: str, what: str) -> str:
     """Return `name` if it can be part of a file name and of every format.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If it cannot.
+    Raises GeometryError if it cannot.
     """
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}", name):
         raise GeometryError(f"{name!r} cannot name a {what}: use letters, digits, '-', '_' and '.', at most 100")

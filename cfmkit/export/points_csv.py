@@ -14,10 +14,7 @@ if TYPE_CHECKING:
 def write_points(drawing: Drawing) -> dict[str, bytes]:
     """Return the drawing's tables as CSV with the header ``x [mm],y [mm],...``, by file name.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If two tables have one name, or a name that no file can have.
+    Raises GeometryError if two tables have one name, or a name that no file can have.
     """
     from cfmkit.tables import Table, border_column, to_csv
 

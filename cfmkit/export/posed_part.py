@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cfmkit.arrays import distinct
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -31,12 +33,12 @@ N_PLACES, N_COVERING = 26, 41
 
 @dataclass(frozen=True, eq=False)
 class PosedBody:
-    """A body in p poses: all points no farther than `half` from a point, a line or the inside of a polygon."""
+    """A body in p poses: all points within `half_thickness` of a point, a line or the inside of a polygon."""
 
     name: str  # of the kind of body: several may have it
     role: Role
     core: FloatArray  # (p, k, 2) points of the line, or corners of the polygon [m]; p = 1 for what does not move
-    half: Any = 0.0  # half of its thickness: a number, or (k,) at the points of a line [m]
+    half_thickness: Any = 0.0  # a number, or (k,) at the points of a line [m]
     closed: bool = False  # whether the core is a polygon
     round: bool = False  # whether a line ends in half circles
 
@@ -46,14 +48,14 @@ class PosedBody:
         return cls(name, role, np.asarray(corners).reshape(-1, *np.shape(corners)[-2:]), closed=True)
 
     @classmethod
-    def line(cls, name: str, role: Role, points: FloatArray, half: Any, round: bool = False) -> PosedBody:
+    def line(cls, name: str, role: Role, points: FloatArray, half_thickness: Any, round: bool = False) -> PosedBody:
         """Return what is around a line, or a point, (k, 2) or (p, k, 2) [m]."""
-        return cls(name, role, np.asarray(points).reshape(-1, *np.shape(points)[-2:]), half, round=round)
+        return cls(name, role, np.asarray(points).reshape(-1, *np.shape(points)[-2:]), half_thickness, round=round)
 
     @property
     def reach(self) -> float:
         """Largest distance of its material from the core [m]."""
-        return float(np.max(self.half))
+        return float(np.max(self.half_thickness))
 
     def core_at(self, pose: int) -> FloatArray:
         """Return the core in a pose (k, 2) [m]."""
@@ -68,7 +70,7 @@ class PosedBody:
         if len(core) == 1:
             return arc(core[0], self.reach, 0.0, math.tau)
         if not self.round:
-            return band(core, self.half)
+            return band(core, self.half_thickness)
         (x, y), half = core[-1] - core[0], self.reach
         left = math.atan2(y, x) + 0.5 * math.pi
         return np.vstack([arc(core[-1], half, left - math.pi, math.pi), arc(core[0], half, left, math.pi)])
@@ -161,20 +163,15 @@ def swept(bodies: Iterable[PosedBody]) -> Any:
     return union_all([body.shape(pose) for body in bodies for pose in range(len(body.core))])
 
 
-def screw_positions(ground: FloatArray, moving: Sequence[PosedBody], head: float) -> list[FloatArray]:
+def screw_positions(
+    ground: FloatArray,  # (4, 2): rectangle along the axes [m]
+    moving: Sequence[PosedBody],  # what passes over it
+    head: float,  # diameter of the screw's head, which is also its distance from the edge [m]
+) -> list[FloatArray]:
     """Return a position next to each corner of a base plate where a screw can be reached beside all that moves.
 
     Positions along the edges are tried, the nearest to the corner first; a corner from which half of both edges is
     covered has no screw. If fewer than two are left, the screws are in the corners, below what moves.
-
-    Parameters
-    ----------
-    ground : (4, 2) array
-        Rectangle along the axes [m].
-    moving : sequence of PosedBody
-        What passes over it.
-    head : float
-        Diameter of the screw's head, which is also its distance from the edge [m].
     """
     from shapely import Point
 
@@ -195,4 +192,4 @@ def _evenly_moved(core: FloatArray) -> Any:
     """Return the numbers of poses (p, k, 2) between which a body moves by equal distances, the ends included."""
     steps = np.hypot(*np.moveaxis(np.diff(core, axis=0), -1, 0)).max(axis=1)
     path = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.unique(np.searchsorted(path, np.linspace(0.0, path[-1], N_COVERING)))
+    return distinct(np.searchsorted(path, np.linspace(0.0, path[-1], N_COVERING)))

@@ -30,12 +30,8 @@ LINE_RISE = 1e-6
 def step_bytes(name: str, drawn: Sequence[Outline], sheet: Sheet) -> bytes:
     """Return what a drawing cuts as one STEP file (AP214), in millimetres.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If build123d is not installed.
-    cfmkit.errors.GeometryError
-        If nothing says how thick the parts are, or the kernel cannot make a body of them.
+    Raises UsageError if build123d is not installed; GeometryError if nothing says how thick the parts are, or the
+    kernel cannot make a body of them.
     """
     kernel = _kernel()
     if sheet.thickness is None:

@@ -105,21 +105,10 @@ def joined_away_from_nodes(
     strips: Sequence[DrawnStrip],
     blocks: Sequence[DrawnBlock],
     nodes: NodesAndBodies,
-    contours: Sequence[Contour],
-    fillet: float,
+    contours: Sequence[Contour],  # what was made of them: closed outlines and holes
+    fillet: float,  # radius of inside corners [m]; gaps narrower than twice of it are filled
 ) -> tuple[Join, ...]:
-    """Return which parts of a drawing are joined unasked, each pair once, where they are closest.
-
-    Parameters
-    ----------
-    strips : sequence of DrawnStrip
-    blocks : sequence of DrawnBlock
-    nodes : NodesAndBodies
-    contours : sequence of Contour
-        What was made of them: closed outlines and holes.
-    fillet : float
-        Radius of inside corners [m]; gaps narrower than twice of it are filled.
-    """
+    """Return which parts of a drawing are joined unasked, each pair once, where they are closest."""
     import shapely
 
     look = _Look(strips, nodes, fillet)

@@ -12,39 +12,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.arc_outlines import Outline, flat_points, outlines
+from cfmkit.export.arc_outlines import Outline, flat_points
 from cfmkit.export.layers import ENGRAVED_LAYER, LayerLook, check_name, looks
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.export.contours import Drawing, EngravedText
+    from cfmkit.export.contours import EngravedText
 
 _DRAWING_MARGIN = 5.0  # around the drawing [mm]
 _STROKE_WIDTH = 0.25  # width of every line [mm]
 
 
-def write_svg(drawing: Drawing, tolerance: float | None = None) -> bytes:
-    """Return the drawing as SVG 1.1 at real size.
-
-    Parameters
-    ----------
-    drawing : Drawing
-        What to draw.
-    tolerance : float, optional
-        Largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the drawing cannot be cut as it is.
-    """
-    return svg_bytes(drawing.name, outlines(drawing, tolerance), drawing.labels)
-
-
 def svg_bytes(name: str, drawn: Sequence[Outline], labels: Sequence[EngravedText] = ()) -> bytes:
-    """Return outlines and engraved texts as SVG; see `write_svg`."""
+    """Return outlines and engraved texts as SVG 1.1 at real size."""
     points = to_border(np.vstack([flat_points(outline.chain) for outline in drawn]), "length")
     digits = _digits(float(np.ptp(points, axis=0).max()))
     shape = partial(_shape, digits=digits)

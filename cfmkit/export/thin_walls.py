@@ -42,19 +42,15 @@ class ThinWall:
 
 
 def facing_lines(
-    starts: FloatArray, along: FloatArray, places: FloatArray, normals: FloatArray, reach: float
+    # starts, along: (n, 2) each: lines of an outline: where each begins, and the vector to its end [m]
+    starts: FloatArray,
+    along: FloatArray,
+    # places, normals: (m, 2) each: where rays start [m], and unit vectors into the material
+    places: FloatArray,
+    normals: FloatArray,
+    reach: float,  # length of the rays [m]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
-    """Return every line that rays meet face to face: the ray, the line, and how far away (k,) [m].
-
-    Parameters
-    ----------
-    starts, along : (n, 2) arrays
-        Lines of an outline: where each begins, and the vector to its end [m].
-    places, normals : (m, 2) arrays
-        Where rays start [m], and unit vectors into the material.
-    reach : float
-        Length of the rays [m].
-    """
+    """Return every line that rays meet face to face: the ray, the line, and how far away (k,) [m]."""
     from shapely import STRtree, linestrings
 
     tree = STRtree(linestrings(np.stack([starts, starts + along], 1)))
@@ -112,18 +108,13 @@ class EdgeLines:
         return line, (number + 0.5) / count[line]
 
 
-def thin_walls(contours: Sequence[Contour], least: float, tolerance: float = OUTLINE_TOLERANCE) -> tuple[ThinWall, ...]:
-    """Return the walls of a part that are thinner than can be made, the thinnest first.
-
-    Parameters
-    ----------
-    contours : sequence of Contour
-        Of its drawing; those that are closed and cut count.
-    least : float
-        Thinnest wall that can be made [m].
-    tolerance : float
-        How far each edge may be from the exact one [m]: a wall just as thick as can be made is not thin.
-    """
+def thin_walls(
+    contours: Sequence[Contour],  # of its drawing; those that are closed and cut count
+    least: float,  # thinnest wall that can be made [m]
+    # how far each edge may be from the exact one [m]: a wall just as thick as can be made is not thin
+    tolerance: float = OUTLINE_TOLERANCE,
+) -> tuple[ThinWall, ...]:
+    """Return the walls of a part that are thinner than can be made, the thinnest first."""
     cut = [one for one in contours if one.layer == "cut" and one.closed]
     if not cut or least <= 2.0 * tolerance:
         return ()

@@ -92,31 +92,15 @@ class OutlinePiece:
 
 
 def merge_pieces(
-    pieces: Sequence[OutlinePiece],
-    size: float,
-    fillet: float = 0.0,
-    holes: Sequence[OutlinePiece] = (),
-    layer: str = "cut",
+    pieces: Sequence[OutlinePiece],  # they may overlap
+    size: float,  # of the thinnest of them: what is much smaller is rounding [m]
+    fillet: float = 0.0,  # radius of inside corners [m]: that of the cutter. Gaps narrower than twice of it are filled
+    holes: Sequence[OutlinePiece] = (),  # cut out in the end
+    layer: str = "cut",  # of the contours
 ) -> tuple[Contour, ...]:
     """Return the contours of the union of some pieces, with rounded inside corners, less some holes.
 
-    Parameters
-    ----------
-    pieces : sequence of OutlinePiece
-        They may overlap.
-    size : float
-        Of the thinnest of them: what is much smaller is rounding [m].
-    fillet : float
-        Radius of inside corners [m]: that of the cutter. Gaps narrower than twice of it are filled.
-    holes : sequence of OutlinePiece
-        Cut out in the end.
-    layer : str
-        Of the contours.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If nothing is left.
+    Raises GeometryError if nothing is left.
     """
     tolerance = MAX_GRID_DISTANCES * GRID_DISTANCE * size
     tracks = [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for piece in pieces for edge in piece.edges]

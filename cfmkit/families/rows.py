@@ -341,8 +341,8 @@ class Variants(Sequence[Any]):
             kept &= number.allows(self.values[path].astype(np.float64))
         return kept
 
-    def of_plain_numbers(self, plain: Collection[str]) -> Iterator[tuple[int, Any]]:
-        """Yield (index, specification) of valid ones; not validated where nothing but plain numbers varies.
+    def validate_each(self, plain: Collection[str]) -> Iterator[tuple[int, Any]]:
+        """Yield (index, specification) of valid variants; where only plain numbers vary their bounds alone are checked.
 
         `plain`: paths of numbers that need not agree with anything else.
         """

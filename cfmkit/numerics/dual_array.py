@@ -164,6 +164,41 @@ def stack(parts: Sequence[Any]) -> Any:
     return DualArray(value, np.stack([np.broadcast_to(slope, shape) for slope in slopes], axis=-1))
 
 
+def plain(x: Any) -> Any:
+    """Return the values of an array, dual or not."""
+    return x.value if isinstance(x, DualArray) else x
+
+
+def dual_of_steps(value: Any, stepped: Any) -> Any:
+    """Return an array (...) with its derivatives from complex steps (k, ...); the array if all of them are zero."""
+    slopes = np.imag(stepped) / COMPLEX_STEP
+    return DualArray(value, slopes) if slopes.any() else value
+
+
+def chain(value: Any, partials: Sequence[Any], arguments: Sequence[Any]) -> Any:
+    """Return a function's values with their derivatives, from its partial derivatives; the values if none is dual.
+
+    Parameters
+    ----------
+    value : (...) array
+        Of the function.
+    partials, arguments : sequences of arrays
+        Derivatives of the function by its arguments, (...) each, and these arguments.
+
+    Examples
+    --------
+    >>> x = DualArray(np.array([3.0]), np.eye(1))
+    >>> chain(x.value**2, [2 * x.value], [x]).slopes
+    array([[6.]])
+    """
+    slopes = [
+        argument.aligned_slopes(np.ndim(value)) * partial
+        for partial, argument in zip(partials, arguments, strict=True)
+        if isinstance(argument, DualArray)
+    ]
+    return DualArray(value, sum(slopes[1:], slopes[0])) if slopes else value
+
+
 def map_analytic(function: Callable[[Any], tuple[Any, ...]], x: DualArray) -> tuple[DualArray, ...]:
     """Return some analytic functions of every number of an array, by complex steps."""
     stepped = function(x.value + 1j * COMPLEX_STEP * x.slopes)

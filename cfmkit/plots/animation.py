@@ -75,20 +75,15 @@ def frames(result: Result, moving: Moving) -> list[NDArray[np.uint8]]:
     return frames_of_sweep
 
 
-def animation(result: Result, moving: Moving, kind: str) -> bytes:
+def animation(
+    # result, moving: the solved mechanism, and its poses as its family draws them
+    result: Result,
+    moving: Moving,
+    kind: str,  # format of the file
+) -> bytes:
     """Return the mechanism in motion as the content of a file.
 
-    Parameters
-    ----------
-    result, moving : Result, Moving
-        The solved mechanism, and its poses as its family draws them.
-    kind : {"gif", "mp4"}
-        Format of the file.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If a film is requested where there is no ``ffmpeg``.
+    Raises UsageError if a film is requested where there is no ``ffmpeg``.
     """
     if kind == "mp4":
         require_ffmpeg()
@@ -100,10 +95,7 @@ def animation(result: Result, moving: Moving, kind: str) -> bytes:
 def require_ffmpeg() -> str:
     """Return where ``ffmpeg`` is.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is not there.
+    Raises UsageError if it is not there.
     """
     if (program := shutil.which("ffmpeg")) is None:
         raise UsageError("--animate mp4 needs the program ffmpeg, which is not there; --animate gif needs nothing")

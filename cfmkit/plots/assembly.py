@@ -1,4 +1,4 @@
-"""A mechanism put together: its parts in one pose, numbered as in the parts list, and the list beside them."""
+"""A mechanism put together: its parts in one pose, numbered as in the parts list, and the list beside or below them."""
 
 from __future__ import annotations
 
@@ -9,11 +9,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
+from cfmkit.plots.figure_width import print_width
 from cfmkit.plots.parts import PLATE_COLOUR, STEEL_COLOUR, mm
-from cfmkit.plots.style import SMALL_FONT, SPRING_OCHRE, TEXT_GREY, TEXT_INK, apply_style, axes_mm, new_figure
+from cfmkit.plots.style import (
+    SMALL_FONT,
+    SPRING_OCHRE,
+    TEXT_GREY,
+    TEXT_INK,
+    apply_style,
+    has_titles,
+    new_figure,
+    size_mm,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -23,58 +33,85 @@ if TYPE_CHECKING:
     from cfmkit.stock.parts_list import ListedPart
 
 SHEET_SIZE = (220.0, 150.0)
-"""Of the figure [mm]."""
+"""Of the figure where the list stands beside the picture, unless another width is asked for [mm]."""
 
 LIST_WIDTH = 92.0
-"""Of the parts list beside the picture [mm]."""
+"""Of the parts list [mm]."""
+
+MIN_WIDTH_BESIDE = 150.0
+"""Of a figure in which the list stands beside the picture; in a narrower one it stands below [mm]."""
+
+HEADING_ROOM, PLAIN_ROOM, BOTTOM_ROOM = 12.0, 4.0, 4.0
+"""Above the picture, with and without a heading, and below it [mm]."""
+
+LINE_HEIGHT, ITEM_GAP, LIST_TOP, KEY_ROOM = 3.4, 1.0, 4.0, 5.0
+"""Of the parts list: its lines, between two items, above the first, and for what its colours mean [mm]."""
 
 EDGE_MARGIN, BALLOON_RADIUS = 12.0, 3.0
 """Room for balloons around the parts, and their radius [mm of print]."""
 
+MAX_HEIGHT_SHARE = 1.2
+"""Height of the picture above a list, in parts of the figure's width, where a mechanism is tall."""
+
 ANCHOR_SHARES = (0.0, 0.6, -0.6, 0.3, -0.3)
 """Where a number may point at a part whose middle is that of another one."""
 
-LETTERS_PER_LINE = 50
-"""Of the parts list."""
+LETTERS_PER_MM = 0.6
+"""Of the width of the list that its texts have."""
 
 
 @apply_style
-def assembly_figure(title: str, bodies: Sequence[PosedBody], parts: Sequence[ListedPart], pose: int) -> Figure:
-    """Return the picture of an assembly.
-
-    Parameters
-    ----------
-    title : str
-        What the mechanism is called.
-    bodies : sequence of PosedBody
-        What is drawn, the lowest first; those of a part have the name that its `body` says.
-    parts : sequence of ListedPart
-        In the order of their item numbers.
-    pose : int
-        Which pose of bodies that move.
-    """
-    figure = new_figure(*SHEET_SIZE)
-    write_heading(figure, Heading(title, "assembly, numbers as in parts.csv"))
-    ax = axes_mm(figure, (0.0, 4.0, SHEET_SIZE[0] - LIST_WIDTH, SHEET_SIZE[1] - 16.0))
-    ax.axis("off")
-    ax.set(xticks=[], yticks=[])
+def assembly_figure(
+    title: str,  # what the mechanism is called
+    bodies: Sequence[PosedBody],  # what is drawn, the lowest first; those of a part have the name that its `body` says
+    parts: Sequence[ListedPart],  # in the order of their item numbers
+    pose: int,  # which pose of bodies that move
+) -> Figure:
+    """Return the picture of an assembly."""
     drawn = [(body, mm(body.outline(pose))) for body in bodies]
     points = np.vstack([outline for _, outline in drawn])
     low, high = points.min(axis=0), points.max(axis=0)
+    width = print_width(SHEET_SIZE[0])
+    top = HEADING_ROOM if has_titles() else PLAIN_ROOM
+    if width >= MIN_WIDTH_BESIDE:
+        room = (width - LIST_WIDTH, SHEET_SIZE[1] - HEADING_ROOM - BOTTOM_ROOM)
+        figure = new_figure(width, room[1] + top + BOTTOM_ROOM)
+        list_box = (room[0], BOTTOM_ROOM, LIST_WIDTH, room[1])
+    else:
+        scale = (width - 2.0 * EDGE_MARGIN) / (high[0] - low[0])
+        room = (width, min(scale * (high[1] - low[1]) + 2.0 * EDGE_MARGIN, MAX_HEIGHT_SHARE * width))
+        list_box = (0.0, BOTTOM_ROOM, width, _list_height(parts, width))
+        figure = new_figure(width, room[1] + list_box[3] + top + BOTTOM_ROOM)
+    write_heading(figure, Heading(title, "assembly, numbers as in parts.csv"))
+    ax = _blank_axes(figure, (0.0, size_mm(figure)[1] - top - room[1], *room))
     _frame(ax, low, high)
     made = {part.body for part in parts if part.source == "make"}
     for body, outline in drawn:
         fill = PLATE_COLOUR if body.name in made else SPRING_OCHRE if body.name.startswith("spring") else STEEL_COLOUR
         ax.fill(*outline.T, zorder=2, facecolor=fill, edgecolor=TEXT_INK, linewidth=0.6, alpha=0.85, gid=body.name)
     _balloons(ax, drawn, parts, low, high)
-    _list(figure, parts)
+    _write_list(_blank_axes(figure, list_box), parts, list_box[2:])
     return figure
+
+
+def _blank_axes(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
+    """Return axes without lines and numbers in a box (left, bottom, width, height) [mm of print]."""
+    width, height = size_mm(figure)
+    ax = figure.add_axes((box[0] / width, box[1] / height, box[2] / width, box[3] / height))
+    ax.axis("off")
+    ax.set(xticks=[], yticks=[])
+    return ax
+
+
+def _print_size(ax: Axes) -> tuple[float, float]:
+    """Return width and height of axes [mm of print]."""
+    (width, height), box = size_mm(ax.figure), ax.get_position()
+    return width * box.width, height * box.height
 
 
 def _frame(ax: Axes, low: FloatArray, high: FloatArray) -> None:
     """Set the limits of the axes: the parts to scale, with room for balloons."""
-    box = ax.get_position()
-    width, height = SHEET_SIZE[0] * box.width, SHEET_SIZE[1] * box.height
+    width, height = _print_size(ax)
     scale = min((width - 2.0 * EDGE_MARGIN) / (high[0] - low[0]), (height - 2.0 * EDGE_MARGIN) / (high[1] - low[1]))
     middle, half = 0.5 * (low + high), 0.5 * np.array([width, height]) / scale
     ax.set_xlim(middle[0] - half[0], middle[0] + half[0])
@@ -106,7 +143,7 @@ def _balloons(
                 break
     left, right = _sides(anchors, middle[0])
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
-    per_mm = (x1 - x0) / (SHEET_SIZE[0] - LIST_WIDTH)
+    per_mm = (x1 - x0) / _print_size(ax)[0]
     for side, numbers in ((x0 + 1.5 * BALLOON_RADIUS * per_mm, left), (x1 - 1.5 * BALLOON_RADIUS * per_mm, right)):
         heights = _spread([anchors[number][1] for number in numbers], 2.6 * BALLOON_RADIUS * per_mm, (y0, y1))
         for number, height in zip(numbers, heights, strict=True):
@@ -148,21 +185,29 @@ def _spread(heights: Sequence[float], gap: float, ends: tuple[float, float]) -> 
     return placed
 
 
-def _list(figure: Figure, parts: Iterable[ListedPart]) -> None:
-    """Write the parts list: item, count, name and size."""
-    ax = axes_mm(figure, (SHEET_SIZE[0] - LIST_WIDTH, 4.0, LIST_WIDTH, SHEET_SIZE[1] - 16.0))
-    ax.set(xlim=(0.0, LIST_WIDTH), ylim=(0.0, SHEET_SIZE[1] - 16.0))
-    ax.axis("off")
-    ax.set(xticks=[], yticks=[])
-    y = SHEET_SIZE[1] - 20.0
+def _list_lines(part: ListedPart, width: float) -> list[str]:
+    """Return the lines of one item of a list of a width [mm]: count, name, place, size and standard."""
+    name = part.name or part.data.partition(",")[0]
+    where = f", {part.place}" if part.place != name else ""
+    standard = f" ({part.standard})" if part.standard else ""
+    text = f"{part.count} x {name}{where}" + (f": {part.size}" if part.size else "") + standard
+    return textwrap.wrap(text, round(LETTERS_PER_MM * (width - 8.0)))
+
+
+def _list_height(parts: Sequence[ListedPart], width: float) -> float:
+    """Return the height of the parts list [mm]."""
+    n_lines = sum(len(_list_lines(part, width)) for part in parts)
+    return LINE_HEIGHT * n_lines + ITEM_GAP * len(parts) + LIST_TOP + KEY_ROOM
+
+
+def _write_list(ax: Axes, parts: Sequence[ListedPart], size: tuple[float, float]) -> None:
+    """Write the parts list in axes of a size [mm]."""
+    ax.set(xlim=(0.0, size[0]), ylim=(0.0, size[1]))
+    y = size[1] - LIST_TOP
     for number, part in enumerate(parts, start=1):
-        name = part.name or part.data.partition(",")[0]
-        where = f", {part.place}" if part.place != name else ""
-        standard = f" ({part.standard})" if part.standard else ""
-        said = f"{part.count} x {name}{where}" + (f": {part.size}" if part.size else "") + standard
         ax.text(2.0, y, str(number), fontsize=SMALL_FONT, color=TEXT_INK, va="top", fontweight="bold")
-        for line in textwrap.wrap(said, LETTERS_PER_LINE):
+        for line in _list_lines(part, size[0]):
             ax.text(8.0, y, line, fontsize=SMALL_FONT, color=TEXT_INK if part.source == "make" else TEXT_GREY, va="top")
-            y -= 3.4
-        y -= 1.0
+            y -= LINE_HEIGHT
+        y -= ITEM_GAP
     ax.text(2.0, 1.0, "black: to make, grey: to buy", fontsize=SMALL_FONT, color=TEXT_GREY)

@@ -192,18 +192,15 @@ def remark(ax: Axes, place: tuple[float, float], text: str, **options: Any) -> N
 
 
 @apply_style
-def top_axis(ax: Axes, places: FloatArray, values: FloatArray, label: str) -> None:
-    """Add an axis at the top for another quantity that grows with the lower one.
-
-    Parameters
-    ----------
-    ax : Axes
-        With final limits.
-    places, values : (n,) array
-        Increasing: where on the lower axis which value of the other quantity stands, in border units.
-    label : str
-        Of the new axis.
-    """
+def top_axis(
+    ax: Axes,  # with final limits
+    # places, values: (n,): increasing: where on the lower axis which value of the other quantity stands, in border
+    # units
+    places: FloatArray,
+    values: FloatArray,
+    label: str,  # of the new axis
+) -> None:
+    """Add an axis at the top for another quantity that grows with the lower one."""
     low, high = ax.get_xlim()
     chosen: list[float] = []
     taken = -np.inf

@@ -36,18 +36,12 @@ MIN_BAND_SHARE = 0.002
 
 
 @apply_style
-def curve_figure(result: Result, look: CurveLook | None = None, subject: str = "") -> Figure:
-    """Return the force-displacement (or torque-angle) curve of a result, enlarged where it is flat.
-
-    Parameters
-    ----------
-    result : Result
-        With at least one curve.
-    look : CurveLook, optional
-        Levels and regions to draw as well.
-    subject : str
-        For the heading; default: what is drawn over what.
-    """
+def curve_figure(
+    result: Result,  # with at least one curve
+    look: CurveLook | None = None,  # levels and regions to draw as well
+    subject: str = "",  # for the heading; default: what is drawn over what
+) -> Figure:
+    """Return the force-displacement (or torque-angle) curve of a result, enlarged where it is flat."""
     look = look or CurveLook()
     curve = result.curve
     figure = new_figure()

@@ -73,18 +73,12 @@ class _Line:
 
 
 @apply_style
-def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLook | None = None) -> Axes:
-    """Draw one or several curves on axes; return the axes.
-
-    Parameters
-    ----------
-    source : Result, Curve or sequence of Curve
-        A result also brings its requirements.
-    ax : Axes
-        To draw on.
-    look : CurveLook, optional
-        What to draw beside the lines.
-    """
+def plot_curve(
+    source: Result | Curve | Sequence[Curve],  # a result also brings its requirements
+    ax: Axes,  # to draw on
+    look: CurveLook | None = None,  # what to draw beside the lines
+) -> Axes:
+    """Draw one or several curves on axes; return the axes."""
     look = look or CurveLook()
     if is_plain():
         look = replace(look, bands=False, levels=(), regions=())

@@ -37,18 +37,12 @@ class Gap:
 
 
 @apply_style
-def fidelity_figure(heading: Heading, curves: Sequence[Curve], gaps: Sequence[Gap]) -> Figure:
-    """Return curves overlaid, and the differences from the finest below.
-
-    Parameters
-    ----------
-    heading : Heading
-        To write above.
-    curves : sequence of Curve
-        One a model, labelled; at least one.
-    gaps : sequence of Gap
-        At most one for each branch of each curve but the finest.
-    """
+def fidelity_figure(
+    heading: Heading,  # to write above
+    curves: Sequence[Curve],  # one a model, labelled; at least one
+    gaps: Sequence[Gap],  # at most one for each branch of each curve but the finest
+) -> Figure:
+    """Return curves overlaid, and the differences from the finest below."""
     figure = new_figure()
     write_heading(figure, heading)
     room = 96.0 - heading.height_mm

@@ -72,17 +72,12 @@ class FigureForm:
             yield from self.write(self.draw(make), stem)
 
     def select_page_figures(
-        self, makers: Mapping[str, Callable[[], Figure]], drawn: Mapping[str, Figure]
+        self,
+        makers: Mapping[str, Callable[[], Figure]],  # what draws each of them
+        # those that were drawn in this form already; they serve where it is no other than a page's
+        drawn: Mapping[str, Figure],
     ) -> dict[str, Figure]:
-        """Return figures as a page shows them: with its own headings and width, whatever is drawn for print.
-
-        Parameters
-        ----------
-        makers : mapping of str to callable
-            What draws each of them.
-        drawn : mapping of str to Figure
-            Those that were drawn in this form already; they serve where it is no other than a page's.
-        """
+        """Return figures as a page shows them: with its own headings and width, whatever is drawn for print."""
         form = FigureForm(overlay=self.overlay)
         return {
             stem: drawn[stem] if self.on_screen and stem in drawn else form.draw(make) for stem, make in makers.items()
@@ -94,34 +89,16 @@ DEFAULT_FORM = FigureForm()
 
 
 def form_of(
-    formats: str | None = None,
-    width: str | None = None,
-    titles: bool = True,
-    style: str | None = None,
-    plain: bool = False,
-    overlay: str | None = None,
+    formats: str | None = None,  # names with commas between them
+    width: str | None = None,  # a length with its unit
+    titles: bool = True,  # whether figures have headings
+    style: str | None = None,  # path of a style file of matplotlib
+    plain: bool = False,  # whether they are for a journal: without bands, notes, marks and headings
+    overlay: str | None = None,  # output folder of an earlier run, whose curve is drawn as well
 ) -> FigureForm:
     """Return the form that options ask for.
 
-    Parameters
-    ----------
-    formats : str, optional
-        Names with commas between them.
-    width : str, optional
-        A length with its unit.
-    titles : bool
-        Whether figures have headings.
-    style : str, optional
-        Path of a style file of matplotlib.
-    plain : bool
-        Whether they are for a journal: without bands, notes, marks and headings.
-    overlay : str, optional
-        Output folder of an earlier run, whose curve is drawn as well.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If one of them is malformed, or the folder has no curve.
+    Raises UsageError if one of them is malformed, or the folder has no curve.
 
     Examples
     --------
@@ -161,10 +138,8 @@ FIXED_SETTINGS = ("backend", "svg.", "pdf.", "ps.", "savefig.format", "savefig.b
 def settings(path: str) -> tuple[tuple[str, Any], ...]:
     """Return the settings in a style file of matplotlib, in the order of their names.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it cannot be read, or says something that matplotlib does not know or that is not a file's to change.
+    Raises UsageError if it cannot be read, or says something that matplotlib does not know or that is not a file's to
+    change.
     """
     found = _read_style(path)
     for name in found:

@@ -72,6 +72,7 @@ class FigureLayout:
     boxes: Sequence[Box] = ()
     own_numbers: bool = False  # whether every axis has numbers, also those whose neighbour had them for both
     broken: tuple[int, ...] = ()  # axes of the figure whose vertical name takes two lines
+    width: float | None = None  # of the figure, for drawings that lay themselves out [mm]; None: their own
 
     def record_size(self, width: float, height: float) -> tuple[float, float]:
         """Return the size of the figure, and note it where none is set."""
@@ -93,6 +94,12 @@ def active_layout() -> FigureLayout | None:
     return _ACTIVE_LAYOUT.get()
 
 
+def print_width(usual: float) -> float:
+    """Return the width that is asked for [mm], for a drawing that lays itself out in any width: without `axes_mm`."""
+    layout = active_layout()
+    return usual if layout is None or layout.width is None else layout.width
+
+
 @contextmanager
 def _apply(layout: FigureLayout) -> Iterator[None]:
     mark = _ACTIVE_LAYOUT.set(layout)
@@ -104,7 +111,7 @@ def _apply(layout: FigureLayout) -> Iterator[None]:
 
 def draw_in_width(make: Callable[[], Figure], width: float | None, titles: bool) -> Figure:
     """Return a figure in a width [mm], by default its own; without titles their height is cut off."""
-    first = layout = FigureLayout()
+    first = layout = FigureLayout(width=width)
     with _apply(first):
         figure = make()
     if not first.axes:

@@ -15,16 +15,11 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 
-def figures(family: Family, result: Result) -> Mapping[str, Callable[[], Figure]]:
-    """Return what draws each picture of a result, by file stem; empty if there is nothing to draw.
-
-    Parameters
-    ----------
-    family : Family
-        Without `draw` there is the curve.
-    result : Result
-        Of any status.
-    """
+def figures(
+    family: Family,  # without `draw` there is the curve
+    result: Result,  # of any status
+) -> Mapping[str, Callable[[], Figure]]:
+    """Return what draws each picture of a result, by file stem; empty if there is nothing to draw."""
     if not result.curves:
         return {}
     if family.draw is None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
+import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-from cfmkit.store.private_cache_folder import private_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,8 +23,22 @@ def find_room() -> None:
     """
     if CACHE_VARIABLE in os.environ or "matplotlib" in sys.modules or all(map(_is_writable, _own_folders())):
         return
-    if (folder := private_folder("fonts")) is not None:
-        os.environ[CACHE_VARIABLE] = str(folder)
+    with suppress(OSError):
+        os.environ[CACHE_VARIABLE] = str(_private_folder())
+
+
+def _private_folder() -> Path:
+    """Return a folder for temporary files that serves all processes of this user, and that nobody else can write.
+
+    What stands in its place and belongs to somebody else is not trusted: then the folder is a new one.
+    """
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    folder = Path(tempfile.gettempdir()) / f"cfmkit-fonts-{user}"
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    about = folder.lstat()
+    ours = stat.S_ISDIR(about.st_mode) and (user == "user" or (about.st_uid == user and not about.st_mode & 0o022))
+    return folder if ours and _is_writable(folder) else Path(tempfile.mkdtemp(prefix="cfmkit-fonts-"))
 
 
 def _own_folders() -> Iterator[Path]:

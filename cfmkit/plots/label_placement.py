@@ -70,18 +70,12 @@ class Label:
 
 
 @apply_style
-def place_labels(ax: Axes, labels: list[Label], size: float = SMALL_FONT) -> list[Text]:
-    """Write names on axes whose limits are final; return the texts.
-
-    Parameters
-    ----------
-    ax : Axes
-        With everything drawn that the names must avoid.
-    labels : list of Label
-        In order of importance: earlier ones choose first.
-    size : float
-        Font size [pt].
-    """
+def place_labels(
+    ax: Axes,  # with everything drawn that the names must avoid
+    labels: list[Label],  # in order of importance: earlier ones choose first
+    size: float = SMALL_FONT,  # font size [pt]
+) -> list[Text]:
+    """Write names on axes whose limits are final; return the texts."""
     ground = _Ground(ax)
     lines = [ground.to_points(label.points) for label in labels]
     written = (

@@ -32,10 +32,7 @@ class EarlierCurve:
     def require(self, kind: Kind) -> None:
         """Raise if it cannot be drawn beside a curve of a kind.
 
-        Raises
-        ------
-        cfmkit.errors.UsageError
-            If it is of the other one.
+        Raises UsageError if it is of the other one.
         """
         if kind != self.kind:
             raise UsageError(f"--overlay {visible(self.name)}: a curve of {self.kind}, and this one is of {kind}")
@@ -44,10 +41,7 @@ class EarlierCurve:
 def read_earlier(folder: str) -> EarlierCurve:
     """Return the nominal curve in the output folder of `design` or `analyze`.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is no curve.csv, or it is not one of cfmkit.
+    Raises UsageError if there is no curve.csv, or it is not one of cfmkit.
     """
     file = Path(folder, "curve.csv")
     if not file.is_file():

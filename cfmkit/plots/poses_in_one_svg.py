@@ -52,16 +52,11 @@ def choose_poses(count: int, poses: int = N_FILM_POSES) -> FloatArray:
 
 
 @apply_style
-def film(moving: Moving, title: str) -> str:
-    """Return all poses as one SVG for a page: each in groups of the class ``pose`` with its number in ``data-pose``.
-
-    Parameters
-    ----------
-    moving : Moving
-        What to draw.
-    title : str
-        What a screen reader says about it.
-    """
+def film(
+    moving: Moving,  # what to draw
+    title: str,  # what a screen reader says about it
+) -> str:
+    """Return all poses as one SVG for a page: each in groups of the class ``pose`` with its number in ``data-pose``."""
     return _merge_poses(poses(moving, range(len(moving.motion))), title)
 
 

@@ -36,12 +36,12 @@ def remove_rounding(values: FloatArray) -> FloatArray:
     return np.where(known, values[known][0], values) if known.any() else values
 
 
-def vanishing(values: FloatArray, size: float) -> FloatArray:
+def zero_rounding(values: FloatArray, size: float) -> FloatArray:
     """Return values, zero where they are rounding of something of that size.
 
     Examples
     --------
-    >>> vanishing(np.array([1e-12, -2.0]), 5.0).tolist()
+    >>> zero_rounding(np.array([1e-12, -2.0]), 5.0).tolist()
     [0.0, -2.0]
     """
     return np.where(np.abs(values) <= NOISE_SHARE * size, 0.0, values)

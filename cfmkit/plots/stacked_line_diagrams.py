@@ -109,18 +109,14 @@ def draw_diagram(diagram: Diagram, ax: Axes) -> Axes:
 
 
 @apply_style
-def diagram_figure(heading: Heading, diagrams: Sequence[Diagram], top_mm: float = 0.0, right_mm: float = 5.0) -> Figure:
-    """Return a figure of diagrams below each other, over one common axis.
-
-    Parameters
-    ----------
-    heading : Heading
-        What to write above.
-    diagrams : sequence of Diagram
-        From top to bottom; regions are named in the first.
-    top_mm, right_mm : float
-        Room kept free above the first diagram and to the right, for a second axis [mm].
-    """
+def diagram_figure(
+    heading: Heading,  # what to write above
+    diagrams: Sequence[Diagram],  # from top to bottom; regions are named in the first
+    # top_mm, right_mm: room kept free above the first diagram and to the right, for a second axis [mm]
+    top_mm: float = 0.0,
+    right_mm: float = 5.0,
+) -> Figure:
+    """Return a figure of diagrams below each other, over one common axis."""
     figure = new_figure()
     write_heading(figure, heading)
     each = (100.0 - heading.height_mm - 1.5 - top_mm - 12.0 + 4.0) / len(diagrams)

@@ -88,18 +88,12 @@ def stress_views(
 
 
 @apply_style
-def stress_map_figure(result: Result, views: Sequence[StressView], subject: str) -> Figure:
-    """Return a figure of parts at poses, coloured by stress in one scale, each with the place of its peak.
-
-    Parameters
-    ----------
-    result : Result
-        What the heading names.
-    views : sequence of StressView
-        Beside each other where the parts are tall, else above each other.
-    subject : str
-        What the heading says of them.
-    """
+def stress_map_figure(
+    result: Result,  # what the heading names
+    views: Sequence[StressView],  # beside each other where the parts are tall, else above each other
+    subject: str,  # what the heading says of them
+) -> Figure:
+    """Return a figure of parts at poses, coloured by stress in one scale, each with the place of its peak."""
     moved = [view.moved for view in views]
     low = [places.min(axis=0) for places in moved]
     sizes = np.array([np.ptp(places, axis=0) for places in moved]) * 1.05

@@ -106,19 +106,11 @@ MISSED_COLOUR = "#D5D5D5"
 
 
 def figures(
-    found: StudyMarks, lines: Sequence[StudyCurve] = (), labels: tuple[str, str] = ("", "")
+    found: StudyMarks,  # the points
+    lines: Sequence[StudyCurve] = (),  # curves, for a study of one or two parameters
+    labels: tuple[str, str] = ("", ""),  # (str, str): of the curves' axes
 ) -> dict[str, Callable[[], Figure]]:
-    """Return what draws each picture, by name.
-
-    Parameters
-    ----------
-    found : StudyMarks
-        The points.
-    lines : sequence of StudyCurve
-        Curves, for a study of one or two parameters.
-    labels : (str, str)
-        Of the curves' axes.
-    """
+    """Return what draws each picture, by name."""
     pictures: dict[str, Callable[[], Figure]] = {}
     if len(found.varied) == 1:
         if lines:

@@ -66,17 +66,13 @@ def _write(figure: Figure, kind: str, metadata: dict[str, None]) -> bytes:
     return into.getvalue()
 
 
-def inline(drawn: bytes, name: str) -> str:
+def inline(
+    drawn: bytes,  # what `svg` returns
+    name: str,  # of letters, digits, ``-`` and ``_``
+) -> str:
     """Return an SVG as a part of a page: without its prologue, its names led by another so that they meet no others.
 
     To a screen reader it is one picture of that name, not a hundred shapes.
-
-    Parameters
-    ----------
-    drawn : bytes
-        What `svg` returns.
-    name : str
-        Of letters, digits, ``-`` and ``_``.
     """
     text = drawn.decode()
     label = re.sub("[-_]+", " ", name).strip()

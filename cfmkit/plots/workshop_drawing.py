@@ -93,21 +93,12 @@ class _Hole:
 
 @apply_style
 def drawing_figure(
-    drawing: Drawing, title: str, tolerances: Sequence[str] = (), block: TitleBlock | None = None
+    drawing: Drawing,  # of the part
+    title: str,  # what the mechanism is called
+    tolerances: Sequence[str] = (),  # one line for each that the specification states
+    block: TitleBlock | None = None,  # without it there is none, and dimensions have three decimals
 ) -> Figure:
-    """Return a part's drawing.
-
-    Parameters
-    ----------
-    drawing : Drawing
-        Of the part.
-    title : str
-        What the mechanism is called.
-    tolerances : sequence of str
-        One line for each that the specification states.
-    block : TitleBlock, optional
-        Without it there is none, and dimensions have three decimals.
-    """
+    """Return a part's drawing."""
     decimals = block.decimals if block else TitleBlock.decimals
     figure = new_figure(*PAPER_SIZE)
     x0, y0, x1, y1 = mm(drawing.extents).tolist()
@@ -389,12 +380,12 @@ def _words(
         ax.text(4.0, y, word, fontsize=SMALL_FONT, color=TEXT_GREY, va="top")
         y = _write_text(ax, 24.0, y, text) - 0.6
     if drawn_holes:
-        y = _write_text(ax, 4.0, y - 2.0, "holes, from the lower left corner (+)", NORMAL_FONT)
+        y = _write_text(ax, 4.0, y - 2.0, "holes, at x, y from the lower left corner (+)", NORMAL_FONT)
         for number, hole in enumerate(drawn_holes[:MOST_HOLES], start=1):
             x, up, across = (length_in_words(size, decimals) for size in (hole.x, hole.y, hole.diameter))
             screw = screw_through(hole.diameter)
             fits = f" ({screw.name})" if screw and math.isclose(screw.hole, hole.diameter, rel_tol=SIZE_RTOL) else ""
-            y = _write_text(ax, 4.0, y, f"{number}   \u2300 {across}{fits}   x {x}, y {up}")
+            y = _write_text(ax, 4.0, y, f"{number}   \u2300 {across}{fits}   {x.removesuffix(' mm')}, {up}")
         if len(drawn_holes) > MOST_HOLES:
             y = _write_text(ax, 4.0, y, f"and {len(drawn_holes) - MOST_HOLES} more, in the DXF file")
     for heading, lines in (

@@ -8,7 +8,7 @@ import traceback
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 from cfmkit.arrays import Several, shorten_values
 from cfmkit.documents.run_outcome import worst
@@ -19,6 +19,7 @@ from cfmkit.runs import batch_output_files
 from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, run_analysis, run_design, spec_of
 from cfmkit.runs.run import carry_out as carry_out_run
 from cfmkit.studies.batch_sources_and_outcomes import SKIPPED_MESSAGE, Entry
+from cfmkit.studies.engine import NullMonitor
 from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, list_gone, read_earlier_batch
 from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
+    from cfmkit.studies.engine import Monitor
     from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
     from cfmkit.studies.serial_and_cluster_executors import Executor, Lost
     from cfmkit.tables import Table
@@ -156,47 +158,13 @@ def lost_entry(job: BatchJob, outcome: Lost) -> Entry:
     return Entry(job.spec, job.folder, "", "", "", outcome.status.key, code, outcome.message, bug=outcome.bug)
 
 
-class BatchMonitor(Protocol):
-    """Progress callback of a batch, with cancellation."""
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the batch is to end."""
-
-    def total(self, points: int) -> None:
-        """Take how many specifications there are."""
-
-    def add_finished(self, points: int, failed: int, reused: bool) -> None:
-        """Take that more are finished."""
-
-    def stopping(self) -> bool:
-        """Return whether the batch is to end."""
-
-
-@dataclass
-class SilentMonitor:
-    """A monitor that does nothing."""
-
-    stopped: bool = False
-
-    def total(self, points: int) -> None:
-        """Ignore it."""
-
-    def add_finished(self, points: int, failed: int, reused: bool) -> None:
-        """Ignore it."""
-
-    def stopping(self) -> bool:
-        """Never end."""
-        return False
-
-
 @dataclass(frozen=True)
 class BatchExecution:
     """Execution of a batch."""
 
     executor: Executor  # runs jobs in this process or in several
     fail_fast: bool  # whether the first failure ends the batch
-    progress: BatchMonitor
+    progress: Monitor
     kept: KeptRuns  # finished runs of an earlier batch in the same folder
 
 
@@ -232,17 +200,14 @@ def carry_out(work: BatchWork, jobs: Sequence[BatchJob], execution: BatchExecuti
         entry = outcome if isinstance(outcome, Entry) else lost_entry(job, outcome)
         execution.kept.keep(entry)
         note(job, entry)
-    message = "not run: interrupted" if execution.progress.stopped else SKIPPED_MESSAGE
+    message = "not run: interrupted" if execution.progress.stopping() else SKIPPED_MESSAGE
     return tuple(found.get(job.index) or Entry(job.spec, job.folder, message=message) for job in jobs)
 
 
 def choose_executor(jobs: int | None, count: int, timeout: float | None) -> Executor:
     """Return the executor of the jobs: this process, or a pool of several.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the timeout is not above zero.
+    Raises UsageError if the timeout is not above zero.
     """
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import cores, serial
@@ -337,7 +302,7 @@ def batch(
     page: bool = False,
     form: FigureForm | None = None,
     arguments: Sequence[str] = (),
-    monitor: BatchMonitor | None = None,
+    monitor: Monitor | None = None,
     noting: Noting = journal_of,
 ) -> BatchResult:
     """Design or analyse many specifications, check their requirements, and write a folder for each and for all.
@@ -385,7 +350,7 @@ def batch(
         How figures are written.
     arguments : sequence of str
         What manifests say of the command line.
-    monitor : BatchMonitor, optional
+    monitor : Monitor, optional
         Progress callback with cancellation.
     noting : callable
         What opens the journal of the folder.
@@ -434,7 +399,7 @@ def batch(
     reference = "" if compare is None else os.fspath(compare)
     begins = accept and batch_output_files.check_reference(reference, place)
     before = None if compare is None or begins else read_earlier_batch(reference)
-    watched = monitor or SilentMonitor()
+    watched = monitor or NullMonitor()
     with RunFolder(place) as folder, noting(folder, fresh) as journal:
         folder.check("results.csv", "requirements.csv", "metrics.json")
         entries = carry_out(
@@ -444,8 +409,8 @@ def batch(
         if before is not None:
             changed = changes_of(before, entries, place, tolerance)
             compared = BatchComparison(reference, tolerance, changed, list_gone(before, entries))
-        code = exit_code(entries, watched.stopped)
-        if compared is not None and compared.changes_beyond_tolerance and not watched.stopped and not accept:
+        code = exit_code(entries, watched.stopping())
+        if compared is not None and compared.changes_beyond_tolerance and not watched.stopping() and not accept:
             code = worst([code, ExitCode.REQUIREMENT_MISSED])
         written = batch_output_files.write(
             folder,
@@ -454,7 +419,7 @@ def batch(
             page,
             compared,
         )
-    if accepted := accept and not watched.stopped:
+    if accepted := accept and not watched.stopping():
         batch_output_files.write_reference(reference, place, entries, work.arguments)
     if report is not None:
         report(junit_of(entries))

@@ -61,10 +61,7 @@ def write(
 def check_reference(reference: str, place: str) -> bool:
     """Return True if the folder of a reference that is to be accepted is not there yet.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If none is named, or it is the output folder of the batch itself.
+    Raises UsageError if none is named, or it is the output folder of the batch itself.
     """
     if not reference:
         raise UsageError("--accept replaces a reference: name its folder with --compare")
@@ -76,10 +73,7 @@ def check_reference(reference: str, place: str) -> bool:
 def write_reference(reference: str, folder: str, entries: Sequence[Entry], arguments: Sequence[str]) -> None:
     """Replace the results in the folder of a reference by those of a batch: what a comparison reads, and nothing else.
 
-    Raises
-    ------
-    cfmkit.errors.OutputError
-        If the folder cannot be written, or has a file of those names that cfmkit did not write.
+    Raises OutputError if the folder cannot be written, or has a file of those names that cfmkit did not write.
     """
     from cfmkit.store import RunFolder
 

@@ -20,10 +20,7 @@ DRAWING_SUFFIXES = (".png", ".svg", ".pdf")
 def find_drawn_family(name: str | None) -> Family:
     """Return the family of that name, which has a drawing.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is no such family, or it has no drawing.
+    Raises UsageError if there is no such family, or it has no drawing.
     """
     from cfmkit.families import family, records
 
@@ -46,10 +43,7 @@ def read_drawing(record: Family) -> dict[str, bytes]:
 def read_dimensions(record: Family) -> list[dict[str, str]]:
     """Return ``symbol``, ``key`` of the specification and ``meaning`` of each row of the drawing's table.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the drawing is no SVG, or a row has no symbol or key.
+    Raises UsageError if the drawing is no SVG, or a row has no symbol or key.
     """
     from xml.etree import ElementTree
 

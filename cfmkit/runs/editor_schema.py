@@ -23,14 +23,10 @@ SCHEMA_LINE_START = "# yaml-language-server: $schema="
 """How the line begins by which the YAML language server, and so most editors, finds a schema."""
 
 
-def schema(records: Iterable[Family]) -> dict[str, Any]:
-    """Return the schema of the specifications of some families; metrics are a closed list of names.
-
-    Parameters
-    ----------
-    records : iterable of Family
-        One: its specifications alone; several: any of theirs.
-    """
+def schema(
+    records: Iterable[Family],  # one: its specifications alone; several: any of theirs
+) -> dict[str, Any]:
+    """Return the schema of the specifications of some families; metrics are a closed list of names."""
     known = {record.name: record for record in records}
     found = plain_schema({name: record.spec_type for name, record in known.items()})
     for choice in found.get("oneOf", [found]):

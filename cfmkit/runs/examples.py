@@ -52,10 +52,7 @@ ABBREVIATED_WORDS = ("sec.", "eqs.", "figs.")
 def folder() -> Path:
     """Return the folder of all examples.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If this installation has none.
+    Raises UsageError if this installation has none.
     """
     return shipped_folder("configs", "cam.yaml")
 
@@ -105,14 +102,12 @@ def _first_sentence(text: str) -> str:
 
 
 def example(name: str) -> Example:
-    """Return one example by its name, with or without its ending.
+    """Return one example by its name, with or without its folder and its ending.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is none of that name.
+    Raises UsageError if there is none of that name.
     """
-    known = {one.name: one for one in examples()}
+    listed = examples()
+    known = {one.path.stem: one for one in listed} | {one.name: one for one in listed}
     wanted = name.removesuffix(".yaml")
     if wanted in known:
         return known[wanted]
@@ -126,12 +121,7 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
 
     With `schema` it gets the line by which editors find the schema of its family, and that file, which may be replaced.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is no example of that name.
-    cfmkit.errors.OutputError
-        If a file is there already, or cannot be written.
+    Raises UsageError if there is no example of that name; OutputError if a file is there already, or cannot be written.
     """
     from cfmkit import api
     from cfmkit.families import family

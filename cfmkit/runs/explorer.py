@@ -96,12 +96,7 @@ class Explorer:
     def from_file(cls, source: str, changes: tuple[str, ...] = ()) -> Explorer:
         """Return the explorer of a file.
 
-        Raises
-        ------
-        cfmkit.errors.UsageError
-            If it cannot be read.
-        cfmkit.errors.SpecError
-            With every problem in it.
+        Raises UsageError if it cannot be read; SpecError with every problem in it.
         """
         document = read_spec(source, changes)
         bind(document)
@@ -195,12 +190,8 @@ class Explorer:
     def save(self, name: str, changes: Sequence[str]) -> dict[str, Any]:
         """Write the specification with changes beside its file; nothing is replaced.
 
-        Raises
-        ------
-        cfmkit.errors.UsageError
-            If it is not the plain name of a YAML file.
-        cfmkit.errors.OutputError
-            If there is such a file, or it cannot be written.
+        Raises UsageError if it is not the plain name of a YAML file; OutputError if there is such a file, or it cannot
+        be written.
         """
         from cfmkit.store.safe_disk_changes import reporting, write_new
 

@@ -86,10 +86,7 @@ class ExplorerServer(ThreadingHTTPServer):
     ) -> None:
         """Bind to a port of this computer alone; 0 takes a free one.
 
-        Raises
-        ------
-        OSError
-            If the port is taken.
+        Raises OSError if the port is taken.
         """
         self.explorer, self.token, self.turn = explorer, secrets.token_urlsafe(24), threading.Lock()
         self.failed = failed
@@ -109,10 +106,7 @@ class ExplorerServer(ThreadingHTTPServer):
         Every user of the computer can read the command lines of all programs, but this file is readable by its owner
         alone. It is removed when the page has been opened, or with the server.
 
-        Raises
-        ------
-        OSError
-            If it cannot be written.
+        Raises OSError if it cannot be written.
         """
         descriptor, name = tempfile.mkstemp(prefix="cfmkit-explore-", suffix=".html")  # of mode 600
         self._redirect = Path(name)

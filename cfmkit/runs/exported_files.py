@@ -29,9 +29,11 @@ DRAWING_FORMATS = ("png", "pdf")
 
 
 def export_files(
-    spec: Spec,
+    spec: Spec,  # the mechanism as it is
+    # kerf, tolerance: width of the cut, and largest distance from the exact curves: with a unit, or a number [m]
     kerf: str | float | None = None,
     tolerance: str | float | None = None,
+    # of `cfmkit.export.FILE_FORMATS`, `DECK_FORMAT` and `DRAWING_FORMATS`; default: `cfmkit.export.DEFAULT_FORMATS`
     formats: str | Sequence[str] | None = None,
 ) -> tuple[dict[str, bytes], Drawing, dict[str, CfmError]]:
     """Return the files by name, the outlines with notes and warnings, and errors of formats not made.
@@ -39,23 +41,9 @@ def export_files(
     A body, a deck or a dimensioned drawing that cannot be made does not stop the other formats; if there is nothing
     else, its error is raised.
 
-    Parameters
-    ----------
-    spec : Spec
-        The mechanism as it is.
-    kerf, tolerance : str or float, optional
-        Width of the cut, and largest distance from the exact curves: with a unit, or a number [m].
-    formats : str or sequence of str, optional
-        Of `cfmkit.export.FILE_FORMATS`, `DECK_FORMAT` and `DRAWING_FORMATS`; default: `cfmkit.export.DEFAULT_FORMATS`.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the family has nothing to cut, a length is not above zero, a format is unknown or needs a missing library.
-    cfmkit.errors.SolutionError
-        If the mechanism cannot exist as described.
-    cfmkit.errors.GeometryError
-        If it cannot be cut as it is, or nothing says how thick it is and a format needs that.
+    Raises UsageError if the family has nothing to cut, a length is not above zero, a format is unknown or needs a
+    missing library; SolutionError if the mechanism cannot exist as described; GeometryError if it cannot be cut as it
+    is, or nothing says how thick it is and a format needs that.
     """
     from cfmkit.export import DEFAULT_FORMATS, files
     from cfmkit.runs.values_with_units import read_length

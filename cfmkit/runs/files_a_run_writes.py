@@ -28,33 +28,16 @@ if TYPE_CHECKING:
 
 
 def files(
-    report: Report,
-    plots: bool = True,
-    page: bool = False,
-    command: str = "",
+    report: Report,  # of any status: without a curve only what is known is written
+    plots: bool = True,  # whether to draw figures
+    page: bool = False,  # whether to write ``report.html``, which has the figures as well
+    command: str = "",  # what the page says about how the run was started
+    # how figures are written; default: as PNG, as they are drawn. The page has them as SVG
     form: FigureForm = DEFAULT_FORM,
-    animate: str | None = None,
-    started: RunCommand | None = None,
+    animate: str | None = None,  # whether to write the mechanism in motion beside its curve, where its family draws it
+    started: RunCommand | None = None,  # which commands apply remedies, for the page
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield every file of a run as (name below the folder, content), each when it is needed.
-
-    Parameters
-    ----------
-    report : Report
-        Of any status: without a curve only what is known is written.
-    plots : bool
-        Whether to draw figures.
-    page : bool
-        Whether to write ``report.html``, which has the figures as well.
-    command : str
-        What the page says about how the run was started.
-    form : FigureForm, optional
-        How figures are written; default: as PNG, as they are drawn. The page has them as SVG.
-    animate : {"gif", "mp4"}, optional
-        Whether to write the mechanism in motion beside its curve, where its family draws it.
-    started : RunCommand, optional
-        Which commands apply remedies, for the page.
-    """
+    """Yield every file of a run as (name below the folder, content), each when it is needed."""
     result, designed = report.result, report.design.spec if report.design else None
     if designed is not None:
         yield "design.yaml", api.dumps(designed).encode()

@@ -7,20 +7,13 @@ from pathlib import Path
 from cfmkit.errors import UsageError
 
 
-def shipped_folder(name: str, sample: str) -> Path:
+def shipped_folder(
+    name: str,  # as it stands in the tree: ``configs``, ``docs``
+    sample: str,  # a file that it must have: another package's folder of that name may stand beside this one
+) -> Path:
     """Return a folder that comes with the package.
 
-    Parameters
-    ----------
-    name : str
-        As it stands in the tree: ``configs``, ``docs``.
-    sample : str
-        A file that it must have: another package's folder of that name may stand beside this one.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If this installation has none.
+    Raises UsageError if this installation has none.
     """
     package = Path(__file__).parents[1]
     for place in (package / name, package.parent / name):

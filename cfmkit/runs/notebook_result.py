@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 class Metrics(Named[Quantity]):
     """Metrics by name; a notebook shows all of them as a table."""
 
+    def __missing__(self, name: str) -> Quantity:
+        """Raise KeyError with the metric that may be meant."""
+        from cfmkit.specs.yamlio import did_you_mean
+
+        raise KeyError(f"there is no metric {name!r}; {did_you_mean(name, list(self)) or '`cfmkit show metrics`'}")
+
     def _repr_html_(self) -> str:
         """Return the table: a row a metric, a column a branch."""
         from cfmkit.documents.notebook import table_of

@@ -106,10 +106,7 @@ def _texts(value: Any) -> tuple[str, ...]:
 def choose_rows(name: str | None) -> tuple[PrintedRow, ...]:
     """Return the rows of one paper, or of a family's papers, or all.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is no such paper or family.
+    Raises UsageError if there is no such paper or family.
     """
     from difflib import get_close_matches
 
@@ -200,10 +197,7 @@ class Number:
 def number(text: str) -> Number:
     """Return a printed number.
 
-    Raises
-    ------
-    cfmkit.errors.QuantityError
-        If it is none.
+    Raises QuantityError if it is none.
 
     Examples
     --------

@@ -19,20 +19,14 @@ OPTIONS_SOURCE = "options"
 """Name of a request that has no file."""
 
 
-def read_request(name: str | None, keys: Mapping[str, str]) -> SuggestBlock:
+def read_request(
+    name: str | None,  # the file; ``-`` is standard input
+    keys: Mapping[str, str],  # key of the request -> its value as a file would have it
+    mark: str = "--",  # what stands before a key in messages; nothing where keys are arguments of a function
+) -> SuggestBlock:
     """Return the request of a file, or of none, with keys replaced by what options say.
 
-    Parameters
-    ----------
-    name : str, optional
-        The file; ``-`` is standard input.
-    keys : mapping of str to str
-        Key of the request -> its value as a file would have it.
-
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        With everything that is wrong with it.
+    Raises SpecError with everything that is wrong with it.
     """
     if name is None:
         document = read_document("cfmkit: 1\nsuggest: {}\n", OPTIONS_SOURCE)
@@ -45,15 +39,15 @@ def read_request(name: str | None, keys: Mapping[str, str]) -> SuggestBlock:
     except SpecError as error:
         reported = error
     for key in keys:
-        reported = rename_source(reported, f"--set suggest.{key}", f"--{key}")
-    raise reported if name is not None else _name_missing_options(reported)
+        reported = rename_source(reported, f"--set suggest.{key}", f"{mark}{key}")
+    raise reported if name is not None else _name_missing_options(reported, mark)
 
 
-def _name_missing_options(error: SpecError) -> SpecError:
+def _name_missing_options(error: SpecError, mark: str) -> SpecError:
     """Return the error of a request without a file with a missing key as a missing option."""
     return SpecError(
         [
-            Problem("", 0, 0, "", re.sub(r"^the key '(\w+)' is missing.*", r"--\1 is missing", one.message))
+            Problem("", 0, 0, "", re.sub(r"^the key '(\w+)' is missing.*", rf"{mark}\1 is missing", one.message))
             if one.source == OPTIONS_SOURCE
             else one
             for one in error.problems

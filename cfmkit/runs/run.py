@@ -127,21 +127,12 @@ class RunTask:
 
 
 def carry_out(
-    verb: Verb, wanted: RunTask, arguments: Sequence[str], progress: Callable[[float, str], None] | None = None
+    verb: Verb,  # what to compute
+    wanted: RunTask,  # of what, and where to
+    arguments: Sequence[str],  # the command line, for the manifest
+    progress: Callable[[float, str], None] | None = None,  # progress callback
 ) -> FinishedRun:
-    """Return what a run found, after writing its folder.
-
-    Parameters
-    ----------
-    verb : Verb
-        What to compute.
-    wanted : RunTask
-        Of what, and where to.
-    arguments : sequence of str
-        The command line, for the manifest.
-    progress : callable, optional
-        Progress callback.
-    """
+    """Return what a run found, after writing its folder."""
     start = time.perf_counter()
     document, spec = read(wanted)
     _make_ready(spec)

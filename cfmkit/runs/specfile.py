@@ -24,22 +24,14 @@ if TYPE_CHECKING:
 STDIN_PATH = "-"
 
 
-def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> YamlDocument:
+def read_spec(
+    name: str,  # path of a YAML file; ``-`` is standard input
+    changes: Iterable[str] = (),  # what ``--set`` takes
+    of_many: bool = False,  # whether there are other specifications, for which some options may be
+) -> YamlDocument:
     """Return what a file says, changed by options such as ``a.b=1 mm``; nothing is checked yet.
 
-    Parameters
-    ----------
-    name : str
-        Path of a YAML file; ``-`` is standard input.
-    changes : iterable of str
-        What ``--set`` takes.
-    of_many : bool
-        Whether there are other specifications, for which some options may be.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the file cannot be read, or an option is malformed or for a specification of another family.
+    Raises UsageError if the file cannot be read, or an option is malformed or for a specification of another family.
     """
     from cfmkit.specs.yamlio import read_document
     from cfmkit.specs.yamlio.base_file import with_base
@@ -54,10 +46,7 @@ def apply_options(document: YamlDocument, changes: Iterable[str], of_many: bool 
 
     An option for another family is skipped where there are many specifications, and refused where there is only one.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If an option is malformed, for a family that does not exist, or for none that there is.
+    Raises UsageError if an option is malformed, for a family that does not exist, or for none that there is.
     """
     for change in changes:
         family, option = split_address(change)
@@ -72,10 +61,7 @@ def apply_options(document: YamlDocument, changes: Iterable[str], of_many: bool 
 def split_address(change: str) -> tuple[str | None, str]:
     """Return the family that an option such as ``cam:mechanism.roller_radius=10 mm`` is for, and the option itself.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is no such family.
+    Raises UsageError if there is no such family.
 
     Examples
     --------
@@ -107,10 +93,7 @@ def _family_of(document: YamlDocument) -> str | None:
 def standard_input() -> bytes:
     """Return what comes in, up to the size that no specification has.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If nothing can come in.
+    Raises UsageError if nothing can come in.
     """
     from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES
 
@@ -122,10 +105,7 @@ def standard_input() -> bytes:
 def content(name: str) -> bytes:
     """Return the bytes of a file.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        In one sentence, if it is not there, a folder or not readable.
+    Raises UsageError in one sentence, if it is not there, a folder or not readable.
     """
     from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES
 
@@ -145,10 +125,7 @@ def content(name: str) -> bytes:
 def bind(document: YamlDocument) -> Spec:
     """Return the checked specification of the family that it names.
 
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        With every problem at once, those of the requirements' metrics included.
+    Raises SpecError with every problem at once, those of the requirements' metrics included.
     """
     family = _family_record(document)
     try:

@@ -114,6 +114,6 @@ def suggest(
     )
     keys |= {} if min_yield is None else {"yield": min_yield}
     name = None if request is None else os.fspath(request)
-    block = read_request(name, {key: format_value(value) for key, value in keys.items()})
+    block = read_request(name, {key: format_value(value) for key, value in keys.items()}, mark="")
     run = Run(seed, time_budget=read_time(time_budget), executor=serial if jobs == 1 else Pool(jobs))
     return SuggestionsView.of(search_families(block.request(), run, block.prefer), block)

@@ -36,28 +36,16 @@ class Deadlines:
 
 
 def files(
+    # suggestions, block: proposals, and the block `suggest`
     suggestions: Suggestions,
     block: SuggestBlock,
-    run: Run,
-    plots: bool,
-    deadlines: Deadlines,
+    run: Run,  # its executor draws the proposals
+    plots: bool,  # whether to draw
+    deadlines: Deadlines,  # what is left out when its time is up
+    # how the search was started, for ``report.html``; None: no page is written, nor one of each proposal
     command: str | None = None,
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield every file of the run as (name below the folder, content).
-
-    Parameters
-    ----------
-    suggestions, block : Suggestions and SuggestBlock
-        Proposals, and the block `suggest`.
-    run : Run
-        Its executor draws the proposals.
-    plots : bool
-        Whether to draw.
-    deadlines : Deadlines
-        What is left out when its time is up.
-    command : str, optional
-        How the search was started, for ``report.html``; None: no page is written, nor one of each proposal.
-    """
+    """Yield every file of the run as (name below the folder, content)."""
     yield "metrics.json", json_bytes(as_json(suggestions, block))
     yield "suggestions.csv", table(suggestions)
     in_time = not deadlines.figures.late()
@@ -167,23 +155,13 @@ def table(suggestions: Suggestions) -> bytes:
 
 
 def page(
-    record: Mapping[str, Any], code: ExitCode, texts: Mapping[str, str], drawn: Mapping[str, Figure], command: str
+    record: Mapping[str, Any],  # what metrics.json says
+    code: ExitCode,  # of the process
+    texts: Mapping[str, str],  # the specification of each proposal, by its folder
+    drawn: Mapping[str, Figure],  # the pictures, by their names
+    command: str,  # how the search was started
 ) -> bytes:
-    """Return the page of a search.
-
-    Parameters
-    ----------
-    record : mapping
-        What metrics.json says.
-    code : ExitCode
-        Of the process.
-    texts : mapping of str to str
-        The specification of each proposal, by its folder.
-    drawn : mapping of str to Figure
-        The pictures, by their names.
-    command : str
-        How the search was started.
-    """
+    """Return the page of a search."""
     document = document_of(record, code)
     proposals = (*record["proposals"], *record["unjudged"])
     specs = [(f"Specification {proposal['folder']}", texts[proposal["folder"]]) for proposal in proposals]

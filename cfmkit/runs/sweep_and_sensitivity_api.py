@@ -202,10 +202,8 @@ def in_words(values: Any, spec: Spec, path: str) -> Any:
 
     A range is the list of its numbers. What is not from NumPy has no unit where it is a bare number, as in a file.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If an array has more than one dimension, a value is not finite, or a range has more values than a study points.
+    Raises UsageError if an array has more than one dimension, a value is not finite, or a range has more values than a
+    study points.
     """
     if isinstance(values, range):
         if values[MOST_POINTS:]:

@@ -30,10 +30,7 @@ def read_window(window: Window | str | tuple[float, float] | None, kind: Kind) -
 
     The ends are lengths if the `kind` of the curve is a force, and angles if it is a torque.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is malformed, or not increasing.
+    Raises UsageError if it is malformed, or not increasing.
     """
     if window is None or isinstance(window, Window):
         return window
@@ -55,10 +52,7 @@ def read_window(window: Window | str | tuple[float, float] | None, kind: Kind) -
 def read_target(text: str | float | None, kind: Kind) -> float | None:
     """Return the force [N] or torque [N m] that a text says, or a number as it is; None for None.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is malformed.
+    Raises UsageError if it is malformed.
     """
     if text is None or not isinstance(text, str):
         return text

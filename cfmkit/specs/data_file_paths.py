@@ -20,10 +20,7 @@ class DataSource(str):
     def __new__(cls, name: str, folder: str | os.PathLike[str]) -> DataSource:
         """Return `name` as a data file below `folder`.
 
-        Raises
-        ------
-        ValueError
-            If it is not below, or not there.
+        Raises ValueError if it is not below, or not there.
         """
         source = super().__new__(cls, name)
         source.folder = os.fspath(folder)

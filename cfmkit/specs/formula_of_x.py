@@ -46,10 +46,7 @@ _FUNCTION_SLOPES: dict[str, Callable[[Any], Any]] = {
 def formula(text: str) -> Callable[[FloatArray], FloatArray]:
     """Return the function of x that a text describes.
 
-    Raises
-    ------
-    ValueError
-        With what is wrong, if it is no such formula.
+    Raises ValueError with what is wrong, if it is no such formula.
 
     Examples
     --------
@@ -79,10 +76,7 @@ def slope(text: str) -> Callable[[FloatArray], FloatArray]:
 
     Where the function has a corner (``abs``, ``min``, ``max``) it is that of one of its sides.
 
-    Raises
-    ------
-    ValueError
-        As `formula` does.
+    Raises ValueError as `formula` does.
 
     Examples
     --------

@@ -44,14 +44,11 @@ class Key:
     description: str  # what it means
 
 
-def schema(models: Mapping[str, type[Spec]]) -> dict[str, Any]:
-    """Return the JSON schema of one family's specifications, or of any one of several.
-
-    Parameters
-    ----------
-    models : mapping of str to type
-        Families by name, each with the model of its specifications; their order is kept.
-    """
+def schema(
+    # families by name, each with the model of its specifications; their order is kept
+    models: Mapping[str, type[Spec]],
+) -> dict[str, Any]:
+    """Return the JSON schema of one family's specifications, or of any one of several."""
     each = {name: json_schema(model) for name, model in models.items()}
     if len(each) == 1:
         return {"$schema": SCHEMA_DIALECT} | next(iter(each.values()))

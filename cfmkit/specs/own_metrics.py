@@ -48,25 +48,14 @@ def stamp() -> str:
 
 
 def register_metric(
-    function: Callable[[Any], Any], name: str | None = None, dimension: str | None = None, definition: str | None = None
+    function: Callable[[Any], Any],  # returns the value of a `Result` [SI]
+    name: str | None = None,  # default: that of the function
+    dimension: str | None = None,  # such as ``"force"``; default: a plain number
+    definition: str | None = None,  # one sentence; default: the first line of the function's docstring
 ) -> OwnMetric:
     """Enter a function into the table, in place of one of the same name, and return the metric.
 
-    Parameters
-    ----------
-    function : callable
-        Returns the value of a `Result` [SI].
-    name : str, optional
-        Default: that of the function.
-    dimension : str, optional
-        Such as ``"force"``; default: a plain number.
-    definition : str, optional
-        One sentence; default: the first line of the function's docstring.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the name cannot stand in a requirement, or there is no such dimension.
+    Raises UsageError if the name cannot stand in a requirement, or there is no such dimension.
     """
     from cfmkit.specs.units import DIMENSIONS_BY_NAME
 

@@ -190,10 +190,7 @@ _COLUMN_DIMENSIONS = {"displacement": "length", "force": "force", "angle": "angl
 def _from_file(source: DataSource) -> tuple[tuple[Place, DimensionedFloat], ...]:
     """Return the points of a CSV.
 
-    Raises
-    ------
-    ValueError
-        If its columns or numbers are not those of a curve; the message names the line.
+    Raises ValueError if its columns or numbers are not those of a curve; the message names the line.
     """
     try:
         text = source.path.read_text(encoding="utf-8-sig")

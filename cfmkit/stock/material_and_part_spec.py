@@ -298,6 +298,9 @@ class AroundFrame(PartFrame):
     )
 
 
+ScrewName = Literal["M1.6", "M2", "M2.5", "M3", "M4", "M5", "M6", "M8", "M10", "M12", "M16"]
+
+
 class CutPart(Model):
     """Cut of a part from a sheet, common to all families."""
 
@@ -324,6 +327,11 @@ class CutPart(Model):
     )
     holes: Annotated[tuple[Hole, ...], Field(max_length=1000)] = Field(
         (), description="fixing pattern: [{at: [x, y], diameter: 4 mm}]"
+    )
+    screws: ScrewName | None = Field(
+        None,
+        description="M3, say: clearance holes in pads, walls and the driven part, where the heads have room beside "
+        "what bends",
     )
 
     @model_validator(mode="after")

@@ -66,6 +66,7 @@ class Material:
     source: str  # where the numbers come from
     scatter: Scatter  # range of modulus and strength to expect
     aliases: tuple[str, ...] = ()  # other words for it; a name that is not found is compared with these too
+    poisson_is_assumed: bool = False  # whether no text is known for the Poisson ratio
 
 
 _METAL_LIST = (
@@ -132,8 +133,8 @@ _PLASTIC_LIST = (
         "pla", 3.0e9, 0.36, 45e6, 1240.0,
         "Printed (filament). Nominal: Stratasys PLA, ASTM D638, on edge (3.04 GPa, yield 45 MPa; flat 2.54 GPa, 26 "
         "MPa). Low end: PolyTerra PLA data sheet V5.3, ISO 527, between the layers (1.6 GPa, 12 MPa). High end and "
-        "density: additive.tools/materials/pla (to 4 GPa and 65 MPa, 1220 to 1260 kg/m^3). Poisson ratio: no source "
-        "named.",
+        "density: additive.tools/materials/pla (to 4 GPa and 65 MPa, 1220 to 1260 kg/m^3). Poisson ratio: "
+        "FreeCAD's card of PLA (0.36, from SD3D's data sheet).",
         Scatter((1.6e9, 4.0e9), (12e6, 65e6), density=(1220.0, 1260.0)), ("polylactide", "pla-plus"),
     ),
     Material(
@@ -148,15 +149,16 @@ _PLASTIC_LIST = (
         "petg", 2.0e9, 0.38, 45e6, 1270.0,
         "Printed (filament): additive.tools/materials/petg (2 to 3 GPa and 44 to 56 MPa in the plane, 25 to 38 MPa "
         "between the layers, 1250 to 1290 kg/m^3). The modulus is the low end of that: printed PETG is often softer. "
-        "Poisson ratio: no source named.",
-        Scatter((1.5e9, 2.9e9), (25e6, 56e6), density=(1250.0, 1290.0)), ("pet-g",),
+        "Poisson ratio: assumed.",
+        Scatter((1.5e9, 2.9e9), (25e6, 56e6), density=(1250.0, 1290.0)), ("pet-g",), poisson_is_assumed=True,
     ),
     Material(
         "pa12-sls", 1.65e9, 0.39, 48e6, 930.0,
         "Laser sintered, EOS PA 2200 class. Strength and density: additive.tools/materials/pa12 (44 to 52 MPa, 880 "
         "to 960 kg/m^3). Modulus: between 3D Systems' PA12 (1.39 GPa, 43 MPa; PMC10406103, Table 2) and 1.9 GPa; it "
-        "varies with powder refresh, orientation and humidity. Poisson ratio: no source named.",
+        "varies with powder refresh, orientation and humidity. Poisson ratio: assumed.",
         Scatter((1.35e9, 1.9e9), (40e6, 52e6), density=(880.0, 960.0)), ("pa12", "nylon-12", "nylon-sls", "pa-2200"),
+        poisson_is_assumed=True,
     ),
     Material(
         "pa12-mjf", 1.8e9, 0.43, 48e6, 1010.0,
@@ -170,8 +172,9 @@ _PLASTIC_LIST = (
         "pom", 2.8e9, 0.37, 65e6, 1410.0,
         "Polyoxymethylene, moulded or machined, ISO 527: copolymer as in the data sheets of Hostaform C 9021 (2.85 "
         "GPa, 64 MPa) and C 27021 (2.9 GPa, 65 MPa), 1410 kg/m^3; homopolymer 3.0 to 3.2 GPa, 72 MPa (Delrin). Not "
-        "the toughened grades. Poisson ratio: no source named.",
-        Scatter((2.5e9, 3.2e9), (60e6, 76e6)), ("delrin", "acetal", "polyoxymethylene", "hostaform"),
+        "the toughened grades. Poisson ratio: FreeCAD's cards of homopolymer (0.37) and copolymer (0.363).",
+        Scatter((2.5e9, 3.2e9), (60e6, 76e6), poisson_ratio=(0.363, 0.37)),
+        ("delrin", "acetal", "polyoxymethylene", "hostaform"),
     ),
     Material(
         "pa66", 1.4e9, 0.41, 55e6, 1140.0,
@@ -181,10 +184,10 @@ _PLASTIC_LIST = (
         Scatter((1.2e9, 3.1e9), (45e6, 85e6), poisson_ratio=(0.40, 0.41)), ("nylon", "nylon-66", "polyamide"),
     ),
     Material(
-        "pp", 1.4e9, 0.42, 32e6, 910.0,
+        "pp", 1.4e9, 0.44, 32e6, 910.0,
         "Polypropylene homopolymer, ASTM D638: Modern Plastics Encyclopedia 99 (1.14 to 1.55 GPa, yield 31 to 37 "
         "MPa); nominal modulus and density: MakeItFrom, unfilled PP homopolymer (1.4 GPa, 910 kg/m^3). Low end of "
-        "the density: e-uparts. Poisson ratio: no source named.",
+        "the density: e-uparts. Poisson ratio: FreeCAD's card of PP (0.44, from MatWeb).",
         Scatter((1.1e9, 1.6e9), (30e6, 37e6), density=(900.0, 910.0)), ("polypropylene",),
     ),
     Material(
@@ -206,10 +209,11 @@ _PLASTIC_LIST = (
     ),
     Material(
         "tpu-95a", 26e6, 0.48, 8.6e6, 1220.0,
-        "Printed (filament), Shore 95A: nominal modulus, strength and its ends, and Poisson ratio: no source named; "
-        "density: additive.tools/materials/tpu (1200 to 1250 kg/m^3); scatter of the modulus as measured on four "
+        "Printed (filament), Shore 95A: nominal modulus, strength and its ends: no source named; Poisson ratio: "
+        "assumed; density: additive.tools/materials/tpu (1200 to 1250 kg/m^3); scatter of E: measured on four "
         "printed TPUs (Haid et al. 2022, 24 to 247 MPa). Strongly nonlinear: only for small strains.",
         Scatter((24e6, 250e6), (5e6, 12e6), density=(1200.0, 1250.0)), ("tpu", "polyurethane"),
+        poisson_is_assumed=True,
     ),
 )  # fmt: skip
 
@@ -217,12 +221,13 @@ _PUBLISHED_LIST = (
     Material(
         "pom-lan-2010", 2.0e9, 0.35, 76e6, 1410.0,
         "Lan, Wang, Chen 2010, Table 2: E and yield stress of their polyoxymethylene (used there with a safety "
-        "factor of 1.58). Poisson ratio and density: typical POM; scatter: up to the data sheet values.",
-        Scatter((2.0e9, 3.2e9), (60e6, 76e6)),
+        "factor of 1.58). Poisson ratio: assumed; density: typical POM; scatter: up to the data sheet values.",
+        Scatter((2.0e9, 3.2e9), (60e6, 76e6)), poisson_is_assumed=True,
     ),
     Material(
         "pla-ding-2022", 1.477e9, 0.30, None, 1250.0,
-        "Ding, Li, Li 2022, sec. 6: printed PLA-ST; no strength is given there. Scatter of E: printed PLA, low side. "
+        "Ding, Li, Li 2022, sec. 6: E and Poisson ratio of printed PLA-ST; no strength is given there. Scatter of E: "
+        "printed PLA, low side. "
         "Spread of the density: additive.tools/materials/pla.",
         Scatter((1.2e9, 2.0e9), density=(1220.0, 1260.0)),
     ),

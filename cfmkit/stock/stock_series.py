@@ -134,10 +134,13 @@ ALL_SERIES = (
                    0.4375, 0.5, 0.625, 0.75, 0.875, 1), ("aluminium-6061-t6",)),
     StockSeries("sheet", "inch", MARKET_SOURCE, "github.com/machineagency/jubilee, wiki, Parts to Laser Cut (Delrin)",
            _inches(0.0625, 0.09375, 0.125), ("pom",)),
-    StockSeries("wire", "metric", "EN 10270-1 up to 0.5 mm; above, preferred numbers of ISO 3, R10",
-           "springwire.net, spring wire sizes and tolerances; durofer.ch, spring wire",
+    StockSeries("wire", "metric", "EN 10270-1, and preferred numbers of ISO 3, R10",
+           "springwire.net, spring wire sizes and tolerances; durofer.ch, spring wire; mollificiomodenese.it, carbon "
+           "steel wire EN 10270-1",
            _mm(0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.11, 0.12, 0.14, 0.16, 0.18, 0.2, 0.22, 0.25, 0.28, 0.3, 0.32, 0.34,
-               0.36, 0.38, 0.4, 0.45, 0.5, 0.63, 0.8, 1, 1.25, 1.6, 2, 2.5, 3.15, 4, 5, 6.3, 8, 10)),
+               0.36, 0.38, 0.4, 0.45, 0.5, 0.6, 0.63, 0.7, 0.8, 0.9, 1, 1.1, 1.2, 1.25, 1.3, 1.4, 1.5, 1.6, 1.7, 1.8,
+               1.9, 2, 2.1, 2.4, 2.5, 2.6, 2.8, 3, 3.15, 3.2, 3.4, 3.5, 3.6, 3.8, 4, 4.5, 5, 5.5, 6, 6.3, 6.5, 7, 7.5,
+               8, 8.5, 9, 9.5, 10)),
     StockSeries("wire", "inch", "ASTM A228", "interwiregroup.com, tinned coated music wire",
            _inches(0.004, 0.005, 0.006, 0.007, 0.008, 0.009, 0.010, 0.011, 0.012, 0.013, 0.014, 0.015, 0.016, 0.018,
                    0.020, 0.022, 0.024, 0.026, 0.028, 0.030, 0.032, 0.034, 0.036, 0.038, 0.040, 0.042, 0.045, 0.048,
@@ -185,6 +188,23 @@ def missing_size(kind: Kind, system: System, size: float, material: str | None =
     about = f"{material}; {series.standard}" if kind == "sheet" else series.standard
     stated, nearest = (format_short(entry, "length", 6) for entry in (size, series.nearest(size)))
     return f"no {system} {KIND_WORDS[kind].format(stated)} ({about}); the nearest is {nearest}"
+
+
+FIT_LIMITS = _mm(3, 6, 10, 18, 30, 50, 80)
+FIT_TOLERANCES = {7: (10, 12, 15, 18, 21, 25, 30), 8: (14, 18, 22, 27, 33, 39, 46)}
+"""ISO 286-2: largest diameter of each range, and upper deviation of holes H7 and H8 there, in thousandths of a mm [read
+in the tables of public fit calculators that name ISO 286-2:2010]."""
+
+
+def hole_with_fit(diameter: float, grade: Literal[7, 8]) -> str:
+    """Return a hole of a diameter [m] with its fit: H8 turns on a pin h8, H7 seats a bearing or a dowel.
+
+    >>> hole_with_fit(0.003, 8), hole_with_fit(0.022, 7), hole_with_fit(0.1, 7)
+    ('3 mm H8 (+0.014)', '22 mm H7 (+0.021)', '100 mm')
+    """
+    text = format_short(diameter, "length")
+    place = next((k for k, largest in enumerate(FIT_LIMITS) if diameter <= largest * (1 + SIZE_RTOL)), None)
+    return text if place is None else f"{text} H{grade} (+{1e-3 * FIT_TOLERANCES[grade][place]:.3f})"
 
 
 Path = tuple[str | int, ...]

@@ -35,21 +35,15 @@ def file_hash(path: Path) -> str | None:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def stable_hash(value: Any) -> str:
+def stable_hash(
+    value: Any,  # none, truth values, numbers, texts, and sequences and mappings of them
+) -> str:
     """Return the SHA-256 of a value's canonical JSON: the same on every machine and in every run.
 
     Mappings count by content, not by order; tuples, lists and arrays are the same;
     -0.0 is 0.0. An integer is not the float of the same size, nor a truth value.
 
-    Parameters
-    ----------
-    value : Any
-        None, truth values, numbers, texts, and sequences and mappings of them.
-
-    Raises
-    ------
-    cfmkit.errors.CfmError
-        If there is something else inside, or a number that is not finite.
+    Raises CfmError if there is something else inside, or a number that is not finite.
 
     Examples
     --------
@@ -78,15 +72,13 @@ def _canonical(value: Any) -> Any:
     raise CfmError(f"a {type(value).__name__} has no identity: only texts, numbers and their collections have")
 
 
-def origin(libraries: Iterable[str] = NUMERICAL_LIBRARIES) -> dict[str, str]:
+def origin(
+    # distributions whose versions count; one that is not installed counts as that
+    libraries: Iterable[str] = NUMERICAL_LIBRARIES,
+) -> dict[str, str]:
     """Return what computes: cfmkit's version and content, and the versions of Python and of libraries.
 
     It belongs into the identity of every result that is kept for a later run.
-
-    Parameters
-    ----------
-    libraries : iterable of str
-        Distributions whose versions count; one that is not installed counts as that.
     """
     found = {"cfmkit": __version__, "content": code_stamp(), "python": platform.python_version()}
     return found | {name: installed_version(name) or "not installed" for name in libraries}

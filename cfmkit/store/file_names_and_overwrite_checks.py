@@ -23,11 +23,8 @@ OVERWRITE_REMEDY = "move it away or give another output folder (--out)"
 def checked_name(name: str) -> str:
     """Return `name` if it is a plain path below the folder: ``figures/loop.png``.
 
-    Raises
-    ------
-    cfmkit.errors.OutputError
-        If it is absolute, leads upwards, holds control characters or backslashes, or is
-        one of the names that the folder keeps for itself.
+    Raises OutputError if it is absolute, leads upwards, holds control characters or backslashes, or is one of the names
+    that the folder keeps for itself.
     """
     if problem := _problem(name):
         raise OutputError(f"{name!a} is not a name for a file in the output folder: {problem}")

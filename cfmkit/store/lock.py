@@ -84,12 +84,8 @@ class FolderLock:
     def acquire(self) -> None:
         """Lock the folder.
 
-        Raises
-        ------
-        cfmkit.errors.FolderInUse
-            If a live run has it, at once.
-        OSError
-            If the lock file cannot be made; FileNotFoundError if the folder has gone.
+        Raises FolderInUse if a live run has it, at once; OSError if the lock file cannot be made; FileNotFoundError if
+        the folder has gone.
         """
         os.stat(self._folder)
         if locks_wanted():

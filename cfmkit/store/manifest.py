@@ -50,22 +50,14 @@ class Manifest:
 
     @classmethod
     def of_run(
-        cls, info: Mapping[str, Any], files: Mapping[str, FileRecord], started: datetime, duration: timedelta
+        cls,
+        # what the run says about itself (arguments, seed, hash of the spec, status, exit code); JSON values
+        info: Mapping[str, Any],
+        files: Mapping[str, FileRecord],  # what it wrote
+        started: datetime,  # in UTC
+        duration: timedelta,  # how long it took
     ) -> Manifest:
-        """Return the manifest of a run that is about to be committed.
-
-        Parameters
-        ----------
-        info : mapping
-            What the run says about itself (arguments, seed, hash of the spec, status,
-            exit code); JSON values.
-        files : mapping of str to FileRecord
-            What it wrote.
-        started : datetime
-            In UTC.
-        duration : timedelta
-            How long it took.
-        """
+        """Return the manifest of a run that is about to be committed."""
         if taken := sorted(set(info) & set(_OWN_KEYS)):
             raise CfmError(f"the manifest itself says what {', '.join(taken)} is")
         data = {
@@ -91,10 +83,7 @@ class Manifest:
     def read(cls, folder: Path) -> Manifest | None:
         """Return the manifest in a folder, or None if there is none.
 
-        Raises
-        ------
-        cfmkit.errors.OutputError
-            If a ``manifest.json`` is there that cfmkit did not write.
+        Raises OutputError if a ``manifest.json`` is there that cfmkit did not write.
         """
         path = folder / MANIFEST_NAME
         mode = mode_of(path)

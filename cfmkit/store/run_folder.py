@@ -115,30 +115,21 @@ class RunFolder:
     def check(self, *names: str) -> None:
         """Raise now what `write` would raise later: call it before a long computation.
 
-        Raises
-        ------
-        cfmkit.errors.OutputError
-            If a name is not allowed, or something that is not ours is in its place.
+        Raises OutputError if a name is not allowed, or something that is not ours is in its place.
         """
         for name in names:
             ours = self.previous is not None and name in self.previous.files
             with reporting(self.path / checked_name(name), "look at"):
                 refuse_in_the_way(self.path, name, ours=ours)
 
-    def write(self, name: str, data: Data) -> FileRecord:
+    def write(
+        self,
+        name: str,  # path below the folder with forward slashes, e.g. ``figures/loop.png``
+        data: Data,  # the content, whole or in pieces
+    ) -> FileRecord:
         """Take a file into the set that `commit` will put in place.
 
-        Parameters
-        ----------
-        name : str
-            Path below the folder with forward slashes, e.g. ``figures/loop.png``.
-        data : bytes or iterable of bytes
-            The content, whole or in pieces.
-
-        Raises
-        ------
-        cfmkit.errors.OutputError
-            If the name is refused or the data cannot be written.
+        Raises OutputError if the name is refused or the data cannot be written.
         """
         self._require_open()
         self.check(name)
@@ -156,19 +147,14 @@ class RunFolder:
         self._require_open()
         return self.path / JOURNAL_NAME
 
-    def commit(self, info: Mapping[str, Any]) -> Manifest:
+    def commit(
+        self,
+        # what the manifest is to say about the run: arguments, seed, hash of the spec, status, exit code
+        info: Mapping[str, Any],
+    ) -> Manifest:
         """Put the files and a manifest in place of those of the run before, all or none; once.
 
-        Parameters
-        ----------
-        info : mapping
-            What the manifest is to say about the run: arguments, seed, hash of the
-            spec, status, exit code.
-
-        Raises
-        ------
-        cfmkit.errors.OutputError
-            If anything fails; the files of the run before are still in place.
+        Raises OutputError if anything fails; the files of the run before are still in place.
         """
         self._require_open()
         self._owner = 0

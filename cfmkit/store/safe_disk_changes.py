@@ -74,23 +74,16 @@ def reason(error: OSError) -> str:
     return _ERROR_REASONS.get(error.errno or 0) or reason_of(error)
 
 
-def atomic_write(path: str | os.PathLike[str], data: Data) -> FileRecord:
+def atomic_write(
+    path: str | os.PathLike[str],  # the file; its folder must exist
+    data: Data,  # the content, whole or in pieces
+) -> FileRecord:
     """Write a file so that its path holds, at any moment, the old content or the new.
 
     The data goes to a hidden temporary file in the same folder, reaches the disk,
     and takes the name. A link is followed: its target is replaced.
 
-    Parameters
-    ----------
-    path : path-like
-        The file; its folder must exist.
-    data : bytes or iterable of bytes
-        The content, whole or in pieces.
-
-    Raises
-    ------
-    cfmkit.errors.OutputError
-        If anything fails; the old file is still there and the temporary file is not.
+    Raises OutputError if anything fails; the old file is still there and the temporary file is not.
     """
     if "\0" in os.fspath(path):
         raise OutputError(f"cannot write {quote_path(path)}: a path holds no NUL character")

@@ -72,11 +72,8 @@ def plan_for(root: Path, new: dict[str, str], removed: Iterable[str]) -> CommitP
 def execute(root: Path, plan: CommitPlan) -> None:
     """Carry out a plan whose new files are staged.
 
-    Raises
-    ------
-    OSError or cfmkit.errors.OutputError
-        If any step fails. The old files are back in place, unless the disk refused
-        that too: then the message says so, and the next run puts it right.
+    Raises OSError or OutputError if any step fails. The old files are back in place, unless the disk refused that too:
+    then the message says so, and the next run puts it right.
     """
     try:
         _keep_old(root, plan)
@@ -96,10 +93,7 @@ def execute(root: Path, plan: CommitPlan) -> None:
 def recover(root: Path) -> None:
     """Finish or undo what a run that died left behind, and clear its working folder.
 
-    Raises
-    ------
-    cfmkit.errors.OutputError
-        If that is not possible now; nothing is lost, and the next run tries again.
+    Raises OutputError if that is not possible now; nothing is lost, and the next run tries again.
     """
     run = root / TRANSACTION_FOLDER
     if (mode := mode_of(run)) is None:

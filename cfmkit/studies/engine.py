@@ -137,8 +137,8 @@ class Monitor(Protocol):
         """Return whether to finish what runs and end."""
 
 
-class Silent:
-    """A monitor that nobody looks at."""
+class NullMonitor:
+    """A monitor that does nothing."""
 
     def total(self, points: int) -> None:
         """Ignore how many there are."""
@@ -294,7 +294,7 @@ def run(
     study = work.study
     if study.design and family(study.spec.family).design is None:
         raise UsageError(f"{family(study.spec.family).phrase} cannot be designed, only analysed")
-    records, watch = Records(work, journal if journal is not None else Memory()), monitor or Silent()
+    records, watch = Records(work, journal if journal is not None else Memory()), monitor or NullMonitor()
     watch.total(len(work.plan))
     queue = _neighbours(_new(records, work.jobs(), watch), work.together)
     while True:
@@ -363,4 +363,4 @@ def compact(journal: Journal, pieces: Sequence[Records]) -> None:
         journal.keep_only(key for piece in pieces for key in piece.noted_keys())
 
 
-__all__ = ["Job", "Monitor", "Records", "Silent", "Work", "compact", "run"]
+__all__ = ["Job", "Monitor", "NullMonitor", "Records", "Work", "compact", "run"]

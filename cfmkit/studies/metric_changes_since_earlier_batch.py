@@ -113,8 +113,8 @@ def changes(
 
 def _outcome_text(status: str, code: int) -> str:
     """Return the outcome of a specification in words: a curve may be complete and miss a requirement."""
-    missed = code == ExitCode.REQUIREMENT_MISSED
-    return f"{status}, requirement missed" if missed and status == Status.COMPLETE.key else status
+    missed = code == ExitCode.REQUIREMENT_MISSED and status == Status.COMPLETE.key
+    return "requirement missed" if missed else status
 
 
 def list_gone(known: Known, entries: Sequence[Entry]) -> tuple[str, ...]:

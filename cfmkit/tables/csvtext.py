@@ -83,22 +83,15 @@ def _format_cell(cell: Cell) -> str:
     return cell
 
 
-def read_csv(source: str | bytes | Path) -> Table:
+def read_csv(
+    source: str | bytes | Path,  # the text itself, its bytes, or the file that holds it
+) -> Table:
     """Return the table in a CSV file that cfmkit wrote.
 
     Strict: measured data of other origin is read by `cfmkit.experiment`.
 
-    Parameters
-    ----------
-    source : str, bytes or Path
-        The text itself, its bytes, or the file that holds it.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        With the line of the first thing that cfmkit would not have written.
-    cfmkit.errors.UsageError
-        If the file cannot be read.
+    Raises DataError with the line of the first thing that cfmkit would not have written; UsageError if the file cannot
+    be read.
     """
     name = str(source) if isinstance(source, Path) else "CSV"
     rows = _parse_rows(_decode_source(source, name), name)

@@ -9,10 +9,7 @@ from typing import Any
 def json_bytes(data: Any) -> bytes:
     """Return JSON with two spaces, in the order given, UTF-8, a line feed at the end.
 
-    Raises
-    ------
-    ValueError
-        If there is a NaN or an infinity inside: no reader of JSON takes them.
+    Raises ValueError if there is a NaN or an infinity inside: no reader of JSON takes them.
 
     Examples
     --------

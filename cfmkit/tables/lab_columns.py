@@ -76,10 +76,7 @@ class ColumnInfo:
     def with_unit(self, unit: str, source: str, file: str, place: str = "") -> ColumnInfo:
         """Return the column with a unit that `source` states for it.
 
-        Raises
-        ------
-        cfmkit.errors.DataError
-            If another source stated another unit.
+        Raises DataError if another source stated another unit.
         """
         if self.dimension is None:
             return replace(self, unit=unit, dimension=dimension_of(unit), source=source)
@@ -98,10 +95,7 @@ HEADER_SOURCE, UNIT_LINE, CELLS_SOURCE = "the header", "the line of units", "the
 def read_units(text: str | None) -> dict[str, str]:
     """Return what ``--units`` says: ``"s=mm,F=N"`` by column.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is malformed or names a unit that there is not.
+    Raises UsageError if it is malformed or names a unit that there is not.
     """
     found: dict[str, str] = {}
     for part in (text or "").split(","):
@@ -120,25 +114,16 @@ def read_units(text: str | None) -> dict[str, str]:
 
 
 def describe(
-    names: Sequence[str], unit_row: Sequence[str], cells: Mapping[int, str], units: Mapping[str, str], file: str
+    # names, unit_row: cells of the lines with the names and the units; empty texts where there is none
+    names: Sequence[str],
+    unit_row: Sequence[str],
+    cells: Mapping[int, str],  # unit that stands in the cells of a column
+    units: Mapping[str, str],  # what ``--units`` says, by name or by number from 1
+    file: str,  # for messages
 ) -> list[ColumnInfo]:
     """Return the columns of a file with what header, cells and ``--units`` say of them.
 
-    Parameters
-    ----------
-    names, unit_row : sequence of str
-        Cells of the lines with the names and the units; empty texts where there is none.
-    cells : mapping of int to str
-        Unit that stands in the cells of a column.
-    units : mapping of str to str
-        What ``--units`` says, by name or by number from 1.
-    file : str
-        For messages.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If two of them contradict each other, or ``--units`` names a column that is not there.
+    Raises DataError if two of them contradict each other, or ``--units`` names a column that is not there.
     """
     columns = [_describe_column(index, *pair, file) for index, pair in enumerate(zip(names, unit_row, strict=True))]
     for index, unit in cells.items():
@@ -167,10 +152,7 @@ def _index(key: str, columns: Sequence[ColumnInfo], file: str) -> int:
 def column_named(key: str, columns: Sequence[ColumnInfo], file: str) -> ColumnInfo:
     """Return the column that an option means, by name or by number from 1.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If there is none, or there are several.
+    Raises DataError if there is none, or there are several.
     """
     return columns[_index(key, columns, file)]
 
@@ -283,10 +265,8 @@ def dimension_of(unit: str) -> str | None:
 def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name: str) -> dict[str, ColumnInfo]:
     """Return the columns that are used, by role.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If there is no pair of displacement and force or angle and torque, or several; the message has the choices.
+    Raises DataError if there is no pair of displacement and force or angle and torque, or several; the message has the
+    choices.
     """
     pairs = (("length", "force"), ("angle", "torque"))
     there = {item.dimension for item in numeric}

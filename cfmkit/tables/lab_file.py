@@ -170,10 +170,7 @@ class LabTable:
     def numbers(self, column: ColumnInfo) -> FloatArray:
         """Return the numbers of a column in SI.
 
-        Raises
-        ------
-        cfmkit.errors.DataError
-            Naming the first cell that is no number, or has another unit than the column.
+        Raises DataError naming the first cell that is no number, or has another unit than the column.
         """
         cells = [row[column.index] for row in self.cells]
         plain = None if column.unit_column is not None else self._plain_numbers(cells)
@@ -239,10 +236,7 @@ def in_si(values: FloatArray, dimension: str, unit: str) -> FloatArray:
 def decode_file(data: bytes, name: str) -> tuple[str, str]:
     """Return the text of a file and the name of its encoding.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If it is not a text.
+    Raises DataError if it is not a text.
     """
     encoding = next((reported for mark, reported in _BYTE_ORDER_MARKS if data.startswith(mark)), "")
     if not encoding and b"\0" in data[:4096]:
@@ -264,22 +258,14 @@ def lines_of(text: str) -> list[str]:
     return (text if text.isascii() else _MINUS_PATTERN.sub("-", text)).split("\n")
 
 
-def tables_in(lines: list[str], name: str, units: Mapping[str, str] | None = None) -> list[LabTable]:
+def tables_in(
+    lines: list[str],  # of the file
+    name: str,  # for messages
+    units: Mapping[str, str] | None = None,  # what ``--units`` says, by name or by number from 1
+) -> list[LabTable]:
     """Return the tables of a file; with one that is long enough, shorter runs of numbers above it are none.
 
-    Parameters
-    ----------
-    lines : list of str
-        Of the file.
-    name : str
-        For messages.
-    units : mapping of str to str, optional
-        What ``--units`` says, by name or by number from 1.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If there is none, or what a line means is open.
+    Raises DataError if there is none, or what a line means is open.
     """
     filled = [index for index, line in enumerate(lines) if line.strip(EMPTY_CHARACTERS)]
     if not filled:
@@ -452,10 +438,7 @@ def _refuse_groups(sample: list[str], name: str) -> None:
 def refuse_group(cell: str, name: str) -> None:
     """Raise if a cell is a number with a thousands separator that leaves no doubt.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        Naming it.
+    Raises DataError naming it.
     """
     match = _GROUPED_PATTERN.fullmatch(cell)
     if match and (match[1] not in ".," or sum(map(cell.count, ".,")) > 1):

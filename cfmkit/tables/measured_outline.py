@@ -28,19 +28,14 @@ MIN_SIDE_POINTS = 20
 SIDE_WORDS = {"right": "right", "r": "right", "rechts": "right", "left": "left", "l": "left", "links": "left"}
 
 
-def read_sides(path: Path) -> tuple[FloatArray, FloatArray]:
+def read_sides(
+    # columns ``x [mm]`` and ``y [mm]``, in any unit of length; a column ``side`` with left and right, without which the
+    # sign of x tells the sides
+    path: Path,
+) -> tuple[FloatArray, FloatArray]:
     """Return the points of the right and of the left side of an outline, each in the order of y [m].
 
-    Parameters
-    ----------
-    path : Path
-        Columns ``x [mm]`` and ``y [mm]``, in any unit of length; a column ``side`` with left and
-        right, without which the sign of x tells the sides.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If there are no points, no units, or too few on a side.
+    Raises DataError if there are no points, no units, or too few on a side.
     """
     name = path.name
     points, table = _points(path)
@@ -55,18 +50,12 @@ def read_sides(path: Path) -> tuple[FloatArray, FloatArray]:
     return right, left
 
 
-def read_profile(path: Path) -> tuple[FloatArray, FloatArray]:
+def read_profile(
+    path: Path,  # columns ``x [mm]`` and ``y [mm]``, in any unit of length
+) -> tuple[FloatArray, FloatArray]:
     """Return a profile, heights over places that increase [m].
 
-    Parameters
-    ----------
-    path : Path
-        Columns ``x [mm]`` and ``y [mm]``, in any unit of length.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If there are no units, fewer than two points, or places that do not increase.
+    Raises DataError if there are no units, fewer than two points, or places that do not increase.
     """
     points, table = _points(path)
     back = np.flatnonzero(np.diff(points[:, 0]) <= 0)

@@ -8,20 +8,13 @@ from typing import Any
 from cfmkit.errors import UsageError
 
 
-def library(name: str, purpose: str) -> Any:
+def library(
+    name: str,  # what it is imported as
+    purpose: str,  # what needs it, for the message: ``to_pandas``
+) -> Any:
     """Return an optional library.
 
-    Parameters
-    ----------
-    name : str
-        What it is imported as.
-    purpose : str
-        What needs it, for the message: ``to_pandas``.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        Where it is not installed, with the command that installs it.
+    Raises UsageError where it is not installed, with the command that installs it.
     """
     try:
         return import_module(name)

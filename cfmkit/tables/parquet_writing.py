@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 def require_pyarrow() -> None:
     """Refuse where pyarrow is not there.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        With the command that installs it.
+    Raises UsageError with the command that installs it.
     """
     library("pyarrow", "--table parquet")
 
@@ -28,10 +25,7 @@ def require_pyarrow() -> None:
 def parquet(table: Table) -> bytes:
     """Return a table as Parquet, its columns headed as in the CSV, an empty cell as null.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        Without pyarrow.
+    Raises UsageError without pyarrow.
     """
     require_pyarrow()
     import pyarrow

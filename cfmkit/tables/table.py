@@ -166,17 +166,14 @@ def _cell(value: Any) -> Cell:
     raise CfmError(f"a table holds numbers, texts and None, not {type(value).__name__}")
 
 
-def curve_table(curves: Sequence[Curve]) -> Table:
+def curve_table(
+    curves: Sequence[Curve],  # the nominal one first
+) -> Table:
     """Return the curves of one run as one tidy table in border units, stacked in their order.
 
     The values that tell the curves apart lead, then come ``branch``, displacement
     or angle, force or torque, ``stable``, and the extras. A column that a curve
     does not have is empty in its rows.
-
-    Parameters
-    ----------
-    curves : sequence of Curve
-        The nominal one first.
     """
     labels: list[Part] = [(_label_columns(curve), len(curve)) for curve in curves]
     columns: list[Part] = [(dict(curve.columns()), len(curve)) for curve in curves]
@@ -194,18 +191,12 @@ def text_column(name: str, values: Iterable[str | None]) -> TableColumn:
     return TableColumn(name, tuple(None if text is None else visible(text) for text in values))
 
 
-def border_column(name: str, values: Any, dimension: str) -> TableColumn:
-    """Return SI values as a column in the border unit of their dimension.
-
-    Parameters
-    ----------
-    name : str
-        Name of the column, without a unit.
-    values : (n,) array
-        SI values, or texts if `dimension` is ``"text"``.
-    dimension : str
-        A dimension of `cfmkit.specs.units`, or ``"text"``.
-    """
+def border_column(
+    name: str,  # name of the column, without a unit
+    values: Any,  # (n,): SI values, or texts if `dimension` is ``"text"``
+    dimension: str,  # a dimension of `cfmkit.specs.units`, or ``"text"``
+) -> TableColumn:
+    """Return SI values as a column in the border unit of their dimension."""
     if dimension == "text":
         return TableColumn(name, values)
     from cfmkit.specs.units import border_unit
@@ -213,15 +204,11 @@ def border_column(name: str, values: Any, dimension: str) -> TableColumn:
     return TableColumn(name, border_values(values, dimension), border_unit(dimension))
 
 
-def border_values(values: ArrayLike, dimension: str) -> FloatArray:
+def border_values(
+    values: ArrayLike,  # SI values
+    dimension: str,  # a dimension of `cfmkit.specs.units`
+) -> FloatArray:
     """Return SI values in the border unit of their dimension, as short decimals where they are ones.
-
-    Parameters
-    ----------
-    values : array_like
-        SI values.
-    dimension : str
-        A dimension of `cfmkit.specs.units`.
 
     Examples
     --------

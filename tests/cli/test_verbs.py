@@ -242,6 +242,9 @@ def test_show_materials_gives_every_property_with_its_source(cli):
     assert pom["source"]
     page = cli("show", "materials").out
     assert "2.5 ... 3.2" in page
+    assumed = {item["name"] for item in document["materials"] if item["poisson_is_assumed"]}
+    assert assumed == {"petg", "pa12-sls", "tpu-95a", "pom-lan-2010"}
+    assert all("Poisson ratio" in item["source"] for item in document["materials"])
     assert " yield_strength" in page
 
 
@@ -392,6 +395,23 @@ def test_typer_completes_in_the_shell(cli, shell):
     assert {"--install-completion", "--show-completion"} <= set(cli("--help").out.split())
     script = cli(**{"_CFMKIT_COMPLETE": f"source_{shell}"})
     assert (script.code, "_CFMKIT_COMPLETE" in script.out) == (0, True)
+
+
+def test_a_value_of_the_spec_that_is_given_as_an_option_is_answered_with_set(cli, cam):
+    done = cli("design", cam, "--force", "60 N")
+    assert done.code == 2
+    assert (
+        "No such option: --force; values of the spec are changed with --set, e.g. --set design.force='60 N'" in done.err
+    )
+
+
+def test_a_misspelt_part_of_a_name_is_answered_with_that_part(cli):
+    assert "did you mean 'safety'?" in cli("show", "safty").err
+
+
+def test_an_example_of_a_folder_is_found_by_its_own_name(cli):
+    assert cli("examples", "cam_tolerance", "--no-schema").code == 0
+    assert (cli.folder / "cam_tolerance.yaml").is_file()
 
 
 def test_a_shell_without_completion_is_refused(cli, monkeypatch):

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from functional_paths import beam_stress
 from vcfm_support import leaf, side
 
+import cfmkit.elastica as el
 from cfmkit.families.vcfm.leaves import positive_stiffness_springs, truss
 from cfmkit.families.vcfm.leaves import v_beam as vbeam
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
@@ -151,6 +153,20 @@ def test_straight_beam_stiffens_as_it_bends():
         + np.pi**4 / 8 * strip.axial * travel**3 / 50.0**3
     )
     assert usual[-1] / exact[-1] == pytest.approx(1.31, abs=0.01)
+
+
+def test_a_straight_beam_has_the_stress_of_a_beam_in_large_deflection_between_clamps():
+    """Bending and tension of one leaf, its far end guided across: the same units in both, whatever they are."""
+    strip, travel = side(1.0, degrees=0.0), np.array([0.5, 2.0, 5.0])
+    nodes = {
+        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "middle": el.Node(strip.length, 0, el.slider_support(np.pi / 2)),
+    }
+    section = el.Section(strip.youngs_modulus, strip.width, strip.thickness)
+    half = el.Network(nodes, {"leaf": el.Beam("wall", "middle", section)})
+    path = el.trace(half, el.Displacement("middle", np.pi / 2, travel))
+    exact = beam_stress(path, "leaf")[0][path.at_requested]
+    assert positive_stiffness_springs.StraightSpring(strip).stress(travel) == pytest.approx(exact, rel=0.02)
 
 
 def test_cosine_arch_against_finite_elements():

@@ -24,7 +24,7 @@ def solved():
     return result, moving_of(family(result.spec.family), result)
 
 
-def test_a_gif_goes_there_and_back_and_repeats_byte_by_byte(solved):
+def test_a_gif_goes_loading_and_unloading_and_repeats_byte_by_byte(solved):
     content = animation(*solved, "gif")
     image = Image.open(io.BytesIO(content))
     assert image.n_frames == 2 * N_FILM_POSES - 2

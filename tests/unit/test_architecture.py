@@ -130,7 +130,9 @@ ALLOWED = {
     "pint": lambda path: room_of(path) == "specs.units",
     "yaml": lambda path: room_of(path) == "specs.yamlio",
     "ezdxf": lambda path: unit_of(path) == "export",
-    "shapely": lambda path: unit_of(path) in ("export", "solid") or path.name == "strips_and_gaps.py",
+    "shapely": lambda path: (
+        unit_of(path) in ("export", "solid") or path.name in ("strips_and_gaps.py", "html_of_study.py")
+    ),
     "pandas": lambda path: path.name in ("results.py", "study_result.py"),
 }
 

@@ -264,7 +264,7 @@ def test_the_hook_leaves_alone_what_other_tools_read(name, left_out):
 
 def test_a_complete_curve_that_misses_a_requirement_now_is_a_change_in_words(tmp_path):
     (found,) = changes({"a": Earlier("complete", 0, {})}, [one(code=ExitCode.REQUIREMENT_MISSED)], str(tmp_path))
-    assert found.sentence == "status: complete -> complete, requirement missed"
+    assert found.sentence == "status: complete -> requirement missed"
 
 
 def test_accepted_results_are_the_reference_that_the_next_batch_is_compared_with(folder):

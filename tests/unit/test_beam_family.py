@@ -421,6 +421,7 @@ def test_a_tip_that_leaves_the_surface_is_not_out_of_reach():
     assert falls.curves[1].extra["contact_force"].values.min() >= 0
     far = solved("beam_end_effector", "analysis.surface.preload=3 mm")
     assert {"surface_out_of_reach"} == {"tip_lifts_off", "surface_out_of_reach"} & warned(far).keys()
+    assert warned(far)["surface_out_of_reach"].endswith("the mechanism is solved for 0 mm to 5.5 mm")
 
 
 def test_a_surface_that_rises_too_far_is_partial():

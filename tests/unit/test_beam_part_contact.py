@@ -46,7 +46,7 @@ def result():
 def test_a_pad_on_a_beam_has_columns_of_its_force_and_place_and_a_row_where_it_begins(result):
     force, place, event = (result.curve.extra[name].values for name in ("tip_lower_force", "tip_lower_at", "event"))
     (row,) = np.flatnonzero(event != "")
-    assert event[row] == "tip lower begins"
+    assert event[row] == "tip_lower begins"
     assert result.curve.displacement[row] == pytest.approx(8.75e-3, rel=1e-12)
     assert (force[: row + 1] == 0).all()
     assert np.isnan(place[: row + 1]).all()
@@ -124,6 +124,48 @@ def test_two_beams_have_one_force_and_a_place_on_each():
     assert said.endswith("between 'end' and 'upper'")
     assert "beams_touch" not in {warning.name for warning in pair.warnings}
     assert "pad-3-16-0" in {artist.get_gid() for artist in figures(pair)["shapes"]().axes[0].get_children()}
+
+
+@pytest.mark.parametrize(
+    ("support", "sweep", "rows", "place"),
+    [
+        ("clamped", 0, ["upper_lower wall begins"], 9.5e-3),
+        ("pinned", 0, ["upper_lower wall begins"], 9.5e-3),
+        ("clamped", 30, ["upper_lower begins", "upper_lower moves"], None),
+    ],
+)
+def test_an_end_that_is_held_is_a_round_pad_on_which_the_other_beam_bends(support, sweep, rows, place):
+    """It is a disc of half the thickness; the side of the held leaf may touch before it."""
+    text = HELD.replace("held", support).replace("30 deg", f"{sweep} deg")
+    result = cfmkit.analyze(cfmkit.loads(text))
+    assert result.status is Status.COMPLETE
+    events = result.curve.extra["event"].values
+    assert [event for event in events if event] == rows
+    if place is not None:
+        assert result.values["first_contact"].value == pytest.approx(place, rel=1e-12)
+    contacts = f"contacts: [{PAIR_OF_HELD}]"
+    disc = "obstacles: {disc: {kind: disc, centre: [20 mm, 10 mm], radius: 0.25 mm, beams: [upper]}}"
+    alone = cfmkit.analyze(cfmkit.loads(text.replace(contacts, disc)))
+    assert result.curve.force[-4:] == pytest.approx(alone.curve.force[-4:], rel=1e-9)
+
+
+PAIR_OF_HELD = "{between: [upper, lower]}"
+HELD = f"""cfmkit: 1
+family: beam
+mechanism:
+  material: {{name: steel-1.4310}}
+  width: 10 mm
+  thickness: 0.5 mm
+  nodes:
+    root: {{at: [0 mm, 20 mm], support: guided, direction: 90 deg}}
+    tip: {{at: [80 mm, 20 mm]}}
+    wall: {{at: [20 mm, 10 mm], support: held}}
+    end: {{at: [90 mm, 8 mm], support: guided, direction: 0 deg}}
+  beams: {{upper: {{start: root, end: tip, shape: {{kind: arc, sweep: 30 deg}}}}, lower: {{start: wall, end: end}}}}
+  contacts: [{PAIR_OF_HELD}]
+  drive: {{kind: displacement, node: root, direction: -90 deg}}
+analysis: {{travel: 24 mm, points: 13}}
+"""
 
 
 BULGE = (

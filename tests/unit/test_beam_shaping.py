@@ -258,7 +258,7 @@ def test_lengths_and_chords_are_those_of_the_fitted_beams() -> None:
     variables = Variables(task, 2)
     x = table_3(task)
     network = variables.build(x)
-    for name, one in lengths(variables, x).items():
+    for name, one in lengths(variables, x, variables.build(x)).items():
         beam = network.beams[name]
         a, b = network.nodes[beam.start], network.nodes[beam.end]
         fitted = fit(beam, (b.x - a.x, b.y - a.y))

@@ -14,6 +14,7 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families.cam.figures import figures
 from cfmkit.families.cam.scalar_results import SCALAR_QUANTITIES
+from cfmkit.families.cam.statics import Losses, leverage
 from cfmkit.families.rows import values_of_one
 
 PINS = {"diameter": "6 mm", "friction": 0.15}
@@ -80,6 +81,19 @@ def test_forces_are_those_of_rollers_braces_and_slider_in_balance(mounting, way)
         )
         got = forces.slider[index], forces.contact[index], forces.least_contact[index]
         np.testing.assert_allclose(got, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("rubs", [{}, {"bearing": 1e-3}, {"pin": 1e-3}])
+@pytest.mark.parametrize("slope", [0.3, 1.2])
+def test_friction_takes_lever_on_the_way_up_and_gives_as_much_on_the_way_down(rubs, slope):
+    x = np.linspace(0.02, 0.06, 9)
+    losses = Losses(rolling=0.05, roller_radius=0.01, **rubs)
+    up, free, down = (
+        leverage(x, np.full(9, slope), 0.1, parts, friction)
+        for parts, friction in ((losses, 0.05), (Losses(roller_radius=0.01), 0.0), (losses, -0.05))
+    )
+    assert (up < free).all()
+    assert 0.5 * (up + down) == pytest.approx(free, rel=1e-3)  # but for products of two coefficients
 
 
 @pytest.mark.parametrize("mounting", [None, "down", "30 deg"])

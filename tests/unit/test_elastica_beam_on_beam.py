@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from contact_paths import at_drive, check_complementarity, place_of
+from contact_paths import at_drive, check_complementarity, check_work, place_of
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -28,6 +28,7 @@ from cfmkit.elastica import (
     slider_support,
     trace,
 )
+from cfmkit.elastica.contact.sliding import SlidingEquations
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam, NodeOnObstacle, line
@@ -174,7 +175,7 @@ def test_the_tangent_of_two_sides_that_touch_is_the_derivative_of_the_residual()
         BULGE, Loading(TIP_LOAD, np.array([1.0])), flanks=[FlankPlace(UPPER, 0.5), FlankPlace(LOWER, 0.4)]
     )
     mesh = replace(mesh, contacts=tuple(contact._replace(closed=True) for contact in mesh.contacts))
-    equation = equations(mesh)
+    equation = SlidingEquations.from_mesh(mesh, False, equations)
     free = 0.02 * np.random.default_rng(2).normal(size=equation.n)
     for contact, place in zip(mesh.contacts, (0.5, 0.4), strict=True):
         free[equation.slots[[contact.slide, contact.unknown, contact.flag]]] = place, 0.7, 0
@@ -238,3 +239,15 @@ def test_between_points_two_sides_touch_as_at_them():
     known = trace(BULGE, replace(drive, points=np.array([0.1, 0.25])), EXACT)
     assert between.contact_force(UPPER)[0] == pytest.approx(known.contact_force(UPPER)[-1], rel=1e-9)
     assert known.contact_force(UPPER)[-1] > 0.1
+
+
+def test_the_work_of_the_drive_is_the_energy_of_two_leaves_that_shear():
+    """So the tangent of both where they touch is the right one."""
+    depth = 1 / 12
+    section = Section(12 / depth**3, 1.0, depth, axial=True, shear=True)
+    beams = {name: replace(beam, section=section) for name, beam in BULGE.beams.items()}
+    nodes = BULGE.nodes | {
+        "root": Node(0, 0.1 + depth, CLAMPED_SUPPORT),
+        "tip": replace(BULGE.nodes["tip"], y=BULGE.nodes["tip"].y + depth),
+    }
+    check_work(replace(BULGE, nodes=nodes, beams=beams), "tip", 0.1, 0.3)

@@ -101,7 +101,7 @@ def test_a_rotational_stop_has_the_moment_of_the_closed_form(stiffness, moment, 
     assert tip_of(path) == pytest.approx(tip, rel=1e-12)
 
 
-def test_a_stop_with_two_sides_is_met_there_and_back():
+def test_a_stop_with_two_sides_is_met_loading_and_unloading():
     net = cantilever(
         Stop("up", "tip", 0.05, np.pi / 2), Stop("down", "tip", 0.08, DOWN), support=slider_support(np.pi / 2)
     )

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contact_layouts import among_discs
+from contact_paths import check_work
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -23,6 +24,7 @@ from cfmkit.elastica import (
     PointLoad,
     Section,
     Support,
+    Taper,
     arc,
     slider_support,
     trace,
@@ -281,3 +283,58 @@ def test_a_constant_load_may_close_a_contact_of_a_side_before_the_drive_moves():
     net = replace(leaf(side("pin", PINS["disc"])), loads=(PointLoad("tip", 0.0, -1.0),))
     path = trace(net, Loading((PointLoad("tip", 0.0, -1.0),), np.array([0.0, 2.0])), EXACT)
     assert path.contact_force(0)[[0, -1]] == pytest.approx([1.224370708397327, 5.552993116405933], rel=1e-9)
+
+
+def soft(slenderness, thickness=None):
+    """Return a section with EI = 1 that stretches and shears, of a leaf so many times as long as thick."""
+    depth = 1 / slenderness
+    return Section(12 / depth**3, 1.0, depth if thickness is None else thickness, axial=True, shear=thickness is None)
+
+
+def over_disc(slenderness, radius):
+    depth = 1 / slenderness
+    return leaf(side("pin", circle((0.5, -0.05 - radius - depth / 2), radius)), section=soft(slenderness))
+
+
+@pytest.mark.parametrize(
+    ("slenderness", "radius", "load", "known", "spread"),
+    [
+        (33, 0.2, 1.0, (1.185860383930162, 0.548488701863892, 0.979147598084910, -0.177196002373683),
+         (1.185860434267, -0.177195997271, 1e-7)),
+        (33, 0.02, 2.0, (3.477650859049060, 0.513253097657913, 0.955154153270219, -0.243840724901431),
+         (3.477650939269, -0.243840718027, 1e-7)),
+        (10, 0.02, 2.0, (3.377557632970865, 0.522620173756264, 0.955618763375700, -0.243432859307856),
+         (3.377575227244, -0.243431335213, 2e-5)),
+    ],
+)  # fmt: skip
+def test_a_leaf_that_shears_has_the_force_and_the_place_of_shooting(slenderness, radius, load, known, spread):
+    """`spread` is of shooting with the force spread over the length along which the leaf follows the disc."""
+    path = trace(over_disc(slenderness, radius), Loading(TIP_LOAD, np.array([0.5, load])), EXACT)
+    force, place, tip = path.contact_force(0)[-1], path.contact_places(0)[-1, 0], tip_at(path, -1)
+    assert (force, place, *tip) == pytest.approx(known, abs=1e-10)
+    assert (force, tip[1]) == pytest.approx(spread[:2], abs=spread[2])
+    check_complementarity(path)
+
+
+def falling(slenderness, flips=False):
+    """Return a leaf that shears, falls on a floor with its tip, and touches it with its side after that."""
+    floor, depth, angle = line((0, -0.5 / slenderness), 0.0), 1 / slenderness, -np.pi / 9
+    pads = NodeOnObstacle("floor", "tip", floor, depth / 2), side("floor", floor)
+    net = leaf(*pads, support=slider_support(np.pi / 2), at=(0.0, 0.4), angle=angle, section=soft(slenderness))
+    return replace(net, beams={"leaf": Beam("tip", "root", soft(slenderness))}) if flips else net
+
+
+STRETCHING = Taper(np.array([0, 0.4, 1.0]), np.array([0.065, 0.05, 0.03]))
+TAPERED = leaf(side("pin", circle((0.6, -0.275), 0.2)), section=soft(20, STRETCHING))
+
+
+@pytest.mark.parametrize(
+    ("net", "node", "begin", "end"),
+    [
+        (over_disc(10, 0.2), "tip", 0.15, 0.35), (falling(10), "root", 0.1, 0.28), (falling(10), "root", 0.29, 0.32),
+        (falling(33, flips=True), "root", 0.29, 0.32), (TAPERED, "tip", 0.15, 0.3),
+    ],
+)  # fmt: skip
+def test_the_work_of_the_drive_is_the_energy_of_a_leaf_that_shears_or_stretches(net, node, begin, end):
+    """Nothing works at the contact, wherever it slides: so the tangent there is the right one."""
+    check_work(net, node, begin, end)

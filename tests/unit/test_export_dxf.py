@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawing_files import write_dxf
 from scipy.spatial import cKDTree
 
 from cfmkit.errors import GeometryError
-from cfmkit.export import files, write_dxf
+from cfmkit.export import files
 from cfmkit.export.contours import Arc, Contour, Curve2D, Drawing, Line, Smooth, circle, polygon, reference_square
 
 BRACE, REST, CONSTANT, ROLLER = 0.2, 0.068, 0.015, 0.012
@@ -223,7 +224,7 @@ def test_names_that_no_file_should_have_are_refused(name):
 
 SCRIPT = """
 import hashlib, sys
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = [sys.argv[1], sys.argv[1] + '/../support']
 from test_export_dxf import plate
 from cfmkit.export import files
 for name, data in sorted(files(plate(), kerf=2e-4).items()):
@@ -267,10 +268,10 @@ def test_importing_the_exporter_imports_neither_ezdxf_nor_shapely():
 def test_a_machine_without_room_for_a_temporary_folder_gets_an_output_error(tmp_path):
     code = """
 import sys, tempfile
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = [sys.argv[1], sys.argv[1] + '/../support']
 from test_export_dxf import plate
+from drawing_files import write_dxf
 from cfmkit.errors import OutputError
-from cfmkit.export import write_dxf
 tempfile.tempdir = sys.argv[2]
 try:
     write_dxf(plate())

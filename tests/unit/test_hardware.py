@@ -1,5 +1,6 @@
 """Links, pins, guides and screws: formulas against hand calculations, sizes that bear, lists, and the assembly."""
 
+import itertools
 import math
 
 import numpy as np
@@ -10,6 +11,8 @@ from cfmkit.export.posed_part import PosedBody, rectangle, screw_positions, swep
 from cfmkit.families.cam.hardware import hardware as cam_hardware
 from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, guide_rod, link_width, required_safety, screw_for
 from cfmkit.families.slider_crank.springs.hardware import hardware as crank_hardware
+from cfmkit.plots.figure_options import form_of
+from cfmkit.plots.style import size_mm
 from cfmkit.stock.joint_strength import (
     SHEAR_SHARE,
     bearing_pressure,
@@ -113,6 +116,48 @@ def test_numbers_of_the_assembly_are_those_of_the_list():
         wanted = {f"item-{k}": str(k) for k, part in enumerate(found.parts, start=1) if part.body}
         assert shown == wanted
         assert len(table(result)) == len(found.parts)
+
+
+def test_holes_that_turn_on_pins_and_seat_bearings_have_a_fit():
+    rows = {
+        row["place"] + (row["name"] or ""): row
+        for row in table(cfmkit.analyze(cfmkit.load("configs/cam_friction.yaml")))
+    }
+    assert "between holes of 6 mm H8 (+0.018) and 8 mm H8 (+0.022)" in rows["roller to sliderbrace"]["data"]
+    assert "with a hole of 8 mm H8 (+0.022), presses" in rows["on the camroller"]["data"]
+
+
+def test_shafts_and_hook_bars_of_a_cam_bear_the_springs_beyond_the_braces():
+    """Half of the press acts at each brace, the springs of a side beyond it; half of them above a bar's hole."""
+    result = cfmkit.analyze(cfmkit.load("configs/studies/cam_bought_parts.yaml"))
+    mechanism = result.spec.mechanism
+    springs, stretch = mechanism.springs, result.state.elongation.max()
+    outer, side = springs.wound.coil + springs.wound.wire, 0.5 * springs.total * stretch
+    press = np.nanmax(result.curve.extra["contact_force"].values)
+    bending = 0.5 * press * 8e-3 + side * 0.5 * (8e-3 + outer)
+    rows = {row["place"]: row for row in table(result)}
+    assert 32.0 * bending / (math.pi * 8e-3**3) <= PIN_STRENGTH / 1.5
+    assert rows["shafts of the rollers"]["size"] == f"8 x {24 + 2e3 * outer:g} mm"
+    bar = rows["springs to the shafts"]
+    height, width, thick = (float(side) for side in bar["size"].removesuffix(" mm").split(" x "))
+    assert (bar["count"], height, thick) == (4, pytest.approx(2e3 * outer), 8.0)
+    section = 1e-9 * thick * (width**3 - 8.0**3) / (6.0 * width)
+    assert side * 0.125 * 2.0 * outer / section <= 235e6 / 1.5
+
+
+def test_in_one_column_the_parts_list_stands_below_an_assembly_as_wide_as_the_paper():
+    result = cfmkit.analyze(cfmkit.load("configs/cam.yaml"))
+    figure = form_of(width="84 mm").draw(cfmkit.figures(result)["assembly"])
+    picture, listed = (ax.get_position() for ax in figure.axes)
+    width, height = size_mm(figure)
+    assert width == pytest.approx(84.0)
+    assert picture.width == pytest.approx(1.0)
+    assert picture.y0 == pytest.approx(listed.y1)
+    assert (picture.height + listed.height) * height > height - 17.0  # heading and margins
+    figure.canvas.draw()
+    lines = [text.get_window_extent() for text in figure.axes[1].texts]
+    assert all(box.x0 >= 0.0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0.0 for box in lines)
+    assert all(upper.y0 >= lower.y0 for upper, lower in itertools.pairwise(lines))
 
 
 def test_the_box_of_a_cam_contains_a_guide_as_long_as_stated():

@@ -67,3 +67,15 @@ def test_classes_of_one_name_are_those_that_the_architecture_explains():
     named = sorted(re.findall(r"`(\w+)`", told))
     assert list(HOUSE["shared_classes"](texts)) == named
     assert told.startswith({6: "Six", 7: "Seven", 8: "Eight", 9: "Nine"}[len(named)])
+
+
+def test_the_architecture_states_the_lines_of_every_folder():
+    text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    rows = re.findall(r"^\|[^|]*\| (`[^|]*`) \| (\d+\.\d) \|", text, flags=re.MULTILINE)
+    for names, stated in rows:
+        paths = [ROOT / "cfmkit" / name for name in re.findall(r"`([^`]+)`", names)]
+        files = [file for path in paths for file in (path.rglob("*.py") if path.is_dir() else [path])]
+        lines = sum(len(file.read_text("utf-8").splitlines()) for file in files) / 1000
+        assert float(stated) == pytest.approx(lines, rel=0.15, abs=0.15), names
+    folders = {path.name for path in (ROOT / "cfmkit").iterdir() if path.is_dir() and path.name != "__pycache__"}
+    assert folders <= {name.strip("`/") for names, _ in rows for name in names.split(", ")}

@@ -33,7 +33,7 @@ def test_texts_of_everything_are_short(name):
     assert spec.name in repr(found)
 
 
-def test_a_curve_says_over_which_travel_it_goes_there_and_back(result):
+def test_a_curve_says_over_which_travel_it_goes_loading_and_unloading(result):
     assert "962 points, 0 ... 0.24 m, branches load, unload" in repr(result.curve)
 
 
@@ -241,3 +241,16 @@ def test_a_measurement_and_a_fit_show_their_values_and_warnings():
     fitted = repr(cfmkit.calibrate(CONFIGS / "cam.yaml", recording, fit=["mechanism.rolling_friction"]))
     assert "mechanism.rolling_friction = 0.00223" in fitted
     assert fitted.endswith("warnings: weakly_identified, lack_of_fit>")
+
+
+def test_a_metric_that_is_not_there_is_answered_with_the_nearest(result):
+    with pytest.raises(KeyError, match="there is no metric 'ripple'; did you mean 'force_ripple'"):
+        result.metrics["ripple"]
+    assert result.metrics.get("ripple") is None
+
+
+def test_python_is_told_of_arguments_and_not_of_options():
+    with pytest.raises(cfmkit.SpecError, match=r"^envelope is missing"):
+        cfmkit.suggest(force="20 N", travel="10 mm")
+    with pytest.raises(cfmkit.SpecError, match=r"^force: 20 has no unit"):
+        cfmkit.suggest(force="20", travel="10 mm", envelope=["80 mm", "60 mm"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from beam_support import CONFIGS
+from drawing_files import write_dxf, write_svg
 
 import cfmkit
 
@@ -54,9 +55,6 @@ def test_files_have_the_layers_and_solids_do_not_see_them(tmp_path):
 
     drawing = drawn("slider_crank_strip")
     path = tmp_path / "part.dxf"
-    from cfmkit.export.dxf import write_dxf
-    from cfmkit.export.svg import write_svg
-
     path.write_bytes(write_dxf(drawing))
     layers = {one.dxf.layer for one in ezdxf.readfile(path).modelspace()}
     assert {"cut", "held", "driven"} <= layers
@@ -96,8 +94,6 @@ def test_name_and_thickness_of_the_sheet_are_engraved_on_what_is_held(tmp_path, 
 def test_what_is_engraved_is_text_in_a_drawing_whatever_its_signs():
     from dataclasses import replace
     from xml.etree import ElementTree
-
-    from cfmkit.export.svg import write_svg
 
     drawing = drawn("slider_crank_strip")
     odd = replace(drawing, labels=tuple(replace(one, text="a<b & c") for one in drawing.labels))

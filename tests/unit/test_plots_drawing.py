@@ -45,7 +45,7 @@ def test_holes_are_given_from_the_lower_left_corner_of_the_plate():
     x0, _, x1, _ = drawing.extents
     assert found[0].x + found[1].x == pytest.approx(x1 - x0)  # symmetric
     assert found[0].y == pytest.approx(0.020)  # half of a tab of 40 mm
-    assert "6.6 mm (M6)   x 89.256 mm, y 20 mm" in texts(drawing_figure(drawing, "cam"))
+    assert "6.6 mm (M6)   89.256, 20 mm" in texts(drawing_figure(drawing, "cam"))
 
 
 def test_what_a_leaf_measures_is_what_its_drawing_says():

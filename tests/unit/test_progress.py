@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from cfmkit.cli import progress
+from cfmkit.cli import output, progress
+from cfmkit.cli.output import Terminal
 from cfmkit.cli.progress import StudyProgress
 
 
@@ -16,7 +17,7 @@ def told(monkeypatch):
     def run(events, total, reused=0):
         clock, lines = SimpleNamespace(now=0.0), []
         monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: clock.now))
-        monkeypatch.setattr(progress.streams, "complain", lines.append)
+        monkeypatch.setattr(progress.streams, "write_error", lines.append)
         monitor = StudyProgress(SimpleNamespace(json=False, quiet=False))
         monitor.total(total)
         if reused:
@@ -64,3 +65,16 @@ def test_points_that_get_slower_are_followed(told):
     events = [(0.1 * n, 1) for n in range(1, 1000)] + [(100.0 + 2.0 * n, 1) for n in range(100)]
     lines = told(events, 1100)
     assert lines[-1][1] == pytest.approx(298.0 - lines[-1][0], abs=5.0)
+
+
+def test_the_end_of_a_time_budget_is_the_end_of_the_work(monkeypatch):
+    clock, lines = SimpleNamespace(now=0.0), []
+    monkeypatch.setattr(output, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    monkeypatch.setattr(output.streams, "complain", lines.append)
+    monkeypatch.setattr(output.sys, "stderr", SimpleNamespace(isatty=lambda: False))
+    with Terminal().progress(180.0) as report:
+        clock.now = 90.0
+        report(0.13, "1 proposal")
+        clock.now = 300.0
+        report(0.2, "1 proposal")
+    assert lines == ["50 %, 90 s left: 1 proposal\n", "99 %, 3 s left: 1 proposal\n"]

@@ -28,7 +28,7 @@ from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
-from cfmkit.families.vcfm.part import leaf_thickness
+from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
 from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import spread
 from cfmkit.metrics import evaluate
@@ -535,6 +535,14 @@ def test_both_structures_can_be_written_for_cutting(kind, structure, loaded):
     assert len([contour for contour in cut if contour.hole]) == 2 + inside
     assert len(cut) == 4 + inside
     assert not [note for note in drawing.notes if "fillet" in note]
+
+
+@pytest.mark.parametrize("compression", [0.0, 1.0])
+def test_leaves_of_a_spring_are_drawn_from_the_edge_of_its_block(compression):
+    spec = table_i()
+    strips = [body.core[0] for body in _leaf_spring(spec, 0.0, compression * MM) if body.name == "spring"]
+    ends = [abs(0.5 * (strip[1] + strip[-2])[0]) for strip in strips]  # before them a piece lies within the block
+    assert ends == pytest.approx([0.5 * spec.mechanism.frame.block] * 4, rel=1e-9)
 
 
 @pytest.mark.parametrize("stem", ["ding2022", "cosine", "straight", "hybrid", "u_shape"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -94,14 +95,14 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
     The results of an earlier batch are reused if nothing has changed: the spec, the options, cfmkit, and the files
     that were written.
     """
-    from cfmkit.cli import run_study_in_folder
     from cfmkit.cli.progress import watching
+    from cfmkit.cli.run_study_in_folder import open_journal
     from cfmkit.documents.batch_document import document_of
     from cfmkit.documents.document import Note, Written
     from cfmkit.runs.batch import batch, list_unreached_options
     from cfmkit.studies.batch_sources_and_outcomes import message
 
-    start = run_study_in_folder.now()
+    start = time.perf_counter()
     with watching(terminal, "specs") as progress:
         found = batch(
             options.specs,
@@ -124,9 +125,9 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
             form=options.form,
             arguments=terminal.arguments,
             monitor=progress,
-            noting=run_study_in_folder.noting,
+            noting=open_journal,
         )
-    written = Written(found.folder, found.files, run_study_in_folder.now() - start)
+    written = Written(found.folder, found.files, time.perf_counter() - start)
     named = tuple(Note("written", file, whole=True) for file in (options.junit, options.summary) if file)
     if found.accepted:
         named = (*named, Note("accepted", f"{found.accepted} has these results now", whole=True))

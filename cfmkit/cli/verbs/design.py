@@ -43,16 +43,15 @@ def run(options: DesignOptions, terminal: Terminal) -> Document:
 
     budget = None if options.time_budget is None else seconds(options.time_budget)
     running = partial(long_run, options.jobs or cores(), options.fresh, budget=budget)
-    return execute(
-        Verb("design", "designed and analysed", run_design, running=running), options, terminal, options.report
-    )
+    verb = Verb("design", "designed and analysed", run_design, running=running)
+    return execute(verb, options, terminal, options.report, budget)
 
 
 def long_run(
     jobs: int, fresh: bool, folder: RunFolder, plain: Run, budget: float | None = None
 ) -> AbstractContextManager[Run]:
     """Return a run in several processes, for so long [s], that says on a signal whether the same command continues."""
-    from cfmkit.cli.run_study_in_folder import noting
+    from cfmkit.cli.run_study_in_folder import open_journal
     from cfmkit.runs import run
 
-    return run.long_run(jobs, fresh, folder, replace(plain, time_budget=budget), noting)
+    return run.long_run(jobs, fresh, folder, replace(plain, time_budget=budget), open_journal)

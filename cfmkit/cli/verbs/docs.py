@@ -54,10 +54,7 @@ def run(options: DocsOptions, terminal: Terminal) -> Document:
 def _search(word: str) -> Document:
     """Return the sections on a word.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is none.
+    Raises UsageError if there is none.
     """
     if not (sections := search(word) if word.strip() else []):
         raise UsageError(f"no section names {visible(word)!r}; `cfmkit docs` lists all pages")

@@ -80,14 +80,12 @@ def _verb(name: str, path: str) -> str:
     from cfmkit.families import family
     from cfmkit.runs.examples import example
 
-    if (kind := example(name).family) == "figure":
-        return kind
     spec = load(path)
     if "/" in name:
         stated = next((study for study in ("sweep", "sensitivity") if getattr(spec, study) is not None), None)
         if stated is not None:
             return stated
-    return "design" if family(kind).design and getattr(spec, "design", None) is not None else "analyze"
+    return "design" if family(example(name).family).design and getattr(spec, "design", None) is not None else "analyze"
 
 
 def _check_examples(name: str, options: ExamplesOptions, terminal: Terminal) -> Document:

@@ -46,14 +46,14 @@ class ExportOptions(OneSpec):
 
 def run(options: ExportOptions, terminal: Terminal) -> Document:
     """Write the parts of a spec as files to cut or print, finite-element decks, or a dimensioned drawing."""
-    from cfmkit.cli.run_spec_and_print_page import folder_of
+    from cfmkit.cli.output_folder import folder_of
     from cfmkit.documents.run_document import warning_of
     from cfmkit.runs.exported_files import export_files
     from cfmkit.runs.run import provenance
     from cfmkit.runs.specfile import bind, read_spec
     from cfmkit.store import RunFolder
 
-    out = folder_of(options, "export")
+    out = folder_of(options.out, options.spec, "export")
     spec = bind(read_spec(options.spec, options.changes))
     with RunFolder(out) as folder:
         files, drawing, failed = export_files(spec, options.kerf, options.tolerance, options.format)

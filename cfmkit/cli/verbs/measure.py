@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import FigureChoice, MeasurementOptions, NoLock, Quiet, argument, data_record, flag, option
@@ -63,11 +62,12 @@ class MeasureOptions(MeasurementOptions, FigureChoice):
 
 def run(options: MeasureOptions, terminal: Terminal) -> Document:
     """Measure a recorded force curve: branches, filter, metrics raw and filtered, hysteresis, repeatability."""
+    from cfmkit.cli.output_folder import folder_of
     from cfmkit.experiment.measurement_and_calibration_outputs import data_of, files
     from cfmkit.runs.measure_and_calibrate_api import MeasurementSettings, measure_each
     from cfmkit.store import RunFolder
 
-    out, form = _folder(options), options.form
+    out, form = folder_of(options.out, options.data, "measure"), options.form
     how = MeasurementSettings(
         options.window,
         options.filter or "default",
@@ -98,14 +98,6 @@ def run(options: MeasureOptions, terminal: Terminal) -> Document:
         )
     written = Written(out, (*manifest.files, "manifest.json"))
     return _document(reports, data | written.data, code, written)
-
-
-def _folder(options: MeasureOptions) -> str:
-    from cfmkit.errors import UsageError
-
-    if options.out is not None and not options.out.strip():
-        raise UsageError("--out is empty; give a folder")
-    return options.out or str(Path("cfm-out") / f"{Path(options.data).stem}-measure")
 
 
 def _document(

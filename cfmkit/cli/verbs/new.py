@@ -75,10 +75,7 @@ def template(name: str) -> str:
     ``{words of PATH}`` in it stands for the words that a key allows. Keys of its blocks that it leaves out are added as
     comments, each with what it means.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is no such family, or it comes without a template.
+    Raises UsageError if there is no such family, or it comes without a template.
     """
     from cfmkit.families import family
     from cfmkit.specs.keys_and_schema import keys

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
+import time
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.options import StudyOptions, Tables, WithReport, flag, option
+from cfmkit.cli.options import StudyOptions, flag, option
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.specs.sensitivity_methods import MethodWord, describe_methods, describe_samples
 
@@ -31,8 +32,6 @@ HELP_EXAMPLE = (
 class SensitivityOptions(StudyOptions):
     """Arguments and options."""
 
-    report: WithReport = False
-    table: Tables = "csv"
     method: Annotated[
         MethodWord | None,
         option(
@@ -81,58 +80,25 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
     The spec's block `sensitivity` says what is uncertain. Finished samples are kept in the folder: after an
     interruption, run the same command again to continue.
     """
-    from cfmkit.cli import run_study_in_folder
-    from cfmkit.cli.run_spec_and_print_page import folder_of
-    from cfmkit.documents import html_of_study
-    from cfmkit.documents.document import Written
+    from cfmkit.cli.run_study_in_folder import open_study
     from cfmkit.documents.sensitivity_document import document_of
     from cfmkit.runs.run import placing, read
-    from cfmkit.studies.sensitivity.output import exit_code, outputs
+    from cfmkit.studies.sensitivity.output import outputs
     from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
     from cfmkit.studies.sensitivity.setup import prepare
 
-    start = run_study_in_folder.now()
-    out, form, in_parquet = (
-        folder_of(options, "sensitivity"),
-        options.form,
-        run_study_in_folder.wants_parquet(options.table),
-    )
+    start = time.perf_counter()
     document, spec = read(options)
     with placing(document, [f"sensitivity.{key}" for key in changes_of(options)]):
         setup = prepare(changed_by(options, spec), options.seed, options.max_points)
-    with run_study_in_folder.desk(out, terminal, options.fresh) as place:
-        place.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
-        found = replace(
-            carry_out(setup, lambda work: run_study_in_folder.compute(work, options, place)), fresh=options.fresh
-        )
-        for piece in found.evaluator.pieces:
-            run_study_in_folder.tracebacks(piece.records, terminal)
-        kept: dict[str, bytes] = {}
-        for name, data in outputs(found):
-            if options.report or (in_parquet and name == "results.csv"):
-                kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
-            place.folder.write(name, data)
-        if in_parquet:
-            place.folder.write("results.parquet", run_study_in_folder.as_parquet(kept["results.csv"]))
-        makers = _pictures(found) if options.report or not options.no_plots else {}
-        drawn = {} if options.no_plots else {stem: form.draw(make) for stem, make in makers.items()}
-        for stem, figure in drawn.items():
-            for name, content in form.write(figure, stem):
-                place.folder.write(name, content)
-        if options.report:
-            command = shlex.join(["cfmkit", *terminal.arguments])
-            shown = form.select_page_figures(makers, drawn)
-            study = found.setup.study
-            point = run_study_in_folder.command_of_a_point(options, study.design)
-            page = html_of_study.page(document_of(found), study.spec, found.setup.paths, kept, command, shown, point)
-            place.folder.write(html_of_study.REPORT_NAME, page)
-        made = run_study_in_folder.Made(
-            "sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count
-        )
-        manifest = run_study_in_folder.commit(place, made, terminal, exit_code(found))
-        run_study_in_folder.finish(place, [piece.records for piece in found.evaluator.pieces])
-    written = Written(out, (*manifest.files, "manifest.json"), run_study_in_folder.now() - start)
-    return _document(found, written)
+    with open_study("sensitivity", options, terminal, start) as study:
+        study.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
+        found = replace(carry_out(setup, study.compute), fresh=options.fresh)
+        tables = study.write_tables(outputs(found))
+        page = document_of(found)
+        study.write_pages(page, setup.study, found.setup.paths, tables, partial(_pictures, found))
+        written = study.commit(page, setup.study, setup.seed, [piece.records for piece in found.evaluator.pieces])
+    return _document(found, replace(page, files=written), written)
 
 
 def _pictures(found: Findings) -> Mapping[str, Callable[[], Figure]]:
@@ -145,12 +111,7 @@ def _pictures(found: Findings) -> Mapping[str, Callable[[], Figure]]:
 def changed_by(options: SensitivityOptions, spec: Spec) -> Spec:
     """Return a spec with what the options say about its block `sensitivity`.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If an option is malformed.
-    cfmkit.errors.SpecError
-        If the block is not valid with it.
+    Raises UsageError if an option is malformed; SpecError if the block is not valid with it.
     """
     from cfmkit.studies.parts.uncertain_values import with_options
 
@@ -186,10 +147,7 @@ def changes_of(options: SensitivityOptions) -> dict[str, Any]:
 def spread(option: str) -> tuple[str, Any]:
     """Return (path, range or tolerance) of ``--vary``.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is neither.
+    Raises UsageError if it is neither.
     """
     path, equals, text = (part.strip() for part in option.partition("="))
     first, colon, second = (part.strip() for part in text.partition(":"))
@@ -199,18 +157,17 @@ def spread(option: str) -> tuple[str, Any]:
     return path, {first: second} if first in ("normal", "uniform") else (first, second)
 
 
-def _document(found: Findings, written: Written) -> Document:
-    from cfmkit.documents.sensitivity_document import document_of
-    from cfmkit.studies.sensitivity.output import as_json, exit_code
+def _document(found: Findings, page: Document, written: Written) -> Document:
+    from cfmkit.studies.sensitivity.output import as_json
 
-    spec, code = found.setup.study.spec, exit_code(found)
+    spec = found.setup.study.spec
     records = [piece.records for piece in found.evaluator.pieces]
     data = as_json(found) | {"family": spec.family, "name": spec.name} | written.data
     data |= {"reused": sum(one.reused for one in records)}
     bugs = sum(one.bugs for one in records)
     complaints = (f"error    {bugs} samples hit a bug in cfmkit; -vv shows the first",) if bugs else ()
-    quiet = tuple(_quiet(found, data, code))
-    return replace(document_of(found, written), data=data, complaints=complaints, quiet_complaints=quiet)
+    quiet = tuple(_quiet(found, data, page.exit_code))
+    return replace(page, data=data, complaints=complaints, quiet_complaints=quiet)
 
 
 def _quiet(found: Findings, data: Mapping[str, Any], code: ExitCode) -> Iterator[str]:

@@ -72,10 +72,7 @@ def run(options: ShowOptions, terminal: Terminal) -> Document:
 def _refer_to_help(name: str | None) -> None:
     """Refuse the name of a command with the way to what is known of it.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is one.
+    Raises UsageError if it is one.
     """
     from cfmkit.cli.verbs import names
 

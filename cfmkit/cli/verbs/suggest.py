@@ -6,7 +6,6 @@ import re
 import shlex
 import time
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import (
@@ -129,7 +128,8 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     meet all requirements are listed, then those of which not everything could be judged.
     """
     from cfmkit import families
-    from cfmkit.cli.run_study_in_folder import noting
+    from cfmkit.cli.output_folder import folder_of
+    from cfmkit.cli.run_study_in_folder import open_journal
     from cfmkit.designing.run_many_starts import Clock
     from cfmkit.documents import suggestion_document
     from cfmkit.documents.document import Written, with_skipped_families
@@ -149,12 +149,12 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
         raise UsageError("requirements are missing: name a file, or give --force, --travel and --envelope")
     ends = begun + budget
     block = read_request(options.request, given)
-    out = _folder(options)
-    with RunFolder(out) as folder, terminal.progress() as progress:
+    out = folder_of(options.out, options.request or "options", "suggest")
+    with RunFolder(out) as folder, terminal.progress(budget) as progress:
         folder.check("metrics.json", "suggestions.csv")
         plain = Run(options.seed, progress, time_budget=budget - (time.perf_counter() - start))
         jobs = options.jobs or cores()
-        with long_run(jobs, options.fresh, folder, plain, noting) as working:
+        with long_run(jobs, options.fresh, folder, plain, open_journal) as working:
             if jobs == 1:  # a process of its own, which can be ended when the time is up
                 working = replace(working, executor=Pool(1))
             reserve = max(FIGURES_RESERVE, WRITING_SHARE * budget) if options.no_plots else RESERVE
@@ -229,17 +229,7 @@ def parse_envelope(text: str) -> str:
     if text.strip().startswith("["):
         return text
     sides = [side.strip() for side in re.split(r"(?<=[\d. a-z])x(?=[\d. ])", text.strip())]
-    unit = re.sub(r"^[\d.eE+-]*\s*", "", sides[-1])
+    if not (unit := re.sub(r"^[\d.eE+-]*\s*", "", sides[-1])):
+        raise UsageError(f"--envelope: {text.strip()} has no unit; write {text.strip()}mm")
     full = [side if re.search(r"[a-zA-Z]", side) else f"{side} {unit}" for side in sides]
     return "[" + ", ".join(re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", side) for side in full) + "]"
-
-
-def _folder(options: SuggestOptions) -> str:
-    if options.out is not None:
-        if not options.out.strip():
-            raise UsageError("--out is empty; give a folder")
-        return options.out
-    if options.request == "-":
-        raise UsageError("standard input has no name; give the output folder with --out")
-    stem = "options" if options.request is None else Path(options.request).stem
-    return str(Path("cfm-out") / f"{stem}-suggest")

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import shlex
+import time
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.options import StudyOptions, Tables, WithReport, flag, option
+from cfmkit.cli.options import StudyOptions, flag, option
 from cfmkit.errors import CfmError, ExitCode, UsageError, lines_of
 from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS, list_phrases
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from matplotlib.figure import Figure
 
     from cfmkit.cli.output import Terminal
     from cfmkit.documents.document import Document
@@ -31,8 +30,6 @@ HELP_EXAMPLE = "cfmkit sweep cam.yaml --vary mechanism.roller_radius=8mm:16mm:5"
 class SweepOptions(StudyOptions):
     """Arguments and options."""
 
-    report: WithReport = False
-    table: Tables = "csv"
     vary: Annotated[
         list[str] | None,
         option(
@@ -48,8 +45,8 @@ class SweepOptions(StudyOptions):
         str | None,
         option(
             "--sample",
-            metavar="|".join(f"{kind}:N" for kind in SAMPLE_KINDS),
-            text=f"Draw N points from ranges start:stop: {list_phrases()}.",
+            metavar="KIND:N",
+            text=f"Draw N points from ranges start:stop. KIND: {', '.join(SAMPLE_KINDS)} ({list_phrases()}).",
         ),
     ] = None
     design: Annotated[bool, flag("--design", text="Redesign the mechanism at each point.")] = False
@@ -64,54 +61,27 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
 
     Finished points are kept in the folder: after an interruption, run the same command again to continue.
     """
-    from cfmkit.cli import run_study_in_folder
-    from cfmkit.cli.run_spec_and_print_page import folder_of
+    from cfmkit.cli.run_study_in_folder import open_study
     from cfmkit.documents import sweep_document
-    from cfmkit.documents.document import Written
     from cfmkit.runs.run import placing, read
     from cfmkit.studies.sweep_request_and_files import outputs, prepare, summary_of, writes_curves
 
-    start = run_study_in_folder.now()
-    out, form, in_parquet = folder_of(options, "sweep"), options.form, run_study_in_folder.wants_parquet(options.table)
+    start = time.perf_counter()
     document, spec = read(options)
     asked = request(options)
     with placing(document):
         work = prepare(spec, asked)
-    with run_study_in_folder.desk(out, terminal, options.fresh) as place:
-        place.folder.check("results.csv", "metrics.json", "resolved.yaml")
-        records = run_study_in_folder.compute(work, options, place)
-        run_study_in_folder.tracebacks(records, terminal)
+    with open_study("sweep", options, terminal, start) as study:
+        study.folder.check("results.csv", "metrics.json", "resolved.yaml")
+        records = study.compute(work)
         summary = summary_of(records)
-        kept: dict[str, bytes] = {}
-        for name, data in outputs(records, summary, writes_curves(spec, asked)):
-            if options.report or (in_parquet and name == "results.csv"):
-                kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
-            place.folder.write(name, data)
-        if in_parquet:
-            place.folder.write("results.parquet", run_study_in_folder.as_parquet(kept["results.csv"]))
-        makers = {} if options.no_plots and not options.report else _pictures(records, summary)
-        drawn: dict[str, Figure] = {}
-        for stem, make in makers.items() if not options.no_plots else ():
-            figure = form.draw(make)
-            drawn |= {stem: figure} if options.report else {}
-            for name, content in form.write(figure, stem):
-                place.folder.write(name, content)
+        tables = study.write_tables(outputs(records, summary, writes_curves(spec, asked)))  # which fill the summary
         code, reported = exit_code(records, summary), summary.as_json(records)
         dimensions = {one.name: one.dimension for one in work.study.metrics}
         found = sweep_document.document_of(spec, reported, dimensions, code, reused=records.reused)
-        if options.report:
-            from cfmkit.documents import html_of_study
-
-            varied = [item.path for item in work.plan.variables]
-            command = shlex.join(["cfmkit", *terminal.arguments])
-            shown = form.select_page_figures(makers, drawn)
-            point = run_study_in_folder.command_of_a_point(options, work.study.design)
-            page = html_of_study.page(found, spec, varied, kept, command, shown, point)
-            place.folder.write(html_of_study.REPORT_NAME, page)
-        made = run_study_in_folder.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
-        manifest = run_study_in_folder.commit(place, made, terminal, code)
-        run_study_in_folder.finish(place, [records])
-    written = Written(out, (*manifest.files, "manifest.json"), run_study_in_folder.now() - start)
+        varied = [item.path for item in work.plan.variables]
+        study.write_pages(found, work.study, varied, tables, partial(_pictures, records, summary))
+        written = study.commit(found, work.study, options.seed, [records])
     record = reported | {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
     complaints = tuple(_complaints(records, code, options, document))
     return replace(found, data=record, complaints=complaints, files=written)
@@ -120,10 +90,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
 def request(options: SweepOptions) -> SweepRequest:
     """Return what the options ask for.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If one is malformed, or two contradict each other.
+    Raises UsageError if one is malformed, or two contradict each other.
     """
     from cfmkit.cli.run_study_in_folder import names
     from cfmkit.studies.sweep_request_and_files import SweepRequest

@@ -8,21 +8,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.equations import NO_FRICTION, with_closed
-from cfmkit.elastica.contact.side_conditions import SideCondition, SideConditions
-from cfmkit.elastica.contact.side_gaps import LoadStage, carry
+from cfmkit.elastica.contact.line_tangent import raise_pad
+from cfmkit.elastica.contact.side_conditions import SideConditions
+from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.contact.terms import gaps, measure, rub_values, slip_way
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam, NodeOnObstacle, describe
-from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
-from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
-from cfmkit.numerics.continuation.steps import hermite
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -37,28 +36,10 @@ if TYPE_CHECKING:
 GAP_ROUNDING, FORCE_ROUNDING = 1e-11, 1e-10
 """Gap, in mean beam lengths, and force, as a share of the largest and of one, that may be negative by rounding."""
 SLIP_ROUNDING = 1e-13  # way of slip in one sample, in mean beam lengths, by which it may go back by rounding
-FEWEST_SAMPLES, MOST_SAMPLES = 16, 400  # of a step between whose ends a gap may close and open again
+FEWEST_SAMPLES = 16  # of a step between whose ends a gap may close and open again
 SAMPLES_PER_RADIUS = 6.0  # of the smallest radius that a pad may pass
-OPEN_GAP_STEPS = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
 MAX_SLOPE_STEPS = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
 SIDES_TOGETHER, NODES_TOGETHER = 6, 40  # states of a march, between which it is seen at once whether a contact changes
-NEARER = 30  # halvings of a step, in which it is looked for where a contact still sticks
-MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
-BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
-
-
-class ContactChange(NamedTuple):
-    """The begin or end of a contact; unstable directions before and after it."""
-
-    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes", "slips", "sticks"]
-    number: int  # of the contact in the arrays of its piece
-    at: PathEquilibrium
-    before: int
-    after: int
-    contact: int = -1  # in `Network.contacts`
-    condition: SideCondition | None = None  # on the side of a beam, that is met
-    piece: PieceOfPath | None = None  # whose unknowns `at` has; None: that of the piece before
-    states: int = 1  # of friction that are possible behind it
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +50,7 @@ class PieceOfPath:
     closed: frozenset[int]
     options: Options
     friction: Mapping[int, FrictionState] = field(default_factory=dict)  # of closed contacts that rub
+    siblings: dict[frozenset[int], PieceOfPath] = field(default_factory=dict)  # of the same arrays, by what is closed
     seen_between: dict[tuple[float, float], FloatArray] = field(init=False, default_factory=dict)  # values by drives
 
     @cached_property
@@ -135,7 +117,14 @@ class PieceOfPath:
 
     def with_closed(self, closed: frozenset[int]) -> PieceOfPath:
         """Return the problem with another set of closed contacts; what friction does at a new one is left open."""
-        return PieceOfPath(self.whole, closed, self.options, {k: v for k, v in self.friction.items() if k in closed})
+        friction = {number: state for number, state in self.friction.items() if number in closed}
+        if friction:
+            return PieceOfPath(self.whole, closed, self.options, friction, self.siblings)
+        if not self.friction:
+            self.siblings.setdefault(self.closed, self)
+        if closed not in self.siblings:
+            self.siblings[closed] = PieceOfPath(self.whole, closed, self.options, siblings=self.siblings)
+        return self.siblings[closed]
 
     def say(self, number: int) -> str:
         """Return what the contact of a row of `values` is called."""
@@ -160,7 +149,9 @@ class PieceOfPath:
     @cached_property
     def own_mask(self) -> Any:
         """Which free unknowns of the whole are those of the own problem."""
-        return np.isin(self.whole.mesh.free, self.own.mesh.free)
+        mask = np.zeros(len(self.whole.mesh.free), bool)
+        mask[np.searchsorted(self.whole.mesh.free, self.own.mesh.free)] = True
+        return mask
 
     def shrink(self, at: PathEquilibrium) -> PathEquilibrium:
         """Return an equilibrium without the forces of open contacts."""
@@ -177,7 +168,7 @@ class PieceOfPath:
 
     def expand_state(self, values: FloatArray) -> FloatArray:
         """Return a state of the own unknowns among those of all."""
-        return np.asarray(self.expand(values) + self._kept)
+        return np.asarray(self.expand(values) + self._kept if self.friction else self.expand(values))
 
     def expand(self, values: Any) -> Any:
         """Return values of the own unknowns among those of all, zero for the others."""
@@ -219,6 +210,7 @@ class PieceOfPath:
                 spread_values[number] = z[:, contact.unknown]
             else:
                 spread_values[number] = gaps(mesh, contact, z) if measured is None else measured[number]
+                spread_values[number] += raise_pad(mesh, contact, z)
         spread_values[len(mesh.contacts) : count] = self.sides.values(z, LoadStage.from_problem(self.whole, drives))
         for row, number in enumerate(self.rubbing, count):
             spread_values[row] = rub_values(mesh, mesh.contacts[number], self.friction[number], z)
@@ -263,14 +255,16 @@ class PieceOfPath:
             condition = self.sides.all[number - len(mesh.contacts)]
             return float(self.sides.value(condition, z, LoadStage.from_problem(self.whole, drives))[0])
         contact = mesh.contacts[number]
-        return float(z[0, contact.unknown] if number in self.closed else gaps(mesh, contact, z)[0])
+        open_gap = gaps(mesh, contact, z) + raise_pad(mesh, contact, z)
+        return float(z[0, contact.unknown] if number in self.closed else open_gap[0])
 
     def roundings(self, values: FloatArray) -> FloatArray:
         """Return by how much a force or a gap (contacts, ..., shares) may be negative, (contacts, ...)."""
-        closed = np.isin(np.arange(len(values)), list(self.closed))
+        closed = list(self.closed)
         largest = np.abs(values[closed]).max(axis=(0, -1), initial=1.0)
         shape = -1, *(1,) * (values.ndim - 2)
-        spread_values = np.where(closed.reshape(shape), FORCE_ROUNDING * largest, GAP_ROUNDING)
+        spread_values = np.full(values.shape[:-1], GAP_ROUNDING)
+        spread_values[closed] = FORCE_ROUNDING * largest
         count = len(self.whole.mesh.contacts)
         spread_values[count : count + len(self.sides.all)] = self.sides.roundings.reshape(shape)
         for row in range(count + len(self.sides.all), len(values)):
@@ -292,9 +286,10 @@ class PieceOfPath:
         slope = np.abs(rate[:, whole.motions]).max(axis=1)
         dense = SAMPLES_PER_RADIUS * moved * whole.mesh.scales.length <= FEWEST_SAMPLES * self.smallest_radius
         smooth = np.maximum(slope[:-1], slope[1:]) * np.abs(width[:, 0]) <= MAX_SLOPE_STEPS * moved
-        s = np.linspace(0.0, 1.0, n_samples)[:, None, None]
-        between = x[:-1] + s * s * (3 - 2 * s) * chord
-        between = between + width * (s * (1 - s) ** 2 * rate[:-1] + s * s * (s - 1) * rate[1:])
+        s, some = np.linspace(0.0, 1.0, n_samples)[:, None, None], self.seen_unknowns
+        between = np.zeros((n_samples, *chord.shape))
+        between[..., some] = x[:-1, some] + s * s * (3 - 2 * s) * chord[:, some]
+        between[..., some] += width * (s * (1 - s) ** 2 * rate[:-1, some] + s * s * (s - 1) * rate[1:, some])
         drives = drive[:-1] + s[:, :, 0] * width[:, 0]
         values = self.values(between.reshape(-1, len(kept)), drives.ravel())
         values = values.reshape(len(values), n_samples, -1).swapaxes(1, 2)
@@ -307,6 +302,16 @@ class PieceOfPath:
         if not calm[suspect] and dense[suspect] and smooth[suspect] and not self.slipping_rows:
             self.seen_between[float(drive[suspect]), float(drive[suspect + 1])] = values[:, suspect]
         return calm & dense & smooth
+
+    @cached_property
+    def seen_unknowns(self) -> Any:
+        """Free unknowns of the whole that `values` depends on: all if sides may touch, else those of nodes that do."""
+        mesh = self.whole.mesh
+        if self.sides.all:
+            return slice(None)
+        unknowns = [*mesh.attachments.unknowns[[contact.place for contact in mesh.contacts]].ravel().tolist()]
+        unknowns += [unknown for contact in mesh.contacts for unknown in contact.own_unknowns]
+        return np.flatnonzero(np.isin(mesh.free, unknowns))
 
     @cached_property
     def smallest_radius(self) -> float:
@@ -366,131 +371,3 @@ class WatchedProblem(NetworkProblem):
     @cached_property
     def _quiet(self) -> dict[int, PathEquilibrium]:
         return {}
-
-
-@dataclass(frozen=True, eq=False)
-class StepBetween:
-    """Path between two points of a piece, by the cubic through them, or the chord where slopes are steep."""
-
-    part: PieceOfPath
-    first: PathEquilibrium
-    last: PathEquilibrium
-
-    @cached_property
-    def moved(self) -> float:
-        """Largest motion of the step."""
-        return largest_motion(self.part.whole, self.last.x - self.first.x)
-
-    @cached_property
-    def _is_smooth(self) -> bool:
-        width = abs(self.last.drive - self.first.drive)
-        rates = (largest_motion(self.part.whole, at.rate) for at in (self.first, self.last))
-        return width > 0 and max(rates) * width <= MAX_SLOPE_STEPS * self.moved
-
-    @cached_property
-    def shares(self) -> FloatArray:
-        """Places at which gaps and forces are looked at, from 0 to 1: so dense that no obstacle is passed."""
-        wanted = SAMPLES_PER_RADIUS * self.moved * self.part.whole.mesh.scales.length / self.part.smallest_radius
-        return np.linspace(0.0, 1.0, int(np.clip(np.ceil(wanted), FEWEST_SAMPLES, MOST_SAMPLES)) + 1)
-
-    @property
-    def is_far(self) -> bool:
-        """True if every contact is open and its gap is more than the step can close."""
-        if self.part.closed:
-            return False
-        mesh, ends = self.part.whole.mesh, self.part.values(*self.interpolate(np.array([[0.0], [1.0]])))
-        arms = np.hypot(*mesh.attachments.arm[[contact.place for contact in mesh.contacts]].T)
-        reach = np.append(1.0 + arms, np.full(len(ends) - len(arms), 2.0))
-        return bool((ends > OPEN_GAP_STEPS * self.moved * reach[:, None]).all())
-
-    @cached_property
-    def values(self) -> FloatArray:
-        """Forces of closed and gaps of open contacts there, (contacts, shares)."""
-        seen = self.part.seen_between.pop((self.first.drive, self.last.drive), None)
-        if seen is not None and seen.shape[-1] == len(self.shares):
-            return seen
-        part, values = self.part, self.part.values(*self.interpolate(self.shares[:, None]))
-        for row in part.slipping_rows:
-            values[row] = np.diff(values[row], prepend=values[row, :1])
-            grown = abs(self.last.drive - self.first.drive) * part.row_value(self.last, row, self.travel)
-            values[row, -1] = min(values[row, -1], grown)
-        return values
-
-    @property
-    def travel(self) -> float:
-        """Sense in which the drive goes."""
-        return 1.0 if self.last.drive >= self.first.drive else -1.0
-
-    def interpolate(self, share: Any) -> tuple[FloatArray, Any]:
-        """Return the unknowns (n,) and the drive at a share of the step, or (m, n) and (m,) at m of them, (m, 1)."""
-        drive = self.first.drive + share * (self.last.drive - self.first.drive)
-        if self._is_smooth:
-            x = hermite(self.first, self.last, drive)
-        else:
-            x = self.first.x + share * (self.last.x - self.first.x)
-        x = np.where(share == 1.0, self.last.x, x)
-        return x, np.where(share == 1.0, self.last.drive, drive)[..., 0] if np.ndim(share) else drive
-
-    def solve(self, share: float) -> PathEquilibrium | None:
-        """Return the equilibrium of the piece at a share of the step."""
-        x, drive = self.interpolate(share)
-        at = correct(self.part.own, x[self.part.own_mask], float(drive))
-        if at is None or largest_motion(self.part.own, at.x - x[self.part.own_mask]) > MAX_MISS * self.moved + 1e-9:
-            return None
-        return at
-
-    def crossing(self, number: int) -> float | None:
-        """Return the first share at which force or gap of a contact vanishes, by straight lines; None if nowhere."""
-        values = self.values[number]
-        below = np.flatnonzero(values[1:] < -self.part.roundings(self.values)[number])
-        if not len(below):
-            return None
-        behind = int(below[0]) + 1
-        before, after = float(values[behind - 1]), float(values[behind])
-        part = 0.0 if before <= 0 else before / (before - after)
-        return float(self.shares[behind - 1] + part * (self.shares[behind] - self.shares[behind - 1]))
-
-    def share_of(self, at: PathEquilibrium) -> float:
-        """Return at which share of the step an equilibrium lies, across its chord."""
-        weights = arc_weights(self.part.whole, self.part.options.span)
-        start = np.append(self.first.x, self.first.drive)
-        chord, way = np.append(self.last.x, self.last.drive) - start, np.append(at.x, at.drive) - start
-        finite = np.isfinite(weights)
-        return float((weights * chord)[finite] @ way[finite] / ((weights * chord)[finite] @ chord[finite]))
-
-    def contains(self, at: PathEquilibrium, guess: FloatArray) -> bool:
-        """Return True if an equilibrium lies within the step, near a guess."""
-        start = largest_motion(self.part.whole, at.x - guess) <= MAX_MISS * self.moved + 1e-9
-        return start and -BESIDE_STEP <= self.share_of(at) <= 1 + BESIDE_STEP
-
-    def bisect(self, number: int) -> PathEquilibrium | None:
-        """Return the equilibrium of the piece at which force or gap vanishes, by its drive alone; None if lost."""
-        from scipy.optimize import brentq
-
-        part = self.part
-
-        def value(share: float) -> float:
-            at = self.solve(share)
-            if at is None:
-                raise ArithmeticError
-            return part.row_value(part.grow(at), number, self.travel)
-
-        try:
-            row_values = self.values[number]
-            behind = np.flatnonzero(row_values[1:] < -part.roundings(self.values)[number])
-            end = int(behind[0]) + 1 if len(behind) else len(row_values) - 1
-            begins = self.shares[end - 1 :: -1].tolist()
-            if number >= len(part.whole.mesh.contacts) + len(part.sides.all):
-                # what sticks begins at its limit, where the drive turns, and may soon reach the other one
-                begins += [float(self.shares[end]) * 0.5**k for k in range(1, NEARER)]
-            begin = next((share for share in begins if value(share) > 0), None)
-            if begin is None:
-                return self.first
-            last = next((k for k in range(end, len(row_values)) if value(float(self.shares[k])) <= 0), None)
-            if last is None:
-                return None
-            share = float(brentq(value, begin, self.shares[last], xtol=1e-15, rtol=1e-14))
-        except ArithmeticError:
-            return None
-        at = self.solve(share)
-        return None if at is None else part.grow(at)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.contact.terms import gaps, press
+from cfmkit.elastica.contact.terms import contact_contribution, gaps
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations, SolvedStates
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.contact import FrictionState
@@ -55,7 +55,7 @@ def with_closed(
     )
     held = [unknown for contact in contacts if not contact.closed for unknown in contact.own_unknowns]
     held += [unknown for contact in contacts if contact.rub >= 0 for unknown in (contact.flag, contact.anchor)]
-    pressed = replace(mesh, contacts=contacts, free=np.setdiff1d(mesh.free, held))
+    pressed = replace(mesh, contacts=contacts, free=np.delete(mesh.free, np.searchsorted(mesh.free, held)))
     equations = ((key, made) for key, made in mesh.known.items() if isinstance(made, NumpyEquations))
     exchanged = ((key, made.exchange_contacts(pressed)) for key, made in equations)
     pressed.known.update((key, made) for key, made in exchanged if made is not None)
@@ -142,7 +142,7 @@ class ContactEquations(NumpyEquations):
         whole_gradients = np.array(self.plain.gradients(z, drive))
         for contact in self.mesh.contacts:
             for number in np.flatnonzero(z[:, contact.unknown]).tolist():
-                term = press(self.mesh, contact, z[number])
+                term = contact_contribution(self.mesh, contact, z[number])
                 whole_gradients[number, term.unknowns] += term.gradient
         return whole_gradients
 
@@ -150,7 +150,7 @@ class ContactEquations(NumpyEquations):
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
         gradient, hessian = self.plain.evaluate(z, drive, share)
         for contact in self.mesh.contacts:
-            term = press(self.mesh, contact, z)
+            term = contact_contribution(self.mesh, contact, z)
             gradient[term.unknowns] += term.gradient
             hessian[np.ix_(term.unknowns, term.unknowns)] += term.hessian
         return gradient, hessian
@@ -197,7 +197,7 @@ class ContactEquations(NumpyEquations):
                 tangent[held, held] = -1.0
                 residual[held[:2]] = -free[held[:2]]  # flag and anchor of one with friction stay
                 continue
-            term = press(mesh, contact, z)
+            term = contact_contribution(mesh, contact, z)
             slots = self.slots[term.unknowns]
             inside = slots >= 0
             rows = slots[inside]

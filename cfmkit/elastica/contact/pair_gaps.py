@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cfmkit.elastica.contact.edges import half_thickness_of
+from cfmkit.elastica.contact.line_tangent import measure_compliances
 from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps, interpolate_line, side_states
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import BeamOnBeam
+from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -38,11 +38,22 @@ class Feet(NamedTuple):
 class PairGaps(SideGaps):
     """Gaps of the side of one beam to another beam, which has round ends."""
 
-    @cached_property
-    def partner_elements(self) -> Any:
-        """Elements of the other beam, (m,)."""
-        partner = self.item.partner  # type: ignore[union-attr]
-        return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == partner])
+    def find_kinks(self, z: FloatArray, stage: LoadStage, elements: Any) -> FloatArray:
+        """Return how steeply the gap falls, by the kinks of both lines, from ends of elements, (n, m, 2)."""
+        mesh, item, numbers = self.mesh, self.item, np.asarray(elements)
+        assert isinstance(item, BeamOnBeam)
+        beam, kinks = mesh.fits.network.beams[item.beam], np.zeros((len(z), len(numbers), 2))
+        shear = sum(measure_compliances(mesh, name, 0.5)[1] for name in (item.beam, item.partner))
+        for contact in mesh.contacts:
+            if contact.slide < 0 or contact.item.name != item.name:
+                continue
+            own: Any = contact.item
+            ends = [(contact.element, 1), (contact.element + 1, 0)] if own.beam == item.beam else []
+            node = own.node if isinstance(own, NodeOnBeam) else None
+            ends += [(self.elements[0], 0)] * (node == beam.start) + [(self.elements[-1], 1)] * (node == beam.end)
+            for element, end in ends:
+                kinks[:, numbers == element, end] = 0.5 * shear * z[:, [contact.unknown]]
+        return kinks
 
     def distance(self, places: Any, z: FloatArray, stage: LoadStage) -> tuple[Any, Any]:
         """Return the distances of places (n, ..., 2) from the other beam in n states, and their gradients."""

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
+from cfmkit.elastica.contact.changes import PieceOfPath
 from cfmkit.elastica.contact.edges import find_mate
+from cfmkit.elastica.contact.line_tangent import KINK_REACH
 from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
+from cfmkit.elastica.contact.path_items import ContactChange
 from cfmkit.elastica.contact.places_of_sides import (
     find_nearest_places,
     find_pads_at,
@@ -29,6 +31,7 @@ from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 
 if TYPE_CHECKING:
     from cfmkit.elastica.contact.side_conditions import SideCondition
+    from cfmkit.elastica.contact.step_between import StepBetween
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 BESIDE_SHARE = 0.05  # of a step, by which a located change may lie beside it
@@ -51,7 +54,7 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
     unstable = step.first.unstable
     if condition.kind == "touch":
         return _locate_touch(piece, step, row, condition)
-    at = step.bisect(row)
+    at = _locate_zero(piece, step, row)
     if at is None:
         return None
     if condition.kind == "tangent" and _is_parallel(piece, condition, at):
@@ -112,6 +115,11 @@ def _locate_touch(
     for _ in range(2):
         stage = LoadStage.from_problem(piece.whole, np.array([guess.drive]))
         least = piece.sides.gaps_of(condition.item).find_least(piece.whole.values(guess.x, guess.drive), stage)
+        if _is_beside_kink(piece, condition, guess, least.parameter):
+            why = why_not_laid(piece, condition.item)
+            return PathStop(
+                WhyStopped.LOST, guess.drive, SPREADS_MESSAGE.format(names=describe(condition.item), why=why)
+            )
         between = _contact_around(piece, condition, least.parameter)
         if between is not None:
             at = step.bisect(row)
@@ -145,6 +153,15 @@ def _locate_touch(
     if isinstance(condition.item, NodeOnBeam) and not 0.5 * NEW_PLACE < least.parameter < 1 - 0.5 * NEW_PLACE:
         return PathStop(WhyStopped.LOST, guess.drive, MEETS_END.format(names=describe(condition.item)))
     return None
+
+
+def _is_beside_kink(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium, parameter: float) -> bool:
+    """Return True if a place is near where the same touches, in a beam that shears: it lies there."""
+    mesh, z, beam = piece.whole.mesh, piece.whole.values(at.x, at.drive), condition.item.beam
+    section = mesh.fits.network.beams[beam].section
+    places = [float(z[contact.slide]) for contact in mesh.contacts if contact.number == condition.number]
+    near = KINK_REACH * section.thinnest / mesh.fits[beam].length
+    return section.shear and any(abs(place - parameter) < near for place in places)
 
 
 def _is_parallel(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> bool:
@@ -257,6 +274,17 @@ def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquili
     return piece.grow(at)
 
 
+def _locate_zero(piece: PieceOfPath, step: StepBetween, row: int) -> PathEquilibrium | None:
+    """Return the equilibrium of a step at which a condition is just met: by secants, else by bisection."""
+    share = step.crossing(row)
+    if share is not None:
+        guess, drive = step.interpolate(share)
+        at = _zero_of(piece, step.first._replace(x=guess, drive=float(drive)), row)
+        if at is not None and step.contains(at, guess):
+            return at
+    return step.bisect(row)
+
+
 def row_rate(piece: PieceOfPath, at: PathEquilibrium, row: int) -> float:
     """Return how a row of `PieceOfPath.values` changes with the drive at an equilibrium."""
     step = RATE_STEP / max(1.0, float(np.abs(at.rate).max(initial=0.0)))
@@ -277,15 +305,13 @@ def enter_side_change(
             text = BEGINS_TO_LIE if isinstance(condition.item, BeamOnObstacle) else SPREADS_MESSAGE
             text = text.format(names=describe(condition.item), why=why)
             return PathStop(WhyStopped.LOST, change.at.drive, text)
-    lost = PathStop(WhyStopped.LOST, change.at.drive, NO_WAY.format(names=piece.say(change.number)
-                    if change.piece is None else change.piece.say(min(change.number, 0))))  # fmt: skip
     if condition is None:  # a contact of a side ends
         item = piece.whole.mesh.contacts[change.number]
         beyond = piece.with_flanks(list_remaining_places(piece, change.number), piece.closed - {change.number})
         begin_guess = beyond.shrink(piece.carry(change.at, beyond))
         at = beyond.own.solve(begin_guess.x, begin_guess.drive)
         if at is None:
-            return lost
+            return _stop_lost(piece, change)
         number = item.number
         if isinstance(item.item, BeamOnBeam) and not item.item.leads:
             number = find_partner(piece, number)
@@ -299,7 +325,7 @@ def enter_side_change(
         begin_guess = beyond.shrink(change.at)
         at = beyond.own.solve(begin_guess.x, begin_guess.drive)
         if at is None:
-            return lost
+            return _stop_lost(piece, change)
         whole = beyond.grow(at)
         if condition.kind == "touch":
             grows = beyond.grows_along(whole, change.number)
@@ -313,10 +339,16 @@ def enter_side_change(
         ways = {"tangent": _move_into_beam, "spreads": _part_contact, "wraps": _lie_from_root}
         part = ways[condition.kind](piece, change) if condition.kind in ways else _lay(piece, change, sense)
         if part is None:
-            return lost
+            return _stop_lost(piece, change)
         beyond, whole, grows = part
     turned = bool(grows * sense < 0)
     return beyond, whole, (-sense if turned else sense), turned
+
+
+def _stop_lost(piece: PieceOfPath, change: ContactChange) -> PathStop:
+    """Return the end of a path behind whose change nothing was found."""
+    names = piece.say(change.number) if change.piece is None else change.piece.say(min(change.number, 0))
+    return PathStop(WhyStopped.LOST, change.at.drive, NO_WAY.format(names=names))
 
 
 Entered = tuple[PieceOfPath, "PathEquilibrium", float]

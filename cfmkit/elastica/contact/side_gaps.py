@@ -1,4 +1,4 @@
-"""Places along the sides of beams in many states: how near they are to obstacles, and states on other elements."""
+"""Places along the sides of beams in many states: how near they are to obstacles."""
 
 from __future__ import annotations
 
@@ -10,30 +10,31 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.edges import measure_distance
+from cfmkit.elastica.contact.edges import half_thickness_of, measure_distance
+from cfmkit.elastica.contact.line_tangent import find_reach, line_leaves_normal, round_off
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.contact_arrays import edge_rows
-from cfmkit.elastica.mechanics.equations import SideData
+from cfmkit.elastica.mechanics.equations import LineTables, SideData
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, cuts_at, with_places
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import BeamOnObstacle
+from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.problem import NetworkProblem
     from cfmkit.elastica.model.contact import BeamSide
+    from cfmkit.elastica.model.section import Section
 
 N_ALONG = 33  # places of an element at which the gap of its side is measured
 NEAR_GAP = 1e-3  # share of a mean beam length within which the least gap is found exactly
 PARALLEL_GAP = 1e-9  # mean beam lengths by which the gap along a beam changes that is parallel to an obstacle
-N_ROUNDS, SLOPE_LEVEL = (
-    20,
-    1e-9,
-)  # of the search for the place of a least gap, and the slope there: its square is the error
+N_ROUNDS, SLOPE_LEVEL = 20, 1e-9  # of the search for a least gap, and the slope there: its square is the error
 GAP_RESOLUTION = 1e-13
 BESIDE_CONTACT = 1e-7  # mean beam lengths by which a side may lie in an obstacle beside a contact: rounding
 
@@ -46,6 +47,10 @@ class SideStates(NamedTuple):
     angle: Any  # of the tangent
     ahead: Any  # arc length to the end of the element
     parameter: Any
+    slope: Any  # (n, m, k, 2) of the middle line, by the unloaded arc length
+
+
+MeasuredGaps = tuple[Any, Any, SideStates]
 
 
 class LoadStage(NamedTuple):
@@ -92,6 +97,7 @@ def side_states(
         angle @ at.interpolation.T + turn,
         length[..., None] - speed @ at.integrals.T,
         cuts[..., :1] + (cuts[..., 1:] - cuts[..., :1]) * fractions,
+        np.einsum("kq,nmqd->nmkd", at.interpolation, slope / speed[..., None]),
     )
 
 
@@ -125,12 +131,12 @@ def _rows_at(degree: int, places: FloatArray) -> _RowsAtPlaces:
 
 
 @lru_cache(maxsize=64)
-def _packed_tables(degree: int) -> FloatArray:
-    """Return places along an element, Gauss weights and the matrices at these places, in one row."""
+def find_line_tables(degree: int) -> LineTables:
+    """Return what compiled code needs to follow lines."""
     fractions = _even_angles()
     at, rule = _rows_at(degree, fractions), basis(degree)
-    parts = fractions, rule.weights, at.values, at.integrals, at.interpolation, _series_matrix(degree)
-    return read_only(np.concatenate([np.ravel(part) for part in parts]))
+    parts = fractions, rule.weights, at.values.T, at.integrals.T, at.interpolation.T, _series_matrix(degree)
+    return LineTables(read_only(np.concatenate([np.ravel(part) for part in parts])), len(fractions))
 
 
 def _even_angles() -> FloatArray:
@@ -144,6 +150,24 @@ def interpolate_line(degree: int, fractions: FloatArray, start: Any, slopes: Any
     shape = (*fractions.shape, rows.integrals.shape[-1])
     place = start + np.einsum("...q,...qd->...d", rows.integrals.reshape(shape), slopes)
     return place, np.einsum("...q,...qd->...d", rows.interpolation.reshape(shape), slopes)
+
+
+def join_sides(sides: Sequence[SideData]) -> SideData:
+    """Return several sides in one."""
+    elements, numbers, edge = (np.concatenate(arrays) for arrays in zip(*sides, strict=True))
+    counts = np.array([(0, 0), *((len(side.elements), len(side.edge)) for side in sides[:-1])]).cumsum(axis=0)
+    numbers[:, [0, 10]] += counts[:, :1]
+    numbers[:, 4] += counts[:, 1]
+    return SideData(elements, numbers, edge)
+
+
+def search_sides(
+    mesh: Discretisation, sides: SideData, z: FloatArray, stage: LoadStage, watch: bool = False
+) -> FloatArray | None:
+    """Return what compiled code finds of the gaps of sides in n states, (n, sides, 5); None without it."""
+    if not len(z):
+        return None
+    return equations(mesh).search_sides(z, stage.rows(), sides, find_line_tables(mesh.degree), watch)
 
 
 class LeastGap(NamedTuple):
@@ -167,6 +191,11 @@ class SideGaps:
         """Elements of the beam, (m,)."""
         return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == self.item.beam])
 
+    @property
+    def section(self) -> Section:
+        """Section of the beam."""
+        return self.mesh.fits.network.beams[self.item.beam].section
+
     @cached_property
     def fractions(self) -> FloatArray:
         """Places of an element at which gaps are measured."""
@@ -175,39 +204,55 @@ class SideGaps:
     @cached_property
     def slack(self) -> FloatArray:
         """By how much each element may lie in the obstacle, (m,)."""
-        beside = np.where(np.isin(self.elements, self.touched), BESIDE_CONTACT, 0.0)
-        return np.where(np.isin(self.elements, self.laid), 1.0, beside)
+        beside = dict.fromkeys(self.touched, BESIDE_CONTACT) | dict.fromkeys(self.laid, 1.0)
+        return np.array([beside.get(number, 0.0) for number in self.elements.tolist()])
 
     def half_thickness(self, parameter: Any, element: int) -> Any:
         """Return half the thickness at parameters of an element, in mean beam lengths."""
-        mesh, name = self.mesh, self.item.beam
-        fitted, inside = mesh.fits[name], float(mesh.elements.cuts[element].mean())
-        section = mesh.fits.network.beams[name].section
+        fitted, inside = self.mesh.fits[self.item.beam], float(self.mesh.elements.cuts[element].mean())
         along = fitted.arc(np.clip(parameter, 0.0, 1.0)), float(np.real(fitted.arc(inside)))
-        return 0.5 * (np.real(section.thickness_at(*along)) + 0.0 * parameter) / mesh.scales.length
+        return 0.5 * (np.real(self.section.thickness_at(*along)) + 0.0 * parameter) / self.mesh.scales.length
 
     def _taper(self, parameter: Any, element: int) -> Any:
         """Return the slope of half the thickness along the unloaded beam."""
-        mesh, name = self.mesh, self.item.beam
-        fitted, inside = mesh.fits[name], float(mesh.elements.cuts[element].mean())
-        if not isinstance(mesh.fits.network.beams[name].section.thickness, Taper):
+        mesh = self.mesh
+        if not isinstance(self.section.thickness, Taper):
             return np.zeros(np.shape(parameter))
+        fitted, inside = mesh.fits[self.item.beam], float(mesh.elements.cuts[element].mean())
         sides = [self.half_thickness(parameter + step, element) for step in (PLACE_STEP, -PLACE_STEP)]
         return (sides[0] - sides[1]) / (2 * PLACE_STEP) / (fitted.speed(parameter, inside) / mesh.scales.length)
 
-    def measure(
-        self, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray
-    ) -> tuple[Any, Any, SideStates]:
+    def measure(self, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray) -> MeasuredGaps:
         """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
+        gap, slope, seen = self._measure_line(z, stage, elements, fractions)
+        if self.section.shear:
+            kinks, ways = self.find_kinks(z, stage, elements), (seen.ahead[..., :1] - seen.ahead, seen.ahead)
+            gap, slope = round_off(gap, slope, *ways, kinks, find_reach(self.mesh, self.item, elements))
+        return gap, slope, seen
+
+    def _measure_line(self, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray) -> MeasuredGaps:
+        """Return the same with the kinks of beams that shear."""
         seen = side_states(self.mesh, z, stage, elements, fractions)
         value, normal = self.distance(seen.place, z, stage)
-        half = np.stack(
-            [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)], axis=1
-        )
-        slope = normal[..., 0] * np.cos(seen.angle) + normal[..., 1] * np.sin(seen.angle)
+        half = [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)]
+        if line_leaves_normal(self.section):
+            slope = (normal * seen.slope).sum(axis=-1)
+        else:
+            slope = normal[..., 0] * np.cos(seen.angle) + normal[..., 1] * np.sin(seen.angle)
         taper = [self._taper(seen.parameter[:, k], number) for k, number in enumerate(elements)]
-        slope = slope - np.stack(taper, axis=1)
-        return value - half, slope, seen
+        return value - np.stack(half, axis=1), slope - np.stack(taper, axis=1), seen
+
+    def find_kinks(self, z: FloatArray, stage: LoadStage, elements: Any) -> FloatArray:
+        """Return how steeply the gap falls from contacts at both ends of elements in n states, (n, m, 2)."""
+        numbers = np.asarray(elements)
+        sides = [
+            contact for contact in self.mesh.contacts if contact.slide >= 0 and contact.item.name == self.item.name
+        ]
+        pressed = [contact.element for contact in sides if contact.item.beam == self.item.beam]  # type: ignore[union-attr]
+        gap, slope, _ = self._measure_line(z, stage, numbers, np.array([0.0, 1.0]))
+        at_pad = np.isin(numbers, self.touched)[:, None] & (np.abs(gap) < BESIDE_CONTACT)
+        ends = np.stack([np.isin(numbers - 1, pressed), np.isin(numbers, pressed)], axis=1) | at_pad
+        return np.where(ends, np.maximum(slope * (-1.0, 1.0), 0.0), 0.0)
 
     def distance(self, places: Any, z: FloatArray, stage: LoadStage) -> tuple[Any, Any]:
         """Return the distances of places (n, ..., 2) from what may be touched in n states, and their gradients."""
@@ -216,9 +261,10 @@ class SideGaps:
     def is_parallel(self, z: FloatArray, stage: LoadStage) -> bool:
         """Return True if the whole side is parallel to the obstacle in one state (size,): no place touches first."""
         result = self._search(z[None], stage)
-        if result is not None:
-            return bool(result[0, 4] < PARALLEL_GAP)
-        return bool(np.ptp(self.measure(z[None], stage, self.elements, self.fractions)[0]) < PARALLEL_GAP)
+        spread = (
+            np.ptp(self.measure(z[None], stage, self.elements, self.fractions)[0]) if result is None else result[0, 4]
+        )
+        return bool(spread < PARALLEL_GAP)
 
     def least(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray:
         """Return the least gap in each of n states, plus what it may be negative by rounding beside contacts, (n,).
@@ -243,37 +289,47 @@ class SideGaps:
         gap, rows, seen = self._dips(z[None], stage)
         slack = self.slack[:, None]
         row, place = np.unravel_index(int((gap[0] + slack).argmin()), gap[0].shape)
-        best, least = (
-            float((gap[0] + slack).min()),
-            LeastGap(float(gap[0, row, place]), float(seen.parameter[0, row, place])),
-        )
+        best = float((gap[0] + slack).min())
+        least = LeastGap(float(gap[0, row, place]), float(seen.parameter[0, row, place]))
         for number, value, fraction in zip(rows.row, *self._refine(z[None], stage, rows), strict=True):
             if value + self.slack[number] <= best:
-                indices = self._measure_at(
-                    self._take_element(z[None], stage, int(self.elements[number])), np.array([fraction])
-                )
-                best, least = value + float(self.slack[number]), LeastGap(value, float(indices.parameter[0]))
+                states = self._take_element(z[None], stage, int(self.elements[number]))
+                parameter = float(self._measure_at(states, np.array([fraction])).parameter[0])
+                best, least = value + float(self.slack[number]), LeastGap(value, parameter)
         return least
 
     def _search(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray | None:
         """Return what compiled code finds in n states, (n, 5); None without it, or if the thickness varies."""
-        if self._side is None or not len(z):
-            return None
-        return equations(self.mesh).search_side(z, stage.rows(), self._side, watch)
+        result = None if self.packed is None else search_sides(self.mesh, self.packed, z, stage, watch)
+        return None if result is None else result[:, 0]
 
     @cached_property
-    def _side(self) -> SideData | None:
-        """The side as compiled code takes it."""
-        mesh = self.mesh
-        if not isinstance(self.item, BeamOnObstacle):
+    def packed(self) -> SideData | None:
+        """The side as compiled code takes it; None if the thickness varies, or it shears."""
+        mesh, item = self.mesh, self.item
+        beams, edge, counts, circle = [item.beam], np.empty((0, 6)), (0, 0, 0), (-1, 0.0)
+        if isinstance(item, BeamOnObstacle):
+            edge, outline = edge_rows(item.outline), item.outline
+            counts = len(outline.length), len(outline.radius), int(outline.closed)
+        elif isinstance(item, BeamOnBeam):
+            beams.append(item.partner)
+            circle = -1, half_thickness_of(mesh, item.partner)
+        else:
+            circle = mesh.nodes[item.node], item.radius / mesh.scales.length
+        sections = [mesh.fits.network.beams[beam].section for beam in beams]
+        if any(section.shear or isinstance(section.thickness, Taper) for section in sections):
             return None
-        if isinstance(mesh.fits.network.beams[self.item.beam].section.thickness, Taper):
-            return None
-        edge = self.item.outline
-        half = float(np.ravel(self.half_thickness(0.5, int(self.elements[0])))[0])
-        counts = len(edge.length), len(edge.radius), float(edge.closed), N_ALONG
-        numbers = np.array([half, mesh.scales.length, *counts], float)
-        return SideData(self.elements, self.slack, edge_rows(edge), numbers, _packed_tables(mesh.degree))
+        half, own, partner = half_thickness_of(mesh, item.beam), len(self.elements), self.partner_elements
+        elements = np.zeros((own + len(partner), 2))
+        elements[:own, 0], elements[:own, 1], elements[own:, 0] = self.elements, self.slack, partner
+        numbers = np.array([[0, own, half, mesh.scales.length, 0, *counts, *circle, own, len(partner)]], float)
+        return SideData(elements, numbers, edge)
+
+    @cached_property
+    def partner_elements(self) -> Any:
+        """Elements of the other beam that the side may touch, (m,)."""
+        partner = self.item.partner if isinstance(self.item, BeamOnBeam) else None
+        return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == partner], np.int64)
 
     def _dips(self, z: FloatArray, stage: LoadStage) -> tuple[Any, _Dips, SideStates]:
         """Return gaps at places of elements in n states, and between which of them lies a least one that is near."""
@@ -283,12 +339,10 @@ class SideGaps:
         dips = (low < 0) & (high > 0)
         share = np.where(dips, (gap[..., 1:] - high - gap[..., :-1]) / np.where(dips, low - high, 1.0), 0.0)
         bound = gap[..., :-1] + share * low  # where the tangents at both places meet
-        allowed = gap + self.slack[:, None]
-        lower = (
-            bound + self.slack[:, None] < np.minimum(allowed.min(axis=(1, 2)), NEAR_GAP)[:, None, None] - GAP_RESOLUTION
-        )
-        dips_near = np.nonzero(dips & lower)  # else the least of the gaps that are known is the least
-        state, row, place = dips_near
+        slack = self.slack[:, None]
+        least = np.minimum((gap + slack).min(axis=(1, 2)), NEAR_GAP)[:, None, None]
+        lower = bound + slack < least - GAP_RESOLUTION
+        state, row, place = np.nonzero(dips & lower)  # else the least of the gaps that are known is the least
         return gap, _Dips(state, row, place, slope[state, row, place], slope[state, row, place + 1]), seen
 
     def _refine(self, z: FloatArray, stage: LoadStage, dips: _Dips) -> tuple[FloatArray, FloatArray]:
@@ -319,17 +373,14 @@ class SideGaps:
         fields = energy.fields(moved, z, *stage)
         speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, element] / basis(self.mesh.degree).weights
         cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
+        kinks = self.find_kinks(z, stage, np.array([element]))[:, 0] if self.section.shear else None
         return _ElementStates(
-            element,
-            z,
-            stage,
-            poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0],
-            fields.slope_x[:, element] * speed,
-            fields.slope_y[:, element] * speed,
+            element, z, stage, poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0],
+            fields.slope_x[:, element] * speed, fields.slope_y[:, element] * speed,
             z[:, e.unknowns[element]][:, energy.rotation_columns(self.mesh.degree)],
             np.broadcast_to(e.angle, (count, *e.angle.shape[-2:]))[:, element],
-            np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, element],
-        )
+            np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, element], speed, kinks,
+        )  # fmt: skip
 
     def _measure_at(self, states: _ElementStates, fraction: FloatArray) -> _Beside:
         """Return gap, slope and parameter at one place of an element in each of n states."""
@@ -339,9 +390,18 @@ class SideGaps:
         angle = (states.angle * through).sum(axis=1) + (states.rotation * values).sum(axis=1)
         parameter = states.cuts[:, 0] + (states.cuts[:, 1] - states.cuts[:, 0]) * fraction
         value, normal = self.distance(np.stack([x, y], axis=-1), states.z, states.stage)
-        slope = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
+        gap = value - self.half_thickness(parameter, states.element)
+        if line_leaves_normal(self.section):
+            along = ((states.x * normal[:, :1] + states.y * normal[:, 1:]) * through).sum(axis=1)
+            slope = along / (states.speed * through).sum(axis=1)
+        else:
+            slope = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
         slope = slope - self._taper(parameter, states.element)
-        return _Beside(value - self.half_thickness(parameter, states.element), slope, parameter)
+        if states.kinks is not None:
+            behind, length = (states.speed * upto).sum(axis=1), states.speed @ basis(self.mesh.degree).weights
+            reach = find_reach(self.mesh, self.item, [states.element])[0, 0]
+            gap, slope = round_off(gap, slope, behind, length - behind, states.kinks, reach)
+        return _Beside(gap, slope, parameter)
 
 
 class _ElementStates(NamedTuple):
@@ -356,6 +416,8 @@ class _ElementStates(NamedTuple):
     rotation: FloatArray  # (n, degree + 1)
     angle: FloatArray  # (n, q) unloaded
     cuts: FloatArray  # (n, 2)
+    speed: FloatArray  # (n, q) arc length by the place along the element
+    kinks: FloatArray | None  # (n, 2) of beams that shear
 
 
 class _Dips(NamedTuple):
@@ -374,92 +436,3 @@ class _Beside(NamedTuple):
     gap: FloatArray
     slope: FloatArray
     parameter: FloatArray
-
-
-def carry(
-    old: Discretisation, z: FloatArray, stage: LoadStage, new: Discretisation, places: FloatArray | None = None
-) -> FloatArray:
-    """Return states (n, size) of a network on other elements of the same degree: fields are evaluated anew.
-
-    Forces of contacts are those of the same contacts of nodes; of sides they are zero. `places` (n, k) are those of the
-    contacts of sides of the new elements, if they are not those that these were made for.
-    """
-    values = np.zeros((len(z), new.size), z.dtype)
-    for name, place in new.nodes.items():
-        values[:, new.attachments.unknowns[place]] = z[:, old.attachments.unknowns[old.nodes[name]]]
-    cuts = cuts_at(old, z)
-    fresh = np.broadcast_to(new.elements.cuts, (len(z), *new.elements.cuts.shape))
-    if places is not None and new.moving is not None:
-        fresh = fresh.copy()
-        fresh[:, new.moving.elements] = new.moving.fixed + np.einsum("rck,nk->nrc", new.moving.shares, places)
-    rule, columns, bubbles = basis(new.degree), energy.rotation_columns(new.degree), _bubble_matrix(new.degree)
-    for beam in new.fits:
-        before = np.array([k for k, name in enumerate(old.elements.beam) if name == beam])
-        after = np.array([k for k, name in enumerate(new.elements.beam) if name == beam])
-        for k, side in ((0, 0), (-1, 1)):
-            ends = old.elements.ends[before[k], side], new.elements.ends[after[k], side]
-            values[:, new.attachments.unknowns[ends[1]]] = z[:, old.attachments.unknowns[ends[0]]]
-        rows, joints = new.elements.unknowns[after], new.elements.ends[after[:-1], 1]
-        bodies = new.attachments.unknowns[joints]
-        if len(before) == len(after) and np.array_equal(cuts[:, before], fresh[:, after]):
-            values[:, rows[:, 8:]] = z[:, old.elements.unknowns[before, 8:]]
-            last = old.elements.ends[before[:-1], 1]
-            values[:, bodies] = z[:, old.attachments.unknowns[last]]
-            values[:, bodies[:, :2]] += _origins(old, last) - _origins(new, joints)
-            continue
-        left, right = fresh[:, after, :1], fresh[:, after, 1:]
-        at = left + (right - left) * np.append(rule.places, (0.0, 1.0))
-        place, turn, force = _sample(old, z, stage, before, cuts[:, before], at)
-        values[:, bodies[:, :2]] = place[:, :-1] - _origins(new, joints)
-        values[:, bodies[:, 2]] = turn[:, :-1, -1]
-        rest = turn[..., :-2] - turn[..., -2:-1] * rule.values[:, 0] - turn[..., -1:] * rule.values[:, 1]
-        values[:, rows[:, columns[2:]]] = rest @ bubbles.T
-        values[:, rows[:, -2:]] = force
-    number_of = {contact.number: contact.own_unknowns for contact in old.contacts if contact.slide < 0}
-    for contact in new.contacts:
-        if contact.slide < 0:
-            values[:, list(contact.own_unknowns)] = z[:, list(number_of[contact.number])]
-        else:
-            values[:, contact.slide], values[:, contact.flag] = fresh[:, contact.element, 1], contact.laid
-    return values
-
-
-@lru_cache(maxsize=64)
-def _bubble_matrix(degree: int) -> FloatArray:
-    """Return the matrix from rotations at the Gauss points, those of both ends taken off, to bubbles."""
-    return read_only(np.linalg.pinv(basis(degree).values[:, 2:]))
-
-
-def _origins(mesh: Discretisation, places: Any) -> FloatArray:
-    return np.asarray(mesh.attachments.origin[places] + mesh.attachments.arm[places])
-
-
-def _sample(
-    mesh: Discretisation, z: FloatArray, stage: LoadStage, elements: Any, cuts: FloatArray, at: FloatArray
-) -> tuple[Any, Any, Any]:
-    """Return where m parts of a beam end in n states, (n, m, 2), rotations at parameters (n, m, k), and end forces."""
-    count = len(z)
-    flat = at.reshape(count, -1)
-    home = np.minimum((flat[..., None] > cuts[:, None, :, 1]).sum(axis=-1), len(elements) - 1)
-    left, right = np.moveaxis(np.take_along_axis(cuts, home[..., None], axis=1), -1, 0)
-    fractions = np.clip((flat - left) / (right - left), 0.0, 1.0)
-    stages = stage.rows()
-    numbers = elements[home]
-    result = equations(mesh).locate(z, stages, np.stack([numbers, fractions], axis=-1), _series_matrix(mesh.degree))
-    if result is None:
-        result = np.array([_locate(mesh, z[k], stage.take([k]), numbers[k], fractions[k]) for k in range(count)])
-    result = result.reshape(*at.shape, 4)
-    last, states = numbers.reshape(at.shape)[..., -1], np.arange(count)[:, None]
-    load = energy.line_load(mesh, stages[:, 0], stages[:, 1, None, None])[states, last]
-    force = z[states[..., None], mesh.elements.unknowns[last, -2:]] + load * result[..., -1, 3:]
-    return result[..., -1, :2], result[..., 2], force
-
-
-def _locate(mesh: Discretisation, z: FloatArray, stage: LoadStage, numbers: Any, fractions: FloatArray) -> FloatArray:
-    """Return x, y, rotation, arc length to the end of the element, at places in one state, (k, 4)."""
-    result = np.empty((len(numbers), 4))
-    for number in np.unique(numbers).tolist():
-        rows = numbers == number
-        seen = side_states(mesh, z[None], stage, np.array([number]), fractions[rows])
-        result[rows, :2], result[rows, 2], result[rows, 3] = seen.place[0, 0], seen.turn[0, 0], seen.ahead[0, 0]
-    return result

@@ -1,10 +1,10 @@
 """Equations of a network whose beams touch obstacles with their sides: the places of these contacts are unknowns.
 
 A contact at the parameter S of a beam ends an element there. Its rows are the gap g = 0 and the tangency n . t = 0 of
-the beam to the obstacle (beside a slope of the thickness: n . t = dr/ds). The change of all residuals with S, at held
-coefficients of the rotation, is exact for beams of one thickness whose unloaded angle is a polynomial; else it is a
-difference of ten digits, of which Newton's method needs fewer. The matrix is not symmetric: the stationarity
-f n . t = 0, which would make it so, says nothing where a contact begins.
+the beam to the obstacle (beside a slope of the thickness: n . t = dr/ds; of beams that shear see `line_tangent.py`).
+The change of all residuals with S, at held coefficients of the rotation, is exact for beams of one thickness whose
+unloaded angle is a polynomial; else it is a difference of ten digits, of which Newton's method needs fewer. The matrix
+is not symmetric: the stationarity f n . t = 0, which would make it so, says nothing where a contact begins.
 
 The number of unstable directions comes from another, symmetric matrix, in which all places are held: with the force f
 of a contact and the curvature g'' of its gap along the beam, tangency is a constraint of the stiffness f / g''. So P is
@@ -19,21 +19,26 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.edges import find_mate, find_motion, measure_distance
+from cfmkit.elastica.contact.edges import find_leading, find_motion, measure_distance
 from cfmkit.elastica.contact.equations import GapBounds, number_free_unknowns, open_all_contacts
-from cfmkit.elastica.contact.terms import press
+from cfmkit.elastica.contact.laid_elements import LaidPart, compute_laid_rows
+from cfmkit.elastica.contact.line_tangent import (
+    line_leaves_normal,
+    measure_compliances,
+    measure_line_tangent,
+    raise_pad,
+)
+from cfmkit.elastica.contact.terms import contact_contribution, measure
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
 from cfmkit.elastica.mechanics.moving_elements import (
     MOVED_TABLES,
     PLACE_STEP,
     compute_moved_tables,
+    copy_moved_tables,
     unloaded_beam_at,
-    with_own_tables,
 )
 from cfmkit.elastica.mechanics.polynomials import shape_functions
-from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import BeamOnBeam
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
@@ -45,9 +50,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
 SMALLEST_ELEMENT = 1e-9  # of a beam: shorter ones have no equations
-NEUTRAL_STIFFNESS = (
-    1e-6  # stiffness of the motions [EI/L^3] below which a direction counts as stable: exactly critical ones do
-)
+NEUTRAL_STIFFNESS = 1e-6  # of the motions [EI/L^3] below which a direction counts as stable: exactly critical ones
 SMALLEST_FORCE = 1e-12  # of a contact that begins, in the curvature of its gap over its force
 
 
@@ -56,14 +59,6 @@ class LinearisedSides(LinearEquations):
 
     frozen: FloatArray  # (m, m) symmetric, with places of contacts held
     n_laid: int  # elements that lie on obstacles: each has one force
-
-
-class LaidPart(NamedTuple):
-    """An element that lies on an obstacle: which, where it does, and the curvature that it takes on."""
-
-    element: int
-    contact: ContactAt  # at one of its ends
-    curvature: float
 
 
 class SideAt(NamedTuple):
@@ -80,6 +75,7 @@ class SideAt(NamedTuple):
     rises: float  # normal . across, 1 or -1 where it is tangent
     bulge: float  # curvature of the obstacle there
     along: FloatArray  # (2,) along the beam
+    frozen_row: FloatArray  # (m,) `tangency_row` by what is unknown while all places and forces of contacts are held
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +97,7 @@ class SlidingEquations(NumpyEquations):
     @classmethod
     def from_mesh(cls, mesh: Discretisation, ramp: bool, make: Callable[..., NumpyEquations]) -> SlidingEquations:
         """Return the equations of a network; `make` returns those of one whose elements stand still."""
-        mesh = with_own_tables(mesh)
+        mesh = copy_moved_tables(mesh)
         return cls(mesh, ramp, plain=make(replace(open_all_contacts(mesh), moving=None), ramp))
 
     def rebase(self, base: FloatArray) -> SlidingEquations:
@@ -156,59 +152,6 @@ class SlidingEquations(NumpyEquations):
             edge[self.mesh.elements.unknowns[part.element, -2:]] = 0.0
         return edge
 
-    def _compute_laid_rows(self, part: LaidPart, z: FloatArray) -> tuple[Any, FloatArray, FloatArray]:
-        """Return unknowns, residual and its derivatives (9, 9) of an element that lies on an obstacle.
-
-        They are x, y and rotation of both ends, the tension, and a force that is none; the places are held.
-        """
-        mesh = self.mesh
-        indices = mesh.elements.unknowns[part.element]
-        item: Any = part.contact.item
-        fitted, section = mesh.fits[item.beam], mesh.fits.network.beams[item.beam].section
-        cuts = mesh.elements.cuts[part.element] if mesh.moving is None else self._cuts_of(part.element, z)
-        inside = float(mesh.elements.cuts[part.element].mean())
-        scale = mesh.scales
-        speed = float(np.real(fitted.speed(np.array([inside]), inside) + np.zeros(1))[0]) / scale.length
-        rest = np.real(fitted.angle(cuts, inside)) + 0.0 * cuts
-        bend = float(rest[1] - rest[0]) / ((cuts[1] - cuts[0]) * speed)
-        rigidity = float(np.real(section.rigidities(np.array([inside]), inside)[0][0])) / (
-            scale.force * scale.length**2
-        )
-        axial = float(self.mesh.axial[part.element, 0])
-        moment, length = rigidity * (part.curvature - bend), float(cuts[1] - cuts[0]) * speed
-        unknowns = np.array(
-            [indices[0], indices[1], indices[3], indices[4], indices[5], indices[7], indices[-2], indices[-1]]
-        )
-        angle = rest + z[indices[[3, 7]]]
-        along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-        tension, idle = z[indices[-2]], z[indices[-1]]
-        ends = mesh.elements.ends[part.element]
-        if part.curvature:
-            reach = (angle[1] - angle[0]) / part.curvature
-        else:
-            place = [poses(mesh.attachments, z, [int(end)]).place[0] for end in ends]
-            reach = along[0] @ (place[1] - place[0])
-        residual, slopes = np.zeros(8), np.zeros((8, 8))
-        residual[0:2], residual[3:5] = -tension * along[0], tension * along[1]
-        residual[2], residual[5] = -moment, moment
-        residual[6], residual[7] = reach - length * (1 + axial * tension), idle
-        slopes[0:2, 6], slopes[3:5, 6] = -along[0], along[1]
-        slopes[0:2, 2], slopes[3:5, 5] = -tension * across[0], tension * across[1]
-        if part.curvature:
-            slopes[6, 5], slopes[6, 2] = 1 / part.curvature, -1 / part.curvature
-        else:
-            slopes[6, 3:5], slopes[6, 0:2] = along[0], -along[0]
-            slopes[6, 2] = across[0] @ (place[1] - place[0])
-        slopes[6, 6], slopes[7, 7] = -length * axial, 1.0
-        return unknowns, residual, slopes
-
-    def _cuts_of(self, element: int, z: FloatArray) -> FloatArray:
-        """Return where an element begins and ends."""
-        moving: Any = self.mesh.moving
-        row = int(np.flatnonzero(np.asarray(moving.elements) == element)[0])
-        return np.asarray(moving.fixed[row] + moving.shares[row] @ z[moving.places])
-
     def side_at(self, contact: ContactAt, z: FloatArray) -> SideAt:
         """Return the side of a beam at a contact; the elements stand at their places."""
         mesh, item = self.mesh, contact.item
@@ -229,11 +172,27 @@ class SlidingEquations(NumpyEquations):
         turning[2] = rises
         if len(motion.unknowns):
             hessian[-1, -1] += normal @ motion.arm
-        curvature = self._curvature(contact, z, bend) * rises + float(along @ bulge @ along)
-        return SideAt(
+        bent = self._curvature(contact, z, bend)
+        side = SideAt(
             float(edge.value) - radius, float(normal @ along) - taper, normal @ apart, turning, hessian,
-            (-taper * slope[2], rises * slope[1]), np.append([x, y, turn], motion.unknowns), curvature, rises,
-            float(edge.curvature), along,
+            (-taper * slope[2], rises * slope[1]), np.append([x, y, turn], motion.unknowns),
+            bent * rises + float(along @ bulge @ along), rises, float(edge.curvature), along, turning,
+        )  # fmt: skip
+        if not line_leaves_normal(mesh.fits.network.beams[item.beam].section):  # type: ignore[union-attr]
+            return side
+        force, forces = float(z[contact.unknown]), mesh.elements.unknowns[[contact.element, contact.element + 1], -2:]
+        compliances = measure_compliances(mesh, item.beam, parameter)  # type: ignore[union-attr]
+        at = measure_line_tangent(angle, normal, z[forces[0]] - 0.5 * force * normal, *compliances)
+        # by the force before the kink and that of the contact; with all places held by the forces on both sides of it
+        leaning, frozen = (bulge @ (at.slope - 0.5 * force * at.by_force)) @ apart, (bulge @ at.slope) @ apart
+        leaning[2] = frozen[2] = at.by_turn
+        half, turn_by_place = 0.5 * at.by_force, float(at.by_turn) * slope[1]
+        return side._replace(
+            tangency=float(at.across) - taper, gap_row=np.pad(side.gap_row, (0, 5)), hessian=np.pad(hessian, (0, 5)),
+            tangency_row=np.concatenate([leaning, at.by_force, (0.0, 0.0, -half @ normal)]),
+            frozen_row=np.concatenate([frozen, half, half, (0.0,)]), by_place=(side.by_place[0], turn_by_place),
+            unknowns=np.concatenate([side.unknowns, *forces, (contact.unknown,)]), along=at.slope,
+            curvature=bent * float(at.by_turn) + float(at.slope @ bulge @ at.slope),
         )  # fmt: skip
 
     def _curvature(self, contact: ContactAt, z: FloatArray, unloaded: float) -> float:
@@ -280,7 +239,7 @@ class SlidingEquations(NumpyEquations):
             side, value = self.side_at(contact, z), float(z[contact.unknown])
             inside, rate = slots[side.unknowns] >= 0, moved[side.unknowns]
             indices, press_row, turn_row = slots[side.unknowns][inside], side.gap_row[inside], side.tangency_row[inside]
-            leading = self._find_leading(contact)
+            leading = find_leading(self.mesh, contact)
             if leading is contact:
                 residual[indices] -= value * press_row
                 change[indices] -= value * (side.hessian @ rate)[inside]
@@ -289,7 +248,7 @@ class SlidingEquations(NumpyEquations):
                 residual[force], change[force] = -side.gap, -side.gap_row @ rate
                 tangent[force, indices] -= press_row
                 tangent[force, place] = -side.by_place[0]
-                rows.append((indices, -press_row, 0.0))
+                rows.append((indices[indices < count], -press_row[indices < count], 0.0))
             else:
                 residual[force] = z[leading.unknown] - value
                 tangent[force, force], tangent[force, slots[leading.unknown]] = -1.0, 1.0
@@ -300,7 +259,7 @@ class SlidingEquations(NumpyEquations):
             pressing[contact.unknown] = side, len(rows)
             bound = any(part.element in (contact.element, contact.element + 1) for part in laid)
             stiffness = 0.0 if bound else -max(side.curvature, 0.0) / max(value, SMALLEST_FORCE)
-            rows.append((indices, turn_row, stiffness))
+            rows.append((indices[indices < count], side.frozen_row[inside][indices < count], stiffness))
         self.move_to(places)
         at = LinearisedSides(residual, tangent, change)
         at.frozen, at.n_laid = self._frozen(tangent, rows, laid, z), len(laid)
@@ -310,16 +269,11 @@ class SlidingEquations(NumpyEquations):
     def _couple_places(self, pivots: FloatArray, pressing: dict[int, tuple[SideAt, int]], z: FloatArray) -> None:
         """Put the mixed curvature of the gap of two beams, by both places, among the pivots of conditions."""
         for contact in self._sides:
-            leading = self._find_leading(contact)
+            leading = find_leading(self.mesh, contact)
             if leading is not contact and contact.unknown in pressing:
                 (side, row), (partner, row_of_leading) = pressing[contact.unknown], pressing[leading.unknown]
                 mixed = float(partner.tangency_row[3:5] @ side.along) / max(float(z[leading.unknown]), SMALLEST_FORCE)
                 pivots[[row, row_of_leading], [row_of_leading, row]] = -mixed
-
-    def _find_leading(self, contact: ContactAt) -> ContactAt:
-        """Return the contact that has gap and force: of a pair of beams one of both, else the contact itself."""
-        item = contact.item
-        return find_mate(self.mesh, item) if isinstance(item, BeamOnBeam) and not item.leads else contact
 
     def _lay_rows(self, part: LaidPart, z: FloatArray, residual: FloatArray, tangent: FloatArray) -> None:
         """Put the equations of an element that lies on an obstacle in the place of those of a free one."""
@@ -328,7 +282,7 @@ class SlidingEquations(NumpyEquations):
         residual[inner] = z[indices[8:]]
         tangent[inner], tangent[:, inner] = 0.0, 0.0
         tangent[inner, inner] = 1.0
-        unknowns, rows, slopes = self._compute_laid_rows(part, z)
+        unknowns, rows, slopes = compute_laid_rows(self.mesh, part, z)
         slots = self.slots[unknowns]
         held = slots < 0
         residual[slots[6]] = tangent[slots[6], slots[6]] = 0.0
@@ -338,7 +292,7 @@ class SlidingEquations(NumpyEquations):
 
     def is_pressing(self, contact: ContactAt, z: FloatArray) -> bool:
         """Return True if the side of a beam counts as touching: as it was set, or where it has a force."""
-        return contact.closed if contact.closed is not None else bool(z[self._find_leading(contact).unknown] > 0)
+        return contact.closed if contact.closed is not None else bool(z[find_leading(self.mesh, contact).unknown] > 0)
 
     def _add_nodes(
         self, z: FloatArray, moved: FloatArray, residual: FloatArray, change: FloatArray, tangent: FloatArray,
@@ -354,7 +308,12 @@ class SlidingEquations(NumpyEquations):
                 if slot >= 0:
                     residual[slot], tangent[slot, slot] = -z[contact.unknown], -1.0
                 continue
-            term = press(self.mesh, contact, z)
+            lowered = raise_pad(self.mesh, contact, z[None])[0]
+            if lowered and contact.closed is None:
+                contact = contact._replace(
+                    closed=bool(z[contact.unknown] > measure(self.mesh, contact, z).value + lowered)
+                )
+            term = contact_contribution(self.mesh, contact, z)
             slots = self.slots[term.unknowns]
             indices = slots >= 0
             pushed = slots[indices]
@@ -378,7 +337,7 @@ class SlidingEquations(NumpyEquations):
             self._lay(laid)
             residual = np.array(self.plain.linearise(free, way).residual)
             for part in laid:
-                unknowns, rows, _ = self._compute_laid_rows(part, beside)
+                unknowns, rows, _ = compute_laid_rows(self.mesh, part, beside)
                 slots = self.slots[unknowns]
                 residual[slots[6:]] = 0.0
                 residual[slots[slots >= 0]] += rows[slots >= 0]
@@ -417,7 +376,7 @@ class SlidingEquations(NumpyEquations):
         whole = np.zeros((count + len(rows), count + len(rows)))
         whole[:count, :count] = tangent[:count, :count]
         for part in laid:
-            unknowns, _, slopes = self._compute_laid_rows(part, z)
+            unknowns, _, slopes = compute_laid_rows(self.mesh, part, z)
             slots = self.slots[unknowns]
             some = slots >= 0
             whole[np.ix_(slots[some], slots[some])] -= slopes[np.ix_(some, some)]
@@ -470,17 +429,17 @@ class SlidingEquations(NumpyEquations):
         self._lay(laid)
         total = np.array(self.plain.evaluate(self._drop_tension(z, laid), drive, share)[0])
         for part in laid:
-            unknowns, rows, _ = self._compute_laid_rows(part, z)
+            unknowns, rows, _ = compute_laid_rows(self.mesh, part, z)
             total[self.mesh.elements.unknowns[part.element, -2:]] = 0.0
             np.add.at(total, unknowns, rows)
         for contact in self.mesh.contacts:
             if not z[contact.unknown]:
                 continue
             if contact.slide < 0:
-                term = press(self.mesh, contact, z)
+                term = contact_contribution(self.mesh, contact, z)
                 total[term.unknowns] += term.gradient
                 continue
-            if (leading := self._find_leading(contact)) is not contact:
+            if (leading := find_leading(self.mesh, contact)) is not contact:
                 total[contact.unknown] += z[leading.unknown] - z[contact.unknown]
                 continue
             side = self.side_at(contact, z)

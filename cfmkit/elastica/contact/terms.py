@@ -133,7 +133,7 @@ def is_closed(contact: ContactAt, z: Any, gap: Any) -> bool:
     return float(np.real(z[contact.unknown])) > float(np.real(gap))
 
 
-def press(mesh: Discretisation, contact: ContactAt, z: Any) -> Contribution:
+def contact_contribution(mesh: Discretisation, contact: ContactAt, z: Any) -> Contribution:
     """Return the term of a contact: that of its force where it is closed, else of the condition that it has none."""
     gap, force = measure(mesh, contact, z), z[contact.unknown]
     if contact.rub >= 0:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.terms import press
+from cfmkit.elastica.contact.terms import contact_contribution
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.designs import design_of
@@ -203,7 +203,7 @@ def _term(acting: Acting, z: Any, drive: float) -> Contribution:
     """Return the term of a spring, a load or a contact in one state."""
     network, attached = acting
     if isinstance(attached, ContactAt):
-        return press(network, attached, z)
+        return contact_contribution(network, attached, z)
     return ENERGY_TERMS[type(attached.item)](network, attached, z, 1.0, drive)
 
 
@@ -226,8 +226,8 @@ def _held_forces(at: Equilibria, motions: FloatArray) -> FloatArray:
     return found
 
 
-def unknown_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
-    """Return the derivatives of all unknowns by variables, (p, k, size).
+def unknown_slopes(at: Equilibria, designs: NetworkDesigns, forces: FloatArray) -> FloatArray:
+    """Return the derivatives of all unknowns by variables, (p, k, size), from those of the gradient (`force_slopes`).
 
     Raises
     ------
@@ -235,7 +235,7 @@ def unknown_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
         If a tangent is singular.
     """
     mesh, chosen = at.mesh, at.mesh.free
-    own, forces = equations(mesh), _force_slopes(at, designs)
+    own = equations(mesh)
     found = np.zeros((len(at.z), designs.count, mesh.size))
     if designs.base is not None:
         found += np.imag(designs.base) / COMPLEX_STEP
@@ -246,7 +246,7 @@ def unknown_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
     return found
 
 
-def _force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
+def force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
     """Return the derivatives of the gradient by variables where free unknowns stay, (p, k, size).
 
     Held ones move with their support, to which every spring and load at them answers.
@@ -263,8 +263,8 @@ def _force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
         some = slice(first, first + together)
         for columns, force in energy.element_forces(stepped, moved[some], at.drive[some], 1.0):
             change = np.moveaxis(slopes_of(force, designs.count, force.shape), 0, 1)
-            here: Any = (slice(None), slice(None), unknowns[:, list(columns)])
-            np.add.at(found[some], here, change)
+            for element, own in enumerate(unknowns[:, list(columns)]):  # all different, unlike those of all elements
+                found[some, :, own] += change[:, :, element]
     for d, terms in enumerate(_moved_terms(at, designs)):
         for acting in terms:
             for k, drive in enumerate(at.drive.tolist()):

@@ -8,23 +8,23 @@ into place.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.terms import press
+from cfmkit.elastica.contact.terms import contact_contribution
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
-from cfmkit.elastica.mechanics.wide_strip import bending
-from cfmkit.numerics.dual_array import cos_sin, stack
+from cfmkit.elastica.mechanics.wide_strip import bending, bending_moment
+from cfmkit.numerics.dual_array import DualArray, chain, cos_sin, plain, stack
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
     from cfmkit.elastica.mechanics.terms import Contribution
 
 SINGULAR_SHIFT = 1e-13  # added to the stiffness of the motions where it is singular to rounding
@@ -32,16 +32,85 @@ FLEXIBLE_SHARE = 1e-9  # of the largest flexibility, below which one is that of 
 REAL_SHARE = 1e-9  # imaginary part of an eigenvalue up to which it is real, of its size
 
 
-class Fields(NamedTuple):
-    """State at the Gauss points of the elements, (..., e, q) each."""
+class SectionForces:
+    """Forces on sections at angles, from forces along x and y, (...) each; all are plain but for `along` and `across`.
+
+    Angles and forces may be dual.
+    """
+
+    def __init__(self, angle: Any, h: Any, v: Any) -> None:
+        """Compute the forces."""
+        self.arguments = angle, h, v
+        self.cos, self.sin = cos_sin(plain(angle))
+        self.normal = plain(h) * self.cos + plain(v) * self.sin  # N, along the tangent
+        self.shear = plain(v) * self.cos - plain(h) * self.sin  # Q, across it
+
+    @property
+    def along(self) -> Any:
+        """N with its derivatives."""
+        return chain(self.normal, (self.shear, self.cos, self.sin), self.arguments)
+
+    @property
+    def across(self) -> Any:
+        """Q with its derivatives."""
+        return chain(self.shear, (-self.normal, -self.sin, self.cos), self.arguments)
+
+
+class SectionFields(SectionForces):
+    """Forces on sections, and what positions and moments are integrals of, at points of elements, (..., e, q) each.
+
+    Tables of elements may be dual, too. `slope_x`, `slope_y` and `turning` have derivatives then.
+    """
+
+    def __init__(self, elements: BeamElements, angle: Any, h: Any, v: Any) -> None:
+        """Compute the forces; the rest when it is needed."""
+        super().__init__(angle, h, v)
+        self.all_arguments = *self.arguments, elements.axial, elements.shear
+        self.is_dual = any(isinstance(argument, DualArray) for argument in self.all_arguments)
+        self.axial, self.slip = plain(elements.axial), plain(elements.shear)
+
+    @property
+    def slope_x(self) -> Any:
+        """dX/ds."""
+        cos, sin, normal, shear, axial, slip = self._parts
+        value = (1 + axial * normal) * cos - slip * shear * sin
+        if not self.is_dual:
+            return value
+        f, g = 1 + (axial - slip) * normal, (axial - slip) * shear
+        by_h, by_v = axial * cos**2 + slip * sin**2, (axial - slip) * cos * sin
+        return chain(value, (g * cos - f * sin, by_h, by_v, normal * cos, -shear * sin), self.all_arguments)
+
+    @property
+    def slope_y(self) -> Any:
+        """dY/ds."""
+        cos, sin, normal, shear, axial, slip = self._parts
+        value = (1 + axial * normal) * sin + slip * shear * cos
+        if not self.is_dual:
+            return value
+        f, g = 1 + (axial - slip) * normal, (axial - slip) * shear
+        by_h, by_v = (axial - slip) * cos * sin, axial * sin**2 + slip * cos**2
+        return chain(value, (g * sin + f * cos, by_h, by_v, normal * sin, shear * cos), self.all_arguments)
+
+    @property
+    def turning(self) -> Any:
+        """-dM/ds."""
+        cos, sin, normal, shear, axial, slip = self._parts
+        f, g = 1 + (axial - slip) * normal, (axial - slip) * shear
+        value = shear * f
+        if not self.is_dual:
+            return value
+        by_force = g * cos - f * sin, g * sin + f * cos
+        return chain(value, (g * shear - f * normal, *by_force, shear * normal, -shear * normal), self.all_arguments)
+
+    @property
+    def _parts(self) -> tuple[Any, ...]:
+        return self.cos, self.sin, self.normal, self.shear, self.axial, self.slip
+
+
+class Fields(SectionFields):
+    """The same at the Gauss points of all elements, with the change of curvature."""
 
     curvature: Any  # phi' by the element's parameter
-    cos: Any
-    sin: Any
-    normal: Any  # N, along the tangent
-    shear: Any  # Q, across it
-    slope_x: Any  # dX/ds
-    slope_y: Any
 
 
 def fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fields:
@@ -49,18 +118,14 @@ def fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fields
     e, rule = mesh.elements, basis(mesh.degree)
     own = z[..., e.unknowns]
     rotation = own[..., rotation_columns(mesh.degree)]
-    force = own[..., None, -2:] + line_load(mesh, drive, share)[..., None, :] * e.ahead[..., None]
-    turn = e.angle + rotation @ rule.values.T
-    cos, sin = cos_sin(turn)
-    normal = force[..., 0] * cos + force[..., 1] * sin
-    shear = force[..., 1] * cos - force[..., 0] * sin
+    load = line_load(mesh, drive, share)
+    h, v = (own[..., axis - 2, None] + load[..., axis, None] * e.ahead for axis in (0, 1))
+    at = Fields(e, e.angle + rotation @ rule.values.T, h, v)
+    at.curvature = rotation @ rule.slopes.T
     if e.laid is not None:
-        normal = np.where(e.laid[..., None], own[..., None, -2], normal)
-        shear = np.where(e.laid[..., None], 0.0, shear)
-    stretch, slip = 1 + e.axial * normal, e.shear * shear
-    return Fields(
-        rotation @ rule.slopes.T, cos, sin, normal, shear, stretch * cos - slip * sin, stretch * sin + slip * cos
-    )
+        at.normal = np.where(e.laid[..., None], own[..., None, -2], at.normal)
+        at.shear = np.where(e.laid[..., None], 0.0, at.shear)
+    return at
 
 
 @lru_cache(maxsize=64)
@@ -90,7 +155,7 @@ def _contributions(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iter
     for attached in (*mesh.springs, *mesh.loads):
         yield ENERGY_TERMS[type(attached.item)](mesh, attached, z, share, drive)
     for contact in mesh.contacts:
-        yield press(mesh, contact, z)
+        yield contact_contribution(mesh, contact, z)
 
 
 def _end_poses(mesh: Discretisation, z: Any) -> tuple[AttachmentPoses, AttachmentPoses]:
@@ -119,14 +184,13 @@ def element_forces(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iter
     start, end = _end_poses(mesh, z)
     last = z[..., e.unknowns[:, -2:]]
     first = last + line_load(mesh, drive, share) * e.length[..., None]
-    bend = e.weight * bending(e, at.curvature).moment
-    turning = e.weight * at.shear * (1 + (e.axial - e.shear) * at.normal)
-    turned = bend @ rule.slopes - turning @ rule.values
+    bend = e.weight * bending_moment(e, at.curvature)
+    turned = bend @ rule.slopes - (e.weight * at.turning) @ rule.values
     reach = stack([(e.weight * at.slope_x).sum(axis=-1), (e.weight * at.slope_y).sum(axis=-1)])
     count = e.unknowns.shape[1]
     yield tuple(rotation_columns(mesh.degree).tolist()), turned
-    yield (0, 1, 2), -start.works(first)
-    yield (4, 5, 6), end.works(last)
+    yield (0, 1, 2), -start.generalised_forces(first)
+    yield (4, 5, 6), end.generalised_forces(last)
     yield (count - 2, count - 1), end.place - start.place - reach - (1.0 - share) * e.gap
 
 
@@ -174,7 +238,9 @@ def strain_energy(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) ->
     strain = e.axial * at.normal**2 + e.shear * at.shear**2
     beams = e.weight * (2 * bending(e, at.curvature).energy + strain)
     springs = (ENERGY_TERMS[type(spring.item)](mesh, spring, z, share, drive).energy for spring in mesh.springs)
-    return beams.sum() / 2 + sum(springs) + sum(press(mesh, contact, z).energy for contact in mesh.contacts)
+    return (
+        beams.sum() / 2 + sum(springs) + sum(contact_contribution(mesh, contact, z).energy for contact in mesh.contacts)
+    )
 
 
 def count_unstable(mesh: Discretisation, tangent: Any) -> int:

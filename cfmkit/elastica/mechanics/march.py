@@ -33,11 +33,10 @@ from cfmkit.elastica.mechanics.equations import (
     MarchState,
     NaturalMarch,
     NumpyEquations,
-    SideData,
     SolvedStates,
     begin,
 )
-from cfmkit.elastica.mechanics.moving_elements import with_own_tables
+from cfmkit.elastica.mechanics.moving_elements import copy_moved_tables
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.network import LineSpring, PointLoad, SlideSpring, TorsionSpring
 
@@ -74,7 +73,7 @@ def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
         kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
         plain = kinds <= set(COMPILED_TERMS) and mesh.degree <= MAX_DEGREE
         if mesh.moving is not None and plain and key[2] and are_sides_compiled(mesh):
-            mesh.known[key] = CompiledSides(with_own_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
+            mesh.known[key] = CompiledSides(copy_moved_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
         elif mesh.moving is not None:
             mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
         elif plain and key[2] and are_compiled(mesh):
@@ -115,13 +114,19 @@ class CompiledSides(CompiledEquations):
         """Return the gradient by all unknowns, (size,)."""
         return self.reference.gradient(free, place)
 
-    def search_side(self, z: FloatArray, stages: FloatArray, side: SideData, watch: bool = False) -> FloatArray | None:
-        """Return the least gaps of a side in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().search_side(z, stages, side, watch)
+    def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
+        """Return the curvatures of gaps at contacts of sides in n states, (sides, n); None where something lies."""
+        curvatures, states = np.empty((len(side_contacts(self.mesh)), len(z))), np.ascontiguousarray(z, float)
+        lies = self._lies(z[:, self.mesh.free]).any()
+        return None if lies or not self.code.side_curvatures(self.row, states, curvatures) else curvatures
 
-    def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, series: FloatArray) -> FloatArray | None:
+    def search_sides(self, z: FloatArray, *rest: Any, **named: Any) -> FloatArray | None:
+        """Return the least gaps of sides in n states; None where something lies on an obstacle."""
+        return None if self._lies(z[:, self.mesh.free]).any() else super().search_sides(z, *rest, **named)
+
+    def locate(self, z: FloatArray, *rest: Any) -> FloatArray | None:
         """Return places and rotations in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().locate(z, stages, places, series)
+        return None if self._lies(z[:, self.mesh.free]).any() else super().locate(z, *rest)
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""

@@ -53,7 +53,8 @@ def with_places(mesh: Discretisation, z: Any) -> Discretisation:
 
 def cuts_at(mesh: Discretisation, z: Any) -> Any:
     """Return where all elements begin and end in states (..., size), (..., e, 2)."""
-    cuts = np.broadcast_to(mesh.elements.cuts, (*z.shape[:-1], *mesh.elements.cuts.shape)).copy()
+    cuts = np.empty((*z.shape[:-1], *mesh.elements.cuts.shape))
+    cuts[...] = mesh.elements.cuts
     if mesh.moving is not None:
         moving = mesh.moving
         cuts[..., moving.elements, :] = moving.fixed + np.einsum(
@@ -71,8 +72,8 @@ def lengths_at(mesh: Discretisation, z: Any, number: int) -> Any:
     return (high - low) * fitted.length / mesh.scales.length
 
 
-def with_own_tables(mesh: Discretisation) -> Discretisation:
-    """Return the arrays with tables of the elements of their own, of several states those of the first."""
+def copy_moved_tables(mesh: Discretisation) -> Discretisation:
+    """Return the arrays with copies of the tables that moving contacts change; of several states those of the first."""
     e = mesh.elements
     names = [name for name in (*MOVED_TABLES, "length") if getattr(e, name) is not None]
     if e.weight.ndim > 2:

@@ -40,7 +40,7 @@ class AttachmentPoses(NamedTuple):
         jacobian[..., 1, 0], jacobian[..., 1, 1], jacobian[..., 1, 2] = sin, cos, self.arm[..., 0]
         return jacobian
 
-    def works(self, force: Any) -> Any:
+    def generalised_forces(self, force: Any) -> Any:
         """Return the generalised forces along x, y and rotation, (..., k, 3), of forces there (..., k, 2)."""
         fx, fy = force[..., 0], force[..., 1]
         cos, sin = self.frame[..., 0], self.frame[..., 1]

@@ -54,6 +54,11 @@ def bending(elements: BeamElements, curvature: Any) -> Bending:
     return Bending(narrow * stiff, moment, stiffness, narrow * rising, -narrow * n * first * whole**2, narrow * (1 - g))
 
 
+def bending_moment(elements: BeamElements, curvature: Any) -> Any:
+    """Return the moment of `bending` alone, which may be dual."""
+    return elements.rigidity * curvature if elements.curl is None else bending(elements, curvature).moment
+
+
 def _share(z: Any) -> tuple[Any, ...]:
     return map_analytic(curling_share, z) if isinstance(z, DualArray) else curling_share(z)
 

@@ -29,8 +29,8 @@ from cfmkit.elastica.mechanics.polynomials import (
 )
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.units import MechanicsUnits
-from cfmkit.elastica.mechanics.wide_strip import bending
-from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, cos_sin
+from cfmkit.elastica.mechanics.wide_strip import bending_moment
+from cfmkit.numerics.dual_array import DualArray, dual_of_steps, plain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -198,17 +198,17 @@ def _rest_of_designs(
     if designs.each:
         template_beam = _rest(template.fits.network, template, elements, places)
         beams = [_rest(net, design_of(designs, d), elements, places) for d, (net, _) in enumerate(designs.networks)]
-        angle = np.imag([beam.angle for beam in beams]) / COMPLEX_STEP
-        thickness = np.imag([beam.thickness for beam in beams]) / COMPLEX_STEP
         return _BeamAtRest(
-            template_beam.place, DualArray(template_beam.angle, angle), DualArray(template_beam.thickness, thickness)
+            template_beam.place,
+            dual_of_steps(template_beam.angle, [beam.angle for beam in beams]),
+            dual_of_steps(template_beam.thickness, [beam.thickness for beam in beams]),
         )
     # plain beams: their angle is a polynomial, their speed and thickness are even
     cuts = template.elements.cuts[elements]
     angle = mesh.elements.angle[elements] @ _matrices(template.degree, tuple(places.tolist())).interpolation.T
     steps: Any = np.array([[net.beams[name].section.thickness for name in names] for net, _ in designs.networks])
     first: Any = np.array([template.fits.network.beams[name].section.thickness for name in names])
-    even = DualArray(first[:, None], np.imag(steps)[..., None] / COMPLEX_STEP)
+    even = dual_of_steps(first[:, None], steps[..., None])
     return _BeamAtRest(cuts[:, :1] + (cuts[:, 1:] - cuts[:, :1]) * places, angle, even + 0.0 * places)
 
 
@@ -225,7 +225,7 @@ class _Forces(NamedTuple):
     """States without places, and what places are integrals of."""
 
     states: BeamStates
-    fields: _Fields
+    fields: energy.SectionFields  # at Gauss points
     speed: Any
     upto: Any  # (q, k) integrals up to each place
 
@@ -242,18 +242,24 @@ def _forces(at: Equilibria, elements: list[int], places: FloatArray, rest: _Beam
     rotation, end = unknowns[..., energy.rotation_columns(mesh.degree)], unknowns[..., -2:]
     speed, reached = e.weight / rule.weights, _matrices(mesh.degree, tuple(places.tolist()))
     upto = reached.integrals.T
-    fields = _fields(e, end, load, rotation @ rule.values.T)
-    first = e.weight * bending(e, rotation @ rule.slopes.T).moment
-    moment = -(first @ rule.slopes[:, 0] - (e.weight * fields.turning) @ rule.values[:, 0])[..., None]
+    h, v = (end[..., axis, None] + load[..., axis, None] * e.ahead for axis in (0, 1))
+    fields = energy.SectionFields(e, e.angle + rotation @ rule.values.T, h, v)
+    turning = fields.turning * speed
+    first = e.weight * bending_moment(e, rotation @ rule.slopes.T)
+    moment = -(first @ rule.slopes[:, 0] - turning @ (rule.weights * rule.values[:, 0]))[..., None]
     if e.curl is None:  # rotations from moments, and once more
         inside = integrals_to_points(mesh.degree).T
-        curvature, missed = _curvature(e, rotation, moment - (fields.turning * speed) @ inside)
-        fields = _fields(e, end, load, rotation[..., :1] + curvature @ inside + missed * rule.places)
-        curvature, missed = _curvature(e, rotation, moment - (fields.turning * speed) @ inside)
-        turn = rotation[..., :1] + curvature @ upto + missed * places
+        curvature, missed = _curvature(e, rotation, moment + turning @ -inside)
+        turn = rotation[..., :1] + missed * rule.places + curvature @ inside
+        fields = energy.SectionFields(e, e.angle + turn, h, v)
+        turning = fields.turning * speed
+        curvature, missed = _curvature(e, rotation, moment + turning @ -inside)
+        turn = rotation[..., :1] + missed * places + curvature @ upto
     else:
         turn = rotation @ reached.values.T
     ahead = e.length[..., None] - speed @ upto
+    if not (isinstance(load, DualArray) or load.any()):
+        ahead = 0.0 * plain(ahead)  # so that forces have the derivatives of those on the end
     states = BeamStates(
         rest.place,
         None,
@@ -262,18 +268,21 @@ def _forces(at: Equilibria, elements: list[int], places: FloatArray, rest: _Beam
         rest.angle,
         (end[..., :1] + load[..., :1] * ahead) * scales.force,
         (end[..., 1:] + load[..., 1:] * ahead) * scales.force,
-        (moment - (fields.turning * speed) @ upto) * scales.moment,
+        (moment + turning @ -upto) * scales.moment,
         rest.thickness,
     )
     if e.laid is not None:
-        states, fields = _lie_down(e, rotation, end[..., 0], places, states, fields, scales)
+        states = _lie_down(e, rotation, end[..., 0], places, states, fields, scales)
     return _Forces(states, fields, speed, upto)
 
 
 def _lie_down(
-    e: BeamElements, rotation: Any, tension: Any, places: FloatArray, states: BeamStates, fields: _Fields, scales: Any
-) -> tuple[BeamStates, _Fields]:
-    """Return states with those of elements that lie on an obstacle: even tension and moment, rotations in a line."""
+    e: BeamElements, rotation: Any, tension: Any, places: FloatArray, states: BeamStates, fields: Any, scales: Any
+) -> BeamStates:
+    """Return states with those of elements that lie on an obstacle: even tension and moment, rotations in a line.
+
+    Their fields become those of such elements, too.
+    """
     rule, lies = basis(rotation.shape[-1] - 1), e.laid[..., None]
     change = (rotation[..., 1] - rotation[..., 0])[..., None]
     turn = rotation[..., :1] + change * places
@@ -283,27 +292,12 @@ def _lie_down(
     laid = states._replace(turn=turn, h=force * np.cos(angle), v=force * np.sin(angle), moment=moment + 0.0 * turn)
     merged = {name: np.where(lies, getattr(laid, name), getattr(states, name)) for name in ("turn", "h", "v", "moment")}
     direction = e.angle + rotation[..., :1] + change * rule.places
-    stretch = 1 + e.axial * tension[..., None]
-    along = [np.where(lies, stretch * turned, field) for turned, field in
-             ((np.cos(direction), fields.slope_x), (np.sin(direction), fields.slope_y))]  # fmt: skip
-    return states._replace(**merged), fields._replace(slope_x=along[0], slope_y=along[1])
-
-
-class _Fields(NamedTuple):
-    """Integrands along elements at their Gauss points, (..., m, q)."""
-
-    slope_x: Any  # dX/ds
-    slope_y: Any
-    turning: Any  # -dM/ds
-
-
-def _fields(e: BeamElements, end: Any, load: Any, turn: Any) -> _Fields:
-    """Return the fields of elements from the forces on their ends (..., m, 2) and rotations at Gauss points."""
-    cos, sin = cos_sin(e.angle + turn)
-    h, v = (end[..., axis, None] + load[..., axis, None] * e.ahead for axis in (0, 1))
-    normal, shear = h * cos + v * sin, v * cos - h * sin
-    stretch, slip = 1 + e.axial * normal, e.shear * shear
-    return _Fields(stretch * cos - slip * sin, stretch * sin + slip * cos, shear * (1 + (e.axial - e.shear) * normal))
+    fields.cos, fields.sin = (
+        np.where(lies, turned, field) for turned, field in
+        ((np.cos(direction), fields.cos), (np.sin(direction), fields.sin))
+    )  # fmt: skip
+    fields.normal, fields.shear = np.where(lies, tension[..., None], fields.normal), np.where(lies, 0.0, fields.shear)
+    return states._replace(**merged)
 
 
 def _curvature(e: BeamElements, rotation: Any, moment: Any) -> tuple[Any, Any]:
@@ -367,10 +361,19 @@ def sections(net: Network, beam: str, beam_states: BeamStates) -> BeamSections:
 
 def sections_of_width(width: Any, beam_states: BeamStates) -> BeamSections:
     """Return section forces and stresses from states of a beam of a width [m], or of widths at all places."""
-    cos, sin = cos_sin(beam_states.angle + beam_states.turn)
-    normal, shear = beam_states.h * cos + beam_states.v * sin, beam_states.v * cos - beam_states.h * sin
-    area = width * beam_states.thickness
-    bending = 6 * beam_states.moment / (area * beam_states.thickness)
+    at = energy.SectionForces(beam_states.angle + beam_states.turn, beam_states.h, beam_states.v)
+    bending, axial = _stresses(width, beam_states, at)
     return BeamSections(
-        beam_states.place + 0.0 * beam_states.moment, beam_states.moment, normal, shear, bending, normal / area
+        beam_states.place + 0.0 * plain(beam_states.moment), beam_states.moment, at.along, at.across, bending, axial
     )
+
+
+def stresses_of_width(width: Any, beam_states: BeamStates) -> tuple[Any, Any]:
+    """Return bending and axial stress as of `sections_of_width`, for which forces across sections are not needed."""
+    at = energy.SectionForces(beam_states.angle + beam_states.turn, beam_states.h, beam_states.v)
+    return _stresses(width, beam_states, at)
+
+
+def _stresses(width: Any, beam_states: BeamStates, at: energy.SectionForces) -> tuple[Any, Any]:
+    area = width * beam_states.thickness
+    return 6 * beam_states.moment / (area * beam_states.thickness), at.along / area

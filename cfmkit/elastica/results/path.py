@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
-from cfmkit.elastica.contact.pair_gaps import least_side_gaps
-from cfmkit.elastica.contact.terms import gaps, press
+from cfmkit.elastica.contact.terms import contact_contribution, gaps
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
 from cfmkit.elastica.mechanics.polynomials import basis
@@ -235,6 +234,8 @@ class EquilibriumPath(ShortRepr):
         """
         item = self.network.contacts[number]
         if isinstance(item, BeamSide):
+            from cfmkit.elastica.contact.pair_gaps import least_side_gaps
+
             return read_only(least_side_gaps(self.mesh, item, self.at.z, self.at.drive) * self.mesh.scales.length)
         mesh, contact = self.mesh, next(one for one in self.mesh.contacts if one.number == number)
         unit = 1.0 if contact.item.turns else mesh.scales.length
@@ -449,7 +450,7 @@ def strain_energy(at: Equilibria) -> Any:
         )
     for contact in at.mesh.contacts:
         if contact.slide < 0:
-            total = total + np.array([press(at.mesh, contact, z).energy for z in at.z])
+            total = total + np.array([contact_contribution(at.mesh, contact, z).energy for z in at.z])
     return total
 
 

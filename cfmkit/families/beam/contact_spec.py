@@ -270,7 +270,7 @@ class PartContact(Model):
         return None
 
     def contacts(self, mechanism: Mechanism) -> tuple[BeamOnBeam | NodeOnBeam, ...]:
-        """Return the contacts, all of one name: of two beams also those of their ends that are not held in place."""
+        """Return the contacts, all of one name: of two beams also those of their ends."""
         pad = self.find_pad(mechanism)
         if pad is not None:
             node, beam = pad
@@ -282,7 +282,6 @@ class PartContact(Model):
             NodeOnBeam(name, node, partner, 0.5 * thickness[beam])
             for beam, partner in ((first, second), (second, first))
             for node in end_nodes(mechanism, beam)
-            if mechanism.nodes[node].support not in HELD_SUPPORTS
         ]
         return (BeamOnBeam(name, first, second), BeamOnBeam(name, second, first, leads=False), *ends)
 

@@ -25,7 +25,7 @@ from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
-from cfmkit.plots.rounding_noise import vanishing
+from cfmkit.plots.rounding_noise import zero_rounding
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import stress_map_figure, stress_views
 from cfmkit.plots.style import (
@@ -297,7 +297,7 @@ def reactions(result: Result) -> Figure:
     along = {name: -(force[:, 0] * c + force[:, 1] * s) for name, force in forces.items()}
     across = {name: (force[:, 1] * c - force[:, 0] * s) * (-1 if turned else 1) for name, force in forces.items()}
     size = max(float(np.nanmax(np.abs(force[:, :2]))) for force in forces.values())
-    along, across = ({name: vanishing(row, size) for name, row in rows.items()} for rows in (along, across))
+    along, across = ({name: zero_rounding(row, size) for name, row in rows.items()} for rows in (along, across))
     one = ", one copy" if solution.assembly.parallel > 1 else ""
     heading = Heading.from_result(result, f"force of each beam on its last node{one}{_left_out(forces)}")
     diagrams = [

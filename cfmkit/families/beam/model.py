@@ -28,6 +28,7 @@ from cfmkit.families.beam.constant_force_range_and_extremes import travel_of
 from cfmkit.families.beam.contact_spec import rubs
 from cfmkit.families.beam.contacts import contact_columns, contact_values, refuse_overlap_at_rest
 from cfmkit.families.beam.findings import findings_of
+from cfmkit.families.beam.loading_and_unloading import equilibria_of_both_branches, join_branches, split_at_reversal
 from cfmkit.families.beam.network_elements_spec import LoadsDrive
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
 from cfmkit.families.beam.path_ending import ending_of, in_units
@@ -35,7 +36,6 @@ from cfmkit.families.beam.requested_node_columns import END_FORCES, columns_of, 
 from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, natural, target_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.taut_beams import distance, ways_to_supports
-from cfmkit.families.beam.there_and_back import both_ways, join_ways, part_ways
 from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, follow_surface, values_along
 from cfmkit.families.rows import values_of_one
 from cfmkit.numerics.one_blas_thread import one_blas_thread
@@ -91,7 +91,7 @@ def analyze(spec: BeamSpec, _run: Run) -> Result:
         target=target_of(solution),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=solution.assembly.allowable_stress,
-        closed=solution.model_between_points if solution.back is None else both_ways(solution),
+        closed=solution.model_between_points if solution.back is None else equilibria_of_both_branches(solution),
         winding=solution.winding,
         ends=_ends(solution),
         effort_error=solution.effort_error,
@@ -116,8 +116,10 @@ def solve(spec: BeamSpec) -> Solution:
         path = trace(assembly.network, assembly.drive(), assembly.control())
         return Solution(assembly, path, *_keep_points(assembly, path))
     drive = assembly.drive()
-    there_and_back = replace(drive, points=np.concatenate([drive.points, drive.points[-2::-1]]))
-    load, unload = part_ways(trace(assembly.network, there_and_back, assembly.control()), len(drive.points))
+    loading_and_unloading = replace(drive, points=np.concatenate([drive.points, drive.points[-2::-1]]))
+    load, unload = split_at_reversal(
+        trace(assembly.network, loading_and_unloading, assembly.control()), len(drive.points)
+    )
     back = None if unload is None else Solution(assembly, unload, *_keep_points(assembly, unload))
     return Solution(assembly, load, *_keep_points(assembly, load), back)
 
@@ -203,7 +205,7 @@ def _curve(solution: Solution) -> Curve:
     columns = _columns(solution)
     if solution.back is None:
         return _curve_of(solution, columns, solution.stable)
-    return join_ways(*(_curve_of(way, _columns(way), way.stable) for way in (solution, solution.back)))
+    return join_branches(*(_curve_of(way, _columns(way), way.stable) for way in (solution, solution.back)))
 
 
 def _columns(solution: Solution) -> LazyColumns:

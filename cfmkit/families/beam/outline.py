@@ -9,6 +9,7 @@ import numpy as np
 
 from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Region, Sheet, Smooth, circle, mark
 from cfmkit.export.drawn_as_specified import SpecifiedPiece, check_outline
+from cfmkit.export.fixing_holes import add_fixing_holes
 from cfmkit.export.union import OutlinePiece
 from cfmkit.families.beam.drawn_pieces import STANDING_DISTANCE, both_halves, drawn_parts
 from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes
@@ -73,13 +74,14 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     marks += [mark(shape, False) for shape in frame]
     tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
     legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
+    contours, bare = add_fixing_holes(contours, marks, part.screws)
     notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
     dimensions, facts = tuple(_dimensions(assembly)), tuple(_facts(assembly, fillet))
     return Drawing(
         "beams",
         (*contours, *paths, *marks),
         tables,
-        notes,
+        (*notes, *bare),
         _sheet(assembly, beams),
         dimensions=dimensions,
         facts=facts,

@@ -16,6 +16,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
+from cfmkit.export.fixing_holes import remove_screws
 from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
 from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
 from cfmkit.families.beam.findings import finding
@@ -263,7 +264,7 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
 
     frame = standing_frame(spec)
-    drawn = drawing(_remove_frame(spec, frame))
+    drawn = drawing(_remove_frame(remove_screws(spec), frame))
     cut = [contour for contour in drawn.contours if contour.layer == "cut"]
     material, width = (next(iter(spec.mechanism.of_beams(key).values())) for key in ("material", "width"))
     law = MATERIAL_LAWS[material.law](material.modulus, material.poisson)

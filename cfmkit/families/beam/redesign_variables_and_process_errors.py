@@ -1,4 +1,4 @@
-"""Variables of a yield: values that the design chooses and may change for it, and values that a process errs in."""
+"""Values that may vary when a design is changed to reach a yield, with ranges; and values with process errors."""
 
 from __future__ import annotations
 

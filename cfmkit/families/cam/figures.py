@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.part import Scene
     from cfmkit.families.cam.solution import Solution
-    from cfmkit.families.cam.solution_of_measured_cam import Built
+    from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam
     from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result
 
@@ -384,7 +384,7 @@ def built_figures(result: Result) -> dict[str, Callable[[], Figure]]:
 
 def profile(result: Result) -> Figure:
     """Return the errors of both flanks over the height, along the normal and in x."""
-    built: Built = result.state
+    built: MeasuredCam = result.state
     low = max(float(points[0, 1]) for points in built.registration.points)
     high = min(float(points[-1, 1]) for points in built.registration.points)
     heights = np.linspace(low, high, N_HEIGHTS)
@@ -397,7 +397,7 @@ def profile(result: Result) -> Figure:
     return diagram_figure(Heading.from_result(result, "measured profile less design, positive outside"), diagrams)
 
 
-def _values_over_height(built: Built, side: int, values: FloatArray, heights: FloatArray) -> FloatArray:
+def _values_over_height(built: MeasuredCam, side: int, values: FloatArray, heights: FloatArray) -> FloatArray:
     used = built.registration.used[side]
     y = built.registration.points[side][used, 1]
     order = np.argsort(y, kind="stable")
@@ -409,7 +409,7 @@ def _values_over_height(built: Built, side: int, values: FloatArray, heights: Fl
 
 def shares(result: Result) -> Figure:
     """Return what rest length, profile and friction add to the force of the design."""
-    built: Built = result.state
+    built: MeasuredCam = result.state
     parts = built.shares
     series = [
         Series(parts["profile"], "profile", LINE_BLUE, prefer=0.3),

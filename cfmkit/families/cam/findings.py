@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Solution
-    from cfmkit.families.cam.solution_of_measured_cam import Built
+    from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam
     from cfmkit.families.cam.spec import CamSpec, Mechanism
     from cfmkit.results import Finding
 
@@ -378,7 +378,7 @@ TOO_NOISY = 2.0
 """Points are noisier than stated if their neighbours say so by this factor."""
 
 
-def findings_of_built(built: Built) -> list[Finding]:
+def findings_of_built(built: MeasuredCam) -> list[Finding]:
     """Return what the user must know about the measured profile."""
     found = [*_built_mechanics(built), *_weak_registration(built), *_doubtful_points(built)]
     last = built.assembly.stroke
@@ -400,13 +400,13 @@ def findings_of_built(built: Built) -> list[Finding]:
     return found
 
 
-def describe_unmeasured(built: Built) -> str:
+def describe_unmeasured(built: MeasuredCam) -> str:
     """Return what is said of parts of the flanks without points."""
     spans = " and ".join(f"{mm(low)} to {mm(high)}" for low, high in built.unmeasured)
     return f"a flank has no points where the rollers touch it from {spans} of travel: the force there is not known"
 
 
-def _built_mechanics(built: Built) -> Iterator[Finding]:
+def _built_mechanics(built: MeasuredCam) -> Iterator[Finding]:
     """Yield what is wrong with the mechanism that the measured cam is built into."""
     limit, longest = built.assembly.spec.mechanism.springs.max_elongation, float(built.elongation.max())
     if limit and is_overstretched(longest, limit):
@@ -433,7 +433,7 @@ def _built_mechanics(built: Built) -> Iterator[Finding]:
         )
 
 
-def _weak_registration(built: Built) -> Iterator[Finding]:
+def _weak_registration(built: MeasuredCam) -> Iterator[Finding]:
     """Yield how uncertain the place of the cam is along the direction that the points tell least of."""
     direction, deviation = built.registration.weakest(half_extent(built))
     rmse, lifted = root_mean_square(errors_used(built)), float(built.registration.growth[1])
@@ -459,7 +459,7 @@ def _weak_registration(built: Built) -> Iterator[Finding]:
         )
 
 
-def _doubtful_points(built: Built) -> Iterator[Finding]:
+def _doubtful_points(built: MeasuredCam) -> Iterator[Finding]:
     """Yield what speaks against the measured points, or against what is said of their noise."""
     outliers = sum(int((~keep).sum()) for keep in built.registration.used)
     if outliers:
@@ -483,7 +483,7 @@ def _doubtful_points(built: Built) -> Iterator[Finding]:
         )
 
 
-def _errors_along(built: Built) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _errors_along(built: MeasuredCam) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield path coordinates and errors of the points that count, one flank after the other [m]."""
     registration = built.registration
     for place, error, keep in zip(registration.parameters, registration.errors, registration.used, strict=True):

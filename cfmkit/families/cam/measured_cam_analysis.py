@@ -46,7 +46,7 @@ from cfmkit.families.cam.scalar_results import (
     pressure_of,
     values_of_built,
 )
-from cfmkit.families.cam.solution_of_measured_cam import Built, Sides
+from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides
 from cfmkit.families.cam.window_of_measured_cam import large_holes, requested_travel
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
@@ -133,7 +133,9 @@ def analyze_built(spec: CamSpec) -> Result:
     )
 
 
-def _intervals_between_holes(built: Built, holes: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+def _intervals_between_holes(
+    built: MeasuredCam, holes: Sequence[tuple[float, float]]
+) -> tuple[tuple[float, float], ...]:
     """Return the intervals of displacement at which both contacts are on measured points [m]."""
     inner = [place for hole in holes for place in hole]
     ends = [float(built.travel[0]), *inner, float(built.travel[-1])]
@@ -251,12 +253,12 @@ def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[
 
 def _solve_cam(
     assembly: Assembly, registration: Registration, tracks: tuple[BuiltTrack, BuiltTrack], travel: FloatArray
-) -> Built:
+) -> MeasuredCam:
     slider = assembly.track.start + travel
     states = assembly.track.states(slider)
     sides = sides_at(tracks, slider)
     designed = Sides((states.x, states.x), (states.slope, states.slope))
-    return Built(
+    return MeasuredCam(
         assembly,
         registration,
         errors_across(assembly, registration),
@@ -280,7 +282,7 @@ def sides_at(tracks: tuple[BuiltTrack, BuiltTrack], slider: FloatArray) -> Sides
 class LoopAsBuilt(ShortRepr):
     """The loop of a measured cam at every place (a `cfmkit.results.ClosedForm`): its tracks are known between nodes."""
 
-    built: Built
+    built: MeasuredCam
     tracks: tuple[BuiltTrack, BuiltTrack]
 
     @cached_property
@@ -304,7 +306,7 @@ class LoopAsBuilt(ShortRepr):
         """Return the stress below the more loaded contact at displacements of any shape [Pa]."""
         return np.asarray(stress(pressure_of(self._move_to(places), _way(branch))).reshape(np.shape(places)))
 
-    def _move_to(self, places: FloatArray) -> Built:
+    def _move_to(self, places: FloatArray) -> MeasuredCam:
         """Return the mechanism at other displacements."""
         built = self.built
         travel = np.clip(np.ravel(places) - built.origin, built.travel[0], built.travel[-1])
@@ -340,7 +342,7 @@ def shares_of(assembly: Assembly, designed: Sides, sides: Sides) -> dict[str, Fl
     }
 
 
-def _values(built: Built) -> Mapping[str, Quantity]:
+def _values(built: MeasuredCam) -> Mapping[str, Quantity]:
     """Return the scalar results: those of any cam, and those of a measured one."""
     (up, *pressed_up), (down, *pressed_down) = built.forces(1.0), built.forces(-1.0)
     known = np.isfinite(up) & np.isfinite(down) & (up + down > 0)
@@ -355,7 +357,7 @@ def _values(built: Built) -> Mapping[str, Quantity]:
     return shared | dict(values_of_built(built))
 
 
-def _curve(built: Built) -> Curve:
+def _curve(built: MeasuredCam) -> Curve:
     """Return the closed loop with the parts of the force."""
     up, down = built.forces(1.0), built.forces(-1.0)
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from cfmkit.families.cam.measured_deviation_definitions import DEVIATION_DEFINITIONS
 from cfmkit.families.cam.solution import Solution
-from cfmkit.families.cam.solution_of_measured_cam import Built, Sides
+from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides
 from cfmkit.results import Quantity, quantities
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
         Inside what the model covers.
     """
     state = result.state
-    if not isinstance(state, Built | Solution):
+    if not isinstance(state, MeasuredCam | Solution):
         return {}
     sides, designed = _sides(state, loop.places - state.origin)
     loads, mechanism = state.assembly.loads, state.assembly.spec.mechanism
@@ -73,7 +73,7 @@ def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
     return quantities(DEVIATION_DEFINITIONS, numbers)
 
 
-def _sides(state: Built | Solution, travel: FloatArray) -> tuple[Sides, Sides]:
+def _sides(state: MeasuredCam | Solution, travel: FloatArray) -> tuple[Sides, Sides]:
     """Return both sides at some travels: as built, and as designed."""
     track = state.assembly.track
     states = track.states(track.start + travel)

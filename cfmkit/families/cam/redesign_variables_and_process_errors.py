@@ -1,4 +1,4 @@
-"""Variables of a yield of cams: values of the design that may change for it, and values that err."""
+"""Values that may vary when a design is changed to reach a yield, with ranges; and values with process errors."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.assembly import Assembly
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.solution import Solution
-    from cfmkit.families.cam.solution_of_measured_cam import Built
+    from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam
     from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.families.cam.statics import Forces
 
@@ -413,7 +413,7 @@ ROW_COLUMNS: Mapping[str, ScalarQuantity[Solution]] = {**SCALAR_QUANTITIES, **_O
 """What studies may ask of rows: of values that only motions and measured cams have their cells are empty."""
 
 
-def values_of_built(built: Built) -> Mapping[str, Quantity]:
+def values_of_built(built: MeasuredCam) -> Mapping[str, Quantity]:
     """Return the scalar results by name."""
     found, used = built.registration, built.registration.used
     errors = errors_used(built)
@@ -449,13 +449,13 @@ OF_THE_FORCE = ("profile_force_sd", "profile_force_share", "loop_area_per_fricti
 """What needs the force everywhere in the window."""
 
 
-def pressure_of(built: Built, way: float) -> FloatArray:
+def pressure_of(built: MeasuredCam, way: float) -> FloatArray:
     """Return the larger pressure of both contacts on the way up (1) or down (-1), the flank curved as designed [Pa]."""
     track, forces = built.assembly.track, built.forces(way)
     return flank_pressure(built.assembly, track.states(track.start + built.travel), np.maximum(forces[1], forces[2]))
 
 
-def loop_area_per_friction(built: Built) -> float:
+def loop_area_per_friction(built: MeasuredCam) -> float:
     """Return d(loop area)/d(friction) over the window [J], from a small friction either way."""
     loads, small = built.assembly.loads, 1e-6
     up, down = (built.sides.forces(loads, way * small, loads.rest_half_width)[0] for way in (1.0, -1.0))
@@ -465,13 +465,13 @@ def loop_area_per_friction(built: Built) -> float:
     return float(_integral(places, up - down, *(ends or (places[0], places[-1])))[0]) / small
 
 
-def half_extent(built: Built) -> float:
+def half_extent(built: MeasuredCam) -> float:
     """Return half the height of the measured part [m]: where an angle is felt."""
     heights = np.concatenate([points[:, 1] for points in built.registration.points])
     return 0.5 * float(np.ptp(heights))
 
 
-def errors_used(built: Built) -> FloatArray:
+def errors_used(built: MeasuredCam) -> FloatArray:
     """Return the errors of the points that count, both flanks [m]."""
     registration = built.registration
     return np.concatenate([error[keep] for error, keep in zip(registration.errors, registration.used, strict=True)])

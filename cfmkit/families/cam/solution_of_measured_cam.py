@@ -53,8 +53,8 @@ class Sides:
 
 
 @dataclass(frozen=True, repr=False)
-class Built(ShortRepr):
-    """A solved mechanism with a measured cam."""
+class MeasuredCam(ShortRepr):
+    """Solution of a mechanism whose cam profile was measured after manufacture."""
 
     assembly: Assembly  # the design and the loads
     registration: Registration  # of the right and the left flank

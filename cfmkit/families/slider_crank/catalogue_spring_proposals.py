@@ -1,6 +1,7 @@
-"""Linkages with springs of the generic series at their pins, for a force: the family's own design chooses them.
+"""Proposals of slider-cranks for a constant force with catalogue torsion springs at their pins.
 
-Only springs that fit beside the links are its catalogue; links that bear them are added as for custom springs.
+The family's own design chooses the springs from those of the generic series that fit beside the links; then links
+that bear the loads are added, as for custom springs.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     for sheet in sheets_of_links(request):
         targets = {
             "force": request.target, "travel": window, "springs": JOINT_NAMES[:3],
-            "catalogue": _catalogue_springs(spec, request, sheet),
+            "catalogue": _catalogue_springs(spec, request, sheet), "spring_safety": request.safety,
         }  # fmt: skip
         changes = {"design": targets, "analysis": pushed_analysis(window), "mechanism.part.sheet": sheet}
         designed = design(spec.replace(changes), Run())

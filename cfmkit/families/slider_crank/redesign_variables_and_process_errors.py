@@ -1,4 +1,4 @@
-"""Variables of a yield: values that the design chooses and may change for it, and values that a process errs in."""
+"""Values that may vary when a design is changed to reach a yield, with ranges; and values with process errors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def free(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[float, float]]:
-    """Return thicknesses and width of a designed strip with the ranges of `design.beam`; of springs, their rates.
+    """Return the values that a redesign may vary, with ranges: thicknesses and width of a strip, or spring rates.
 
     The width of a strip from a sheet stays.
 
@@ -54,7 +54,7 @@ def _rates(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple
 
 
 def errors(spec: SliderCrankSpec) -> dict[str, str]:
-    """Return which values err: the thickness of a strip, everywhere; of links, where holes lie; rates; friction."""
+    """Return the kind of process error of each value: strip thickness, positions of holes, spring rates, friction."""
     mechanism = spec.mechanism
     if mechanism.beam is not None:
         return {"mechanism.beam.offset": "thickness"} if spec.fidelity == "beam" else {}

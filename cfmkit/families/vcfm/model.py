@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from cfmkit.arrays import LazySequence, ShortRepr
+from cfmkit.arrays import LazySequence, ShortRepr, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.rows import SolvedRows, findings_of_one, valid, values_of_one
@@ -426,7 +426,7 @@ class DenseCurve(ShortRepr):
     @cached_property
     def places(self) -> FloatArray:
         """Increasing travels of the shuttle [m]."""
-        return np.unique(self.solution.dense)
+        return distinct(self.solution.dense)
 
     @property
     def peaks(self) -> FloatArray:

@@ -23,6 +23,7 @@ from cfmkit.export.contours import (
 )
 from cfmkit.export.drawn_as_specified import check_outline
 from cfmkit.export.fillets import round_inside_corners, sharp_notes
+from cfmkit.export.fixing_holes import add_fixing_holes
 from cfmkit.export.posed_part import rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.bought_parts import parts_of
@@ -61,11 +62,13 @@ def drawing(spec: VcfmSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     sections = check_outline(cut, tuple(specified_pieces(spec, top)), thinnest, fillet)
     part = spec.mechanism.cut_part
     holes = [circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes]
+    marks = tuple(_marks(spec, spring, sizes))
+    contours, bare = add_fixing_holes((*cut, *holes), marks, part.screws)
     return Drawing(
         "vcfm",
-        (*cut, *holes, *_marks(spec, spring, sizes)),
+        (*contours, *marks),
         (table,),
-        (*_notes(spec), *frame_notes(spec, sizes), *_sharp(rounded, fillet)),
+        (*_notes(spec), *frame_notes(spec, sizes), *_sharp(rounded, fillet), *bare),
         _sheet(spec, spring),
         tuple(_dimensions(spec, sizes)),
         tuple(_facts(spec)),

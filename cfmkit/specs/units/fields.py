@@ -72,10 +72,7 @@ class UnitField:
     def read(self, value: Any) -> tuple[float, str]:
         """Return (SI value, dimension) of text, or of a number that is SI already.
 
-        Raises
-        ------
-        cfmkit.errors.QuantityError
-            With what is wrong and what to write instead.
+        Raises QuantityError with what is wrong and what to write instead.
         """
         number, dimension = self._read(value)
         if number and not MIN_QUANTITY <= abs(number) <= MAX_QUANTITY:
@@ -106,10 +103,7 @@ class UnitField:
     def check(self, value: float, bounds: Mapping[str, float], given: Any = None) -> float:
         """Return `value` if it keeps its SI bounds: gt, ge, lt, le.
 
-        Raises
-        ------
-        cfmkit.errors.QuantityError
-            With the value as it was given, and the bounds with units.
+        Raises QuantityError with the value as it was given, and the bounds with units.
         """
         if all(_BOUND_OPERATORS[name][1](value, bound) for name, bound in bounds.items()):
             return value
@@ -234,10 +228,7 @@ class _OpenQuantity:
 def quantity(dimension: str) -> UnitField:
     """Return the annotation for a float of that dimension: ``Annotated[float, quantity("length")]``.
 
-    Raises
-    ------
-    KeyError
-        If there is no such dimension.
+    Raises KeyError if there is no such dimension.
     """
     return UnitField((dimension_of(dimension).name,))
 
@@ -298,7 +289,6 @@ Ratio = Annotated[float, quantity("ratio")]
 Factor = Annotated[float, quantity("factor")]
 Force = Annotated[float, quantity("force")]
 Torque = Annotated[float, quantity("torque")]
-Energy = Annotated[float, quantity("energy")]
 Stiffness = Annotated[float, quantity("stiffness")]
 RotationalStiffness = Annotated[float, quantity("rotational_stiffness")]
 Stress = Annotated[float, quantity("stress")]
@@ -306,18 +296,6 @@ Mass = Annotated[float, quantity("mass")]
 Inertia = Annotated[float, quantity("inertia")]
 Density = Annotated[float, quantity("density")]
 Time = Annotated[float, quantity("time")]
-Velocity = Annotated[float, quantity("velocity")]
-Acceleration = Annotated[float, quantity("acceleration")]
-Frequency = Annotated[float, quantity("frequency")]
 LineLoad = Annotated[float, quantity("line_load")]
-Area = Annotated[float, quantity("area")]
-Volume = Annotated[float, quantity("volume")]
-SecondMoment = Annotated[float, quantity("second_moment")]
-Curvature = Annotated[float, quantity("curvature")]
-FlexuralRigidity = Annotated[float, quantity("flexural_rigidity")]
-AngularVelocity = Annotated[float, quantity("angular_velocity")]
-AngularAcceleration = Annotated[float, quantity("angular_acceleration")]
-Damping = Annotated[float, quantity("damping")]
-RotationalDamping = Annotated[float, quantity("rotational_damping")]
 Displacement = Place
 MetricValue = Annotated[str, _OpenQuantity()]

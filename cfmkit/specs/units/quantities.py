@@ -40,20 +40,13 @@ _RADIX_PREFIX = re.compile("[-+]?0[xXoObB][0-9a-fA-F]")
 _PRECISE_CONTEXT = Context(prec=60)
 
 
-def read_quantity(text: str, dimension: str) -> float:
+def read_quantity(
+    text: str,  # a number and a unit; a zero, a ratio and a count need no unit
+    dimension: str,  # the name of the dimension that is wanted, a key of `DIMENSIONS`
+) -> float:
     """Return the SI value of text such as ``"0.69 N/mm"``.
 
-    Parameters
-    ----------
-    text : str
-        A number and a unit; a zero, a ratio and a count need no unit.
-    dimension : str
-        The name of the dimension that is wanted, a key of `DIMENSIONS`.
-
-    Raises
-    ------
-    cfmkit.errors.QuantityError
-        With what is wrong and what to write instead.
+    Raises QuantityError with what is wrong and what to write instead.
 
     Examples
     --------
@@ -66,10 +59,7 @@ def read_quantity(text: str, dimension: str) -> float:
 def read_one_of(text: str, dimensions: tuple[str, ...]) -> tuple[float, str]:
     """Return (SI value, dimension) of text that may be of several dimensions; a bare zero is of the first.
 
-    Raises
-    ------
-    cfmkit.errors.QuantityError
-        With what is wrong and what to write instead.
+    Raises QuantityError with what is wrong and what to write instead.
     """
     number, unit = _split_number(text, dimensions)
     value = read_number(number)
@@ -103,10 +93,7 @@ def meant_as_percent(text: str) -> str:
 def check_quantity(text: str) -> str:
     """Return text that is a number, with or without some known unit, tidied; the dimension is left open.
 
-    Raises
-    ------
-    cfmkit.errors.QuantityError
-        If it is not a number, or its unit is not known.
+    Raises QuantityError if it is not a number, or its unit is not known.
     """
     number, unit = _split_number(text, ())
     value = read_number(number)
@@ -117,17 +104,12 @@ def check_quantity(text: str) -> str:
     return f"{number} {unit}"
 
 
-def format_quantity(value: float, dimension: str, unit: str | None = None) -> str:
+def format_quantity(
+    value: float,  # SI value, finite
+    dimension: str,  # its dimension, a key of `DIMENSIONS`
+    unit: str | None = None,  # the unit to write; default: the border unit of the dimension
+) -> str:
     """Return the shortest text that `read_quantity` reads back as exactly `value`.
-
-    Parameters
-    ----------
-    value : float
-        SI value, finite.
-    dimension : str
-        Its dimension, a key of `DIMENSIONS`.
-    unit : str, optional
-        The unit to write; default: the border unit of the dimension.
 
     Examples
     --------

@@ -60,18 +60,12 @@ def _oddity(char: str) -> str | None:
     return None
 
 
-def read_number(text: str) -> float:
+def read_number(
+    text: str,  # an optional sign, decimal digits with an optional dot, an optional exponent
+) -> float:
     """Return the number that `text` represents.
 
-    Parameters
-    ----------
-    text : str
-        An optional sign, decimal digits with an optional dot, an optional exponent.
-
-    Raises
-    ------
-    cfmkit.errors.QuantityError
-        If the text is anything else, or its value overflows or underflows.
+    Raises QuantityError if the text is anything else, or its value overflows or underflows.
 
     Examples
     --------

@@ -163,10 +163,7 @@ UNITS_BY_SYMBOL: Mapping[str, Unit] = MappingProxyType(
 def dimension_of(name: str) -> Dimension:
     """Return the dimension called `name`.
 
-    Raises
-    ------
-    KeyError
-        If there is none; the message lists them.
+    Raises KeyError if there is none; the message lists them.
     """
     try:
         return DIMENSIONS_BY_NAME[name]
@@ -177,16 +174,6 @@ def dimension_of(name: str) -> Dimension:
 def border_unit(dimension: str) -> str:
     """Return the unit in which a dimension is written to files and screens: ``"mm"``."""
     return dimension_of(dimension).unit
-
-
-def border_factor(dimension: str) -> float:
-    """Return how many border units one SI unit is: 1000.0 for a length.
-
-    To convert, prefer `to_border`, which is exact to the last digit also where
-    this factor is not (0.001 for N/m to N/mm).
-    """
-    item = dimension_of(dimension)
-    return item.up / item.down
 
 
 def to_border(values: Any, dimension: str) -> Any:

@@ -39,10 +39,7 @@ def is_unit(text: str) -> bool:
 def unit_size(text: str) -> Size:
     """Return the SI size of a unit.
 
-    Raises
-    ------
-    cfmkit.errors.QuantityError
-        If it is not made of known symbols.
+    Raises QuantityError if it is not made of known symbols.
     """
     factors = _factors(text)
     if factors is None:

@@ -94,20 +94,13 @@ def dimension_of_end(end: float) -> str:
     return str(getattr(end, "dimension", PLACE_DIMENSIONS[0]))
 
 
-def window_places(ends: Ends, travel: tuple[float, float]) -> tuple[float, float]:
+def window_places(
+    ends: Ends,  # places, or shares of the travel
+    travel: tuple[float, float],  # where the motion starts and where it ends, in this order [m or rad]
+) -> tuple[float, float]:
     """Return a window as places, increasing [m or rad].
 
-    Parameters
-    ----------
-    ends : tuple of WindowEnd
-        Places, or shares of the travel.
-    travel : (float, float)
-        Where the motion starts and where it ends, in this order [m or rad].
-
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If nothing is left between the ends.
+    Raises InputError if nothing is left between the ends.
 
     Examples
     --------

@@ -26,20 +26,14 @@ MAX_FILES = 16
 _BASE_KEY = re.compile(rb"^(\xef\xbb\xbf)?[\"']?base[\"']?\s*:", re.MULTILINE)
 
 
-def with_base(document: YamlDocument, above: tuple[str, ...] = ()) -> YamlDocument:
+def with_base(
+    document: YamlDocument,  # as read; its folder is where its base is looked for
+    above: tuple[str, ...] = (),  # real paths of the files that name this one, the first of them first
+) -> YamlDocument:
     """Return a document with the values of its base where it has none of its override; as it is if it names none.
 
-    Parameters
-    ----------
-    document : YamlDocument
-        As read; its folder is where its base is looked for.
-    above : tuple of str
-        Real paths of the files that name this one, the first of them first.
-
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        If the base cannot be read, is no specification, or the files name each other; with the place in the right file.
+    Raises SpecError if the base cannot be read, is no specification, or the files name each other; with the place in
+    the right file.
     """
     if not isinstance(document.tree, dict) or BASE_KEY not in document.tree:
         return document

@@ -76,10 +76,7 @@ class YamlDocument:
 
         Faults in the value become problems of the new document.
 
-        Raises
-        ------
-        cfmkit.errors.UsageError
-            If the option has no path or no value.
+        Raises UsageError if the option has no path or no value.
         """
         parsed = parse_option(option)
         if parsed.faults:
@@ -97,10 +94,7 @@ class YamlDocument:
     def family(self, known: Sequence[str]) -> str:
         """Return what the specification says its family is.
 
-        Raises
-        ------
-        cfmkit.errors.SpecError
-            If it says none of the `known` ones, or cannot be read.
+        Raises SpecError if it says none of the `known` ones, or cannot be read.
         """
         family = self.tree.get("family") if isinstance(self.tree, dict) else None
         if self._reading.broken or not isinstance(self.tree, dict):
@@ -114,10 +108,7 @@ class YamlDocument:
     def bind(self, spec_type: type[SpecType]) -> SpecType:
         """Return the specification, checked.
 
-        Raises
-        ------
-        cfmkit.errors.SpecError
-            With every problem of the file and the options.
+        Raises SpecError with every problem of the file and the options.
         """
         if self._reading.broken or not isinstance(self.tree, dict):
             raise SpecError(_sort_problems(self.problems))
@@ -184,18 +175,12 @@ class YamlDocument:
         return parse_indices(tuple(path.split(".")) if path else (), self.tree) if isinstance(path, str) else path
 
 
-def read_document(data: bytes | str, source: str, folder: FilePath | None = None) -> YamlDocument:
-    """Return what a text says; nothing is raised, faults become the document's problems.
-
-    Parameters
-    ----------
-    data : bytes or str
-        The specification, UTF-8.
-    source : str
-        Its name for messages.
-    folder : pathlib.Path, optional
-        What file names in it are relative to.
-    """
+def read_document(
+    data: bytes | str,  # the specification, UTF-8
+    source: str,  # its name for messages
+    folder: FilePath | None = None,  # what file names in it are relative to
+) -> YamlDocument:
+    """Return what a text says; nothing is raised, faults become the document's problems."""
     reading = read_text(data)
     if not reading.broken and not isinstance(reading.tree, dict):
         reading.broken = True
@@ -285,10 +270,7 @@ class NoSuchPlace(Exception):
 def parse_option(text: str) -> Option:
     """Return the option that ``a.b=value`` means.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is no ``=``, no path or no value.
+    Raises UsageError if there is no ``=``, no path or no value.
     """
     found = _OPTION_PATTERN.fullmatch(text)
     path, equals, value = (found[1], "=", found[2]) if found else text.partition("=")
@@ -319,10 +301,7 @@ def _read_value(path: tuple[str, ...], text: str) -> Option:
 def with_value(tree: Any, path: tuple[str, ...], value: Any) -> Any:
     """Return a copy of the tree with a value at a path; missing blocks are made.
 
-    Raises
-    ------
-    NoSuchPlace
-        If the path leads through a value, or out of a list.
+    Raises NoSuchPlace if the path leads through a value, or out of a list.
     """
     head, rest = path[0], path[1:]
     if isinstance(tree, tuple):

@@ -68,18 +68,12 @@ def spec_error(error: ValidationError, model: type[BaseModel], tree: Any) -> Spe
     return SpecError([Problem("", 0, 0, to_dotted(one.path), one.message) for one in explain(error, model, tree)])
 
 
-def explain(error: ValidationError, model: type[BaseModel], tree: Any) -> list[Complaint]:
-    """Return what is wrong with a tree, one complaint a fault.
-
-    Parameters
-    ----------
-    error : pydantic.ValidationError
-        What validating `tree` as `model` raised.
-    model : type of BaseModel
-        The type that was wanted.
-    tree : mapping
-        What was validated: nested dicts and tuples.
-    """
+def explain(
+    error: ValidationError,  # what validating `tree` as `model` raised
+    model: type[BaseModel],  # the type that was wanted
+    tree: Any,  # what was validated: nested dicts and tuples
+) -> list[Complaint]:
+    """Return what is wrong with a tree, one complaint a fault."""
     lines = [
         _Error(line["type"], trace(model, tree, line["loc"]), line.get("ctx", {}), line["msg"])
         for line in error.errors(include_url=False, include_input=False)[:MOST_EXPLAINED]

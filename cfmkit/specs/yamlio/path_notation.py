@@ -24,9 +24,9 @@ def parse_indices(path: tuple[str, ...], tree: Any) -> Path:
 def to_dotted(path: Path) -> str:
     """Return a path as ``requirements.0.max``; odd keys are quoted."""
     return ".".join(
-        part if isinstance(part, str) and re.fullmatch(r"[\w-]{1,60}", part) else _odd(part) for part in path
+        part if isinstance(part, str) and re.fullmatch(r"[\w-]{1,60}", part) else _quote_key(part) for part in path
     )
 
 
-def _odd(part: str | int) -> str:
+def _quote_key(part: str | int) -> str:
     return str(part) if isinstance(part, int) else quote(part)

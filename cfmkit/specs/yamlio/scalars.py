@@ -24,10 +24,7 @@ _INTEGER_PATTERN = re.compile("[-+]?[0-9]+")
 def read_plain(text: str) -> Any:
     """Return what an unquoted scalar means: None, a bool, an int, a float, or the text itself.
 
-    Raises
-    ------
-    cfmkit.errors.QuantityError
-        If it looks like a number but is none that everybody reads the same way.
+    Raises QuantityError if it looks like a number but is none that everybody reads the same way.
     """
     if text in _CONSTANT_WORDS:
         return _CONSTANT_WORDS[text]
@@ -41,10 +38,7 @@ def read_plain(text: str) -> Any:
 def check_text(text: str) -> str:
     """Return the text of a quoted scalar.
 
-    Raises
-    ------
-    cfmkit.errors.QuantityError
-        If an escape put a control character into it.
+    Raises QuantityError if an escape put a control character into it.
     """
     if match := _CONTROL_PATTERN.search(text):
         raise QuantityError(f"the text holds the control character U+{ord(match[0]):04X}; remove it")

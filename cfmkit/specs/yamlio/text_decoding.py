@@ -39,10 +39,7 @@ class Unreadable(Exception):
 def decode(data: bytes | str) -> str:
     """Return the text of a source without its byte order mark.
 
-    Raises
-    ------
-    Unreadable
-        If it is too large, or not UTF-8.
+    Raises Unreadable if it is too large, or not UTF-8.
     """
     if len(data) > MAX_FILE_BYTES:
         raise Unreadable(Fault(1, 1, (), f"the file is larger than {MAX_FILE_BYTES} bytes; put long data elsewhere"))

@@ -1,7 +1,7 @@
 """Drawn parts of a design, each analysed in full and checked against the requirements.
 
 Parts are drawn as `cfmkit sensitivity --method tolerance` draws them, and analysed as rows of one solution where the
-family has such, else one by one. A part without a result is a bad part: whoever made it has nothing to sell.
+family has such, else one by one. A part without a result counts as one that misses the requirements.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from cfmkit.families import family
 from cfmkit.metrics import split_name, window_of, windows_judged
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.engine import Silent, Work
+from cfmkit.studies.engine import NullMonitor, Work
 from cfmkit.studies.engine import run as computed
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.parts.share import Share
@@ -46,7 +46,7 @@ class Outcomes:
     met: NDArray[np.bool_]  # (n, r) which requirement each part meets; False where it has no result
     trimmed: NDArray[np.bool_]  # (n, r) the same where a trim has brought the mean force of each to the design's
     failed: NDArray[np.bool_]  # (n,) which parts have no result, or one that ends early
-    why: str  # what became of the first of those
+    why: str  # message of the first of those
     lacking: tuple[int, str]  # how many others have no value for a requirement, and why the first has none
 
     def share(self, met: NDArray[np.bool_] | None = None) -> Share:
@@ -56,7 +56,7 @@ class Outcomes:
         )
 
 
-class _Progress(Silent):
+class _Progress(NullMonitor):
     """Progress of parts that are analysed."""
 
     def __init__(self, run: Run, what: str, count: int) -> None:
@@ -69,7 +69,7 @@ class _Progress(Silent):
 
 
 def analyze_parts(parts: Parts, values: FloatArray, nominal: Result, run: Run, what: str = "parts") -> Outcomes:
-    """Return what becomes of parts with values (n, d) [SI]; `nominal`: the result of the perfect part."""
+    """Return which requirements parts with values (n, d) [SI] meet; `nominal`: the result of the perfect part."""
     spec = parts.spec
     metrics = _metrics_to_note(spec, nominal)
     study = Study(spec, parts.paths, metrics, seed=run.seed, findings=False, manufactured=True)

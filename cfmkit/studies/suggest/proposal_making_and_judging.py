@@ -17,12 +17,13 @@ from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE_METRICS, add_size, function_named
+from cfmkit.families.hardware import SAFETY_METRICS
 from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump, read_document
-from cfmkit.stock.processes import PROCESSES_BY_NAME
+from cfmkit.studies.suggest.material_and_fastening_of_proposal import add_process_and_materials, add_screws
 from cfmkit.studies.suggest.misses_in_words import (
     disqualifying,
     largest_force,
@@ -350,7 +351,8 @@ def judge_proposal(
     record = family(name)
     called = variant.replace(" ", "-").replace(",", "")
     # read back from its text: what is judged is what stands in the file
-    plain = spec_of(name, dump(add_process_and_materials(spec, request).replace({"design": None, "name": called})))
+    spec = add_process_and_materials(spec, request) if near is None else add_screws(record, spec)
+    plain = spec_of(name, dump(spec.replace({"design": None, "name": called})))
     begun = time.perf_counter()
     result = record.analyze(spec_of(name, dump(plain.replace({"requirements": windows_of(plain, request)}))), Run())
     seconds = time.perf_counter() - begun
@@ -408,35 +410,6 @@ def model_of(name: str, spec: Spec) -> str:
     return spec.fidelity or next(iter(family(name).models))
 
 
-def add_process_and_materials(spec: Spec, request: Request) -> Spec:
-    """Return a specification whose material is as stated, and whose part says by which process it is made if one is.
-
-    Its inside corners are as round as before, or as round as the process makes them: a smaller radius has more stress.
-    """
-    mechanism = spec.get_value("mechanism")
-    owners = {"mechanism": mechanism, "mechanism.contact": getattr(mechanism, "contact", None)}
-    for path, owner in owners.items():
-        if (material := getattr(owner, "material", None)) is not None:
-            block = material.model_dump(exclude_unset=True)
-            if (stated := request.stated_material(block)) != block:
-                spec = spec.replace({f"{path}.material": dict(stated)})
-    if request.process is None:
-        return spec
-    radius = PROCESSES_BY_NAME[request.process].least_radius
-    fillet = getattr(spec.get_value("mechanism"), "fillet", 0.0)
-    changes: tuple[dict[str, Any], ...] = (
-        {"mechanism.part.process": request.process, "mechanism.part.fillet": max(radius, fillet)},
-        {"mechanism.part.process": request.process},
-        {"mechanism.plate.process": request.process},
-    )
-    for one in changes:
-        try:
-            return spec.replace(one)
-        except CfmError:  # another kind of part
-            continue
-    return spec
-
-
 def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> dict[str, float | None]:
     """Return what proposals are compared by, in SI."""
     kind = request.kind
@@ -466,8 +439,8 @@ def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> d
 
 
 def _least_factor(found: Mapping[str, Any]) -> float | None:
-    """Return the smallest safety factor: of the part that bends, or of links."""
-    known = [found[name].value for name in ("safety_factor", "link_safety_factor") if name in found]
+    """Return the smallest safety factor: of the part that bends, of links, or of springs."""
+    known = [found[name].value for name in SAFETY_METRICS if name in found]
     return min((value for value in known if value is not None), default=None)
 
 

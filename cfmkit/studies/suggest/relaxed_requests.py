@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     Relaxed = tuple[Request, str]
     Relaxation = Callable[[Request, float], Relaxed | None]
 
-RELAXATION_FACTORS = (1.15, 2.2, 6.0, 20.0)
-"""Factors at which a request is relaxed for a family; one that is farther off is not near."""
+RELAXATION_FACTORS = (1.15, 2.2, 6.0)
+"""Factors at which a request is relaxed for a family: a mechanism six times as large is no alternative any more."""
 
 N_HALVINGS = 3
 """Of the last step, on a logarithmic scale: what is left is less than what the laws leave out."""
@@ -91,7 +91,8 @@ def confirm(request: Request, seed: int, clock: Clock, edge: Edge) -> str | None
     relaxation = _relaxations(request)[edge.key]
     tried: set[str] = set()
     for more in FURTHER_FACTORS:
-        relaxed = relaxation(request, edge.factor * more)
+        factor = edge.factor * more
+        relaxed = relaxation(request, factor) if factor <= RELAXATION_FACTORS[-1] else None
         if relaxed is None:
             return None
         # the sides that were just enough by the laws may be too little: then all of them

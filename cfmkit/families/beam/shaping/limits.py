@@ -65,8 +65,8 @@ def stress(view: View) -> list[PendingRows]:
     allowed = task.limits.stress
     if allowed is None:
         return []
-    parts = ("left", "right") if task.total_stress else ("stress",)
-    return [_extremes(view, "stress", part, slice(1, None), (allowed, allowed), allowed) for part in parts]
+    most = dict.fromkeys(("left", "right") if task.total_stress else ("stress",), (allowed, allowed))
+    return [_extremes(view, "stress", most, slice(1, None), allowed)]
 
 
 def envelope(view: View) -> list[PendingRows]:
@@ -85,45 +85,53 @@ def _keep_inside(
     size = view.response.variables.task.size
     if box is None:
         return []
-    ends = {"x": (box[1], -box[0]), "y": (box[3], -box[2])}
-    return [_extremes(view, name, axis, which, most, size) for axis, most in ends.items()]
+    return [_extremes(view, name, {"x": (box[1], -box[0]), "y": (box[3], -box[2])}, which, size)]
 
 
-def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float, float], unit: float) -> PendingRows:
-    """Return (most - largest value along each beam) / unit at some poses, of the value and of its negative."""
+def _extremes(view: View, name: str, most: dict[str, tuple[float, float]], which: slice, unit: float) -> PendingRows:
+    """Return (most - largest value along each beam) / unit at some poses, of some values and of their negatives."""
     lines = view.response.state.lines
     poses = np.arange(len(view.poses.at))[which]
     top, three, weights = _highest(
-        [line.place for line in lines.values()], [getattr(line, what)[which] for line in lines.values()]
+        [line.place for line in lines.values()],
+        [np.stack([getattr(line, what)[which] for what in most]) for line in lines.values()],
     )
-    values = (np.array(most)[:, None] - top) / unit
+    values = (np.array(list(most.values()))[:, None, :, None] - top) / unit  # (what, beam, side, pose)
     is_near = values < view.near
     share = (weights * np.array([-1.0, 1.0])[:, None, None] / unit)[is_near]
-    rows = np.stack([at.index[which] for at, which in zip(view.response.rows.values(), three, strict=True)])[is_near]
+    rows = np.stack([at.index[three[:, k]] for k, at in enumerate(view.response.rows.values())], axis=1)[is_near]
     pose = np.broadcast_to(poses, is_near.shape)[is_near]
+    ends = np.cumsum([0, *is_near.reshape(len(most), -1).sum(axis=1).tolist()])
 
     def slopes() -> FloatArray:
         out = np.zeros((*values.shape, len(view.response.x)))
-        at_three = view.response.slopes_at(what, pose[:, None], rows)
-        out[is_near] = (share[:, :, None] * at_three).sum(axis=1)
+        at_three = [
+            view.response.slopes_at(what, pose[first:end, None], rows[first:end])
+            for what, first, end in zip(most, ends[:-1], ends[1:], strict=True)
+        ]
+        out[is_near] = (share[:, :, None] * np.concatenate(at_three)).sum(axis=1)
         return out
-
-    sides = SIDE_NAMES[what]
 
     def describe_places() -> list[str]:
         at = view.poses.at[which]
-        return [f"{beam}, {side}, at {1e3 * pose:.4g} mm" for beam in lines for side in sides for pose in at]
+        return [
+            f"{beam}, {side}, at {1e3 * pose:.4g} mm"
+            for what in most
+            for beam in lines
+            for side in SIDE_NAMES[what]
+            for pose in at
+        ]
 
     return PendingRows(name, values, slopes, describe_places)
 
 
 def _highest(places: list[FloatArray], values: list[FloatArray]) -> tuple[FloatArray, Any, FloatArray]:
-    """Return `largest_of_three` of the values (p, r) of all beams and of their negatives, (beams, 2, p, ...)."""
-    both = [np.stack([value, -value]) for value in values]
+    """Return `largest_of_three` of values (w, p, r) of all beams and of their negatives, (w, beams, 2, p, ...)."""
+    both = [np.stack([value, -value], axis=1) for value in values]
     if len({len(place) for place in places}) == 1:  # as a rule: one call for all beams
-        return largest_of_three(np.stack(places)[:, None, None], np.stack(both))
+        return largest_of_three(np.stack(places)[:, None, None], np.stack(both, axis=1))
     extremes = [largest_of_three(place, value) for place, value in zip(places, both, strict=True)]
-    top, three, weights = (np.stack(part) for part in zip(*extremes, strict=True))
+    top, three, weights = (np.stack(part, axis=1) for part in zip(*extremes, strict=True))
     return top, three, weights
 
 
@@ -250,33 +258,33 @@ def _pair(network: Network, first: str, second: str) -> Pair:
 
 def separations(view: View, couples: list[Pair]) -> PendingRows:
     """Return (gap / required gap - 1) of all pairs at the poses that are shown, (pairs, q)."""
-    shown, opening = view.poses.shown, view.response.variables.task.limits.opening
-    lines = {name: _Thinned.from_view(view, name) for name in view.lengths}
-    ways = [_way(view, pair, *(lines[name].place for name in pair.beams)) for pair in couples]
-    ways_between = np.stack([pair_ways.length for pair_ways in ways])
-    wanted = np.array([_required_gap(view, pair) for pair in couples])[:, None, None]
-    is_near = opening * ways_between < wanted
-    required = np.where(is_near, opening * ways_between, wanted)
-    required[
-        ~np.stack([_choose_pairs(pair, pair_ways.length) for pair, pair_ways in zip(couples, ways, strict=True)])
-    ] = np.nan
-    first, second = ([lines[pair.beams[side]] for pair in couples] for side in (0, 1))
-    dx = np.stack([pair_ways.x for pair_ways in first])[..., None] - np.stack([line.x for line in second])[:, :, None]
-    dy = np.stack([line.y for line in first])[..., None] - np.stack([line.y for line in second])[:, :, None]
+    shown, limits = view.poses.shown, view.response.variables.task.limits
+    beams, opening = _ThinnedBeams.from_view(view), limits.opening
+    numbers = {name: k for k, name in enumerate(view.lengths)}
+    first, second = np.array([[numbers[name] for name in pair.beams] for pair in couples]).T
+    ways = _Ways.from_beams(view, couples, beams.place[first], beams.place[second])
+    half = np.array([0.5 * thickest_of(view.section(name)) for name in view.lengths])
+    wanted = ((limits.clearance or 0.0) + half[first] + half[second])[:, None, None]
+    is_near = opening * ways.length < wanted
+    required = np.where(is_near, opening * ways.length, wanted)
+    required[~_choose_pairs(couples, ways.length)] = np.nan
+    dx, dy = (line[first][..., :, None] - line[second][..., None, :] for line in (beams.x, beams.y))
     distance = np.hypot(dx, dy) + 1e-12
     ratio = np.nan_to_num(distance / required[:, None], nan=np.inf)
     soft, weights = soft_least(ratio.reshape(*ratio.shape[:2], -1), BOUND_SHARPNESS)
-    share = np.where((soft - 1.0 < view.near)[..., None] & (weights > _NO_WEIGHT), weights, 0.0)
-    at = p, q, i, j = np.nonzero(share.reshape(ratio.shape))
-    pull = share.reshape(ratio.shape)[at] / required[p, i, j]
-    rows = tuple(np.stack([line.row for line in side])[p, k] for side, k in ((first, i), (second, j)))
 
     def slopes() -> FloatArray:
+        share = np.where((soft - 1.0 < view.near)[..., None] & (weights > _NO_WEIGHT), weights, 0.0)
+        at = p, q, i, j = np.nonzero(share.reshape(ratio.shape))
+        pull = share.reshape(ratio.shape)[at] / required[p, i, j]
         push = np.where(is_near[p, i, j], opening * pull * ratio[at], 0.0)
-        by = -push[:, None] * slopes_of_ways(ways, p, i, j)
+        by = -push[:, None] * ways.slopes_at(p, i, j)
         for axis, apart in (("x", dx), ("y", dy)):
             along = (apart[at] / distance[at] * pull)[:, None]
-            line, second_slopes = (view.response.slopes_at(axis, shown[q], row) for row in rows)
+            line, second_slopes = (
+                view.response.slopes_at(axis, shown[q], beams.row[side[p], place])
+                for side, place in ((first, i), (second, j))
+            )
             by += along * (line - second_slopes)
         out = np.zeros((*soft.shape, len(view.response.x)))
         np.add.at(out, (p, q), by)
@@ -290,23 +298,27 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
 
 
 @dataclass(frozen=True)
-class _Thinned:
-    """A beam at 17 of its places: a smooth bound must not depend on how fine the mesh is.
+class _ThinnedBeams:
+    """Beams at 17 of their places: a smooth bound must not depend on how fine the mesh is."""
 
-    place, row (17,): fraction of the arc length, which of all rows; x, y (q, 17): at the poses that are shown [m].
-    """
-
-    place: FloatArray
-    row: Any
+    place: FloatArray  # (b, 17) fraction of the arc length
+    row: Any  # (b, 17) which of all rows
+    # x, y, (b, q, 17): at the poses that are shown [m]
     x: FloatArray
     y: FloatArray
 
     @classmethod
-    def from_view(cls, view: View, beam: str) -> _Thinned:
-        """Return a beam of a response."""
-        line, row = view.response.state.lines[beam], view.response.rows[beam].index
-        kept, shown = _even(len(line.place)), view.poses.shown
-        return cls(line.place[kept], row[kept], line.x[shown][:, kept], line.y[shown][:, kept])
+    def from_view(cls, view: View) -> _ThinnedBeams:
+        """Return the beams of a response."""
+        lines, shown = view.response.state.lines, view.poses.shown
+        kept = [_even(len(line.place)) for line in lines.values()]
+        x, y = (
+            np.stack([getattr(line, axis)[shown][:, own] for line, own in zip(lines.values(), kept, strict=True)])
+            for axis in ("x", "y")
+        )
+        at = [(rows.place[own], rows.index[own]) for rows, own in zip(view.response.rows.values(), kept, strict=True)]
+        place, row = (np.stack(column) for column in zip(*at, strict=True))
+        return cls(place, row, x, y)
 
 
 @cache
@@ -315,54 +327,44 @@ def _even(count: int) -> Any:
     return np.unique(np.linspace(0, count - 1, _N_PLACES + 1).round().astype(np.int64))
 
 
-def _choose_pairs(pair: Pair, distance: FloatArray) -> Any:
-    """Return which places are compared: not a joint with itself, and no neighbours on one beam."""
-    if pair.alone:
-        return np.triu(np.ones(distance.shape, dtype=bool), 2)
-    return distance > 1e-9
-
-
-def _required_gap(view: View, pair: Pair) -> float:
-    """Return the gap of the centre lines [m]: that of the surfaces and half the thickness of both beams."""
-    thickness = sum(0.5 * thickest_of(view.section(name)) for name in pair.beams)
-    return float((view.response.variables.task.limits.clearance or 0.0) + thickness)
+def _choose_pairs(couples: list[Pair], distance: FloatArray) -> Any:
+    """Return which places of pairs are compared: not a joint with itself, and no neighbours on one beam."""
+    alone = np.array([pair.alone for pair in couples])[:, None, None]
+    return np.where(alone, np.triu(np.ones(distance.shape[1:], dtype=bool), 2), distance > 1e-9)
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
-    """The way between places of two beams along them: length (r, r) [m], infinite where they do not meet.
-
-    It is `shares[0]` of the length of the first beam and `shares[1]` of that of the second (r, r).
-    """
+class _Ways:
+    """Ways between places of two beams of n pairs along them: length (n, r, r) [m], infinite where they do not meet."""
 
     length: FloatArray
+    # of the beams of each pair, through each of the joints at which they may meet: (n, m, r)
     shares: tuple[FloatArray, FloatArray]
-    by_lengths: tuple[FloatArray, FloatArray]
+    joint: Any  # (n, r, r) through which of these joints the way is shortest
+    apart: FloatArray  # (n, r, r) the way along a pair that is one beam, as a share of its length; NaN of two beams
+    by_lengths: tuple[FloatArray, FloatArray]  # (n, k) derivatives of the lengths of both beams
 
+    @classmethod
+    def from_beams(cls, view: View, couples: list[Pair], u: FloatArray, v: FloatArray) -> _Ways:
+        """Return the ways of pairs between places (n, r) of their first and second beams."""
+        first, second = ([view.lengths[pair.beams[side]] for pair in couples] for side in (0, 1))
+        own, other = (np.array([line.length for line in lines])[:, None, None] for lines in (first, second))
+        count = max(1, *(len(pair.joints) for pair in couples))
+        ends = np.array([[*pair.joints, *[(np.nan, np.nan)] * (count - len(pair.joints))] for pair in couples])
+        p, q = abs(u[:, None] - ends[..., :1]), abs(v[:, None] - ends[..., 1:])
+        through = np.nan_to_num(p[..., :, None] * own[..., None] + q[..., None, :] * other[..., None], nan=np.inf)
+        joint = through.argmin(axis=1)
+        length = np.take_along_axis(through, joint[:, None], axis=1)[:, 0]
+        alone = np.array([pair.alone for pair in couples])[:, None, None]
+        apart = np.where(alone, abs(u[:, :, None] - v[:, None, :]), np.nan)
+        length = np.where(alone, apart * own, length)
+        by_lengths = np.array([line.by_length for line in first]), np.array([line.by_length for line in second])
+        return cls(length, (np.nan_to_num(p), np.nan_to_num(q)), joint, apart, by_lengths)
 
-def slopes_of_ways(ways: list[_Way], pair: Any, i: Any, j: Any) -> FloatArray:
-    """Return the derivatives of the ways of some pairs at places (n,) of both beams, (n, k)."""
-    total = 0.0
-    for side in (0, 1):
-        share = np.stack([pair_ways.shares[side] for pair_ways in ways])[pair, i, j]
-        total = total + share[:, None] * np.stack([pair_ways.by_lengths[side] for pair_ways in ways])[pair]
-    return np.asarray(total)
-
-
-def _way(view: View, pair: Pair, u: FloatArray, v: FloatArray) -> _Way:
-    """Return the way between places of the two beams."""
-    first, second = (view.lengths[name] for name in pair.beams)
-    u, v = u[:, None], v[None, :]
-    slopes = first.by_length, second.by_length
-    if pair.alone:
-        apart = abs(u - v)
-        return _Way(apart * first.length, (apart, np.zeros_like(apart)), slopes)
-    shortest = np.full((u.size, v.size), np.inf)
-    shares = np.zeros(shortest.shape), np.zeros(shortest.shape)
-    for end, at in pair.joints:
-        p, q = abs(u - end), abs(v - at)
-        through_joint = p * first.length + q * second.length
-        shorter = through_joint < shortest
-        shortest = np.where(shorter, through_joint, shortest)
-        shares = np.where(shorter, p, shares[0]), np.where(shorter, q, shares[1])
-    return _Way(shortest, shares, slopes)
+    def slopes_at(self, pair: Any, i: Any, j: Any) -> FloatArray:
+        """Return the derivatives of the ways of some pairs at places (m,) of both beams, (m, k)."""
+        joint = self.joint[pair, i, j]
+        first, second = self.shares[0][pair, joint, i], self.shares[1][pair, joint, j]
+        apart = self.apart[pair, i, j]
+        first, second = np.where(np.isnan(apart), first, apart), np.where(np.isnan(apart), second, 0.0)
+        return np.asarray(first[:, None] * self.by_lengths[0][pair] + second[:, None] * self.by_lengths[1][pair])

@@ -8,12 +8,12 @@ leaves the band between two poses: that is seen at many more poses, where a desi
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cache, cached_property, partial
+from functools import cache, cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import distinct, read_only
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.results import beam_states
 from cfmkit.errors import CfmError
@@ -21,13 +21,12 @@ from cfmkit.families.beam.shaping.variables import Length, has_pad_inside, has_v
 from cfmkit.numerics.quadrature import clenshaw_curtis
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path, Section
     from cfmkit.elastica.sensitivity import Gradient
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.shaping.variables import Variables
+    from cfmkit.numerics.dual_array import DualArray
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
@@ -49,16 +48,20 @@ class PosePlan:
 
 def poses_of(task: Task, start: float) -> PosePlan:
     """Return the poses for a window that begins at `start` [m]."""
-    end = task.window[1]
-    inside = start + 0.5 * (end - start) * (1 - np.cos(np.linspace(0, np.pi, task.points)))
+    return _plan_poses(task.points, start, task.window[1], task.compared)
+
+
+@lru_cache(maxsize=16)
+def _plan_poses(points: int, start: float, end: float, compared: tuple[float, float] | None) -> PosePlan:
+    inside = start + 0.5 * (end - start) * (1 - np.cos(np.linspace(0, np.pi, points)))
     inside[-1] = end
-    before = np.linspace(0.0, start, task.points // _POSES_PER_REUSE + 2)[1:-1] if start > 0 else np.zeros(0)
-    also = np.array(task.compared or (end, end))
+    before = np.linspace(0.0, start, points // _POSES_PER_REUSE + 2)[1:-1] if start > 0 else np.zeros(0)
+    also = np.array(compared or (end, end))
     middle = _MIDDLE_SHARE * end
     at = np.unique(np.concatenate([[0.0], before, inside, also, [middle]]))
     window = np.searchsorted(at, inside)
     mean = np.zeros(len(at))
-    mean[window] = clenshaw_curtis(task.points)
+    mean[window] = clenshaw_curtis(points)
     shown = np.array([0, np.searchsorted(at, middle), window[-1]])
     return PosePlan(read_only(at), window, shown, read_only(mean), np.searchsorted(at, also))
 
@@ -74,6 +77,20 @@ SEARCH_CONTROL = Control(tolerance=1e-5, branch="stop", most_points=200)
 def _fractions(elements: int) -> FloatArray:
     """Return the places on each element of a beam of so many."""
     return read_only(np.linspace(0.0, 1.0, -(-_PLACES_PER_BEAM // elements) + 1))
+
+
+@cache
+def _all_fractions(counts: frozenset[int]) -> FloatArray:
+    """Return the places on elements of beams that are cut into any of some numbers."""
+    return distinct(np.concatenate([_fractions(count) for count in counts]))
+
+
+_STRESS_PARTS = {
+    "stress": {"bending": 1.0},
+    "left": {"axial": 1.0, "bending": 1.0},
+    "right": {"axial": 1.0, "bending": -1.0},
+}
+"""Stresses of `BeamAtPoses` as sums."""
 
 
 class NoAnswer(Exception):
@@ -117,9 +134,7 @@ class RowsOfBeam:
     """Samples of a beam by the engine, at r places."""
 
     place: FloatArray  # (r,) fraction of the arc length
-    # row, index, (r,): which of the beam's rows, and of all rows, they are
-    row: Any
-    index: Any
+    index: Any  # (r,) which of all rows they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,54 +153,52 @@ class Response:
     @cached_property
     def lengths(self) -> dict[str, Length]:
         """Lengths of all beams."""
-        return lengths(self.variables, self.x)
+        return lengths(self.variables, self.x, self.path.network)
+
+    @cached_property
+    def _elements(self) -> tuple[list[int], FloatArray]:
+        """All elements, and the fractions of each at which states are computed: those of beams of any number."""
+        beams = self.path.mesh.elements.beam
+        return list(range(len(beams))), _all_fractions(frozenset(map(beams.count, beams)))
 
     @cached_property
     def rows(self) -> dict[str, RowsOfBeam]:
-        """Samples of each beam; the ends of elements occur twice there, and once here."""
-        found, first = {}, 0
-        for name, states in self.states.items():
-            once = np.flatnonzero(np.append(True, np.diff(states.place) > 0))
-            found[name] = RowsOfBeam(states.place[once], once, first + once)
-            first += len(states.place)
-        return found
+        """Samples of each beam; the ends of elements occur twice among its states, and once here."""
+        (_, fractions), beams = self._elements, self.path.mesh.elements.beam
+        rows = {}
+        for name in self.path.network.beams:
+            own = [k for k, beam in enumerate(beams) if beam == name]
+            among = np.searchsorted(fractions, _fractions(len(own)))
+            index = (np.array(own)[:, None] * len(fractions) + among).ravel()
+            place = self.states.place[index]
+            once = np.append(True, np.diff(place) > 0)
+            rows[name] = RowsOfBeam(place[once], index[once])
+        return rows
 
     @cached_property
-    def _beams_by_cuts(self) -> list[dict[str, list[int]]]:
-        """Elements of each beam; those that are cut into as many elements together."""
-        mesh = self.path.mesh
-        elements = {name: beam_states.elements_of(mesh, name) for name in mesh.fits}
-        counts = sorted({len(own) for own in elements.values()})
-        return [{name: own for name, own in elements.items() if len(own) == count} for count in counts]
-
-    def _compute_along_beams(self, compute: Callable[[list[int], FloatArray], Any]) -> dict[str, Any]:
-        """Return columns (p, r) or (r,) for each beam, computed for elements and fractions of them."""
-        columns = {}
-        for alike in self._beams_by_cuts:
-            elements = [k for own in alike.values() for k in own]
-            together = compute(elements, _fractions(len(elements) // len(alike)))
-            width = together[0].shape[-1] // len(alike)
-            for k, name in enumerate(alike):
-                own = slice(k * width, (k + 1) * width)
-                columns[name] = type(together)(*(part[..., own] for part in together))
-        return {name: columns[name] for name in self.path.network.beams}
-
-    @cached_property
-    def states(self) -> dict[str, beam_states.BeamStates]:
-        """States at all rows of every beam at the poses."""
+    def states(self) -> beam_states.BeamStates:
+        """States at the poses, at the fractions of all elements, one after the other."""
         path = self.path.take(self.keep)
-        return self._compute_along_beams(partial(beam_states.states_of_elements, path.network, path.at))
+        return beam_states.states_of_elements(path.network, path.at, *self._elements)
 
     @cached_property
     def state(self) -> NetworkAtPoses:
         """Force and beams."""
-        lines = {}
-        for name, at in self.rows.items():
-            states = self.states[name]
-            sections = beam_states.sections(self.path.network, name, states)
-            pull = sections.axial_stress[:, at.row] if self.variables.task.total_stress else None
-            bending = sections.bending_stress[:, at.row]
-            lines[name] = BeamAtPoses(at.place, states.x[:, at.row], states.y[:, at.row], bending, pull)
+        elements, fractions = self._elements
+        beams = self.path.network.beams
+        width = np.repeat([beams[self.path.mesh.elements.beam[k]].section.width for k in elements], len(fractions))
+        states = self.states
+        bending, axial = beam_states.stresses_of_width(width, states)
+        lines = {
+            name: BeamAtPoses(
+                at.place,
+                states.x[:, at.index],
+                states.y[:, at.index],
+                bending[:, at.index],
+                axial[:, at.index] if self.variables.task.total_stress else None,
+            )
+            for name, at in self.rows.items()
+        }
         return NetworkAtPoses(self.variables.task.force(self.path)[self.keep], lines)
 
     @cached_property
@@ -209,28 +222,26 @@ class Response:
         return self.variables.task.force_slopes(self._gradient)
 
     @cached_property
-    def slopes(self) -> dict[str, FloatArray]:
-        """Derivatives (k, p, r) of x, y, stress, and of the stress on the left and right, at all rows of the sampling.
+    def _dual(self) -> dict[str, DualArray]:
+        """Coordinates and stresses at all rows of the sampling with their derivatives, (p, r).
 
         Raises
         ------
         NoAnswer
             Where the engine has none.
         """
-        states = self._compute_along_beams(self._gradient.dual_states).values()
-        sections = self._compute_along_beams(self._gradient.dual_sections).values()
-        x, y, bending, axial = (
-            np.concatenate([getattr(beam, name).all_slopes for beam in beams], axis=-1)
-            for beams, name in ((states, "x"), (states, "y"), (sections, "bending_stress"), (sections, "axial_stress"))
-        )
-        return {"x": x, "y": y, "stress": bending, "left": axial + bending, "right": axial - bending}
+        states = self._gradient.dual_states(*self._elements)
+        bending, axial = self._gradient.dual_stresses(*self._elements)
+        return {"x": states.x, "y": states.y, "bending": bending, "axial": axial}
 
     def slopes_at(self, what: str, pose: Any, row: Any) -> FloatArray:
-        """Return the derivatives (..., k) of one of `slopes` at poses and rows of the sampling, (...) each."""
+        """Return derivatives (..., k) of a coordinate or stress of `BeamAtPoses` at poses and rows, (...) each."""
         shape = np.broadcast_shapes(np.shape(pose), np.shape(row))
         if 0 in shape:
             return np.empty((*shape, len(self.x)))
-        return np.asarray(np.moveaxis(self.slopes[what][:, pose, row], 0, -1))
+        parts = _STRESS_PARTS.get(what, {what: 1.0})
+        slopes = [factor * self._dual[name].all_slopes[:, pose, row] for name, factor in parts.items()]
+        return np.asarray(np.moveaxis(sum(slopes[1:], slopes[0]), 0, -1))
 
 
 def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response | None:

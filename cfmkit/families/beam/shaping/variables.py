@@ -112,31 +112,30 @@ class Length:
     by_straightness: FloatArray
 
 
-def lengths(variables: Variables, x: FloatArray) -> dict[str, Length]:
-    """Return the lengths of all beams by name."""
-    network = variables.build(x)
-    shaped = variables.task.shaped
-    return {
-        name: _of_polynomial(variables, x, network, name) if name in shaped else _of_any(variables, network, name)
-        for name in network.beams
-    }
+def lengths(variables: Variables, x: FloatArray, network: Network) -> dict[str, Length]:
+    """Return the lengths of all beams of the network of some variables, by name."""
+    shaped = _of_polynomials(variables, x, network)
+    return {name: shaped[name] if name in shaped else _of_any(variables, network, name) for name in network.beams}
 
 
-def _of_polynomial(variables: Variables, x: FloatArray, network: Network, name: str) -> Length:
-    """Return the length of a beam whose shape varies: chord / |chi| with chi the mean of exp(i eta)."""
-    order = variables.order
-    first = len(variables.task.coordinates) + order * variables.task.shaped.index(name)
+def _of_polynomials(variables: Variables, x: FloatArray, network: Network) -> dict[str, Length]:
+    """Return the lengths of the beams whose shape varies: chord / |chi| with chi the mean of exp(i eta)."""
+    names, order = variables.task.shaped, variables.order
+    first = len(variables.task.coordinates)
     powers = _GAUSS_NODES[:, None] ** np.arange(1, order + 1)
-    turn = np.exp(1j * (powers @ x[first : first + order])) * _GAUSS_WEIGHTS
-    chi = turn.sum()
-    by_chi = np.zeros(variables.count, dtype=complex)
-    by_chi[first : first + order] = 1j * (turn @ powers)
+    turn = np.exp(1j * (x[first:].reshape(len(names), order) @ powers.T)) * _GAUSS_WEIGHTS
+    chi, by_chi = turn.sum(axis=1), 1j * (turn @ powers)
     ratio = abs(chi)
-    by_ratio = np.real(np.conj(chi) * by_chi) / ratio
-    reach = _reach(network, name)
+    by_ratio = np.zeros((len(names), variables.count))
+    for k, row in enumerate(np.real(np.conj(chi)[:, None] * by_chi) / ratio[:, None]):
+        by_ratio[k, first + k * order : first + (k + 1) * order] = row
+    reach = np.array([_reach(network, name) for name in names])
     chord = abs(reach)
-    by_chord = np.real(np.conj(reach) * _by_reach(variables, name)) / chord
-    return Length(chord / ratio, ratio, by_chord / ratio - chord / ratio**2 * by_ratio, by_ratio)
+    by_reach = np.array([_by_reach(variables, name) for name in names]).reshape(len(names), -1)
+    by_chord = np.real(np.conj(reach)[:, None] * by_reach) / chord[:, None]
+    by_length = by_chord / ratio[:, None] - (chord / ratio**2)[:, None] * by_ratio
+    columns = (chord / ratio).tolist(), ratio.tolist(), by_length, by_ratio
+    return {name: Length(*row) for name, row in zip(names, zip(*columns, strict=True), strict=True)}
 
 
 def _of_any(variables: Variables, network: Network, name: str) -> Length:

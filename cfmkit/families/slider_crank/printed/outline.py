@@ -11,6 +11,7 @@ from cfmkit.export.arc_outlines import check_simple
 from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Region, Sheet, circle, mark
 from cfmkit.export.drawn_as_specified import check_outline
 from cfmkit.export.fillets import round_inside_corners, sharp_notes
+from cfmkit.export.fixing_holes import add_fixing_holes, remove_screws
 from cfmkit.export.posed_part import PosedBody, swept
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP_BEAM
 from cfmkit.families.slider_crank.printed.part import STRAIGHT_SINE, Leg, bodies, choose_points
@@ -66,11 +67,12 @@ def _draw_leg(spec: SliderCrankSpec, leg: Leg) -> Drawing:
         )
         for one in thin
     ]
+    contours, bare = add_fixing_holes((*made, *holes), marks, part.screws)
     return Drawing(
         "slider-crank",
-        (*made, *holes, path, *marks),
+        (*contours, path, *marks),
         (_table(leg),),
-        sharp_notes(sharp, fillet),
+        (*sharp_notes(sharp, fillet), *bare),
         Sheet(widest, tuple(regions)),
         tuple(_dimensions(leg.points)),
         tuple(_facts(spec, leg)),
@@ -108,6 +110,7 @@ class SolvedPiece:
 
 def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:
     """Return one leg as it is solved as a solid."""
+    spec = remove_screws(spec)
     part, leg = spec.mechanism.part, Leg.from_spec(spec, as_printed=True)
     frame: tuple[FloatArray, ...] = ()
     if part is not None and part.frame is not None and part.frame.ground is not None:

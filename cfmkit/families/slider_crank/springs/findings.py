@@ -18,15 +18,16 @@ from cfmkit.families.slider_crank.springs.bistability_class import (
     SNAP_THROUGH_CLASS,
     TRISTABLE_CLASS,
 )
-from cfmkit.families.slider_crank.springs.bought_spring_limits import fault_of_bought_spring
 from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
+from cfmkit.stock.springs.guides import guide_cure, guide_needed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.solution import Solution
     from cfmkit.families.slider_crank.springs.spec import Bought
 
@@ -292,12 +293,46 @@ def _stretched_outside(solution: Solution) -> Sentence:
 # --- limits of springs ----------------------------------------------------------------------------------------------
 
 
+def _fault_of_bought_spring(spec: SliderCrankSpec, number: int, moved: float) -> tuple[Any, ...] | None:
+    """Return what is wrong with a bought spring over a motion, and settings that cure it; None if nothing is.
+
+    Parameters
+    ----------
+    spec : SliderCrankSpec
+        With bought springs.
+    number : int
+        Which of them.
+    moved : float
+        Size of the largest turn of its joint, of the slider its travel [rad or m].
+    """
+    spring, pins = spec.mechanism.springs.bought[number], spec.mechanism.pins
+    coil, key = spring.coil, f"mechanism.springs.bought.{number}"
+    if spring.kind == "compression":
+        if spring.is_guided or not moved > spring.unguided * (1 + 1e-9):
+            return None
+        return (
+            f"{spring.name} buckles when it is deflected by {mm(spring.unguided)} (ends {spring.seats}), and "
+            f"is deflected by {mm(moved)}; {guide_needed(spring, coil, key)}",
+            *guide_cure(coil, key),
+        )
+    if spring.kind != "torsion" or coil is None or pins is None or not np.isfinite(moved):
+        return None
+    inside = coil.inner_diameter_wound_up(moved)
+    if inside >= pins.diameter:
+        return None
+    return (
+        f"{spring.name} at the {spring.at.replace('_', ' ')} is {mm(coil.inner_diameter)} wide inside, "
+        f"wound up by {deg(moved)} {mm(max(inside, 0.0))}: it binds on its pin of {mm(pins.diameter)}; use "
+        "a wider spring, or a thinner pin ('mechanism.pins.diameter')",
+    )
+
+
 def _fails(number: int, spring: Bought) -> Rule:
     """Return the rule on what a bought spring cannot do."""
 
     def fault(solution: Solution, row: int) -> Sentence | None:
         turns = np.broadcast_to(solution.extremes.largest_turns, (4, len(solution)))
-        return fault_of_bought_spring(solution.specs[row], number, float(turns[JOINT_NAMES.index(spring.at), row]))
+        return _fault_of_bought_spring(solution.specs[row], number, float(turns[JOINT_NAMES.index(spring.at), row]))
 
     return FindingRule(
         "spring_buckles" if spring.kind == "compression" else "spring_binds_on_pin",

@@ -35,7 +35,7 @@ from cfmkit.specs.units import format_short
 from cfmkit.stock.joint_strength import link_stress, pin_that_bears
 from cfmkit.stock.parts_list import ListedPart
 from cfmkit.stock.springs.guides import guide_words
-from cfmkit.stock.stock_series import series_of
+from cfmkit.stock.stock_series import hole_with_fit, series_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -155,12 +155,18 @@ def _parts(
     mechanism, legs, link = spec.mechanism, spec.mechanism.sets, solution.assembly.linkage
     sheet, width, pin = sizes
     for name, length in (("crank", link.crank), ("coupler", link.coupler)):
-        data = (
-            f"{_describe_strength(strength)}; {mm(float(length))} between holes of {mm(pin)}; geometry/slider-crank.dxf"
-        )
+        holes = f"{mm(float(length))} between holes of {hole_with_fit(pin, 8)}"
+        data = f"{_describe_strength(strength)}; {holes}; geometry/slider-crank.dxf"
         yield ListedPart("link", name, legs, data, "make", mm(float(length) + width, width, sheet), "", name)
     yield ListedPart(
-        "on its guide", "slider", 1, f"with a hole of {mm(pin)}", "make", mm(width, width, sheet), "", "slider"
+        "on its guide",
+        "slider",
+        1,
+        f"with a hole of {hole_with_fit(pin, 8)}",
+        "make",
+        mm(width, width, sheet),
+        "",
+        "slider",
     )
     yield pin_part("joints", 3 * legs, pin, 2.0 * sheet, load, "joint")
     for entry in mechanism.springs.bought:

@@ -118,7 +118,7 @@ def solve_rows(variants: Variants) -> Iterator[tuple[NDArray[np.intp], SolvedRow
     built: dict[int, tuple[SliderCrankSpec, Assembly, Ends]] = {}
     plain = _plain_numbers(variants.spec, variants.as_made)
     kind = repr(_kind(variants.spec)) if plain >= variants.values.keys() else None
-    for index, spec in variants.of_plain_numbers(plain):
+    for index, spec in variants.validate_each(plain):
         if spec.fidelity != "prb" or not any(spec.mechanism.springs.rates):
             continue
         try:

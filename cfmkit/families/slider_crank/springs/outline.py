@@ -10,7 +10,7 @@ from cfmkit.export.contours import Arc, Contour, Drawing, DrawnDimension, Line, 
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
-from cfmkit.stock.stock_series import series_of
+from cfmkit.stock.stock_series import hole_with_fit, series_of
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -72,7 +72,7 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     )
     material = spec.mechanism.material
     facts = [("material", "not stated" if material is None else material.words)]
-    facts += [("pin holes", f"diameter {format_short(2.0 * hole, 'length')}")]
+    facts += [("pin holes", f"diameter {hole_with_fit(2.0 * hole, 8)}, pins h8")]
     facts += [("links", f"{format_short(2.0 * eye, 'length')} wide, ends round")]
     facts += [("offset", format_short(linkage.offset, "length"))] if linkage.offset else []
     sheet = Sheet(part.sheet if part else None, (), SHEET_KEY)

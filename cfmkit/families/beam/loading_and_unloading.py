@@ -1,4 +1,4 @@
-"""A curve with friction: the way there, branch `load`, and the way back from its end, branch `unload`."""
+"""Force curves with hysteresis: branch `load` of the forward travel, branch `unload` of the return."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 SAME_PLACE = 1e-9  # share of the range within which an event is at a point
 
 
-def part_ways(path: Path, count: int) -> tuple[Path, Path | None]:
-    """Return the parts of a path up to the last of `count` requested values, and behind it; None if it ends before."""
+def split_at_reversal(path: Path, count: int) -> tuple[Path, Path | None]:
+    """Return the path up to the last of `count` requested values, and the rest, the return; None if it ends before."""
     turns = np.flatnonzero(path.requested == count - 1)
     if not len(turns) or turns[0] == len(path) - 1:
         return path, None
@@ -54,8 +54,8 @@ def _points_of_events(path: Path) -> Iterator[int]:
         yield int(marked[number])
 
 
-def join_ways(load: Curve, unload: Curve) -> Curve:
-    """Return one curve of both ways, in the order in which the mechanism goes through them."""
+def join_branches(load: Curve, unload: Curve) -> Curve:
+    """Return one curve of both branches, in the order in which the mechanism goes through them."""
 
     def column(name: str) -> Column:
         there, back = load.extra[name], unload.extra[name]
@@ -71,25 +71,25 @@ def join_ways(load: Curve, unload: Curve) -> Curve:
     )
 
 
-def both_ways(solution: Solution) -> BothWays | None:
-    """Return the equilibria between the points of both ways; None unless both go over the same motion."""
+def equilibria_of_both_branches(solution: Solution) -> BothBranches | None:
+    """Return the equilibria between the points of both branches; None unless both cover the same motion."""
     there = solution.model_between_points
     back = None if solution.back is None else solution.back.model_between_points
     if there is None or back is None:
         return None
     first, second = (np.array([way.own_points[0], way.own_points[-1]]) for way in (there, back))
-    return BothWays({"load": there, "unload": back}) if np.allclose(first, second, rtol=0, atol=1e-12) else None
+    return BothBranches({"load": there, "unload": back}) if np.allclose(first, second, rtol=0, atol=1e-12) else None
 
 
 @dataclass(frozen=True, eq=False)
-class BothWays:
-    """Effort and stress of both ways at every place (a `cfmkit.results.ClosedForm`)."""
+class BothBranches:
+    """Effort and stress of both branches at every place (a `cfmkit.results.ClosedForm`)."""
 
     ways: dict[str, BetweenPoints]
 
     @property
     def places(self) -> FloatArray:
-        """The points of both ways, and extremes between them, increasing [m or rad]."""
+        """The points of both branches, and extremes between them, increasing [m or rad]."""
         return np.unique(np.concatenate([way.places for way in self.ways.values()]))
 
     @property
@@ -98,9 +98,9 @@ class BothWays:
         return np.unique(np.concatenate([way.peaks for way in self.ways.values()]))
 
     def effort(self, branch: str, places: FloatArray, /) -> FloatArray:
-        """Return the effort of a way at places of any shape [N or N m]."""
+        """Return the effort of a branch at places of any shape [N or N m]."""
         return self.ways[branch].effort(branch, places)
 
     def stress(self, branch: str, places: FloatArray, /) -> FloatArray:
-        """Return the largest stress of a way at places of any shape [Pa]."""
+        """Return the largest stress of a branch at places of any shape [Pa]."""
         return self.ways[branch].stress(branch, places)
