@@ -16,6 +16,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.runs.run import run_analysis, run_design
 from cfmkit.specs.units import TravelShare
 from cfmkit.studies.choose_metrics_to_note import metrics_of
+from cfmkit.studies.parts import drawn_yields
 from cfmkit.studies.parts.drawn_yields import common_errors, yields_of
 from cfmkit.studies.parts.outcomes import analyze_parts
 from cfmkit.studies.parts.parts import Parts
@@ -265,3 +266,13 @@ def test_failed_parts_count_as_bad_ones():
     found = share.as_json()
     assert found["value"] == 0.5
     assert found["clopper_pearson"] == list(clopper_pearson(5, 10))
+
+
+def test_a_design_that_is_designed_again_has_the_yield_of_its_parts_before_as_well(monkeypatch):
+    """Parts as given are not drawn again, and a specification that differs in its description only has as many good."""
+    spec = cfmkit.load("configs/cam.yaml").replace({"design.process": "laser", "design.samples": 40})
+    nominal = replace(cfmkit.analyze(spec), spec=spec)
+    other = yields_of(nominal, spec.replace({"description": "another one"}), Run())
+    monkeypatch.setattr(drawn_yields, "_yield_before", None)
+    again = yields_of(nominal, spec, Run())
+    assert again.before == again.after == other.before

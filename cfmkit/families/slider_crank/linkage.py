@@ -143,6 +143,8 @@ class Linkage:
     def _run(self, lift: FloatArray) -> FloatArray:
         """Return the length of the coupler along x, not negative [LH, eq. 5a]."""
         squared = (self.coupler - lift) * (self.coupler + lift)
+        if not np.ndim(squared) and squared >= 0.0:  # of one place, as parts are put together one by one
+            return np.sqrt(squared)
         with np.errstate(invalid="ignore"):
             run: FloatArray = np.sqrt(squared)
         return run
