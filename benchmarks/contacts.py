@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import cfmkit
-from cfmkit.elastica import Control, trace
+from cfmkit.elastica import Control, Displacement, Loading, trace
 from cfmkit.families.beam.network_from_spec import assemble
 
 ROOT = Path(__file__).parents[1]
 sys.path += [str(ROOT / "tests" / part) for part in ("support", "unit")]
+import test_elastica_beam_on_beam as pairs  # noqa: E402
+import test_elastica_pads_on_beams as pads  # noqa: E402
 from contact_layouts import among_discs, with_pads  # noqa: E402
 
 if TYPE_CHECKING:
@@ -38,6 +40,11 @@ def cases() -> Iterator[tuple[str, Any, Any, Control]]:
     yield "stops and pads, out and back", *with_pads(PAD_SEED), Control()
     for seed in DISC_SEEDS:
         yield f"side among discs {seed}, out and back", *among_discs(seed), Control()
+    load = Loading(pads.TIP_LOAD, np.array([0.25, 0.5, 1, 2, 3, 2, 1, 0.5, 0.25]))
+    yield "pad on a leaf, out and back", pads.two_leaves(), load, Control()
+    yield "two leaves, sides, out and back", pairs.BULGE, replace(load, points=load.points / 2), Control()
+    fall = Displacement("root", pairs.DOWN, np.array([0.1, 0.2, 0.3, 0.2, 0.1]))
+    yield "two leaves, end and side, out and back", pairs.falling_leaf(), fall, Control()
 
 
 def main() -> None:

@@ -51,7 +51,7 @@ def by_ccx(data: bytes) -> tuple[float, float]:
 
 def by_cfmkit(spec: cfmkit.Spec) -> list[float]:
     """Return the same of every part of a specification, in the order of its decks."""
-    return [reaction(one, one.part.create_mesh().refine()[0]) for one in family(spec.family).driven_parts(spec)]
+    return [reaction(one, one.part.create_mesh().refine()[0]) for one in family(spec.family).elastic.solids(spec)]
 
 
 LAYERS, GRADED = 3, 1.5
@@ -108,7 +108,7 @@ def in_three_dimensions(names: list[str]) -> None:
     print("|---|---|---|---|---|---|")
     for name, changes in ({one: SPECS.get(one, []) for one in names} or SPECS).items():
         spec = cfmkit.load(name, ["analysis.fidelity=solid", *changes])
-        for one in family(spec.family).driven_parts(spec):
+        for one in family(spec.family).elastic.solids(spec):
             own = reaction(one, one.part.create_mesh())
             try:
                 other, took = by_ccx(extruded(one))

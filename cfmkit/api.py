@@ -197,7 +197,7 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
         raise UsageError(f"{record.phrase} cannot be designed, only analysed")
     from cfmkit.studies.design_with_margins_and_verification import run_design
 
-    return run_design(spec, record.design, run or Run())
+    return run_design(spec, record.design.make, run or Run())
 
 
 def evaluate(

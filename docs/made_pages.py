@@ -79,11 +79,11 @@ def _family(record: Any) -> str:
     for head, known in blocks.items():
         rows = [(f"`{one.path}`", _kind(one), one.default, one.allowed, _needed(one)) for one in known]
         parts += [f"## {head}\n", *_table(("key", "kind, unit", "default", "allowed", "meaning"), rows)]
-    values = [(f"`{name}`", border_unit(kind), text) for name, (kind, text) in record.values.items()]
+    values = [(f"`{name}`", border_unit(kind), text) for name, (kind, text) in record.outputs.values.items()]
     parts += ["## Values beside the metrics\n", *_table(("name", "unit", "what it is"), values)]
-    found = [(f"`{name}`", text) for name, text in record.findings.items()]
+    found = [(f"`{name}`", text) for name, text in record.outputs.findings.items()]
     parts += ["## Warnings and failures\n", *_table(("name", "meaning"), found)]
-    parts += ["## References\n", *(f"- {text}" for text in record.references)]
+    parts += ["## References\n", *(f"- {paper.reference}" for paper in record.papers)]
 
     return "\n".join(parts) + "\n"
 

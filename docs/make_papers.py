@@ -54,19 +54,13 @@ def _counts(done: Sequence[ComputedRow]) -> Iterator[str]:
 
 def _section(paper: str, done: Sequence[ComputedRow]) -> Iterator[str]:
     mine = [one for one in done if one.row.paper == paper]
-    (reference,) = [text for record in records() for text in record.references if _names(text, paper)][:1]
+    (reference,) = [one.reference for record in records() for one in record.papers if one.name == paper]
     yield f"## {paper}\n\n{reference}\n"
     yield "| place | what | printed | `cfmkit` | verdict | why |\n|---|---|---|---|---|---|"
     for one in mine:
         cells = (one.row.place, one.row.what, ", ".join(one.row.printed), _here(one), one.row.verdict, one.row.why)
         yield f"| {' | '.join(_cell(cell) for cell in cells)} |"
     yield ""
-
-
-def _names(reference: str, paper: str) -> bool:
-    author, _, year = paper.rpartition("-")
-    first = reference.partition(",")[0].split()[-1].lower()
-    return first == author and year in reference
 
 
 def _here(one: ComputedRow) -> str:

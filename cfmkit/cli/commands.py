@@ -31,6 +31,10 @@ _TYPER_OPTIONS: dict[str, Any] = {
 }
 
 
+PLAIN_TYPES = (str, int, bool)
+"""Types of options whose values need no conversion."""
+
+
 @dataclass(frozen=True)
 class Call:
     """A command line that was understood: what to call, and with which options."""
@@ -110,7 +114,9 @@ def _plain(command: Any) -> Any:
     helped = command.get_help_option
 
     def help_option(ctx: Any) -> Any:
-        return _drop_types(helped(ctx))
+        option = _drop_types(helped(ctx))
+        _convert_if_given(option)
+        return option
 
     command.get_help_option = help_option
     for item in command.params:
@@ -119,13 +125,16 @@ def _plain(command: Any) -> Any:
 
 
 def _convert_if_given(item: Any) -> None:
-    """Let an option that is not given be None at once: to convert nothing typer makes a validator for every option."""
+    """Let an option be as it is that is not given or of its type: to convert it typer makes a validator for each."""
     convert, several = item.process_value, item.nargs == -1 or getattr(item, "multiple", False)
+    kind = getattr(getattr(item, "type_descriptor", None), "annotation", None)  # older versions of typer have none
 
     def process_value(ctx: Any, value: Any) -> Any:
-        if value is None and not item.required and item.callback is None:
-            return () if several else None
-        return convert(ctx, value)
+        is_given = value is not None or item.required
+        if is_given and not (kind in PLAIN_TYPES and type(value) is kind):
+            return convert(ctx, value)
+        value = value if is_given else () if several else None
+        return value if item.callback is None else item.callback(ctx, item, value)
 
     item.process_value = process_value
 

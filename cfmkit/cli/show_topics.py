@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import asdict
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cfmkit import families
@@ -154,6 +153,7 @@ def stock_page() -> Document:
 
 def family_page(name: str) -> Document:
     """Return what a spec of a family may say, what a run can report, and where it comes from."""
+    from cfmkit.runs.dimension_drawing import DRAWING_FILE
     from cfmkit.specs.keys_and_schema import keys
     from cfmkit.specs.units import border_unit
 
@@ -161,10 +161,10 @@ def family_page(name: str) -> Document:
     spec_keys = [asdict(key) for key in keys(record.spec_type)]
     values = [
         {"name": key, "unit": border_unit(dimension), "definition": definition, "per_branch": False}
-        for key, (dimension, definition) in record.values.items()
+        for key, (dimension, definition) in record.outputs.values.items()
     ]
-    findings = [{"name": key, "meaning": meaning} for key, meaning in record.findings.items()]
-    references = [{"reference": reference} for reference in record.references]
+    findings = [{"name": key, "meaning": meaning} for key, meaning in record.outputs.findings.items()]
+    references = [{"reference": paper.reference} for paper in record.papers]
     sections = (
         *_key_sections(spec_keys),
         ("values beside the metrics", values, METRIC_FIELDS),
@@ -172,8 +172,8 @@ def family_page(name: str) -> Document:
         ("references", references, (field("reference", "", wraps=True),)),
     )
     data = {"keys": spec_keys, "values": values, "findings": findings, "references": references}
-    starts = f"`cfmkit new {name}` starts a file" if record.template else ""
-    drawn = f"`cfmkit show {name} --figure` draws it with its dimensions named" if record.dimension_drawing else ""
+    starts = f"`cfmkit new {name}` starts a file" if record.file("template.yaml") else ""
+    drawn = f"`cfmkit show {name} --figure` draws it with its dimensions named" if record.file(DRAWING_FILE) else ""
     commands = "; ".join(filter(None, (starts, drawn)))
     return _page(name, f"{record.summary}. {commands}" if commands else record.summary, sections, data)
 
@@ -224,19 +224,20 @@ def find_page(name: str) -> Document | None:
         return None
     data = {heading: records for heading, records, _ in sections}
     page = _page(name, "", sections, data)
-    bibtex = [text for entry in data.get("references", ()) if (text := _bibtex(entry))]
+    papers = {paper.name: paper.bibtex for record in families.records() for paper in record.papers}
+    bibtex = [papers[entry["name"]] for entry in data.get("references", ())]
     more = (block for text in bibtex for block in (line(""), Verbatim(text + "\n")))
     return Document({**data, **({"bibtex": bibtex} if bibtex else {})}, (*page.body, *more))
 
 
 def _symbols(name: str) -> list[Record]:
     """Return what a symbol such as ``theta2`` is in the drawings of the families."""
-    from cfmkit.runs.dimension_drawing import read_dimensions
+    from cfmkit.runs.dimension_drawing import DRAWING_FILE, read_dimensions
 
     return [
         {"name": row["symbol"], "family": record.name, "key": row["key"], "meaning": row["meaning"]}
         for record in families.records()
-        if record.dimension_drawing
+        if record.file(DRAWING_FILE)
         for row in read_dimensions(record)
         if name in re.split(r", | \.\.\. ", row["symbol"])
     ]
@@ -251,25 +252,10 @@ def names() -> list[str]:
 def references() -> list[dict[str, str]]:
     """Return the papers behind all families: name, family and the reference in full."""
     return [
-        {"name": _tag(text), "family": record.name, "reference": text}
+        {"name": paper.name, "family": record.name, "reference": paper.reference}
         for record in families.records()
-        for text in record.references
+        for paper in record.papers
     ]
-
-
-def _bibtex(reference: Record) -> str:
-    """Return the BibTeX entry of a paper, whose key begins with its first author and ends with its year."""
-    author, _, year = reference["name"].rpartition("-")
-    entries = re.split(r"\n(?=@)", families.family(reference["family"]).bibtex.strip())
-    key = re.compile(rf"@\w+\{{{author.replace('-', '')}[a-z]*{year},", re.IGNORECASE)
-    return next((entry.strip() for entry in entries if key.match(entry)), "")
-
-
-def _tag(reference: str) -> str:
-    """Return the first author's family name and the year: ``lan-2010``."""
-    author = reference.partition(",")[0].split()[-1].lower()
-    years = re.findall(r"\b(?:19|20)[0-9]{2}\b", reference)
-    return "-".join([author, *years[:1]])
 
 
 def _keys(heading: str, name: str) -> set[str]:
@@ -324,10 +310,7 @@ def _values() -> list[Record]:
     from cfmkit.specs.units import border_unit
 
     every = families.records()
-    values_by_source = [(record.name, record.values) for record in every]
-    values_by_source += [
-        (record.name, import_module(record.attribution).DEVIATION_DEFINITIONS) for record in every if record.attribution
-    ]
+    values_by_source = [(record.name, {**record.outputs.values, **record.outputs.causes}) for record in every]
     values_by_source.append(("recordings", define_recorded_values("torque") | define_recorded_values("force")))
     return [
         {"name": key, "family": name, "unit": border_unit(dimension), "definition": definition}
@@ -356,7 +339,7 @@ def _findings() -> list[Record]:
     from cfmkit.experiment import calibration, correction, findings
     from cfmkit.studies.findings import STUDY_FINDINGS
 
-    findings_by_source = [(record.name, record.findings) for record in families.records()]
+    findings_by_source = [(record.name, record.outputs.findings) for record in families.records()]
     findings_by_source += [("recordings", findings.RECORDING_FINDINGS), ("calibrate", calibration.CALIBRATION_FINDINGS)]
     findings_by_source += [("correct", correction.CORRECTION_FINDINGS), *STUDY_FINDINGS.items()]
     return [

@@ -92,7 +92,7 @@ def references_of(name: str) -> dict[str, Any]:
 
     record = family(name)
     versions = {"cfmkit": __version__, **imported_versions()}
-    return {"references": record.references, "bibtex": record.bibtex, "versions": versions}
+    return {"references": [paper.reference for paper in record.papers], "bibtex": record.bibtex, "versions": versions}
 
 
 def escaped_json(data: Any) -> str:

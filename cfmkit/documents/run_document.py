@@ -331,7 +331,13 @@ def _facts(report: Report) -> Iterator[ValueRow]:
     if spec.target_curve is not None:
         known |= {"force_ripple", "torque_ripple"}
     for name in dict.fromkeys(
-        ("deviation_from_curve", "usable_stroke", "hysteresis_area", *family(spec.family).headline, *SHOWN_METRICS)
+        (
+            "deviation_from_curve",
+            "usable_stroke",
+            "hysteresis_area",
+            *family(spec.family).outputs.headline,
+            *SHOWN_METRICS,
+        )
     ):
         if name not in known and _has_value(report, name):
             text = _stroke(report) if name == "usable_stroke" else branches(report, name, report.metrics)

@@ -153,7 +153,7 @@ def report_on(result: Result, design: Design | None = None) -> Report:
     from cfmkit.families import family
     from cfmkit.metrics import check, evaluate, values_of_family
 
-    values = values_of_family(family(result.spec.family).values)
+    values = values_of_family(family(result.spec.family).outputs.values)
     requirements = check(result.spec.part_requirements, result, values)
     return Report(result, evaluate(result), requirements, design)
 

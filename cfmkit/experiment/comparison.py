@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -99,12 +98,11 @@ class Comparison(ShortRepr):
 
     def causes(self, result: Result) -> Mapping[str, Quantity]:
         """Return what the loop says about the causes of its departure from the model, where the family can tell."""
-        module = family(result.spec.family).attribution
+        attribute = family(result.spec.family).attribution
         loop = self.loop
-        if module is None or loop is None:
+        if attribute is None or loop is None:
             return {}
-        causes: Mapping[str, Quantity] = import_module(module).attribute(result, loop)
-        return empty_uncovered(causes, self.holes, self.curve.kind)
+        return empty_uncovered(attribute(result, loop), self.holes, self.curve.kind)
 
     def metrics(self) -> dict[str, Quantity]:
         """Return root mean square, largest and mean error per branch, and over all, by name, SI."""

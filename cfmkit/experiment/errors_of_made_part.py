@@ -27,7 +27,6 @@ from cfmkit.experiment.calibration import POORLY_DETERMINED, ModelCurves, fit_sa
 from cfmkit.experiment.comparison import compare
 from cfmkit.experiment.parameters_to_fit import DATA_PREFIX, ZERO_OFFSETS, FitParameter, parameters
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.metrics import Window
 from cfmkit.numerics.robust_statistics import robust_scale
@@ -165,8 +164,7 @@ def errors_that_can_be_told(spec: Spec) -> tuple[FitParameter, ...]:
     Values that err together are one parameter: moduli of one size by a factor, all thicknesses by one amount, the
     rates of a list of springs by a factor.
     """
-    stated = family(spec.family).errors
-    kinds: dict[str, str] = {} if stated is None else dict(function_named(stated)(spec))
+    kinds = dict(family(spec.family).errors(spec))
     groups: dict[tuple[str, float | str], list[str]] = {}
     for path, value in spec.leaves():
         if path.startswith("mechanism.") and path.endswith(".material.youngs_modulus"):

@@ -17,7 +17,7 @@ from cfmkit.errors import CfmError, SolutionError
 from cfmkit.experiment.aimed_curve import N_PLACES, analyze_part
 from cfmkit.experiment.errors_of_made_part import is_thickness
 from cfmkit.families import family
-from cfmkit.families.base import ENVELOPE_METRICS, function_named
+from cfmkit.families.base import ENVELOPE_METRICS
 from cfmkit.metrics import check, values_of_family
 from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
@@ -94,8 +94,7 @@ def limits_of(spec: Spec) -> dict[str, DrawnRange]:
     cfmkit.errors.SpecError
         If a path of `design.free` is not in the specification.
     """
-    stated = family(spec.family).errors
-    kinds: dict[str, str] = {} if stated is None else dict(function_named(stated)(spec))
+    kinds = dict(family(spec.family).errors(spec))
     design = getattr(spec, "design", None)
     ranges = {path: _widen(float(spec.get_value(path)), *ends) for path, ends in free_of(spec, spec).items()}
     if not getattr(design, "free", None):
@@ -311,7 +310,8 @@ class Redesign:
                 held.append(f"{path} {format_short(limit.high, dimension, 4)} (the most that the design allows)")
         why = f", held by {' and '.join(held)}" if held else ""
         message = f"no part that can be made has {wanted}: the nearest has {reached}{why}"
-        levels = [path for path in family(self.drawn.family).levels if _has(self.drawn, path)]
+        method = family(self.drawn.family).design
+        levels = [path for path in method.levels if _has(self.drawn, path)] if method else []
         return NotMakeable(message, {path: reached for path in levels[:1]})
 
 
@@ -333,7 +333,7 @@ def largest_miss(result: Result, of_envelope: bool = False) -> float:
 
     `of_envelope`: of the requirements on the envelope alone.
     """
-    values = values_of_family(family(result.spec.family).values)
+    values = values_of_family(family(result.spec.family).outputs.values)
     shares = [0.0]
     for outcome in check(result.spec.part_requirements, result, values):
         if outcome.value is None or (of_envelope and outcome.metric not in ENVELOPE_METRICS):

@@ -7,21 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.export.arc_outlines import outlines
-from cfmkit.export.contours import OUTLINE_TOLERANCE
-from cfmkit.export.dxf import dxf_bytes, write_dxf
-from cfmkit.export.kerf import with_kerf
-from cfmkit.export.layers import check_name
-from cfmkit.export.points_csv import write_points
-from cfmkit.export.svg import svg_bytes, write_svg
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.export.arc_outlines import Outline
     from cfmkit.export.contours import Drawing
-
-__all__ = ["DEFAULT_FORMATS", "FILE_FORMATS", "OUTLINE_TOLERANCE", "files", "write_dxf", "write_points", "write_svg"]
 
 FILE_FORMATS = ("dxf", "svg", "csv", "stl", "3mf", "step")
 """What `files` can write."""
@@ -46,6 +36,13 @@ def files(
     Raises GeometryError if the drawing cannot be cut as it is, or not with that kerf; if it has no thickness for a
     body; UsageError if the library for a format is not installed.
     """
+    from cfmkit.export.arc_outlines import outlines
+    from cfmkit.export.dxf import dxf_bytes
+    from cfmkit.export.kerf import with_kerf
+    from cfmkit.export.layers import check_name
+    from cfmkit.export.points_csv import write_points
+    from cfmkit.export.svg import svg_bytes
+
     tolerance = drawing.tolerance if tolerance is None else tolerance
     stem = check_name(drawing.name, "drawing")
     drawn = outlines(drawing.with_reference_square(), tolerance)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.arrays import FloatArray, ShortRepr, read_only
+from cfmkit.arrays import FloatArray, ShortRepr, distinct, read_only
 from cfmkit.export.layers import DRIVEN_LAYER, HELD_LAYER
 from cfmkit.numerics.biarcs import cubic
 
@@ -346,7 +346,7 @@ def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list
 
 def _chain(edge: Edge, points: int) -> FloatArray:
     if isinstance(edge, Smooth):
-        chosen = np.unique(np.linspace(0, len(edge.points) - 1, points).astype(int))
+        chosen = distinct(np.linspace(0, len(edge.points) - 1, points).astype(int))
         return np.asarray(edge.points[chosen])
     if isinstance(edge, Line):
         return np.array([edge.start, edge.end], dtype=float)

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cfmkit.arrays import distinct
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -190,4 +192,4 @@ def _evenly_moved(core: FloatArray) -> Any:
     """Return the numbers of poses (p, k, 2) between which a body moves by equal distances, the ends included."""
     steps = np.hypot(*np.moveaxis(np.diff(core, axis=0), -1, 0)).max(axis=1)
     path = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.unique(np.searchsorted(path, np.linspace(0.0, path[-1], N_COVERING)))
+    return distinct(np.searchsorted(path, np.linspace(0.0, path[-1], N_COVERING)))

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Family
 
 FAMILY_MODULES = {
-    "beam": "cfmkit.families.beam",
-    "cam": "cfmkit.families.cam",
-    "slider-crank": "cfmkit.families.slider_crank",
-    "vcfm": "cfmkit.families.vcfm",
+    "beam": "cfmkit.families.beam.record",
+    "cam": "cfmkit.families.cam.record",
+    "slider-crank": "cfmkit.families.slider_crank.record",
+    "vcfm": "cfmkit.families.vcfm.record",
 }
-"""Those of this package."""
+"""Those of this package, and the module with the record of each."""
 
 _REGISTERED_FAMILIES: dict[str, Family] = {}
 _REGISTRATION_STAMPS: dict[str, str] = {}
@@ -111,12 +111,12 @@ def _with_own_metrics(record: Family) -> Family:
     if stamp != own_metrics.stamp() or plain is not record:
         from cfmkit.metrics import known_metrics
 
-        taken = {*record.values, *(item.name for item in known_metrics(None))}
+        taken = {*record.outputs.values, *(item.name for item in known_metrics(None))}
         metrics = own_metrics.own_metrics()
         if clash := [name for name in metrics if name in taken]:
             raise UsageError(f"the metric {clash[0]!r} needs another name: {record.phrase} has one of this name")
         about = {name: (metric.dimension, metric.definition) for name, metric in metrics.items()}
-        extended = replace(record, values={**record.values, **about})
+        extended = replace(record, outputs=replace(record.outputs, values={**record.outputs.values, **about}))
         _WITH_OWN_METRICS[record.name] = own_metrics.stamp(), record, extended
     return extended
 

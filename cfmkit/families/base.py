@@ -18,12 +18,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
     from importlib.resources.abc import Traversable
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.contours import Drawing
     from cfmkit.export.posed_part import PosedPart
+    from cfmkit.families.papers import Paper
     from cfmkit.families.rows import SolvedRows
+    from cfmkit.families.suggestion_request import FamilyOffer, Request
+    from cfmkit.plots.poses_in_one_svg import Moving
     from cfmkit.results import Design, Result
     from cfmkit.solid.adaptive_solution import DrivenPart
     from cfmkit.specs.own_metrics import OwnMetric
@@ -37,16 +42,9 @@ class Sampled:
     effort: Mapping[str, FloatArray]  # branch -> force [N] or torque [N m]
     # (s, p) stresses of s parts of the mechanism, or the largest alone [Pa]; s = 0 where there is none
     stress: FloatArray
-
-
-@dataclass(frozen=True)
-class SampledSlopes:
-    """Effort and stress of one part at p places of its motion, and their exact derivatives by some of its values."""
-
-    sampled: Sampled  # the effort and the stresses themselves
-    # dotted path of a value -> derivatives of both by it, per SI unit of the value; paths whose derivatives are not
-    # known exactly are left out
-    by: Mapping[str, Sampled]
+    # dotted path of a value -> exact derivatives of both by it, per SI unit of the value; of values that were asked
+    # for, those whose derivatives are known
+    slopes: Mapping[str, Sampled] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -70,6 +68,20 @@ class Analyzer(Protocol):
         """Return the curves of a mechanism, its scalar results and what is wrong with it."""
 
 
+class Sampler(Protocol):
+    """Effort and stress of a part at a few places."""
+
+    def __call__(self, spec: Any, places: FloatArray, paths: Sequence[str] = (), /) -> Sampled | None:
+        """Return them at places [m or rad], with slopes by the values at some paths; None if that is not possible."""
+
+
+class Outliner(Protocol):
+    """The drawing of what is cut."""
+
+    def __call__(self, spec: Any, tolerance: float = ..., /) -> Drawing:
+        """Return contours; edges that are not `Smooth` lie within the tolerance [m] of the exact ones."""
+
+
 def function_named(name: str) -> Any:
     """Return the function that ``"module:function"`` names; the module is imported for it.
 
@@ -85,21 +97,6 @@ def function_named(name: str) -> Any:
     module, function, *words = name.split(":")
     found = getattr(import_module(module), function)
     return partial(found, *words) if words else found
-
-
-def when_called(name: str) -> Callable[..., Any]:
-    """Return the function that ``"module:function"`` names, without its module: that is imported at the first call.
-
-    Examples
-    --------
-    >>> when_called("math:hypot")(3.0, 4.0)
-    5.0
-    """
-    return partial(_call, name)
-
-
-def _call(name: str, /, *given: Any, **named: Any) -> Any:
-    return function_named(name)(*given, **named)
 
 
 _VOWEL_SOUND_LETTERS = "aefhilmnorsx"
@@ -172,98 +169,138 @@ ENVELOPE_METRICS = {
 
 
 @dataclass(frozen=True)
-class Search:
-    """Findings and tables of a design that no analysis of the specification it writes can have: those of its search."""
+class ResultNames:
+    """Everything that a result of a family may name."""
 
+    # the family's own scalar results beside the metrics of the contract: name -> (dimension, definition)
+    values: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    # for values of the dimension ``text``: name -> the words that the value is an index into
+    words: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    # what `attribution` says of a measured loop: name -> (dimension, definition)
+    causes: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    # every warning or failure name the family can report, with its meaning
+    findings: Mapping[str, str] = field(default_factory=dict)
+    headline: tuple[str, ...] = ()  # values and metrics that are shown first after a run, in this order
+    branches: tuple[str, ...] = ()  # every name that a branch of its curves may have; none where the curve decides
+
+
+@dataclass(frozen=True)
+class DesignMethod:
+    """From targets to a specification, with what its search says that no analysis of that specification can have."""
+
+    make: Callable[[Any, Run], Design]  # ``make(spec, run)``: the `spec` of its design is analysed like any other
+    levels: tuple[str, ...] = ()  # dotted paths of the forces that the `design` block may ask for
     findings: tuple[str, ...] = ()  # names of findings about the search
     tables: tuple[str, ...] = ()  # names of tables about it, as ``starts.csv``
 
 
 @dataclass(frozen=True)
+class Pictures:
+    """Pictures of a result."""
+
+    figures: Callable[[Result], Mapping[str, Callable[[], Figure]]]  # file stem -> what draws it
+    moving: Callable[[Result], Moving | None] | None = None  # the mechanism in motion, for films
+
+
+@dataclass(frozen=True)
+class ElasticParts:
+    """Parts of a mechanism that bend, for decks of finite-element solvers."""
+
+    solids: Callable[[Any], tuple[DrivenPart, ...]]  # of a specification: the parts as planar solids
+    beams: Callable[[Any], tuple[DrivenNetwork, ...]]  # the same parts as networks of beams
+
+
+def no_values(*_specs: Any) -> dict[str, Any]:
+    """Return that no value of a specification is known to move or to err."""
+    return {}
+
+
+@dataclass(frozen=True)
 class Family:
-    """One family of mechanisms, as the registry knows it."""
+    """One family of mechanisms, as the registry knows it.
+
+    Functions of slow modules are imported with `cfmkit.families.deferred_imports`.
+    """
 
     # name, summary: as written in ``family:`` of a spec, and one line on what it is
     name: str
     summary: str
     spec_type: type[Spec]  # what the YAML may say
     # what `analysis.fidelity` may say, the coarsest first and the finest last, and the model that it picks:
-    # ``model(spec, run) -> Result``, or its ``"module:function"``, imported when it is to run. A family with one model
-    # gives it a name, too
-    models: Mapping[str, Analyzer | str]
-    # ``design(spec, run) -> Design``; its spec is analysed like any other
-    design: Callable[[Any, Run], Design] | None = None
-    search: Search | None = None  # what a design says beside the analysis; None: nothing, it only computes
-    # the family's own scalar results beside the metrics of the contract: name -> (dimension, definition)
-    values: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    # for values of the dimension ``text``: name -> the words that the value is an index into
-    words: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    # ``model(spec, run) -> Result``. A family with one model gives it a name, too
+    models: Mapping[str, Analyzer]
+    outputs: ResultNames = field(default_factory=ResultNames)
+    # folder of a package, ``"package/folder"``, with files of fixed names, each optional: `template.yaml`, which
+    # ``cfmkit new`` starts from; `references.bib`, the papers; `dimensions.svg`, the mechanism with its dimensions and
+    # their keys named, also as PNG and PDF
+    folder: str = ""
     resolve: Callable[[Any], Any] | None = None  # ``resolve(spec) -> spec`` with every derived part written out
+    design: DesignMethod | None = None
     # ``rows(variants) -> iterator of (indices, SolvedRows)``: the mechanisms of closed form, those of one kind together
     # (`cfmkit.families.rows`)
     rows: Callable[[Any], Iterator[tuple[NDArray[Any], SolvedRows[Any]]]] | None = None
     # ``gradient(spec, paths) -> {metric: {path: derivative}}``: exact derivatives [SI] of those metrics (over the
     # window of the analysis) and paths that the family knows; `local` asks for it
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
-    # ``"module:function"`` with ``sampled(spec, places) -> Sampled``: effort and stress at a few places [m or rad],
-    # faster than the analysis and equal to it; None if it cannot. Searches over many parts ask for it
-    sampled: str | None = None
-    # ``"module:function"`` with ``sampled_slopes(spec, places, paths) -> SampledSlopes``: the same with exact
-    # derivatives by the values at those paths that the family knows; None if it cannot
-    sampled_slopes: str | None = None
-    # ``"module:function"`` with ``free(spec, designed) -> {path: (low, high)}``: which values of a designed
-    # specification may move, and in which ranges [SI], as its `design` block says it for the design itself
-    free: str | None = None
-    # ``"module:function"`` with ``errors(spec) -> {path: "thickness", "position", "rate" or "friction"}``: which values
-    # of a part err, and in what: by the process that makes it, as the rate of a spring, or as a coefficient of friction
-    errors: str | None = None
-    # ``"module"`` with ``attribute(result, loop) -> quantities``: what a measured loop says about the causes of its
-    # departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement
-    attribution: str | None = None
-    draw: str | None = None  # ``"module"`` with ``figures(result)``, imported when drawing
-    # the mechanism with its dimensions and their keys named: a file of a package, ``"package/folder/file.svg"``; a PNG
-    # and a PDF of the same name may stand beside it
-    dimension_drawing: str = ""
-    # ``"module"`` with ``drawing(spec, tolerance)``, imported when exporting. Edges that are not `Smooth` lie within
-    # the tolerance [m] of the exact ones; smooth ones are fitted by whoever writes them
-    outline: str | None = None
-    # ``"module:function"`` with ``function(spec) -> (DrivenPart, ...)``: what is solved as planar solids, for decks of
-    # finite-element solvers; imported when exporting
-    elastic_parts: str | None = None
-    # ``"module:function"`` with ``function(spec) -> (DrivenNetwork, ...)``: the same parts as beams, for decks
-    elastic_networks: str | None = None
-    # ``"module:function"``, ``propose(request, run) -> FamilyOffer``: what it could do with a request, by scaling laws
-    propose: str | None = None
-    # ``"module:function"`` with ``part_over_motion(result) -> PosedPart``: where the material of a solved mechanism is
-    # in its poses; its box follows. None where that is not known
-    part: str | None = None
-    levels: tuple[str, ...] = ()  # dotted paths of the forces that its `design` block may ask for
-    headline: tuple[str, ...] = ()  # values and metrics that are shown first after a run, in this order
-    branches: tuple[str, ...] = ()  # every name that a branch of its curves may have; none where the curve decides
-    template: str = ""  # what ``cfmkit new`` starts from: a file of a package, ``"package/folder/file"``
-    # every warning or failure name the family can report, with its meaning
-    findings: dict[str, str] = field(default_factory=dict)
-    references: tuple[str, ...] = ()  # the papers, in one line each
-    bibliography: str = ""  # the same in BibTeX: a file of a package, ``"package/folder/file"``
+    # ``sample(spec, places, paths)``: effort and stress at a few places [m or rad], faster than the analysis and equal
+    # to it, with exact derivatives where paths are given; None if it cannot. Searches over many parts ask for it
+    sample: Sampler | None = None
+    # ``free(spec, designed) -> {path: (low, high)}``: which values of a designed specification may move, and in which
+    # ranges [SI], as its `design` block says it for the design itself
+    free: Callable[[Any, Any], Mapping[str, tuple[float, float]]] = no_values
+    # ``errors(spec) -> {path: "thickness", "position", "rate" or "friction"}``: which values of a part err, and in
+    # what: by the process that makes it, as the rate of a spring, or as a coefficient of friction
+    errors: Callable[[Any], Mapping[str, str]] = no_values
+    # ``attribution(result, loop)``: what a measured loop says about the causes of its departure from the model
+    attribution: Callable[[Result, MeasuredLoop], Mapping[str, Quantity]] | None = None
+    draw: Pictures | None = None
+    outline: Outliner | None = None
+    elastic: ElasticParts | None = None
+    # ``propose(request, run)``: what the family could do with a request, by scaling laws
+    propose: Callable[[Request, Run], FamilyOffer] | None = None
+    # ``part(result)``: where the material of a solved mechanism is in its poses; its box follows. None where that is
+    # not known
+    part: Callable[[Result], PosedPart | None] | None = None
     interface: int | None = (
         None  # the `INTERFACE_VERSION` that a family of another package was written for, as a plain number
     )
 
     def __post_init__(self) -> None:
         """Add the findings that every family has, and the values of those that know their box."""
-        object.__setattr__(self, "findings", {**self.findings, **SHARED_FINDINGS})
-        if self.part:
-            object.__setattr__(self, "values", {**self.values, **ENVELOPE_METRICS})
+        size = ENVELOPE_METRICS if self.part else {}
+        outputs = self.outputs
+        outputs = replace(outputs, values={**outputs.values, **size}, findings={**outputs.findings, **SHARED_FINDINGS})
+        object.__setattr__(self, "outputs", outputs)
+
+    def file(self, name: str) -> Traversable | None:
+        """Return a file in the family's folder; None if there is none of this name."""
+        from importlib.resources import files
+
+        package, _, path = self.folder.partition("/")
+        file = files(package).joinpath(path, name) if package else None
+        return file if file is not None and file.is_file() else None
+
+    def read(self, name: str) -> str:
+        """Return the text of a file in the family's folder; empty if there is none of this name."""
+        file = self.file(name)
+        return "" if file is None else file.read_text(encoding="utf-8")
 
     @property
     def bibtex(self) -> str:
         """The papers as BibTeX; empty where there is no file of them."""
-        return read_packaged(self.bibliography) if self.bibliography else ""
+        return self.read("references.bib")
+
+    @property
+    def papers(self) -> tuple[Paper, ...]:
+        """The papers, each with its reference in one line."""
+        from cfmkit.families.papers import read_papers
+
+        return read_papers(self.bibtex)
 
     @property
     def leading(self) -> tuple[str, ...]:
         """Values that pages show first: the headline, and how far a curve is from the one that was to be followed."""
-        return (*self.headline, "deviation_from_curve")
+        return (*self.outputs.headline, "deviation_from_curve")
 
     @property
     def phrase(self) -> str:
@@ -271,11 +308,9 @@ class Family:
         return f"{article(self.name)} {self.name} mechanism"
 
     def model_of(self, spec: Spec) -> Analyzer:
-        """Return the model that a specification picks, or else the only one; it is imported with this."""
+        """Return the model that a specification picks, or else the only one."""
         (only, *_) = self.models
-        model = self.models[spec.fidelity or only]
-        function: Analyzer = function_named(model) if isinstance(model, str) else model
-        return function
+        return self.models[spec.fidelity or only]
 
     def analyze(self, spec: Spec, run: Run) -> Result:
         """Return the result of the model that a specification picks, with the user's metrics and, if asked, its box."""
@@ -290,19 +325,8 @@ class Family:
 
     def envelope(self, result: Result) -> BoundingBox | None:
         """Return the box that a solved mechanism stays in; None if it is not known."""
-        part = function_named(self.part)(result) if self.part else None
+        part = self.part(result) if self.part else None
         return None if part is None else BoundingBox.from_part(part)
-
-    def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:
-        """Return the parts of a mechanism that are solved as planar solids; none where the family has none."""
-        found: tuple[DrivenPart, ...] = function_named(self.elastic_parts)(spec) if self.elastic_parts else ()
-        return found
-
-    def driven_networks(self, spec: Spec) -> tuple[DrivenNetwork, ...]:
-        """Return the elastic parts of a mechanism as networks of beams; none where the family has none."""
-        name = self.elastic_networks
-        found: tuple[DrivenNetwork, ...] = function_named(name)(spec) if name else ()
-        return found
 
 
 def with_own_metrics(result: Result) -> Result:
@@ -348,16 +372,3 @@ def add_size(result: Result, space: BoundingBox | None) -> Result:
         for (name, about), value in zip(ENVELOPE_METRICS.items(), sides, strict=True)
     }
     return replace(result, values=result.values | found)  # type: ignore[operator]
-
-
-def read_packaged(name: str) -> str:
-    """Return the text of a file that comes with a package, by ``"package/folder/file"``."""
-    return package_file(name).read_text(encoding="utf-8")
-
-
-def package_file(name: str) -> Traversable:
-    """Return a file that comes with a package, by ``"package/folder/file"``; it need not be there."""
-    from importlib.resources import files
-
-    package, _, path = name.partition("/")
-    return files(package).joinpath(path)

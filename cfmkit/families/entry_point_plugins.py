@@ -17,7 +17,7 @@ import sys
 import threading
 from collections.abc import Mapping
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -190,7 +190,7 @@ def _fault_of(record: Any, offer: InstalledFamily) -> str:
 
 def fault_of_record(record: Family, needs_interface: bool = True) -> str:
     """Return why a record cannot be used; empty if it can. A record that is made now need not state its interface."""
-    from cfmkit.families.base import INTERFACE_VERSION, Family, read_packaged
+    from cfmkit.families.base import INTERFACE_VERSION
 
     if record.interface is None and needs_interface:
         return f"its record does not state its interface; this cfmkit has 'interface={INTERFACE_VERSION}'"
@@ -199,17 +199,34 @@ def fault_of_record(record: Family, needs_interface: bool = True) -> str:
             f"its record is for interface {record.interface}, this cfmkit has interface {INTERFACE_VERSION}; another "
             "version of one of them is needed"
         )
-    for one in fields(Family):
-        if not _is_of_kind(getattr(record, one.name), str(one.type)):
-            return f"the field {one.name!r} of its record must be of the type {one.type}"
-    for name in filter(None, (record.template, record.bibliography, record.dimension_drawing)):
-        read_packaged(name)
+    if fault := _fault_of_fields(record, ""):
+        return fault
+    if record.folder and not _is_folder(record.folder):
+        return f"the field 'folder' of its record names no folder of a package: {record.folder!r}"
+    return "" if record.papers or not record.bibtex else "its references.bib has no entry that can be read"
+
+
+def _fault_of_fields(record: Any, above: str) -> str:
+    """Return which field of a record, or of a part of it, is not of its type; empty if none."""
+    for entry in fields(record):
+        value, name = getattr(record, entry.name), f"{above}{entry.name}"
+        if not _is_of_kind(value, str(entry.type)):
+            return f"the field {name!r} of its record must be of the type {entry.type}"
+        if is_dataclass(value) and not isinstance(value, type) and (fault := _fault_of_fields(value, f"{name}.")):
+            return fault
     return ""
+
+
+def _is_folder(name: str) -> bool:
+    from importlib.resources import files
+
+    package, _, path = name.partition("/")
+    return files(package).joinpath(path).is_dir()
 
 
 def _is_of_kind(value: Any, kind: str) -> bool:
     """Return whether a field of a record is what its annotation says, as far as every verb relies on it."""
-    from cfmkit.families.base import Search
+    from cfmkit.families import base
     from cfmkit.specs.spec import Spec
 
     def are(parts: Any, *types: type) -> bool:
@@ -222,20 +239,20 @@ def _is_of_kind(value: Any, kind: str) -> bool:
         return isinstance(value, type) and issubclass(value, Spec)
     if kind == "tuple[str, ...]":
         return isinstance(value, tuple) and are(value, str)
-    if kind.startswith(("Mapping", "dict")):
+    if kind.startswith("Mapping"):
         if not isinstance(value, Mapping) or not are(value, str):
             return False
         if "Analyzer" in kind:
-            return bool(value) and all(isinstance(one, str) or callable(one) for one in value.values())
+            return bool(value) and all(map(callable, value.values()))
         if "tuple" in kind:
             pairs = "..." not in kind
             return are(value.values(), tuple) and all(
                 are(one, str) and (not pairs or len(one) == 2) for one in value.values()
             )
         return are(value.values(), str)
-    if kind.startswith("Callable"):
+    if kind.startswith("Callable") or kind in ("Sampler", "Outliner"):
         return callable(value)
-    return isinstance(value, {"str": str, "bool": bool, "int": int, "Search": Search}[kind])
+    return isinstance(value, {"str": str, "int": int}.get(kind) or getattr(base, kind))
 
 
 def code_identity(offer: InstalledFamily) -> dict[str, str]:

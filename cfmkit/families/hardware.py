@@ -32,7 +32,7 @@ DEFAULT_MATERIAL = "steel-s235"
 DEFAULT_SAFETY = 1.5
 """Against yield, where `safety_factor` is not above 1."""
 
-SAFETY_METRICS = ("safety_factor", "link_safety_factor")
+SAFETY_METRICS = ("safety_factor", "link_safety_factor", "spring_safety_factor")
 """Metrics of strength: what a requirement asks of them is asked of pins, shafts and screws, too."""
 
 PIN_STRENGTH = 235e6

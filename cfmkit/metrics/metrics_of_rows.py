@@ -6,7 +6,7 @@ which an extreme may stand, the same ends that are solved for. Curves may have d
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
     Ends = tuple[FloatArray, FloatArray]
 
@@ -131,6 +132,7 @@ class CurveRows(ShortRepr):
     peaks: FloatArray | None = None
     travel: Ends | None = None  # (d,) each, of which windows may be shares; default: from end to end
     traced: bool = False  # whether every place takes an equilibrium of its own
+    followed: TargetCurve | None = None  # what every effort is to follow
     _windows: dict[Any, RowsInWindow] = field(default_factory=dict, init=False, repr=False)
 
     def all_at(self, places: FloatArray) -> FloatArray:
@@ -154,6 +156,15 @@ class CurveRows(ShortRepr):
     def extent(self) -> Ends:
         """First and last place of each row."""
         return self.samples.motion[:, 0], self.samples.motion[:, -1]
+
+    def level_along(self, curve: TargetCurve, size: FloatArray) -> CurveRows:
+        """Return curves less one that they are to follow, on constant efforts (d,)."""
+
+        def effort(places: FloatArray, rows: Any) -> FloatArray:
+            level = size if rows is None else size[rows]
+            return np.asarray(self.effort(places, rows) - curve.evaluate(places) + level[:, None])
+
+        return replace(self, effort=effort, target=size, followed=None)
 
     def restrict_to_window(self, window: Ends | None) -> RowsInWindow:
         """Return the curves in windows, (d,) each; None: over their full travel."""
@@ -301,6 +312,38 @@ class RowsInWindow:
         """Return the root mean square of F - target at places uniform in the motion."""
         return np.where(self._has_target, ranges_many.rms_to_target(self.branches, self.curves.target), np.nan)
 
+    def deviation_from_curve(self) -> FloatArray:
+        """Return the largest |F - F*| over the largest |F*|, F* the curve that is to be followed."""
+        curve, inside = self.curves.followed, self.inside
+        if curve is None:
+            return np.full(len(self.ends[0]), np.nan)
+        offsets = RowSamples(inside.motion, inside.values - curve.evaluate(inside.motion), inside.count)
+        top, bottom = offsets.extremes(lambda places: self.curves.all_at(places) - curve.evaluate(places))
+        return np.asarray(np.maximum(top, -bottom) / self.largest_of_curve(*self.ends))
+
+    def rms_to_curve(self) -> FloatArray:
+        """Return the root mean square of F - F* at places uniform in the motion."""
+        curve, places = self.curves.followed, ranges_many.uniform_places(self.branches)
+        if curve is None:
+            return np.full(len(places), np.nan)
+        offset = self.branches.interpolate(places) - curve.evaluate(places)
+        rms = np.sqrt(np.einsum("ij,ij->i", offset, offset) / ranges_many.UNIFORM_POINTS)
+        return np.asarray(np.where(self._is_followed(*self.ends), rms, np.nan))
+
+    def largest_of_curve(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Return the largest effort of the curve that is to be followed between places, (d,); NaN where it is zero."""
+        size, curve, known = np.full(len(low), np.nan), self.curves.followed, self._is_followed(low, high)
+        if curve is not None and known.any():
+            pairs, which = np.unique(np.stack([low, high], axis=1)[known], axis=0, return_inverse=True)
+            size[known] = np.array([curve.largest(*pair) for pair in pairs.tolist()])[which.ravel()]
+        return np.where(size > self.curves.error, size, np.nan)
+
+    def _is_followed(self, low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
+        """Return between which places the curve that is to be followed is known, (d,)."""
+        curve = self.curves.followed
+        ends = zip(low.tolist(), high.tolist(), strict=True)
+        return np.array([curve is not None and pair[0] < pair[1] and curve.covers(*pair) for pair in ends])
+
     @property
     def _has_target(self) -> NDArray[np.bool_]:
         return np.abs(self.curves.target) > self.curves.error
@@ -332,6 +375,7 @@ def _value_at(samples: RowSamples, place: FloatArray) -> FloatArray:
 
 def _usable(branches: Mapping[str, RowsInWindow]) -> Ends:
     """Return start and end of the largest interval in which every branch keeps its limits, (d,) each."""
+    branches = _level_branches(branches)
     first = next(iter(branches.values()))
     levels = np.mean([one.reference for one in branches.values()], axis=0)
     known = np.isfinite(levels)
@@ -340,7 +384,24 @@ def _usable(branches: Mapping[str, RowsInWindow]) -> Ends:
     return np.where(known, start, np.nan), np.where(known, end, np.nan)
 
 
+def _level_branches(branches: Mapping[str, RowsInWindow]) -> Mapping[str, RowsInWindow]:
+    """Return branches that follow a curve as ones that are to be level, where the curve is known."""
+    first = next(iter(branches.values()))
+    curve = first.curves.followed
+    if curve is None:
+        return branches
+    low, high = (
+        np.clip(pick([item.curves.extent[end] for item in branches.values()], axis=0), *curve.extent)
+        for end, pick in enumerate((np.max, np.min))
+    )
+    size, (start, stop) = first.largest_of_curve(low, high), first.curves.valid
+    valid = np.maximum(start, low), np.minimum(stop, high)
+    level = {name: replace(item.curves.level_along(curve, size), valid=valid) for name, item in branches.items()}
+    return {name: RowsInWindow(curves, branches[name].ends) for name, curves in level.items()}
+
+
 def _usable_stroke(branches: Mapping[str, RowsInWindow]) -> FloatArray:
+    branches = _level_branches(branches)
     known = np.all([np.isfinite(one.reference) for one in branches.values()], axis=0)
     return np.where(known, ranges_many.usable_stroke(*_usable(branches)), np.nan)
 

@@ -335,6 +335,7 @@ IN_WINDOW = (
         "largest |F - F*| of the {effort} over the largest |F*| in the window, F* the curve of `design.target` or "
         "`analysis.target`",
         deviation_from_curve,
+        partial(_where_known, methodcaller("deviation_from_curve")),
         of_curve=True,
     ),
     Definition(
@@ -343,6 +344,7 @@ IN_WINDOW = (
         "sqrt(mean((F - F*)^2)) of the {effort} at 100 places uniform in the {motion}, the start of the window "
         "excluded, F* the curve of `design.target` or `analysis.target`",
         rms_to_curve,
+        partial(_where_known, methodcaller("rms_to_curve")),
         of_curve=True,
     ),
     Definition(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def figures(
-    family: Family,  # its `draw` names the module with ``figures(result)``; without one there is the curve
+    family: Family,  # without `draw` there is the curve
     result: Result,  # of any status
 ) -> Mapping[str, Callable[[], Figure]]:
     """Return what draws each picture of a result, by file stem; empty if there is nothing to draw."""
@@ -27,14 +26,12 @@ def figures(
         from cfmkit.plots.curve_with_enlarged_band import curve_figure
 
         return {"curve": partial(curve_figure, result)}
-    makers: Mapping[str, Callable[[], Figure]] = import_module(family.draw).figures(result)
-    return makers
+    return family.draw.figures(result)
 
 
 def moving_of(family: Family, result: Result) -> Moving | None:
     """Return a mechanism in motion; None if there is no curve, or its family has no film."""
-    if not family.draw or not result.curves:
+    if not family.draw or not family.draw.moving or not result.curves:
         return None
-    draw = getattr(import_module(family.draw), "moving", None)  # optional: a family may have figures without a film
-    found: Moving | None = draw(result) if draw else None
-    return found if found is not None and len(found.motion) > 1 else None
+    moving = family.draw.moving(result)
+    return moving if moving is not None and len(moving.motion) > 1 else None

@@ -13,6 +13,7 @@ from cfmkit.errors import UsageError, visible
 if TYPE_CHECKING:
     from cfmkit.families.base import Family
 
+DRAWING_FILE = "dimensions.svg"
 DRAWING_SUFFIXES = (".png", ".svg", ".pdf")
 
 
@@ -23,22 +24,20 @@ def find_drawn_family(name: str | None) -> Family:
     """
     from cfmkit.families import family, records
 
-    names = ", ".join(record.name for record in records() if record.dimension_drawing)
+    names = ", ".join(record.name for record in records() if record.file(DRAWING_FILE))
     if name is None:
         raise UsageError(f"--figure needs a family: {names}")
     record = family(name)
-    if not record.dimension_drawing:
+    if not record.file(DRAWING_FILE):
         raise UsageError(f"the family {visible(name)!r} has no drawing; there are {names}")
     return record
 
 
 def read_drawing(record: Family) -> dict[str, bytes]:
     """Return the drawing of a family by the ending of its file: ``.svg``, and those of `DRAWING_SUFFIXES` there."""
-    from cfmkit.families.base import package_file
-
-    stem = record.dimension_drawing.removesuffix(".svg")
-    files = {ending: package_file(stem + ending) for ending in DRAWING_SUFFIXES}
-    return {ending: file.read_bytes() for ending, file in files.items() if file.is_file()}
+    stem = DRAWING_FILE.removesuffix(".svg")
+    files = {ending: record.file(stem + ending) for ending in DRAWING_SUFFIXES}
+    return {ending: file.read_bytes() for ending, file in files.items() if file is not None}
 
 
 def read_dimensions(record: Family) -> list[dict[str, str]]:
@@ -48,15 +47,11 @@ def read_dimensions(record: Family) -> list[dict[str, str]]:
     """
     from xml.etree import ElementTree
 
-    from cfmkit.families.base import read_packaged
-
     rows = []
     try:
-        for text in ElementTree.fromstring(read_packaged(record.dimension_drawing)).iterfind(
-            ".//{*}text[@class='row']"
-        ):
+        for text in ElementTree.fromstring(record.read(DRAWING_FILE)).iterfind(".//{*}text[@class='row']"):
             symbol, key, *meaning = ("".join(part.itertext()) for part in text)
             rows.append({"symbol": symbol, "key": key, "meaning": " ".join(meaning)})
     except (ElementTree.ParseError, ValueError) as error:
-        raise UsageError(f"{record.dimension_drawing} has no rows of symbol, key, meaning: {error}") from None
+        raise UsageError(f"{record.folder}/{DRAWING_FILE} has no rows of symbol, key, meaning: {error}") from None
     return rows

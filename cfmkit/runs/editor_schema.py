@@ -56,10 +56,10 @@ BASE_SCHEMA = {"type": "string", "description": "another specification, whose va
 
 def metric_names(record: Family) -> Iterator[str]:
     """Yield what a requirement of a family may name: every metric and value, those of a branch with its name."""
-    for item in known_metrics(None, values_of_family(record.values)):
+    for item in known_metrics(None, values_of_family(record.outputs.values)):
         yield item.name
-        if item.scope == "branch" and len(record.branches) > 1:
-            yield from (f"{item.name}[{branch}]" for branch in record.branches)
+        if item.scope == "branch" and len(record.outputs.branches) > 1:
+            yield from (f"{item.name}[{branch}]" for branch in record.outputs.branches)
 
 
 def _close_names(node: dict[str, Any], names: list[str]) -> dict[str, Any]:

@@ -8,7 +8,6 @@ notes and warnings.
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import CfmError, UsageError
@@ -76,7 +75,7 @@ def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Dr
     if record.outline is None:
         raise UsageError(f"{record.phrase} has no part to draw")
     given = () if tolerance is None else (tolerance,)
-    outlines = import_module(record.outline).drawing(spec, *given)
+    outlines = record.outline(spec, *given)
     outlines = replace(outlines, warnings=(*outlines.warnings, *_thin_walls(outlines, spec)))
     return engrave_labels(outlines, spec.name)
 
@@ -124,15 +123,15 @@ def _drawing_on_paper(outlines: Drawing, spec: Spec, name: str) -> dict[str, byt
 def _decks(spec: Spec) -> dict[str, bytes]:
     """Return the elastic parts as decks of a finite-element solver: meshed, and as beams."""
     record = family(spec.family)
-    if record.elastic_parts is None:
+    if record.elastic is None:
         raise UsageError(f"--format inp: {record.phrase} has no elastic part to be solved")
     from cfmkit.export.beam_deck_for_abaqus import beam_deck
     from cfmkit.solid.mesh_deck_for_abaqus import deck
 
-    parts = record.driven_parts(spec)
+    parts = record.elastic.solids(spec)
     found = {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in parts}
     steps = {one.name: len(one.stops) for one in parts}
-    for network in record.driven_networks(spec):
+    for network in record.elastic.beams(spec):
         title = f"{spec.name}, {network.name} as beams"
         found[f"{network.name}-as-beams.inp"] = beam_deck(title, network, steps[network.name])
     return found

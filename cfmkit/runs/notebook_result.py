@@ -73,7 +73,8 @@ class AnalysisView(Result):
         """Outcome of each requirement of the specification."""
         from cfmkit.metrics import check, values_of_family
 
-        return Requirements(check(self.spec.part_requirements, self, values_of_family(family(self.spec.family).values)))
+        values = values_of_family(family(self.spec.family).outputs.values)
+        return Requirements(check(self.spec.part_requirements, self, values))
 
     def plot(self, ax: Axes | None = None, *, bands: bool = True, names: bool = True, arrows: bool = True) -> Axes:
         """Draw force over displacement, or torque over angle, and return the axes.

@@ -168,9 +168,9 @@ def _requirement_faults(
     """Yield what is wrong with metric names, bounds and windows, each with its place in the file."""
     from cfmkit.metrics import known_metrics, requirement_problems, values_of_family
 
-    known = known_metrics(None, values_of_family(family.values))
+    known = known_metrics(None, values_of_family(family.outputs.values))
     for index, requirement in requirements:
-        for problem in requirement_problems((requirement,), known, branches=family.branches):
+        for problem in requirement_problems((requirement,), known, branches=family.outputs.branches):
             key = problem.path.rpartition(".")[2]
             yield place_problem(document, f"requirements.{index}.{key}", problem.message)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import ExitCode
 from cfmkit.specs.units import to_border
 from cfmkit.studies.serial_and_cluster_executors import BUG_PREFIX
+from cfmkit.studies.suggest.relaxed_requests import RELAXATION_FACTORS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -121,6 +122,10 @@ def message(found: Suggestions) -> str:
         return f"no mechanism is known to meet the requirements, {count} {were} not judged in full{late}"
     if found.late:
         return "the time budget ended the search before a mechanism met the requirements; increase it (--time-budget)"
+    if found.remote:
+        return (
+            f"no mechanism meets the requirements, nor with one of them relaxed up to {RELAXATION_FACTORS[-1]:g} times"
+        )
     return "no mechanism meets the requirements"
 
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BaseModel, Field, ValidationError, create_model, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, create_model, field_validator, model_validator
 
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength, keys_of
 from cfmkit.specs.leaves import stated_leaves
@@ -179,6 +179,11 @@ else:
 
 AS_MADE = "as_made"
 """Key of the context in which a manufactured part is validated: see `Spec.replace`."""
+
+
+def is_made(info: ValidationInfo) -> bool:
+    """Return True if the values are those of one manufactured part."""
+    return bool(info.context) and bool(info.context.get(AS_MADE))  # type: ignore[union-attr]
 
 
 class Spec(Model):
@@ -395,6 +400,7 @@ __all__ = [
     "SolidAnalysis",
     "Spec",
     "frozen",
+    "is_made",
     "readable_requirement",
     "refuse",
 ]

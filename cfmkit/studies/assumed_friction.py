@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.metrics import evaluate
 from cfmkit.specs.units import format_short
 
@@ -32,7 +31,7 @@ def friction_note(result: Result, run: Run) -> str:
     stated = [getattr(mechanism, key, False) for key in ("pins", "guide")]
     if stated != [None, None] or not record.part or not result.status.usable:
         return ""
-    pin = getattr(function_named(record.part)(result), "pin", None)
+    pin = getattr(record.part(result), "pin", None)
     if pin is None:
         return ""
     rubbing: dict[str, Any] = {"mechanism.pins": {"diameter": pin, "friction": PLAIN_FRICTION}}

@@ -51,16 +51,16 @@ def metrics_of(spec: Spec, names: Iterable[str], sample: Curve | None = None) ->
     cfmkit.errors.UsageError
         If a metric or its branch is not known.
     """
-    record, kind = family(spec.family), sample.kind if sample is not None else "force"
-    own = values_of_family(record.values)
+    outputs, kind = family(spec.family).outputs, sample.kind if sample is not None else "force"
+    own = values_of_family(outputs.values)
     asked = tuple(dict.fromkeys(names))
     if not asked:
         left_out = _left_out(spec, sample)
         listed = (item.name for item in definitions(kind, own))
         asked = tuple(name for name in dict.fromkeys(listed) if name not in left_out)
     known = metrics_by_name(kind, own)
-    meant = [(name, definition_of(name, known, record.branches)) for name in asked]
-    return tuple(Metric(name, one.dimension, one.definition, words=record.words.get(name, ())) for name, one in meant)
+    meant = [(name, definition_of(name, known, outputs.branches)) for name in asked]
+    return tuple(Metric(name, one.dimension, one.definition, words=outputs.words.get(name, ())) for name, one in meant)
 
 
 def _left_out(spec: Spec, sample: Curve | None) -> frozenset[str]:

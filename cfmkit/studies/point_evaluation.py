@@ -108,7 +108,7 @@ class Study:
     def definitions(self, kind: Kind) -> Mapping[str, Definition]:
         """Return every metric of curves of a kind and every value of the family, by name."""
         if kind not in self._definitions:
-            self._definitions[kind] = metrics_by_name(kind, values_of_family(family(self.spec.family).values))
+            self._definitions[kind] = metrics_by_name(kind, values_of_family(family(self.spec.family).outputs.values))
         return self._definitions[kind]
 
     @cached_property
@@ -181,7 +181,7 @@ class Study:
         record, run = family(spec.family), Run(self.seed)
         if not self.design or record.design is None:
             return windows_judged(record.with_envelope(record.analyze(spec, run), self.names))
-        design = self.make_design(spec, record.design, Run(self.seed))
+        design = self.make_design(spec, record.design.make, Run(self.seed))
         if design.spec is None:
             return Result(spec, design.status, design.explanation, warnings=design.warnings)
         result = windows_judged(record.with_envelope(record.analyze(design.spec, run), self.names))
@@ -192,7 +192,7 @@ class Study:
         warnings = tuple(sorted({item.name for item in result.warnings})) if self.findings else ()
         if not result.status.usable:
             return Row(result.status, message=result.message, warnings=warnings)
-        extra = values_of_family(family(result.spec.family).values)
+        extra = values_of_family(family(result.spec.family).outputs.values)
         surveys: Surveys = {}
         values = tuple(_finite(item.value) for item in self.quantities(result, surveys))
         met = tuple(outcome.ok for outcome in check(result.spec.part_requirements, result, extra, surveys))
@@ -208,7 +208,7 @@ class Study:
         `surveys` is a cache of values derived from the curve, shared between calls.
         """
         surveys = {} if surveys is None else surveys
-        extra = values_of_family(family(result.spec.family).values)
+        extra = values_of_family(family(result.spec.family).outputs.values)
         found: dict[tuple[str, Ends | None], Quantity] = {}
         for over in dict.fromkeys(one.over for one in self.metrics):
             names = [one.name for one in self.metrics if one.over == over]

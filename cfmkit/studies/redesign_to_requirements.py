@@ -95,7 +95,7 @@ def _analyze(spec: Spec, run: Run) -> Result:
 
 
 def _outcomes(result: Result) -> Sequence[Outcome]:
-    return check(result.spec.part_requirements, result, values_of_family(family(result.spec.family).values))
+    return check(result.spec.part_requirements, result, values_of_family(family(result.spec.family).outputs.values))
 
 
 def _judge(design: Design, run: Run) -> Design:

@@ -276,7 +276,7 @@ def _outcomes(spec: Spec, run: Run) -> tuple[list[bool], set[str]]:
     """Return whether a design is solved to its end and meets each requirement on one part; names of its warnings."""
     record = family(spec.family)
     result = record.analyze(spec, run)
-    met = check(spec.part_requirements, result, values_of_family(record.values))
+    met = check(spec.part_requirements, result, values_of_family(record.outputs.values))
     reached = [result.status is Status.COMPLETE, _keeps_tolerance(spec, result), *(bool(entry.ok) for entry in met)]
     return reached, {entry.name for entry in result.warnings}
 

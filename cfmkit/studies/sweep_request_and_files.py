@@ -111,7 +111,7 @@ def _draw(combine: str, samples: int | None, seed: int) -> Draw:
 def summary_of(records: Records) -> Summary:
     """Return an empty summary for the rows of a study."""
     study = records.work.study
-    return Summary(study, main_columns(study, family(study.spec.family).headline))
+    return Summary(study, main_columns(study, family(study.spec.family).outputs.headline))
 
 
 def outputs(records: Records, summary: Summary, curves: bool = False) -> Iterator[tuple[str, Data]]:

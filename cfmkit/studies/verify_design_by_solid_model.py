@@ -19,7 +19,6 @@ import numpy as np
 from cfmkit.designing.reported_values_of_finished_design import search_values
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.metrics import evaluate, window_of
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
@@ -67,7 +66,8 @@ def verify_by_solid(given: Spec, design: Design, run: Run) -> Design:
         return Design(None, Status.INVALID, f"design.verify: this design cannot be analysed as a solid: {reported}")
     beams = record.analyze(design.spec, run)
     solid = record.analyze(as_solid, run)
-    path = next((path for path in record.levels if _level(given, path)), None)
+    levels = record.design.levels if record.design else ()
+    path = next((path for path in levels if _level(given, path)), None)
     own, found, where = _values(beams, solid, AT_END[path]) if path in AT_END else _means(beams, solid)
     wanted = own if path is None else math.copysign(_level(given, path), own or 0.0)
     if solid.status is not Status.COMPLETE or not wanted or not found or not own or wanted / found <= 0:
@@ -111,9 +111,9 @@ def _relevel(
         reported = f"{begun}; the sheet fixes the widths and the design states no force: no correction is made"
         return replace(design, spec=as_solid, notes=(*design.notes, ("verify", reported)))
     wanted = _level(given, path)
-    record = family(given.family)
-    assert record.design is not None
-    again = record.design(given.replace({path: factor * wanted}), run)
+    method = family(given.family).design
+    assert method is not None
+    again = method.make(given.replace({path: factor * wanted}), run)
     if again.spec is None:
         return replace(again, message=f"design.verify: for a solid of {format_short(wanted, 'force')}, {again.message}")
     # what is wanted stays what is wanted
@@ -182,9 +182,7 @@ def _level(spec: Spec, path: str) -> float:
 
 def _explain_outside(given: Spec, designed: Spec, corrected: Mapping[str, float]) -> Design | None:
     """Return why there is no design, where a corrected width is not in the range that it is designed in."""
-    record = family(given.family)
-    ranges = function_named(record.free)(given, designed) if record.free is not None else {}
-    for path, (low, high) in ranges.items():
+    for path, (low, high) in family(given.family).free(given, designed).items():
         if path in corrected and not low * (1 - 1e-9) <= corrected[path] <= high * (1 + 1e-9):
             reported = (
                 f"design.verify: for the requested force of the solid {path} would be "

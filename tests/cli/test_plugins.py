@@ -161,10 +161,13 @@ def test_whatever_a_package_raises_ends_no_verb(site, kind, arguments, capsys):
 @pytest.mark.parametrize(
     "change",
     [
-        "summary=None", "spec_type=None", "spec_type=int", "models={}", "models=None", "models={'a': 3}", "values=None",
-        "values={'a': 'force'}", "values={'a': ('force',)}", "words={'a': 'b'}", "references='one paper'",
-        "references=None", "findings={'a': 3}", "headline=('a', 3)", "design=3", "draw=3", "template=3",
-        "template='nowhere/x.yaml'", "bibliography='cfmkit/nowhere.bib'", "block_shares='yes'", "search={}",
+        "summary=None", "spec_type=None", "spec_type=int", "models={}", "models=None", "models={'a': 3}",
+        "models={'a': 'module:function'}", "outputs=None", "outputs=ResultNames(values=None)",
+        "outputs=ResultNames(values={'a': 'force'})", "outputs=ResultNames(values={'a': ('force',)})",
+        "outputs=ResultNames(words={'a': 'b'})", "outputs=ResultNames(findings={'a': 3})",
+        "outputs=ResultNames(headline=('a', 3))", "design=3", "design=DesignMethod(3)",
+        "design=DesignMethod(print, levels='force')", "draw=3", "draw=Pictures(3)", "outline='module'", "elastic=3",
+        "free=None", "folder=3", "folder='nowhere/x'", "folder='cfmkit/nowhere'", "block_shares='yes'", "search={}",
     ],
 )  # fmt: skip
 def test_a_record_that_is_not_what_the_verbs_rely_on_is_skipped(site, change, capsys):

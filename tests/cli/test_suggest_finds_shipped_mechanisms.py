@@ -40,9 +40,9 @@ def reason_not_asked(result, space):
     return None
 
 
-def solved(path):
+def solved(path, changes=()):
     """Return a shipped mechanism, analysed, and its box; leaves by their exact model, which designs are judged by."""
-    spec = cfmkit.load(path)
+    spec = cfmkit.load(path, changes)
     result = cfmkit.analyze(spec.replace({"analysis.fidelity": "exact"}) if spec.family == "vcfm" else spec)
     return result, family(spec.family).envelope(result)
 
@@ -90,7 +90,32 @@ def test_a_shipped_mechanism_is_found_by_its_own_numbers(path):
     result, space = solved(path)
     if (reason := reason_not_asked(result, space)) is not None:
         pytest.skip(reason)
-    name, keys = numbers_of(result, space)
+    find(*numbers_of(result, space))
+
+
+HALF_SIZE_OF_PETG = (
+    "mechanism.crank_length=27 mm",
+    "mechanism.stretched_position=50 mm",
+    "mechanism.offset=30 mm",
+    "mechanism.material=petg",
+    "mechanism.beam={width: 2.57 mm, thickness: 0.4886 mm}",
+    "analysis.travel=[0 mm, 14.5 mm]",
+    "analysis.window=[0.5 mm, 14.5 mm]",
+    "requirements=[]",
+    "design=null",
+)
+
+
+@pytest.mark.slow
+def test_a_strip_of_half_the_size_is_found_by_its_own_numbers():
+    result, space = solved(CONFIGS / "slider_crank_strip.yaml", HALF_SIZE_OF_PETG)
+    assert space.across == pytest.approx(53.7e-3, abs=1e-4)
+    assert space.along == pytest.approx(80.4e-3, abs=1e-4)
+    find(*numbers_of(result, space))
+
+
+def find(name, keys):
+    """Fail unless a candidate of a family does what is required by the model of its designs."""
     request = read_request(None, keys).request()
     offer, refused = search.offer_of(family(name), request, Run()), []
     for candidate in offer.candidates:

@@ -149,7 +149,7 @@ def test_designing_at_each_point(cli, tmp_path):
         (("--vary", "mechanism.roller_radius"), 2, "no values"),
         (("--vary", "mechanism.roler_radius=[1 mm]"), 3, "did you mean 'mechanism.roller_radius'?"),
         (("--vary", RADII, "--zip", "--sample", "lhs:4"), 2, "exclude each other"),
-        (("--vary", RADII, "--sample", "halton:4"), 2, "lhs:N or sobol:N"),
+        (("--vary", RADII, "--sample", "dice:4"), 2, "lhs:N or "),
         (("--vary", RADII, "--metrics", "force_riple"), 2, "did you mean 'force_ripple'?"),
         (("--vary", RADII, "--max-points", "4"), 2, "5 points are more than 4"),
         (("--vary", "mechanism.roller_radius=1 mm:2 mm:999999999999"), 2, "--max-points"),

@@ -196,14 +196,14 @@ def test_show_lists_families_and_topics(cli):
 def test_show_explains_every_key_value_and_finding_of_a_family(cli, family):
     record = families.family(family)
     document = cli("show", family, "--json").document
-    assert {item["name"] for item in document["findings"]} == set(record.findings)
-    assert {item["name"] for item in document["values"]} == set(record.values)
+    assert {item["name"] for item in document["findings"]} == set(record.outputs.findings)
+    assert {item["name"] for item in document["values"]} == set(record.outputs.values)
     keys = {item["path"]: item for item in document["keys"]}
     assert all(item["kind"] and (item["description"] or path == "family") for path, item in keys.items())
     page = cli("show", family).out
-    for name in (*record.findings, *record.values, *(path.rpartition(".")[2] for path in keys)):
+    for name in (*record.outputs.findings, *record.outputs.values, *(path.rpartition(".")[2] for path in keys)):
         assert name in page
-    assert record.references[0][:20] in page
+    assert record.papers[0].reference[:20] in page
 
 
 def test_show_cam_says_kind_default_and_bounds_of_a_key(cli):

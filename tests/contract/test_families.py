@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 import re
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from cfmkit.cli.main import main
 from cfmkit.cli.verbs.new import template
 from cfmkit.documents import run_outcome
 from cfmkit.export.contours import Drawing
+from cfmkit.families.deferred_imports import load_deferred
 from cfmkit.results import Status
 from cfmkit.runs.files_a_run_writes import files
 from cfmkit.specs.keys_and_schema import keys
@@ -125,12 +125,13 @@ def test_a_template_lists_the_words_of_a_choice(name):
 def test_what_a_family_says_about_itself_is_complete(name):
     record = families.family(name)
     assert record.summary
-    assert record.references
-    assert all(DIMENSIONS_BY_NAME[dimension] and definition for dimension, definition in record.values.values())
-    assert all(record.findings.values())
-    named = ((record.draw, "figures"), (record.outline, "drawing"), (record.attribution, "attribute"))
-    for module, function in named:
-        assert module is None or callable(getattr(import_module(module), function))
+    assert record.papers
+    assert all(DIMENSIONS_BY_NAME[dimension] and definition for dimension, definition in record.outputs.values.values())
+    assert all(record.outputs.findings.values())
+    parts = [record, *filter(None, (record.design, record.draw, record.elastic))]
+    functions = [value for part in parts for value in vars(part).values() if callable(value)]
+    assert len(functions) > 6
+    assert all(callable(load_deferred(function)) for function in functions)
 
 
 @every_config
@@ -203,8 +204,8 @@ def test_every_numeric_leaf_can_be_replaced(path):
 def _explained(record, name):
     """Return what a family says of a value: one of something named in brackets is explained for all of its kind."""
     plain, bracket, _ = name.partition("[")
-    kind = next((known for known in record.values if bracket and known.startswith(f"{plain}[")), name)
-    return record.values.get(kind)
+    kind = next((known for known in record.outputs.values if bracket and known.startswith(f"{plain}[")), name)
+    return record.outputs.values.get(kind)
 
 
 @every_config
@@ -212,10 +213,10 @@ def test_every_value_and_finding_is_one_that_the_family_explains(path):
     record, result = families.family(cfmkit.load(path).family), analysed(path)
     explained = {name: _explained(record, name) for name in result.values}
     assert {name for name, known in explained.items() if known is None} == set()
-    assert {item.name for item in result.warnings} <= set(record.findings)
+    assert {item.name for item in result.warnings} <= set(record.outputs.findings)
     for name, quantity in result.values.items():
         assert (quantity.dimension, quantity.definition) == explained[name]
-    assert set(record.headline) <= set(api.evaluate(result)), "a headline that no metric has"
+    assert set(record.outputs.headline) <= set(api.evaluate(result)), "a headline that no metric has"
 
 
 @every_config

@@ -14,7 +14,7 @@ import cfmkit
 from cfmkit import families
 from cfmkit.curves import Curve
 from cfmkit.errors import SpecError, UsageError
-from cfmkit.families.base import function_named
+from cfmkit.families.deferred_imports import load_deferred
 from cfmkit.families.run_control import Run
 from cfmkit.results import Finding, Result, Status
 from cfmkit.studies.comparison_of_fidelities import (
@@ -84,7 +84,7 @@ def test_the_models_of_a_family_are_the_words_of_its_fidelity(name):
         words = tuple(record.models)[:1]
     assert tuple(record.models) == words
     for model in record.models.values():
-        assert callable(function_named(model) if isinstance(model, str) else model)
+        assert callable(load_deferred(model))
 
 
 @pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)

@@ -15,44 +15,22 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    PINNED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    LineLoad,
-    Loading,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    PointLoad,
-    Rotation,
-    Section,
-    SlideSpring,
-    Support,
-    Taper,
-    TorsionSpring,
-    arc,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 
-FINE = Control(tolerance=1e-9)
+FINE = el.Control(tolerance=1e-9)
 RIGIDITY = 2.0e-2  # E b t^3 / 12 of the section below [N m2]
-SLIM = Section(2.4e9, 0.1, 1e-3, axial=False)
+SLIM = el.Section(2.4e9, 0.1, 1e-3, axial=False)
 LENGTH = 0.4
 
 
-def cantilever(section: Section = SLIM, **beam: object) -> Network:
-    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0)}
-    return Network(nodes, {"beam": Beam("root", "tip", section, **beam)})  # type: ignore[arg-type]
+def cantilever(section: el.Section = SLIM, **beam: object) -> el.Network:
+    nodes = {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "tip": el.Node(LENGTH, 0)}
+    return el.Network(nodes, {"beam": el.Beam("root", "tip", section, **beam)})  # type: ignore[arg-type]
 
 
-def pushed(network: Network, points: list[float], control: Control = FINE, **load: object) -> Path:
-    path = trace(network, Loading((PointLoad("tip", **load),), np.array(points)), control)  # type: ignore[arg-type]
-    assert path.status is PathStatus.COMPLETE, path.message
+def pushed(network: el.Network, points: list[float], control: el.Control = FINE, **load: object) -> el.Path:
+    path = el.trace(network, el.Loading((el.PointLoad("tip", **load),), np.array(points)), control)  # type: ignore[arg-type]
+    assert path.status is el.PathStatus.COMPLETE, path.message
     return path
 
 
@@ -141,7 +119,7 @@ def test_column_buckles_at_euler_s_load_and_follows_the_elastica() -> None:
 
 def test_column_kept_on_its_primary_path_is_marked_unstable() -> None:
     critical = np.pi**2 * RIGIDITY / (4 * LENGTH**2)
-    p = pushed(cantilever(), [2 * critical], Control(branch="primary"), fx=-1.0)
+    p = pushed(cantilever(), [2 * critical], el.Control(branch="primary"), fx=-1.0)
     assert p.unstable[-1] == 1
     assert np.abs(p.motion("tip")[-1]).max() < 1e-9
 
@@ -149,9 +127,9 @@ def test_column_kept_on_its_primary_path_is_marked_unstable() -> None:
 def test_parallel_guiding_beam_is_two_cantilevers_of_half_its_length() -> None:
     """Its middle is an inflection point [FF]: the digits are Mattiasson's."""
     table = np.array(MATTIASSON)
-    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0, Support(rotation=True))}
+    nodes = {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "tip": el.Node(LENGTH, 0, el.Support(rotation=True))}
     forces = table[1:, 0] * RIGIDITY / (0.5 * LENGTH) ** 2
-    p = pushed(Network(nodes, {"beam": Beam("root", "tip", SLIM)}), forces.tolist(), fy=-1.0)
+    p = pushed(el.Network(nodes, {"beam": el.Beam("root", "tip", SLIM)}), forces.tolist(), fy=-1.0)
     moved = p.motion("tip")[p.at_requested]
     np.testing.assert_allclose(-moved[:, 1] / LENGTH, table[1:, 1], atol=5.1e-6)
     np.testing.assert_allclose(-moved[:, 0] / LENGTH, table[1:, 2], atol=5.1e-6)
@@ -160,7 +138,7 @@ def test_parallel_guiding_beam_is_two_cantilevers_of_half_its_length() -> None:
 def test_curved_beam_under_an_end_moment_only_changes_its_curvature() -> None:
     """A circle stays one: curvature 1/R + M/EI [FF]."""
     sweep, turn = np.pi / 2, -1.2
-    p = trace(cantilever(shape=arc(sweep)), Rotation("tip", np.array([turn])), FINE)
+    p = el.trace(cantilever(shape=el.arc(sweep)), el.Rotation("tip", np.array([turn])), FINE)
     length = LENGTH * (sweep / 2) / np.sin(sweep / 2)
     start = -sweep / 2
     radius = length / (sweep + turn)
@@ -174,7 +152,7 @@ def test_curved_beam_under_an_end_moment_only_changes_its_curvature() -> None:
 
 def test_shear_flexible_cantilever() -> None:
     """Deflection by bending and by shear, P L^3 / 3 EI + P L / (kappa G A), kappa = 5/6 [TS]."""
-    section = Section(2.4e9, 0.1, 0.08, shear=True, poisson_ratio=0.25)
+    section = el.Section(2.4e9, 0.1, 0.08, shear=True, poisson_ratio=0.25)
     stiff, shear = 2.4e9 * 0.1 * 0.08**3 / 12, 5 / 6 * 2.4e9 / 2.5 * 0.1 * 0.08
     p = pushed(cantilever(section), [1.0], fy=1.0)
     assert p.motion("tip")[-1, 1] == pytest.approx(LENGTH**3 / (3 * stiff) + LENGTH / shear, rel=1e-8)
@@ -182,7 +160,7 @@ def test_shear_flexible_cantilever() -> None:
 
 def test_tapered_cantilever() -> None:
     """Thickness linear from 2 to 1 mm: deflection = P times the integral of x^2 / EI [TS]."""
-    section = Section(2.4e9, 0.1, Taper(np.array([0, 1]), np.array([2e-3, 1e-3])), axial=False)
+    section = el.Section(2.4e9, 0.1, el.Taper(np.array([0, 1]), np.array([2e-3, 1e-3])), axial=False)
     force = 1e-6
     exact = quad(lambda s: (LENGTH - s) ** 2 / (2.4e9 * 0.1 * (2e-3 - 1e-3 * s / LENGTH) ** 3 / 12), 0, LENGTH)[0]
     assert pushed(cantilever(section), [force], fy=1.0).motion("tip")[-1, 1] == pytest.approx(force * exact, rel=1e-7)
@@ -190,7 +168,9 @@ def test_tapered_cantilever() -> None:
 
 def test_stepped_cantilever() -> None:
     """The same integral in two parts [TS]."""
-    section = Section(2.4e9, 0.1, Taper(np.array([0, 0.3, 0.3, 1]), np.array([2e-3, 2e-3, 1e-3, 1e-3])), axial=False)
+    section = el.Section(
+        2.4e9, 0.1, el.Taper(np.array([0, 0.3, 0.3, 1]), np.array([2e-3, 2e-3, 1e-3, 1e-3])), axial=False
+    )
     force, cut = 1e-6, 0.3 * LENGTH
     thick, thin = 8 * RIGIDITY, RIGIDITY
     exact = (LENGTH**3 - (LENGTH - cut) ** 3) / (3 * thick) + (LENGTH - cut) ** 3 / (3 * thin)
@@ -206,7 +186,7 @@ def test_cantilever_under_its_own_weight_small_and_large() -> None:
 
     factor = 8.0
     weight = factor * RIGIDITY / LENGTH**3
-    p = trace(cantilever(), Loading((LineLoad("beam", wy=-weight),), np.array([1e-6, 1.0])), FINE)
+    p = el.trace(cantilever(), el.Loading((el.LineLoad("beam", wy=-weight),), np.array([1e-6, 1.0])), FINE)
     moved = p.motion("tip")[p.at_requested]
     assert moved[0, 1] == pytest.approx(-1e-6 * weight * LENGTH**4 / (8 * RIGIDITY), rel=1e-6)
 
@@ -227,13 +207,15 @@ def test_pretensioned_beam_is_stiffened_as_a_tie_rod() -> None:
 
     Two halves of a tie rod [TS], of a material whose bending rigidity is per unit of the length before.
     """
-    section = Section(2.4e9, 0.1, 1e-3)
+    section = el.Section(2.4e9, 0.1, 1e-3)
     pull = 2e-5 * LENGTH
     nodes = {
-        "root": Node(0, 0, Support(True, True, True, displacement=(-pull, 0, 0))),
-        "tip": Node(LENGTH, 0, slider_support(np.pi / 2)),
+        "root": el.Node(0, 0, el.Support(True, True, True, displacement=(-pull, 0, 0))),
+        "tip": el.Node(LENGTH, 0, el.slider_support(np.pi / 2)),
     }
-    p = trace(Network(nodes, {"beam": Beam("root", "tip", section)}), Displacement("tip", np.pi / 2, [1e-7]), FINE)
+    p = el.trace(
+        el.Network(nodes, {"beam": el.Beam("root", "tip", section)}), el.Displacement("tip", np.pi / 2, [1e-7]), FINE
+    )
     stretch, tension = 1 + 2e-5, 2.4e9 * 0.1 * 1e-3 * 2e-5
     u = 0.5 * LENGTH * np.sqrt(tension * stretch / RIGIDITY)
     assert p.effort[-1] / 1e-7 == pytest.approx(tension / (stretch * LENGTH * (1 - np.tanh(u) / u)), rel=1e-7)
@@ -241,9 +223,13 @@ def test_pretensioned_beam_is_stiffened_as_a_tie_rod() -> None:
 
 def test_precompressed_clamped_beam_buckles_at_four_pi_squared() -> None:
     """P = 4 pi^2 EI / L^2 [TG, sec. 2.2], here of a beam that is shorter by its strain."""
-    section = Section(2.4e9, 0.1, 1e-3)
-    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0, slider_support(0.0))}
-    p = trace(Network(nodes, {"beam": Beam("root", "tip", section)}), Displacement("tip", np.pi, [1e-4 * LENGTH]), FINE)
+    section = el.Section(2.4e9, 0.1, 1e-3)
+    nodes = {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "tip": el.Node(LENGTH, 0, el.slider_support(0.0))}
+    p = el.trace(
+        el.Network(nodes, {"beam": el.Beam("root", "tip", section)}),
+        el.Displacement("tip", np.pi, [1e-4 * LENGTH]),
+        FINE,
+    )
     critical = 4 * np.pi**2 * RIGIDITY / LENGTH**2
     event = p.events[0]
     # Reissner: P = EA e at the bifurcation, and P (1 - e) = 4 pi^2 EI / (L (1 - e))^2 (1 - e)^2
@@ -256,12 +242,14 @@ def test_precompressed_clamped_beam_buckles_at_four_pi_squared() -> None:
 
 def test_springs_at_the_tip_and_root_add_as_they_should() -> None:
     force, stiffness = 1e-7, 0.7
-    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0)}
-    sprung = Network(nodes, {"beam": Beam("root", "tip", SLIM)}, springs=(SlideSpring("tip", np.pi / 2, stiffness),))
+    nodes = {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "tip": el.Node(LENGTH, 0)}
+    sprung = el.Network(
+        nodes, {"beam": el.Beam("root", "tip", SLIM)}, springs=(el.SlideSpring("tip", np.pi / 2, stiffness),)
+    )
     assert pushed(sprung, [force], fy=1.0).motion("tip")[-1, 1] == pytest.approx(
         force / (3 * RIGIDITY / LENGTH**3 + stiffness), rel=1e-7
     )
-    nodes = {"root": Node(0, 0, PINNED_SUPPORT), "tip": Node(LENGTH, 0)}
-    hinged = Network(nodes, {"beam": Beam("root", "tip", SLIM)}, springs=(TorsionSpring(None, "root", 0.03),))
+    nodes = {"root": el.Node(0, 0, el.PINNED_SUPPORT), "tip": el.Node(LENGTH, 0)}
+    hinged = el.Network(nodes, {"beam": el.Beam("root", "tip", SLIM)}, springs=(el.TorsionSpring(None, "root", 0.03),))
     turn = pushed(hinged, [0.06], moment=1.0).motion("tip")[-1, 2]
     assert turn == pytest.approx(0.06 / 0.03 + 0.06 * LENGTH / RIGIDITY, rel=1e-9)

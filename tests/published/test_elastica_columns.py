@@ -15,22 +15,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    FREE_SUPPORT,
-    PINNED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    PathStatus,
-    PointLoad,
-    Section,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 
 LENGTH = 0.1
 APPROACH = np.linspace(0.02, 0.5, 13)
@@ -42,13 +27,17 @@ def elastica(approach: float) -> float:
     return float((2 * ellipk(m) / np.pi) ** 2)
 
 
-def column(slenderness: float, clamped: bool) -> tuple[Network, float]:
+def column(slenderness: float, clamped: bool) -> tuple[el.Network, float]:
     """Return a column whose far end is guided along it, and its critical load [N]."""
-    section = Section(2e9, 1e-2, LENGTH * np.sqrt(12) / slenderness)
-    ends = (CLAMPED_SUPPORT, slider_support(0.0)) if clamped else (PINNED_SUPPORT, slider_support(0.0, rotates=True))
-    nodes = {"a": Node(0, 0, ends[0]), "b": Node(LENGTH, 0, ends[1])}
+    section = el.Section(2e9, 1e-2, LENGTH * np.sqrt(12) / slenderness)
+    ends = (
+        (el.CLAMPED_SUPPORT, el.slider_support(0.0))
+        if clamped
+        else (el.PINNED_SUPPORT, el.slider_support(0.0, rotates=True))
+    )
+    nodes = {"a": el.Node(0, 0, ends[0]), "b": el.Node(LENGTH, 0, ends[1])}
     rigidity = 2e9 * 1e-2 * section.thickness**3 / 12  # type: ignore[operator]
-    return Network(nodes, {"x": Beam("a", "b", section)}), (4 if clamped else 1) * np.pi**2 * rigidity / LENGTH**2
+    return el.Network(nodes, {"x": el.Beam("a", "b", section)}), (4 if clamped else 1) * np.pi**2 * rigidity / LENGTH**2
 
 
 @pytest.mark.parametrize("imperfection", [0.0, 1e-5 * LENGTH, 1e-3 * LENGTH])
@@ -59,8 +48,8 @@ def test_a_column_is_followed_far_beyond_its_critical_load(
 ) -> None:
     """The first requested point lies far behind the bifurcation: 20 to 300 times the critical approach."""
     network, critical = column(slenderness, clamped)
-    path = trace(network, Displacement("b", np.pi, APPROACH * LENGTH), Control(imperfection=imperfection))
-    assert path.status is PathStatus.COMPLETE, path.message
+    path = el.trace(network, el.Displacement("b", np.pi, APPROACH * LENGTH), el.Control(imperfection=imperfection))
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.stable[path.at_requested].all()
     ratio = path.effort[path.at_requested] / critical
     expected = [elastica(one) for one in APPROACH]  # a clamped column is four quarters of which two are a pinned one
@@ -69,22 +58,22 @@ def test_a_column_is_followed_far_beyond_its_critical_load(
 
 
 ENDS = {
-    "free": (CLAMPED_SUPPORT, FREE_SUPPORT, 0.25),
-    "guided": (CLAMPED_SUPPORT, slider_support(0.0), 4.0),
-    "pinned": (PINNED_SUPPORT, slider_support(0.0, True), 1.0),
+    "free": (el.CLAMPED_SUPPORT, el.FREE_SUPPORT, 0.25),
+    "guided": (el.CLAMPED_SUPPORT, el.slider_support(0.0), 4.0),
+    "pinned": (el.PINNED_SUPPORT, el.slider_support(0.0, True), 1.0),
 }
 
 
-def loaded(kind: str, cut: float | None) -> tuple[Network, float]:
+def loaded(kind: str, cut: float | None) -> tuple[el.Network, float]:
     """Return a column that does not stretch, perhaps of two beams, and its critical load [N]."""
     first, last, factor = ENDS[kind]
-    section = Section(2e9, 8e-3, 1e-3, axial=False)
-    nodes = {"a": Node(0, 0, first), "b": Node(LENGTH, 0, last)}
-    beams = {"x": Beam("a", "b", section)}
+    section = el.Section(2e9, 8e-3, 1e-3, axial=False)
+    nodes = {"a": el.Node(0, 0, first), "b": el.Node(LENGTH, 0, last)}
+    beams = {"x": el.Beam("a", "b", section)}
     if cut is not None:
-        nodes["m"] = Node(cut * LENGTH, 0)
-        beams = {"x": Beam("a", "m", section), "y": Beam("m", "b", section)}
-    return Network(nodes, beams), factor * np.pi**2 * 2e9 * 8e-3 * 1e-9 / 12 / LENGTH**2
+        nodes["m"] = el.Node(cut * LENGTH, 0)
+        beams = {"x": el.Beam("a", "m", section), "y": el.Beam("m", "b", section)}
+    return el.Network(nodes, beams), factor * np.pi**2 * 2e9 * 8e-3 * 1e-9 / 12 / LENGTH**2
 
 
 def approach_under(ratio: float) -> float:
@@ -105,8 +94,8 @@ def test_a_column_is_loaded_with_its_critical_load_and_more(
     """A requested point lies at the bifurcation, or next to it; half a pinned column is a critical cantilever."""
     network, critical = loaded(kind, cut)
     ratios = np.array([0.5, 1.0 + beside, 1.2, 1.9])
-    path = trace(network, Loading((PointLoad("b", fx=-critical),), ratios), Control(tolerance=tolerance))
-    assert path.status is PathStatus.COMPLETE, path.message
+    path = el.trace(network, el.Loading((el.PointLoad("b", fx=-critical),), ratios), el.Control(tolerance=tolerance))
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.stable.all()
     assert path.requested[path.at_requested].tolist() == [0, 1, 2, 3]
     assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
@@ -123,15 +112,15 @@ def test_a_column_of_pieces_is_loaded_with_multiples_of_its_critical_load_at_ran
     cuts = np.sort(rng.choice([0.1, 0.25, 1 / 3, 0.4, 0.5, 2 / 3, 0.75], int(rng.integers(0, 3)), replace=False))
     whole, critical = loaded(kind, None)
     names = ["a", *(f"m{number}" for number in range(len(cuts))), "b"]
-    nodes = dict(whole.nodes) | {name: Node(cut * LENGTH, 0) for name, cut in zip(names[1:-1], cuts, strict=True)}
+    nodes = dict(whole.nodes) | {name: el.Node(cut * LENGTH, 0) for name, cut in zip(names[1:-1], cuts, strict=True)}
     ways = [pair if rng.integers(2) else pair[::-1] for pair in itertools.pairwise(names)]
     section = whole.beams["x"].section
-    network = Network(nodes, {f"{one}{other}": Beam(one, other, section) for one, other in ways})
+    network = el.Network(nodes, {f"{one}{other}": el.Beam(one, other, section) for one, other in ways})
     beside = 1.0 + rng.choice([0.0, 1e-9, -1e-9, 1e-6, -1e-6, 1e-4, 1e-3, 0.02])
     ratios = np.sort(np.append(rng.uniform(0.2, 2, int(rng.integers(1, 6))), beside))
     tolerance = 10 ** rng.uniform(-8, -3)
-    path = trace(network, Loading((PointLoad("b", fx=-critical),), ratios), Control(tolerance=tolerance))
-    assert path.status is PathStatus.COMPLETE, path.message
+    path = el.trace(network, el.Loading((el.PointLoad("b", fx=-critical),), ratios), el.Control(tolerance=tolerance))
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.stable.all()
     reported = [event.kind for event in path.events]
     assert reported == ["bifurcation"] or (not reported and ratios.max() <= 1 + 1e-5)
@@ -151,12 +140,14 @@ def test_a_cantilever_in_strong_tension_bends_in_a_boundary_layer(
     young, width, thickness = 2e11, 8e-3, 1e-4
     rigidity = young * width * thickness**3 / 12
     tension = rigidity * (slender / LENGTH) ** 2
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}
-    beams = {"x": Beam("a", "b", Section(young, width, thickness, axial=axial))}
-    pull = Network(nodes, beams, loads=(PointLoad("b", fx=tension),))
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(LENGTH, 0)}
+    beams = {"x": el.Beam("a", "b", el.Section(young, width, thickness, axial=axial))}
+    pull = el.Network(nodes, beams, loads=(el.PointLoad("b", fx=tension),))
     aside = 1e-4 * tension
-    path = trace(pull, Loading((PointLoad("b", fy=aside),), np.array([0.5, 1.0])), Control(tolerance=tolerance))
-    assert path.status is PathStatus.COMPLETE, path.message
+    path = el.trace(
+        pull, el.Loading((el.PointLoad("b", fy=aside),), np.array([0.5, 1.0])), el.Control(tolerance=tolerance)
+    )
+    assert path.status is el.PathStatus.COMPLETE, path.message
     strain = tension / (young * width * thickness) if axial else 0.0
     expected = aside / tension * (LENGTH - LENGTH * np.tanh(slender) / slender)
     found = path.motion("b")[path.at_requested, 1]

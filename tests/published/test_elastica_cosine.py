@@ -12,31 +12,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    CosineArch,
-    Displacement,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    Section,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 
 SPAN, RISE = 0.2, 0.5e-3  # shallow: the closed form leaves out terms of (h/L)^2
 
 
-def pressed(ratio: float, points: np.ndarray, branch: str = "stable") -> Path:
+def pressed(ratio: float, points: np.ndarray, branch: str = "stable") -> el.Path:
     """Half an arch with `ratio` = rise / thickness, its middle taken to points, in rises."""
-    section = Section(1e9, 10e-3, RISE / ratio)
-    nodes = {"wall": Node(0, 0, CLAMPED_SUPPORT), "middle": Node(0.5 * SPAN, RISE, slider_support(np.pi / 2))}
-    arch = Network(nodes, {"half": Beam("wall", "middle", section, CosineArch(RISE, 0.5))})
-    path = trace(arch, Displacement("middle", -np.pi / 2, points * RISE), Control(branch=branch))  # type: ignore[arg-type]
-    assert path.status is PathStatus.COMPLETE
+    section = el.Section(1e9, 10e-3, RISE / ratio)
+    nodes = {
+        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "middle": el.Node(0.5 * SPAN, RISE, el.slider_support(np.pi / 2)),
+    }
+    arch = el.Network(nodes, {"half": el.Beam("wall", "middle", section, el.CosineArch(RISE, 0.5))})
+    path = el.trace(arch, el.Displacement("middle", -np.pi / 2, points * RISE), el.Control(branch=branch))  # type: ignore[arg-type]
+    assert path.status is el.PathStatus.COMPLETE
     return path
 
 

@@ -14,53 +14,41 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    PINNED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    PointLoad,
-    Section,
-    arc,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 
 
-def traced(network: Network, most: float) -> Path:
-    load = Loading((PointLoad("tip", fy=-1.0),), np.array([most]))
-    path = trace(network, load, Control(through_folds=True, tolerance=1e-8))
-    assert path.status is PathStatus.COMPLETE
+def traced(network: el.Network, most: float) -> el.Path:
+    load = el.Loading((el.PointLoad("tip", fy=-1.0),), np.array([most]))
+    path = el.trace(network, load, el.Control(through_folds=True, tolerance=1e-8))
+    assert path.status is el.PathStatus.COMPLETE
     return path
 
 
-def frame(axial: bool = False) -> Network:
-    section = Section(720.0, 3.0, 2.0, axial=axial)
+def frame(axial: bool = False) -> el.Network:
+    section = el.Section(720.0, 3.0, 2.0, axial=axial)
     nodes = {
-        "a": Node(0, 0, PINNED_SUPPORT),
-        "corner": Node(0, 120),
-        "tip": Node(24, 120),
-        "b": Node(120, 120, PINNED_SUPPORT),
+        "a": el.Node(0, 0, el.PINNED_SUPPORT),
+        "corner": el.Node(0, 120),
+        "tip": el.Node(24, 120),
+        "b": el.Node(120, 120, el.PINNED_SUPPORT),
     }
     beams = {
-        "column": Beam("a", "corner", section),
-        "left": Beam("corner", "tip", section),
-        "right": Beam("tip", "b", section),
+        "column": el.Beam("a", "corner", section),
+        "left": el.Beam("corner", "tip", section),
+        "right": el.Beam("tip", "b", section),
     }
-    return Network(nodes, beams)
+    return el.Network(nodes, beams)
 
 
-def arch() -> Network:
+def arch() -> el.Network:
     foot, top = 100 * np.sin(np.radians(107.5)), 100 * np.cos(np.radians(107.5))
-    section, half = Section(12e6, 1.0, 1.0, axial=False), arc(-np.radians(107.5))
-    nodes = {"a": Node(-foot, top, PINNED_SUPPORT), "tip": Node(0, 100), "b": Node(foot, top, CLAMPED_SUPPORT)}
-    return Network(nodes, {"left": Beam("a", "tip", section, half), "right": Beam("tip", "b", section, half)})
+    section, half = el.Section(12e6, 1.0, 1.0, axial=False), el.arc(-np.radians(107.5))
+    nodes = {
+        "a": el.Node(-foot, top, el.PINNED_SUPPORT),
+        "tip": el.Node(0, 100),
+        "b": el.Node(foot, top, el.CLAMPED_SUPPORT),
+    }
+    return el.Network(nodes, {"left": el.Beam("a", "tip", section, half), "right": el.Beam("tip", "b", section, half)})
 
 
 def carried(state: Any, length: float, bend: float, force: tuple[float, float], rigidity: float) -> Any:
@@ -92,7 +80,7 @@ def arch_gaps(z: Any, travel: float) -> list[float]:
     return [end[0] - foot, end[1] - top, 100 * (end[2] + half), tip[1] - 100 + travel]
 
 
-def limit(path: Path, gaps: Any, beam: str, window: tuple[float, float]) -> float:
+def limit(path: el.Path, gaps: Any, beam: str, window: tuple[float, float]) -> float:
     """Return the extreme of the load over a window of travel that the path passes, solved for anew at seven places."""
     travel = -path.motion("tip")[:, 1]
     places = np.mean(window) + 0.5 * np.ptp(window) * np.cos(np.pi * (np.arange(7) + 0.5) / 7)
@@ -148,16 +136,16 @@ def test_lee_frame_through_snap_through_and_snap_back() -> None:
 
 def test_williams_toggle_through_its_limit_points() -> None:
     """Williams, Q. J. Mech. Appl. Math. 17 (1964) 451: snaps at 34 lb (read to 0.5), regains at about 31 lb."""
-    section = Section(1.03e7, 0.753, 0.243)
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(12.943, 0.386, slider_support(np.pi / 2))}
-    network = Network(nodes, {"beam": Beam("a", "tip", section)})
+    section = el.Section(1.03e7, 0.753, 0.243)
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "tip": el.Node(12.943, 0.386, el.slider_support(np.pi / 2))}
+    network = el.Network(nodes, {"beam": el.Beam("a", "tip", section)})
     p = traced(network, 35.0)
     assert [event.kind for event in p.events] == ["limit point", "limit point"]
     top, bottom = (2 * event.drive for event in p.events)
     assert top == pytest.approx(34, abs=0.5)
     assert bottom == pytest.approx(31, abs=0.5)
     # the same limits by displacement control: where the force has its extremes
-    q = trace(network, Displacement("tip", -np.pi / 2, np.linspace(0.01, 0.65, 129)), Control(tolerance=1e-7))
+    q = el.trace(network, el.Displacement("tip", -np.pi / 2, np.linspace(0.01, 0.65, 129)), el.Control(tolerance=1e-7))
     first = q.drive < 0.4
     assert 2 * q.effort[first].max() == pytest.approx(top, rel=1e-4)
     assert q.stable.all()
@@ -165,8 +153,8 @@ def test_williams_toggle_through_its_limit_points() -> None:
 
 def test_load_control_stops_at_a_limit_point_and_says_so() -> None:
     network = frame(axial=True)
-    p = trace(network, Loading((PointLoad("tip", fy=-1.0),), np.array([1.0, 2.5])), Control())
-    assert p.status is PathStatus.LIMIT_POINT
+    p = el.trace(network, el.Loading((el.PointLoad("tip", fy=-1.0),), np.array([1.0, 2.5])), el.Control())
+    assert p.status is el.PathStatus.LIMIT_POINT
     assert "limit point" in p.message
     assert p.drive[-1] == pytest.approx(1.855673, abs=2e-4)
     assert p.stable.all()

@@ -9,20 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    CosineArch,
-    Displacement,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    Section,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 
 MM = 1e-3
 LENGTH, ANGLE, WIDTH, YOUNG = 35 * MM, np.radians(7), 6 * MM, 1477e6
@@ -61,23 +48,23 @@ SYMMETRIC = np.array(
 )
 
 
-def v_beam(thickness: float = 1 * MM, shear: bool = True) -> Network:
-    section = Section(YOUNG, WIDTH, thickness, shear=shear, poisson_ratio=0.3)
+def v_beam(thickness: float = 1 * MM, shear: bool = True) -> el.Network:
+    section = el.Section(YOUNG, WIDTH, thickness, shear=shear, poisson_ratio=0.3)
     nodes = {
-        "wall": Node(0, 0, CLAMPED_SUPPORT),
-        "shuttle": Node(LENGTH * np.cos(ANGLE), LENGTH * np.sin(ANGLE), slider_support(np.pi / 2)),
+        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "shuttle": el.Node(LENGTH * np.cos(ANGLE), LENGTH * np.sin(ANGLE), el.slider_support(np.pi / 2)),
     }
-    return Network(nodes, {"v": Beam("wall", "shuttle", section)})
+    return el.Network(nodes, {"v": el.Beam("wall", "shuttle", section)})
 
 
-def pressed(network: Network, points: np.ndarray, **control: object) -> Path:
-    return trace(network, Displacement("shuttle", DOWN, points), Control(**control))  # type: ignore[arg-type]
+def pressed(network: el.Network, points: np.ndarray, **control: object) -> el.Path:
+    return el.trace(network, el.Displacement("shuttle", DOWN, points), el.Control(**control))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("shear", "column"), [(True, 1), (False, 2)])
 def test_v_beam_follows_the_stable_branch(shear: bool, column: int) -> None:
     p = pressed(v_beam(shear=shear), STABLE[:, 0] * MM, tolerance=1e-8)
-    assert p.status is PathStatus.COMPLETE
+    assert p.status is el.PathStatus.COMPLETE
     assert p.stable.all()
     np.testing.assert_allclose(p.effort[p.at_requested], STABLE[:, column], atol=6e-7)
     names = p.branch[p.at_requested]
@@ -135,15 +122,18 @@ def test_v_beam_in_tension() -> None:
     np.testing.assert_allclose(p.effort[p.at_requested], [-0.411976, -0.855246, -2.374869, -5.559783], atol=2e-6)
 
 
-def cosine_half(ratio: float) -> tuple[Network, float, float]:
+def cosine_half(ratio: float) -> tuple[el.Network, float, float]:
     """Half a cosine arch whose rise is a hundredth of the span, `ratio` = rise / thickness."""
     span, thickness = 200 * MM, 2 * MM / ratio
     rise = span / 100
-    section = Section(1e9, 10 * MM, thickness)
-    nodes = {"wall": Node(0, 0, CLAMPED_SUPPORT), "shuttle": Node(0.5 * span, rise, slider_support(np.pi / 2))}
-    beams = {"v": Beam("wall", "shuttle", section, CosineArch(rise, 0.5))}
+    section = el.Section(1e9, 10 * MM, thickness)
+    nodes = {
+        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "shuttle": el.Node(0.5 * span, rise, el.slider_support(np.pi / 2)),
+    }
+    beams = {"v": el.Beam("wall", "shuttle", section, el.CosineArch(rise, 0.5))}
     unit = 1e9 * 10 * MM * thickness**3 / 12 * rise / span**3
-    return Network(nodes, beams), rise, unit
+    return el.Network(nodes, beams), rise, unit
 
 
 @pytest.mark.parametrize(
@@ -158,7 +148,7 @@ def test_cosine_arch_normalised_extremes(ratio: float, top: float, at_top: float
     """
     network, rise, unit = cosine_half(ratio)
     p = pressed(network, np.arange(0.005, 1.9999, 0.005) * rise, tolerance=1e-5)
-    assert p.status is PathStatus.COMPLETE
+    assert p.status is el.PathStatus.COMPLETE
     force, place = 2 * p.effort[p.at_requested] / unit, p.drive[p.at_requested] / rise
     assert 1.0 < force.max() / top < 1.01
     assert place[force.argmax()] == pytest.approx(at_top, abs=0.006)

@@ -15,21 +15,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    PointLoad,
-    Section,
-    Support,
-    trace,
-)
+import cfmkit.elastica as el
 
-SECTION = Section(200e9, 5e-3, 1e-3)
+SECTION = el.Section(200e9, 5e-3, 1e-3)
 RIGIDITY = 200e9 * 5e-3 * 1e-9 / 12
 LONG, SHORT = 38e-3, 30e-3
 
@@ -51,7 +39,7 @@ def parallelogram_rate(rigidity: float, length: float) -> float:
     return 48.0 * rigidity / length**3
 
 
-def pinned_beam_rates(section: Section, length: float, angles: np.ndarray) -> np.ndarray:
+def pinned_beam_rates(section: el.Section, length: float, angles: np.ndarray) -> np.ndarray:
     """Return the secant torsion rate of an exact pinned beam at rotations of its pseudo-rigid link [N m/rad].
 
     The end is loaded across the unloaded beam; the rate is the moment of that force about the
@@ -66,12 +54,13 @@ def pinned_beam_rates(section: Section, length: float, angles: np.ndarray) -> np
     angles : (n,) array
         Rotations of the link at which the rate is wanted, increasing [rad].
     """
-    network = Network(
-        {"root": Node(0.0, 0.0, CLAMPED_SUPPORT), "pin": Node(length, 0.0)}, {"leaf": Beam("root", "pin", section)}
+    network = el.Network(
+        {"root": el.Node(0.0, 0.0, el.CLAMPED_SUPPORT), "pin": el.Node(length, 0.0)},
+        {"leaf": el.Beam("root", "pin", section)},
     )
     bending = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
     force = 8.0 * bending / length**2 * np.linspace(0.01, 1.0, 200)
-    path = trace(network, Loading((PointLoad("pin", fy=1.0),), force), Control(tolerance=1e-9))
+    path = el.trace(network, el.Loading((el.PointLoad("pin", fy=1.0),), force), el.Control(tolerance=1e-9))
     at = path.at_requested
     moved = path.motion("pin")[at]
     arm = CHARACTERISTIC * length
@@ -80,7 +69,7 @@ def pinned_beam_rates(section: Section, length: float, angles: np.ndarray) -> np
     return np.asarray(np.interp(angles, angle, rate))
 
 
-def parallelogram_force(section: Section, length: float, travel: np.ndarray) -> np.ndarray:
+def parallelogram_force(section: el.Section, length: float, travel: np.ndarray) -> np.ndarray:
     """Return the force of four exact guided leaves over their common travel, free to shorten [N].
 
     Parameters
@@ -92,11 +81,11 @@ def parallelogram_force(section: Section, length: float, travel: np.ndarray) -> 
     travel : (n,) array
         Across the leaves, increasing [m].
     """
-    network = Network(
-        {"root": Node(0.0, 0.0, CLAMPED_SUPPORT), "stage": Node(length, 0.0, Support(rotation=True))},
-        {"leaf": Beam("root", "stage", section)},
+    network = el.Network(
+        {"root": el.Node(0.0, 0.0, el.CLAMPED_SUPPORT), "stage": el.Node(length, 0.0, el.Support(rotation=True))},
+        {"leaf": el.Beam("root", "stage", section)},
     )
-    path = trace(network, Displacement("stage", 0.5 * np.pi, travel), Control(tolerance=1e-9))
+    path = el.trace(network, el.Displacement("stage", 0.5 * np.pi, travel), el.Control(tolerance=1e-9))
     force: np.ndarray = LEAVES * path.effort[path.at_requested]
     return force
 

@@ -63,7 +63,7 @@ def analyze(spec: CamSpec) -> Result:
 
 
 def design(spec: CamSpec) -> Design:
-    found = family("cam").design
+    found = family("cam").design.make
     assert found is not None
     return found(spec, Run())
 

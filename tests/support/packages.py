@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
     import pytest
 
-RECORD = "from dataclasses import replace\nfrom spare_family import FAMILY as SPARE\n"
+RECORD = (
+    "from dataclasses import replace\nfrom spare_family import FAMILY as SPARE\n"
+    "from cfmkit.families.base import DesignMethod, ResultNames, Pictures\n"
+)
 
 
 def record(name: str, interface: int | None = 1) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.runs.read_suggest_file import read_request
 
@@ -26,4 +25,4 @@ def request(**keys: Any) -> Any:
 
 def propose(name: str, asked: Any) -> Any:
     """Return what a family offers for a request."""
-    return function_named(family(name).propose)(asked, Run())
+    return family(name).propose(asked, Run())

@@ -7,56 +7,34 @@ from typing import Any
 import numpy as np
 from lan_2010 import SHAPES, half
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    CosineArch,
-    Displacement,
-    LineLoad,
-    LineSpring,
-    Link,
-    Loading,
-    Network,
-    Node,
-    PointLoad,
-    Polyline,
-    Polynomial,
-    Rotation,
-    Section,
-    SlideSpring,
-    Spline,
-    Support,
-    Taper,
-    TorsionSpring,
-    slider_support,
-)
+import cfmkit.elastica as el
 
 LAN = np.array([1.877, 3.05, 1.244, 2.40, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148, 1.0, 2.0])
 
 
-def lan(x: Any) -> Network:
+def lan(x: Any) -> el.Network:
     """Node positions [cm], shape coefficients, thickness [mm] and modulus [GPa] of Lan's network, extensible."""
     nodes = {"n3": (x[1] * 1e-2, x[0] * 1e-2), "n4": (x[2] * 1e-2, x[3] * 1e-2)}
     varied = {name: (shape[0], x[4 + 2 * k], x[5 + 2 * k]) for k, (name, (_, _, shape)) in enumerate(SHAPES.items())}
-    return half(Section(x[13] * 1e9, 10e-3, x[12] * 1e-3), nodes=nodes, coefficients=varied)
+    return half(el.Section(x[13] * 1e9, 10e-3, x[12] * 1e-3), nodes=nodes, coefficients=varied)
 
 
-def arms(x: Any) -> Network:
+def arms(x: Any) -> el.Network:
     """A tapered beam on a rigid arm, with its weight, and a linked node whose places vary."""
-    section = Section(2e9, 8e-3, Taper(np.array([0, 0.5, 1]), np.array([1e-3, x[0], 1.2e-3])), shear=True)
+    section = el.Section(2e9, 8e-3, el.Taper(np.array([0, 0.5, 1]), np.array([1e-3, x[0], 1.2e-3])), shear=True)
     nodes = {
-        "a": Node(0, 0, CLAMPED_SUPPORT),
-        "b": Node(0.05, 0.02),
-        "bb": Node(0.05 + x[1], 0.02 + x[2]),
-        "c": Node(0.1, 0.0, CLAMPED_SUPPORT),
-        "d": Node(0.06, 0.08, slider_support(np.pi / 2)),
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "b": el.Node(0.05, 0.02),
+        "bb": el.Node(0.05 + x[1], 0.02 + x[2]),
+        "c": el.Node(0.1, 0.0, el.CLAMPED_SUPPORT),
+        "d": el.Node(0.06, 0.08, el.slider_support(np.pi / 2)),
     }
     beams = {
-        "ab": Beam("a", "b", section, Polynomial((0.0, 0.7)), end_offset=(x[3], 0.001)),
-        "bc": Beam("bb", "c", section, end_joint="pin"),
-        "bd": Beam("b", "d", section),
+        "ab": el.Beam("a", "b", section, el.Polynomial((0.0, 0.7)), end_offset=(x[3], 0.001)),
+        "bc": el.Beam("bb", "c", section, end_joint="pin"),
+        "bd": el.Beam("b", "d", section),
     }
-    return Network(nodes, beams, links=(Link("b", "bb"),), loads=(LineLoad("ab", 20.0, -60.0),))
+    return el.Network(nodes, beams, links=(el.Link("b", "bb"),), loads=(el.LineLoad("ab", 20.0, -60.0),))
 
 
 VALUES = {
@@ -89,50 +67,58 @@ VALUES = {
 X, KINDS = np.array(list(VALUES.values())), list(VALUES)
 
 
-def zoo(x: Any) -> Network:
+def zoo(x: Any) -> el.Network:
     """A network in which everything varies."""
-    section = Section(x[21] * 2e9, x[24] * 1e-3, Taper(np.array([0, 0.5, 1]), np.array([1.0, x[2], 1.2]) * 1e-3), True)
-    plain = Section(x[21] * 2e9, 8e-3, 1e-3, axial=True, shear=True, poisson_ratio=x[22])
-    steps = Taper(np.array([0, 0.3, 0.3, 0.8, 1]), np.array([1.2, 1.1, 0.8, 0.9, 1.0]) * 1e-3)
-    stepped = Section(x[21] * 2e9, 8e-3, steps, axial=True, shear=True, poisson_ratio=x[22])
+    section = el.Section(
+        x[21] * 2e9, x[24] * 1e-3, el.Taper(np.array([0, 0.5, 1]), np.array([1.0, x[2], 1.2]) * 1e-3), True
+    )
+    plain = el.Section(x[21] * 2e9, 8e-3, 1e-3, axial=True, shear=True, poisson_ratio=x[22])
+    steps = el.Taper(np.array([0, 0.3, 0.3, 0.8, 1]), np.array([1.2, 1.1, 0.8, 0.9, 1.0]) * 1e-3)
+    stepped = el.Section(x[21] * 2e9, 8e-3, steps, axial=True, shear=True, poisson_ratio=x[22])
     nodes = {
-        "a": Node(0, 0, Support(True, True, True, displacement=(0.0, x[16], 0.0))),
-        "b": Node(x[0], x[1]),
-        "bb": Node(0.05 + x[3], 0.022),
-        "c": Node(0.1, 0.0, CLAMPED_SUPPORT),
-        "d": Node(0.06, 0.08, slider_support(np.pi / 2)),
-        "e": Node(0.12, 0.05, slider_support(x[17], rotates=True)),
-        "f": Node(-0.02, 0.06, CLAMPED_SUPPORT),
+        "a": el.Node(0, 0, el.Support(True, True, True, displacement=(0.0, x[16], 0.0))),
+        "b": el.Node(x[0], x[1]),
+        "bb": el.Node(0.05 + x[3], 0.022),
+        "c": el.Node(0.1, 0.0, el.CLAMPED_SUPPORT),
+        "d": el.Node(0.06, 0.08, el.slider_support(np.pi / 2)),
+        "e": el.Node(0.12, 0.05, el.slider_support(x[17], rotates=True)),
+        "f": el.Node(-0.02, 0.06, el.CLAMPED_SUPPORT),
     }
     beams = {
-        "ab": Beam("a", "b", section, Polynomial((0.0, x[23])), end_offset=(x[4], x[5])),
-        "bc": Beam("bb", "c", stepped, CosineArch(x[18]), end_joint="pin"),
-        "bd": Beam("b", "d", section),
-        "be": Beam("b", "e", plain, Polyline(np.array([[0.0, 0.0], [0.03, x[19]], [0.07, 0.03]]))),
-        "bf": Beam("bb", "f", stepped, Spline(np.array([[0.0, 0.0], [0.03, x[20]], [0.05, 0.012], [0.085, 0.0]]))),
+        "ab": el.Beam("a", "b", section, el.Polynomial((0.0, x[23])), end_offset=(x[4], x[5])),
+        "bc": el.Beam("bb", "c", stepped, el.CosineArch(x[18]), end_joint="pin"),
+        "bd": el.Beam("b", "d", section),
+        "be": el.Beam("b", "e", plain, el.Polyline(np.array([[0.0, 0.0], [0.03, x[19]], [0.07, 0.03]]))),
+        "bf": el.Beam(
+            "bb", "f", stepped, el.Spline(np.array([[0.0, 0.0], [0.03, x[20]], [0.05, 0.012], [0.085, 0.0]]))
+        ),
     }
     springs = (
-        LineSpring("b", "d", x[6], x[7]),
-        LineSpring("bb", None, 40.0, ground=(0.0, 0.05)),
-        TorsionSpring("b", "e", x[8], x[9]),
-        SlideSpring("e", x[11], x[10], x[12]),
+        el.LineSpring("b", "d", x[6], x[7]),
+        el.LineSpring("bb", None, 40.0, ground=(0.0, 0.05)),
+        el.TorsionSpring("b", "e", x[8], x[9]),
+        el.SlideSpring("e", x[11], x[10], x[12]),
     )
-    loads = (PointLoad("b", fy=x[13], moment=1e-3), PointLoad("bb", fx=x[14], follows=True), LineLoad("ab", 2.0, x[15]))
-    return Network(nodes, beams, (Link("b", "bb"),), springs, loads)
+    loads = (
+        el.PointLoad("b", fy=x[13], moment=1e-3),
+        el.PointLoad("bb", fx=x[14], follows=True),
+        el.LineLoad("ab", 2.0, x[15]),
+    )
+    return el.Network(nodes, beams, (el.Link("b", "bb"),), springs, loads)
 
 
 def pushed(x: Any) -> Any:
-    return zoo(x), Displacement("d", -np.pi / 2, np.array([1e-3, 3e-3]))
+    return zoo(x), el.Displacement("d", -np.pi / 2, np.array([1e-3, 3e-3]))
 
 
 def turned(x: Any) -> Any:
-    return zoo(x), Rotation("e", np.array([-0.1, -0.2]))
+    return zoo(x), el.Rotation("e", np.array([-0.1, -0.2]))
 
 
 def loaded(x: Any) -> Any:
     loads = (
-        PointLoad("b", 0.2, 3 * x[13], 1e-3 * x[2]),
-        PointLoad("d", 0, x[13], follows=True),
-        LineLoad("bf", 1.0, x[15]),
+        el.PointLoad("b", 0.2, 3 * x[13], 1e-3 * x[2]),
+        el.PointLoad("d", 0, x[13], follows=True),
+        el.LineLoad("bf", 1.0, x[15]),
     )
-    return zoo(x), Loading(loads, np.array([0.5, 1.0]))
+    return zoo(x), el.Loading(loads, np.array([0.5, 1.0]))

@@ -147,6 +147,11 @@ def test_mechanisms_with_contacts_are_not_solved_twice_in_a_study(monkeypatch):
     assert not list(beams_in_rows.solve_rows([gripper(), leaf_at_a_stop()]))
 
 
+def test_a_stop_of_a_rotation_beside_the_contact_is_no_reason_to_refuse_a_search():
+    stop = {"lock": {"node": "tip", "rotation": True, "gap": "10 deg"}}
+    assert "lock" in gripper().replace({"mechanism.stops": stop}).mechanism.stops
+
+
 @pytest.mark.parametrize(
     ("changes", "place", "says"),
     [

@@ -94,3 +94,9 @@ def test_forces_under_a_torque_are_those_along_x_and_y():
         (line,) = [line for line in ax.lines if len(line.get_ydata()) > 2]
         np.testing.assert_allclose(line.get_ydata(), result.curve.extra[f"beam_force_{column}"].values, atol=1e-9)
         assert ax.get_ylabel() == f"{name} [N]"
+
+
+@pytest.mark.parametrize(("changes", "lines"), [((), 2), (("analysis.window=null",), 0)])
+def test_the_nominal_force_of_the_paper_is_drawn_within_a_stated_window(changes, lines):
+    figure = drawn(config("beam_end_effector", *changes), "curve")
+    assert sum("F_d" in text.get_text() for text in figure.findobj(Text)) == lines

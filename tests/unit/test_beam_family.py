@@ -421,6 +421,7 @@ def test_a_tip_that_leaves_the_surface_is_not_out_of_reach():
     assert falls.curves[1].extra["contact_force"].values.min() >= 0
     far = solved("beam_end_effector", "analysis.surface.preload=3 mm")
     assert {"surface_out_of_reach"} == {"tip_lifts_off", "surface_out_of_reach"} & warned(far).keys()
+    assert warned(far)["surface_out_of_reach"].endswith("the mechanism is solved for 0 mm to 5.5 mm")
 
 
 def test_a_surface_that_rises_too_far_is_partial():
@@ -502,7 +503,7 @@ def test_thinner_beams_for_the_same_force_reach_further_at_the_same_stress():
 
 def test_the_force_wanted_is_reached_with_stretching_too_and_the_error_of_equation_6_is_told():
     changes = ("mechanism.axial=true", "design.rescale.force=12 N", "design.rescale.free=thickness")
-    design = family("beam").design(config("beam_lan2010", *changes), Run())  # before its digits are rounded
+    design = family("beam").design.make(config("beam_lan2010", *changes), Run())  # before its digits are rounded
     assert value(cfmkit.analyze(design.spec), "nominal_force") == pytest.approx(12, rel=1e-8)
     assert "off by" in {item.name: item.message for item in design.warnings}["rescale_approximate"]
 

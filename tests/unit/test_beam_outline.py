@@ -53,6 +53,20 @@ def test_a_straight_cantilever_has_the_area_of_its_strip_and_its_pad():
     assert area(contours) == pytest.approx((400 + 16) * 1e-6, rel=1e-9)
 
 
+@pytest.mark.parametrize(("curvature", "straight"), [(0.0, True), (2.0, False)])
+def test_a_strip_far_from_the_origin_knows_its_corners_and_whether_it_is_straight(curvature, straight):
+    s = np.linspace(0, 50 * MM, 11)
+    angle = 0.3 + curvature * s
+    points = np.array([0.2, -0.1]) + np.column_stack([np.cos(angle), np.sin(angle)]).cumsum(axis=0) * s[1]
+    even = np.ones(11)
+    strip = strip_module.BeamStrip(points, angle, MM * even, curvature * even, 0 * even)
+    assert strip.straight is straight
+    _, end, _, start = strip.edges
+    left, right = strip.sides
+    assert (end.start, end.end) == (tuple(right[-1]), tuple(left[-1]))
+    assert (start.start, start.end) == (tuple(left[0]), tuple(right[0]))
+
+
 def test_the_drawing_says_what_its_beams_are_made_of():
     second = ("end: tip}", "end: tip, material: pom}\n    other: {start: tip, end: far, material: steel-1.4310}")
     far = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm]}\n    far: {at: [500 mm, 0 mm]}")

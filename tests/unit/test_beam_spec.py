@@ -10,6 +10,7 @@ from beam_support import CANTILEVER, CONFIGS, cantilever, config
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
+from cfmkit.families.beam.network_from_spec import resolve
 from cfmkit.specs.keys_and_schema import keys
 from cfmkit.studies.variable_paths import leaf, paths
 
@@ -158,6 +159,20 @@ def test_switches_choose_the_model_and_the_stress():
     both = cantilever(("width: 100 mm", "width: 100 mm\n  axial: true\n  shear: true"))
     assert both.fidelity == "reissner"
     assert both.replace({"analysis.fidelity": "inextensible"}).fidelity == "inextensible"
+
+
+@pytest.mark.parametrize(
+    ("fidelity", "switches"),
+    [
+        ("inextensible", (False, False)),
+        ("extensible", (True, False)),
+        ("reissner", (True, True)),
+        ("solid", (True, True)),
+    ],
+)
+def test_a_model_is_written_out_as_its_switches(fidelity, switches):
+    mechanism = resolve(cantilever(("analysis:", f"analysis:\n  fidelity: {fidelity}"))).mechanism
+    assert (mechanism.axial, mechanism.shear) == switches
 
 
 def test_values_below_names_are_found_by_their_path():

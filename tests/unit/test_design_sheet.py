@@ -4,7 +4,6 @@ import pytest
 
 import cfmkit
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.metrics import check
 from cfmkit.results import Status
 
@@ -108,6 +107,6 @@ def test_what_a_rescaled_sheet_cannot_have_is_named(wanted):
 )
 def test_no_margin_moves_a_width_that_a_sheet_has(name, sheet, widths):
     spec = cut(name, sheet, widths)
-    moving = function_named(family(spec.family).free)(spec, spec)
+    moving = family(spec.family).free(spec, spec)
     assert moving
     assert not any(path.endswith("width") for path in moving)

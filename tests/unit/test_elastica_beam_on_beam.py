@@ -28,6 +28,7 @@ from cfmkit.elastica import (
     slider_support,
     trace,
 )
+from cfmkit.elastica.contact.sliding import SlidingEquations
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam, NodeOnObstacle, line
@@ -174,7 +175,7 @@ def test_the_tangent_of_two_sides_that_touch_is_the_derivative_of_the_residual()
         BULGE, Loading(TIP_LOAD, np.array([1.0])), flanks=[FlankPlace(UPPER, 0.5), FlankPlace(LOWER, 0.4)]
     )
     mesh = replace(mesh, contacts=tuple(contact._replace(closed=True) for contact in mesh.contacts))
-    equation = equations(mesh)
+    equation = SlidingEquations.from_mesh(mesh, False, equations)
     free = 0.02 * np.random.default_rng(2).normal(size=equation.n)
     for contact, place in zip(mesh.contacts, (0.5, 0.4), strict=True):
         free[equation.slots[[contact.slide, contact.unknown, contact.flag]]] = place, 0.7, 0

@@ -1,4 +1,4 @@
-"""Sides of beams on obstacles in compiled code beside those in numpy: equations, gaps, states on other elements."""
+"""Sides of beams that touch, in compiled code beside those in numpy: equations, gaps, states on other elements."""
 
 from __future__ import annotations
 
@@ -13,19 +13,33 @@ from cfmkit.elastica import (
     CLAMPED_SUPPORT,
     Beam,
     Control,
+    Displacement,
     LineLoad,
+    Link,
     Loading,
     Network,
     Node,
     PointLoad,
     Polynomial,
+    slider_support,
     trace,
 )
-from cfmkit.elastica.contact.side_gaps import NEAR_GAP, LoadStage, SideGaps, carry
+from cfmkit.elastica.contact.carried_states import carry
+from cfmkit.elastica.contact.pair_gaps import make_gaps
+from cfmkit.elastica.contact.side_gaps import NEAR_GAP, LoadStage
 from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE, CompiledEquations, load_compiled
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import CompiledSides, equations
-from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, circle, line, polyline
+from cfmkit.elastica.model.contact import (
+    BeamOnBeam,
+    BeamOnObstacle,
+    BeamSide,
+    NodeOnBeam,
+    NodeOnObstacle,
+    circle,
+    line,
+    polyline,
+)
 
 pytestmark = pytest.mark.skipif(load_compiled() is None, reason="the compiled module was not built")
 OUTLINES = {
@@ -34,6 +48,8 @@ OUTLINES = {
     "hole": circle((0.0, 0.0), 1.4, hole=True),
 }
 SHAPES = {"straight": Polynomial(), "curved": Polynomial((0.1, 0.4, 0.2))}
+LEAF_PLACES = FlankPlace(0, 0.3), FlankPlace(1, 0.7), FlankPlace(3, 0.4), FlankPlace(2, 0.6)
+DRIVE = np.array([0.3])
 SECTIONS = {"stiff": THIN_SECTION, "soft": replace(THIN_SECTION, axial=True, shear=True)}
 
 
@@ -54,6 +70,25 @@ def touching(closed: bool | None, places: tuple[float, ...] = (0.35, 0.6, 0.8), 
     return replace(mesh, contacts=tuple(contact._replace(closed=closed) for contact in mesh.contacts))
 
 
+def leaves_that_touch(closed: bool | None, places: tuple[float, ...] = (0.3, 0.7, 0.6, 0.4)) -> Discretisation:
+    """Return two leaves that touch each other, a pad that is driven, and one on an arm."""
+    nodes = {
+        "root": Node(0.0, 0.0, CLAMPED_SUPPORT), "tip": Node(1.0, 0.0), "arm": Node(1.05, 0.1),
+        "wall": Node(0.0, 0.05, CLAMPED_SUPPORT), "end": Node(1.2, 0.05), "post": Node(0.4, -0.1, slider_support(1.5)),
+    }  # fmt: skip
+    beams = {
+        "lower": Beam("root", "tip", SECTIONS["soft"], SHAPES["curved"]),
+        "upper": Beam("wall", "end", THIN_SECTION),
+    }
+    contacts = (
+        NodeOnBeam("post", "post", "lower", 0.02), BeamOnBeam("pair", "lower", "upper"),
+        BeamOnBeam("pair", "upper", "lower", leads=False), NodeOnBeam("arm", "arm", "upper", 0.01),
+    )  # fmt: skip
+    net = Network(nodes, beams, links=(Link("tip", "arm"),), loads=(LineLoad("lower", 0.3, -0.8),), contacts=contacts)
+    mesh = discretise(net, Displacement("post", 1.5, np.array([0.1])), 7, flanks=places)
+    return replace(mesh, contacts=tuple(contact._replace(closed=closed) for contact in mesh.contacts))
+
+
 def random_states(mesh: Discretisation, count: int) -> Any:
     """Return states with places of contacts beside where the elements end, and forces of either sign."""
     rng = np.random.default_rng(3)
@@ -71,7 +106,17 @@ def random_states(mesh: Discretisation, count: int) -> Any:
 @pytest.mark.parametrize("closed", [None, True])
 @pytest.mark.parametrize("ramp", [False, True])
 def test_equations_of_sides_are_those_of_numpy(shape: str, section: str, closed: bool | None, ramp: bool) -> None:
-    mesh = touching(closed, shape=shape, section=section)
+    check_equations(touching(closed, shape=shape, section=section), ramp)
+
+
+@pytest.mark.parametrize("closed", [None, True])
+@pytest.mark.parametrize("ramp", [False, True])
+def test_equations_of_pads_on_beams_and_of_two_beams_are_those_of_numpy(closed: bool | None, ramp: bool) -> None:
+    check_equations(leaves_that_touch(closed, LEAF_PLACES), ramp)
+
+
+def check_equations(mesh: Discretisation, ramp: bool) -> None:
+    """Both have the same residual, tangent, solutions and unstable directions."""
     compiled = equations(mesh, ramp)
     assert isinstance(compiled, CompiledSides)
     for z in random_states(mesh, 5):
@@ -82,21 +127,39 @@ def test_equations_of_sides_are_those_of_numpy(shape: str, section: str, closed:
         solutions, unstable = CompiledEquations.resolve(compiled, free, 0.3, np.ones((1, compiled.n)))
         assert unstable == right.count_unstable(in_numpy)
         assert solutions == pytest.approx(right.resolve(free, 0.3, np.ones((1, compiled.n)))[0], rel=1e-8)
+        forces = [contact.unknown for contact in mesh.contacts]
+        z[forces] = np.abs(z[forces])
+        gradient, its = CompiledEquations.gradients(compiled, z[None], DRIVE), right.gradients(z[None], DRIVE)
+        assert gradient == pytest.approx(its, abs=1e-12 * np.abs(its).max())
 
 
 @pytest.mark.parametrize("flanks", [(), (0.35, 0.6, 0.8)])
 def test_least_gaps_of_sides_are_those_of_numpy(flanks: tuple[float, ...]) -> None:
     mesh = touching(None, flanks, shape="curved", section="soft")
-    states, stage = random_states(mesh, 20), LoadStage(np.linspace(0, 1, 20))
+    check_gaps(mesh, random_states(mesh, 20), LoadStage(np.linspace(0, 1, 20)))
+
+
+@pytest.mark.parametrize("places", [(), LEAF_PLACES])
+def test_least_gaps_of_pads_on_beams_and_of_two_beams_are_those_of_numpy(places: tuple[FlankPlace, ...]) -> None:
+    whole, stage = leaves_that_touch(None, ()), LoadStage(np.linspace(0, 1, 20))
+    mesh = leaves_that_touch(None, places)
+    check_gaps(mesh, carry(whole, random_states(whole, 20), stage, mesh), stage)  # lines are continuous
+
+
+def check_gaps(mesh: Discretisation, states: Any, stage: LoadStage) -> None:
+    """Both find the same least gaps and places, of states near and far."""
     counts = np.zeros(2, int)
-    for item in mesh.fits.network.contacts[1:]:
-        fast, right = SideGaps(mesh, item, (0,)), SideGaps(mesh, item, (0,))
-        vars(right)["_side"] = None
+    for item in mesh.fits.network.contacts:
+        if not isinstance(item, BeamSide):
+            continue
+        fast, right = make_gaps(mesh, item, (0,)), make_gaps(mesh, item, (0,))
+        vars(right)["packed"] = None
         assert fast._search(states, stage) is not None
         least = right.least(states, stage)
         assert fast.least(states, stage) == pytest.approx(least, abs=1e-13)
         watched, near = fast.least(states, stage, watch=True), least < NEAR_GAP
-        assert watched[near] == pytest.approx(least[near], abs=1e-13)
+        assert watched[near & (least > -NEAR_GAP)] == pytest.approx(least[near & (least > -NEAR_GAP)], abs=1e-13)
+        assert (watched[near] < NEAR_GAP).all()
         assert (watched[~near] >= NEAR_GAP).all()
         assert (watched[~near] <= least[~near]).all()
         counts += int(near.sum()), int((~near).sum())

@@ -8,53 +8,37 @@ import numpy as np
 import pytest
 from corotational import recheck
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Link,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    Polynomial,
-    Section,
-    Taper,
-    TorsionSpring,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.results.equilibria_near_known_path import drive_slope, solve_near_known_path
 from cfmkit.errors import InputError
 
-DOWN = Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 9e-3]))
+DOWN = el.Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 9e-3]))
 
 
-def frame(thickness: float = 1.2e-3, bend: float = 0.7, springs: tuple[TorsionSpring, ...] = ()) -> Network:
+def frame(thickness: float = 1.2e-3, bend: float = 0.7, springs: tuple[el.TorsionSpring, ...] = ()) -> el.Network:
     """Return curved and tapered beams with a linked node, a turned frame and an offset."""
-    section = Section(2e9, 8e-3, Taper(np.array([0, 0.5, 1]), np.array([1e-3, thickness, 1.1e-3])), shear=True)
+    section = el.Section(2e9, 8e-3, el.Taper(np.array([0, 0.5, 1]), np.array([1e-3, thickness, 1.1e-3])), shear=True)
     nodes = {
-        "a": Node(0, 0, CLAMPED_SUPPORT),
-        "b": Node(0.05, 0.02),
-        "bb": Node(0.055, 0.025),
-        "c": Node(0.1, 0.0, CLAMPED_SUPPORT),
-        "d": Node(0.06, 0.08, slider_support(np.pi / 2)),
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "b": el.Node(0.05, 0.02),
+        "bb": el.Node(0.055, 0.025),
+        "c": el.Node(0.1, 0.0, el.CLAMPED_SUPPORT),
+        "d": el.Node(0.06, 0.08, el.slider_support(np.pi / 2)),
     }
     beams = {
-        "ab": Beam("a", "b", section, Polynomial((0.0, bend)), end_offset=(0.003, 0.001)),
-        "bc": Beam("bb", "c", section),
-        "bd": Beam("b", "d", section),
+        "ab": el.Beam("a", "b", section, el.Polynomial((0.0, bend)), end_offset=(0.003, 0.001)),
+        "bc": el.Beam("bb", "c", section),
+        "bd": el.Beam("b", "d", section),
     }
-    return Network(nodes, beams, links=(Link("b", "bb"),), springs=springs)
+    return el.Network(nodes, beams, links=(el.Link("b", "bb"),), springs=springs)
 
 
 @pytest.fixture(scope="module")
-def path() -> Path:
-    return trace(frame(), DOWN, Control(tolerance=1e-9))
+def path() -> el.Path:
+    return el.trace(frame(), DOWN, el.Control(tolerance=1e-9))
 
 
-def test_elements_agree_with_the_engine(path: Path) -> None:
+def test_elements_agree_with_the_engine(path: el.Path) -> None:
     found = recheck(path, elements=60)
     at = path.at_requested
     np.testing.assert_allclose(found.effort, path.effort[at], rtol=5e-6)
@@ -70,14 +54,14 @@ def test_elements_agree_with_the_engine_on_curved_and_tapered_wide_strips(width:
         name: replace(beam, section=replace(beam.section, width=width, wide=True))
         for name, beam in narrow.beams.items()
     }
-    path = trace(replace(narrow, beams=beams), DOWN, Control(tolerance=1e-9))
+    path = el.trace(replace(narrow, beams=beams), DOWN, el.Control(tolerance=1e-9))
     found, at = recheck(path, elements=60), path.at_requested
     np.testing.assert_allclose(found.effort, path.effort[at], rtol=1e-5)
     np.testing.assert_allclose(found.stress, path.peak_stress().value[at], rtol=5e-4)
     assert found.stable.all()
 
 
-def test_the_error_of_the_elements_falls_until_only_the_theories_differ(path: Path) -> None:
+def test_the_error_of_the_elements_falls_until_only_the_theories_differ(path: el.Path) -> None:
     """The two theories measure shear and stretch in frames that differ by the shear angle: about 1e-6 here."""
     exact = path.effort[path.at_requested[-1]]
     coarse, middle, fine = (abs(recheck(path, path.at_requested[-1:], n).effort[0] / exact - 1) for n in (12, 24, 48))
@@ -87,47 +71,48 @@ def test_the_error_of_the_elements_falls_until_only_the_theories_differ(path: Pa
 
 
 def test_elements_find_an_unstable_equilibrium_unstable() -> None:
-    straight = Network(
-        {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.1, 0.0, slider_support(0.0))},
-        {"x": Beam("a", "d", Section(2e9, 8e-3, Taper(np.array([0, 1.0]), np.array([1e-3, 1.05e-3]))))},
+    straight = el.Network(
+        {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "d": el.Node(0.1, 0.0, el.slider_support(0.0))},
+        {"x": el.Beam("a", "d", el.Section(2e9, 8e-3, el.Taper(np.array([0, 1.0]), np.array([1e-3, 1.05e-3]))))},
     )
-    pressed = Displacement("d", np.pi, np.array([1e-6, 2e-3]))
-    on, off = (trace(straight, pressed, Control(branch=branch)) for branch in ("primary", "stable"))  # type: ignore[arg-type]
+    pressed = el.Displacement("d", np.pi, np.array([1e-6, 2e-3]))
+    on, off = (el.trace(straight, pressed, el.Control(branch=branch)) for branch in ("primary", "stable"))  # type: ignore[arg-type]
     assert recheck(on).stable.tolist() == [True, False]
     assert recheck(off).stable.tolist() == [True, True]
 
 
 def test_elements_refuse_what_they_do_not_have() -> None:
     with pytest.raises(InputError, match="beams, links and supports"):
-        recheck(trace(frame(springs=(TorsionSpring(None, "b", 0.01),)), DOWN))
+        recheck(el.trace(frame(springs=(el.TorsionSpring(None, "b", 0.01),)), DOWN))
 
 
-def test_neighbours_are_the_equilibria_of_the_other_network(path: Path) -> None:
+def test_neighbours_are_the_equilibria_of_the_other_network(path: el.Path) -> None:
     other = frame(1.35e-3, 0.72)
-    again = trace(other, DOWN, Control(tolerance=1e-9))
+    again = el.trace(other, DOWN, el.Control(tolerance=1e-9))
     found = solve_near_known_path(path, other, DOWN)
-    assert found.status is PathStatus.COMPLETE
+    assert found.status is el.PathStatus.COMPLETE
     np.testing.assert_allclose(found.effort, again.effort[again.at_requested], rtol=1e-8)
     np.testing.assert_allclose(found.motion("bb"), again.motion("bb")[again.at_requested], atol=1e-9)
     np.testing.assert_allclose(found.peak_stress().value, again.peak_stress().value[again.at_requested], rtol=1e-7)
 
 
-def test_a_neighbour_too_far_away_is_lost_and_not_made_up(path: Path) -> None:
-    found = solve_near_known_path(path, frame(), Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 70e-3])))
-    assert found.status is PathStatus.LOST
+def test_a_neighbour_too_far_away_is_lost_and_not_made_up(path: el.Path) -> None:
+    found = solve_near_known_path(path, frame(), el.Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 70e-3])))
+    assert found.status is el.PathStatus.LOST
     assert "0.07" in found.message
     assert len(found) == 2
 
 
-def test_neighbours_must_be_of_one_kind(path: Path) -> None:
+def test_neighbours_must_be_of_one_kind(path: el.Path) -> None:
     with pytest.raises(InputError, match="same kind"):
-        solve_near_known_path(path, frame(), Displacement("d", -np.pi / 2, np.array([1e-3])))
+        solve_near_known_path(path, frame(), el.Displacement("d", -np.pi / 2, np.array([1e-3])))
 
 
-def test_slope_of_the_force_is_that_of_differences(path: Path) -> None:
+def test_slope_of_the_force_is_that_of_differences(path: el.Path) -> None:
     h = 1e-6
     sides = [
-        trace(frame(), Displacement("d", -np.pi / 2, DOWN.points + step), Control(tolerance=1e-11)) for step in (-h, h)
+        el.trace(frame(), el.Displacement("d", -np.pi / 2, DOWN.points + step), el.Control(tolerance=1e-11))
+        for step in (-h, h)
     ]
     low, high = (side.effort[side.at_requested] for side in sides)
     np.testing.assert_allclose(drive_slope(path), (high - low) / (2 * h), rtol=1e-5)
@@ -137,13 +122,13 @@ def test_a_perfect_v_beam_on_its_bifurcated_branch_agrees_with_corotational_elem
     """Forces and stability there, and on the symmetric branch that is left."""
     length, angle = 35e-3, np.radians(7)
     nodes = {
-        "wall": Node(0, 0, CLAMPED_SUPPORT),
-        "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
+        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "d": el.Node(length * np.cos(angle), length * np.sin(angle), el.slider_support(np.pi / 2)),
     }
-    network = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, 1e-3))})
-    drive = Displacement("d", -np.pi / 2, np.array([0.5e-3, 2e-3, 3e-3, 4e-3, 6e-3]))
-    stable = trace(network, drive, Control(tolerance=1e-9))
-    symmetric = trace(network, drive, Control(tolerance=1e-9, branch="primary"))
+    network = el.Network(nodes, {"v": el.Beam("wall", "d", el.Section(1477e6, 6e-3, 1e-3))})
+    drive = el.Displacement("d", -np.pi / 2, np.array([0.5e-3, 2e-3, 3e-3, 4e-3, 6e-3]))
+    stable = el.trace(network, drive, el.Control(tolerance=1e-9))
+    symmetric = el.trace(network, drive, el.Control(tolerance=1e-9, branch="primary"))
     found, other = recheck(stable, elements=60), recheck(symmetric, elements=60)
     force = stable.effort[stable.at_requested]
     np.testing.assert_allclose(found.effort, force, atol=3e-5 * np.abs(force).max())

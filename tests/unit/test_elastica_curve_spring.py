@@ -6,19 +6,7 @@ import numpy as np
 import pytest
 from functional_paths import functional_path
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Displacement,
-    Link,
-    Loading,
-    Network,
-    Node,
-    PointLoad,
-    Section,
-    SlideSpring,
-    slider_support,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.curve_spring import CurveSpring
 from cfmkit.elastica.mechanics.discretise import discretise
@@ -26,23 +14,23 @@ from cfmkit.elastica.mechanics.equations import NumpyEquations
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.errors import InputError
 
-STRIP = Section(2e9, 1e-2, 1e-3)
+STRIP = el.Section(2e9, 1e-2, 1e-3)
 CURVE = CurveSpring("tip", np.pi / 2, (-5e-3, 0.0, 5e-3, 1e-2, 2e-2), (-2.0, 0.0, 1.0, 1.1, 6.0))
 
 
-def leaf(*springs: object, arm: bool = False) -> Network:
+def leaf(*springs: object, arm: bool = False) -> el.Network:
     """Return a guided leaf; with an arm the spring acts at the arm's end."""
     nodes = {
-        "a": Node(0, 0, CLAMPED_SUPPORT),
-        "b": Node(0.1, 0, slider_support(np.pi / 2)),
-        "tip": Node(0.11 if arm else 0.1, 0),
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "b": el.Node(0.1, 0, el.slider_support(np.pi / 2)),
+        "tip": el.Node(0.11 if arm else 0.1, 0),
     }
-    return Network(nodes, {"x": Beam("a", "b", STRIP)}, (Link("b", "tip"),), springs)  # type: ignore[arg-type]
+    return el.Network(nodes, {"x": el.Beam("a", "b", STRIP)}, (el.Link("b", "tip"),), springs)  # type: ignore[arg-type]
 
 
 def test_the_force_of_the_spring_adds_to_that_of_the_leaf() -> None:
     """Node and spring move alike: the efforts differ by the curve, on it and beyond its end."""
-    drive = Displacement("b", np.pi / 2, np.array([2e-3, 7e-3, 1.5e-2, 2.2e-2]))
+    drive = el.Displacement("b", np.pi / 2, np.array([2e-3, 7e-3, 1.5e-2, 2.2e-2]))
     bare, sprung = functional_path(leaf(), drive, 10), functional_path(leaf(CURVE), drive, 10)
     forces = [CURVE.evaluate(u)[1] for u in drive.points]
     assert sprung.effort - bare.effort == pytest.approx(forces, rel=1e-9)
@@ -52,8 +40,8 @@ def test_the_force_of_the_spring_adds_to_that_of_the_leaf() -> None:
 
 def test_a_straight_curve_is_a_linear_spring() -> None:
     straight = CurveSpring("tip", 0.3, (-1e-2, 0.0, 1e-2), (-0.8, 0.0, 0.8))
-    load = Loading((PointLoad("b", fy=1.0),), np.array([0.5]))
-    linear = functional_path(leaf(SlideSpring("tip", 0.3, 80.0), arm=True), load, 10)
+    load = el.Loading((el.PointLoad("b", fy=1.0),), np.array([0.5]))
+    linear = functional_path(leaf(el.SlideSpring("tip", 0.3, 80.0), arm=True), load, 10)
     curved = functional_path(leaf(straight, arm=True), load, 10)
     assert curved.motion("tip") == pytest.approx(linear.motion("tip"), rel=1e-9, abs=1e-13)
     assert isinstance(equations(linear.mesh), NumpyEquations)
@@ -61,7 +49,7 @@ def test_a_straight_curve_is_a_linear_spring() -> None:
 
 
 def test_gradient_and_hessian_are_the_derivatives_of_the_energy() -> None:
-    network = discretise(leaf(CURVE, arm=True), Loading((PointLoad("b", fy=1.0),), np.array([0.5])), 4)
+    network = discretise(leaf(CURVE, arm=True), el.Loading((el.PointLoad("b", fy=1.0),), np.array([0.5])), 4)
     (spring,) = network.springs
     from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
 

@@ -10,31 +10,16 @@ import pytest
 from beam_equilibrium import Judge, mean_motion
 from beam_networks import drives, network
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    LineLoad,
-    Loading,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    PointLoad,
-    Section,
-    Support,
-    Taper,
-    trace,
-)
+import cfmkit.elastica as el
 
-FINE = Control(tolerance=1e-9)
+FINE = el.Control(tolerance=1e-9)
 
 
-def solved(net: Any, drive: Any, points: Any = None) -> Path:
+def solved(net: Any, drive: Any, points: Any = None) -> el.Path:
     if points is not None:
         drive = dataclasses.replace(drive, points=points)
-    path = trace(net, drive, FINE)
-    assert path.status is PathStatus.COMPLETE, path.message
+    path = el.trace(net, drive, FINE)
+    assert path.status is el.PathStatus.COMPLETE, path.message
     return path
 
 
@@ -56,14 +41,14 @@ def test_every_beam_and_every_body_is_in_equilibrium(seed: int, kind: int) -> No
         np.testing.assert_allclose(total / forces, 0.0, atol=1e-9 * largest)
 
 
-def dead_work(path: Path, point: int) -> float:
+def dead_work(path: el.Path, point: int) -> float:
     """Return the work of the constant dead loads up to a point, from the first."""
     total = 0.0
     for load in path.network.loads:
-        if isinstance(load, PointLoad):
+        if isinstance(load, el.PointLoad):
             moved = path.motion(load.node)[point] - path.motion(load.node)[0]
             total += float(np.dot([load.fx, load.fy, load.moment], moved))
-        elif isinstance(load, LineLoad):
+        elif isinstance(load, el.LineLoad):
             moved = mean_motion(path, load.beam)
             total += float((moved[point] - moved[0]) @ [load.wx, load.wy])
     return total
@@ -88,29 +73,31 @@ def test_energy_grows_by_the_work_of_the_drive_and_of_dead_loads(seed: int, kind
 def test_energy_grows_by_the_work_of_dead_loads_that_are_driven() -> None:
     """The factor's work: its effort is the loads' displacement by unit factor, less that at the start."""
     net = network(2, follower=False)
-    loads = (PointLoad("bb", 0.1, -0.15, 2e-3), PointLoad("d", 0.05, 0.1), LineLoad("cd", 3.0, 5.0))
+    loads = (el.PointLoad("bb", 0.1, -0.15, 2e-3), el.PointLoad("d", 0.05, 0.1), el.LineLoad("cd", 3.0, 5.0))
     nodes, weights = np.polynomial.legendre.leggauss(12)
-    path = solved(net, Loading(loads, np.array([0.0, *(0.5 * (nodes + 1)), 1.0])))
+    path = solved(net, el.Loading(loads, np.array([0.0, *(0.5 * (nodes + 1)), 1.0])))
     at = path.at_requested
     shift = path.effort[at] - path.effort[0]
     work = shift[-1] - 0.5 * weights @ shift[1:-1]
     assert path.energy[at[-1]] - path.energy[0] == pytest.approx(work + dead_work(path, int(at[-1])), rel=1e-7)
 
 
-def pulled_strip(thin: float) -> Path:
+def pulled_strip(thin: float) -> el.Path:
     """Return a clamped strip whose thickness at a quarter of its length is `thin` [m], its end pulled."""
-    thickness = Taper(np.linspace(0, 1, 5), np.array([1e-3, thin, 0.9e-3, 1.1e-3, 1e-3]))
-    section = Section(1.8e9, 5e-3, thickness, shear=True)
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.12, 0.0, Support(rotation=True))}
-    net = Network(nodes, {"ab": Beam("a", "b", section)})
-    return trace(net, Loading((PointLoad("b", 2.0, 0.1),), np.linspace(0.1, 1.0, 10)), Control(tolerance=1e-7))
+    thickness = el.Taper(np.linspace(0, 1, 5), np.array([1e-3, thin, 0.9e-3, 1.1e-3, 1e-3]))
+    section = el.Section(1.8e9, 5e-3, thickness, shear=True)
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.12, 0.0, el.Support(rotation=True))}
+    net = el.Network(nodes, {"ab": el.Beam("a", "b", section)})
+    return el.trace(
+        net, el.Loading((el.PointLoad("b", 2.0, 0.1),), np.linspace(0.1, 1.0, 10)), el.Control(tolerance=1e-7)
+    )
 
 
 @pytest.mark.parametrize("thin", [0.1e-3, 0.04e-3])
 def test_a_strip_with_a_thin_place_is_in_equilibrium(thin: float) -> None:
     """The thin place bears a thousandth of what its neighbours do."""
     path = pulled_strip(thin)
-    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.error <= 1e-7
     judge = Judge(path, -1)
     gap, _ = judge.gaps("ab")

@@ -6,35 +6,20 @@ import numpy as np
 import pytest
 from scipy.special import ellipe, ellipk
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    PINNED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    PointLoad,
-    Section,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.errors import InputError
 
 TRAVEL = np.arange(1, 13) * 0.5e-3
 
 
-def pressed(imperfection: float = 0.0, thickness: float = 1e-3) -> Path:
+def pressed(imperfection: float = 0.0, thickness: float = 1e-3) -> el.Path:
     length, angle = 35e-3, np.radians(7)
     nodes = {
-        "wall": Node(0, 0, CLAMPED_SUPPORT),
-        "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
+        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "d": el.Node(length * np.cos(angle), length * np.sin(angle), el.slider_support(np.pi / 2)),
     }
-    network = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, thickness))})
-    return trace(network, Displacement("d", -np.pi / 2, TRAVEL), Control(imperfection=imperfection))
+    network = el.Network(nodes, {"v": el.Beam("wall", "d", el.Section(1477e6, 6e-3, thickness))})
+    return el.trace(network, el.Displacement("d", -np.pi / 2, TRAVEL), el.Control(imperfection=imperfection))
 
 
 def test_an_imperfect_v_beam_is_stable_without_bifurcations_and_says_so() -> None:
@@ -80,25 +65,29 @@ def test_a_path_without_bifurcation_gets_no_imperfection_and_says_so() -> None:
 
 def test_an_imperfection_must_be_finite() -> None:
     with pytest.raises(InputError, match="imperfection"):
-        Control(imperfection=np.nan)
+        el.Control(imperfection=np.nan)
 
 
 LENGTH = 0.1
 
 
-def column(slenderness: float, clamped: bool, cut: float | None = None, arm: float = 0.0) -> Network:
+def column(slenderness: float, clamped: bool, cut: float | None = None, arm: float = 0.0) -> el.Network:
     """Return a straight column, perhaps of two beams, which may be held by rigid arms at the node between them."""
-    section = Section(2e9, 10e-3, LENGTH * np.sqrt(12) / slenderness)
-    ends = (CLAMPED_SUPPORT, slider_support(0.0)) if clamped else (PINNED_SUPPORT, slider_support(0.0, rotates=True))
-    nodes = {"a": Node(0, 0, ends[0]), "b": Node(LENGTH, 0, ends[1])}
+    section = el.Section(2e9, 10e-3, LENGTH * np.sqrt(12) / slenderness)
+    ends = (
+        (el.CLAMPED_SUPPORT, el.slider_support(0.0))
+        if clamped
+        else (el.PINNED_SUPPORT, el.slider_support(0.0, rotates=True))
+    )
+    nodes = {"a": el.Node(0, 0, ends[0]), "b": el.Node(LENGTH, 0, ends[1])}
     if cut is None:
-        return Network(nodes, {"x": Beam("a", "b", section)})
-    nodes["m"] = Node(cut * LENGTH, arm)
+        return el.Network(nodes, {"x": el.Beam("a", "b", section)})
+    nodes["m"] = el.Node(cut * LENGTH, arm)
     halves = {
-        "x": Beam("a", "m", section, end_offset=(0.0, -arm)),
-        "y": Beam("m", "b", section, start_offset=(0.0, -arm)),
+        "x": el.Beam("a", "m", section, end_offset=(0.0, -arm)),
+        "y": el.Beam("m", "b", section, start_offset=(0.0, -arm)),
     }
-    return Network(nodes, halves)
+    return el.Network(nodes, halves)
 
 
 @pytest.mark.parametrize("arm", [0.0, 4e-3])
@@ -108,9 +97,12 @@ def column(slenderness: float, clamped: bool, cut: float | None = None, arm: flo
 def test_a_column_of_two_beams_is_bent_as_one_beam_is(cut: float, clamped: bool, share: float, arm: float) -> None:
     """The node between them takes its part in the mode, and so do arms on it; to first order, of 0.03 rad here."""
     size = share * LENGTH * np.sqrt(12) / 100
-    drive, control = Displacement("b", np.pi, np.array([0.0065, 0.02, 0.1]) * LENGTH), Control(1e-5, imperfection=size)
-    whole, cut_up = (trace(net, drive, control) for net in (column(100, clamped), column(100, clamped, cut, arm)))
-    assert cut_up.status is PathStatus.COMPLETE, cut_up.message
+    drive, control = (
+        el.Displacement("b", np.pi, np.array([0.0065, 0.02, 0.1]) * LENGTH),
+        el.Control(1e-5, imperfection=size),
+    )
+    whole, cut_up = (el.trace(net, drive, control) for net in (column(100, clamped), column(100, clamped, cut, arm)))
+    assert cut_up.status is el.PathStatus.COMPLETE, cut_up.message
     assert cut_up.events == whole.events == ()
     assert not cut_up.unstable.any()
     expected = whole.effort[whole.at_requested]
@@ -127,14 +119,14 @@ def test_a_bent_column_under_a_force_goes_where_a_displacement_meets_that_force(
     net = column(slenderness, clamped, cut)
     thickness = LENGTH * np.sqrt(12) / slenderness
     critical = (4 if clamped else 1) * np.pi**2 * 2e9 * 10e-3 * thickness**3 / 12 / LENGTH**2
-    control = Control(1e-6, imperfection=0.05 * thickness)
+    control = el.Control(1e-6, imperfection=0.05 * thickness)
     factors = np.array([0.5, 0.97, 1.0, 1.02, 1.3, 2.0])
-    path = trace(net, Loading((PointLoad("b", fx=-critical),), factors), control)
-    assert path.status is PathStatus.COMPLETE, path.message
+    path = el.trace(net, el.Loading((el.PointLoad("b", fx=-critical),), factors), control)
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.events == ()
     assert not path.unstable.any()
     went = -path.motion("b")[path.at_requested, 0]
-    back = trace(net, Displacement("b", np.pi, went), control)
+    back = el.trace(net, el.Displacement("b", np.pi, went), control)
     assert back.events == ()
     np.testing.assert_allclose(back.effort[back.at_requested] / critical, factors, rtol=2e-5)
 
@@ -142,16 +134,20 @@ def test_a_bent_column_under_a_force_goes_where_a_displacement_meets_that_force(
 @pytest.mark.parametrize("clamped", [False, True])
 def test_a_column_that_does_not_stretch_buckles_under_a_displacement_once_it_is_bent(clamped: bool) -> None:
     """The perfect one is rigid until its critical load. Bent by 1e-5 of its length it is nearly so: closed form."""
-    section = Section(2e9, 10e-3, 1e-3, axial=False)
-    ends = (CLAMPED_SUPPORT, slider_support(0.0)) if clamped else (PINNED_SUPPORT, slider_support(0.0, rotates=True))
-    net = Network({"a": Node(0, 0, ends[0]), "b": Node(LENGTH, 0, ends[1])}, {"x": Beam("a", "b", section)})
+    section = el.Section(2e9, 10e-3, 1e-3, axial=False)
+    ends = (
+        (el.CLAMPED_SUPPORT, el.slider_support(0.0))
+        if clamped
+        else (el.PINNED_SUPPORT, el.slider_support(0.0, rotates=True))
+    )
+    net = el.Network({"a": el.Node(0, 0, ends[0]), "b": el.Node(LENGTH, 0, ends[1])}, {"x": el.Beam("a", "b", section)})
     modulus = np.sin(np.array([20.0, 50.0, 80.0]) * np.pi / 360) ** 2  # of the integrals, by the steepest slope
     shortened = 2 * (1 - ellipe(modulus) / ellipk(modulus)) * LENGTH
-    perfect = trace(net, Displacement("b", np.pi, shortened))
-    assert perfect.status is PathStatus.COMPLETE
+    perfect = el.trace(net, el.Displacement("b", np.pi, shortened))
+    assert perfect.status is el.PathStatus.COMPLETE
     critical = (4 if clamped else 1) * np.pi**2 * 2e9 * 10e-3 * 1e-3**3 / 12 / LENGTH**2
-    path = trace(net, Displacement("b", np.pi, shortened), Control(1e-7, imperfection=1e-5 * LENGTH))
-    assert path.status is PathStatus.COMPLETE, path.message
+    path = el.trace(net, el.Displacement("b", np.pi, shortened), el.Control(1e-7, imperfection=1e-5 * LENGTH))
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.imperfection == f"1e-06 m of the buckling mode under {critical:.4g} N"
     assert path.stable.all()
     expected = critical * (2 * ellipk(modulus) / np.pi) ** 2
@@ -160,15 +156,15 @@ def test_a_column_that_does_not_stretch_buckles_under_a_displacement_once_it_is_
 
 def test_a_beam_that_is_pulled_and_does_not_stretch_has_no_mode() -> None:
     """It is looked at under a pull up to 1e5 EI/L^2, and nothing buckles."""
-    section = Section(2e9, 10e-3, 1e-3, axial=False)
+    section = el.Section(2e9, 10e-3, 1e-3, axial=False)
     nodes = {
-        "a": Node(0, 0, CLAMPED_SUPPORT),
-        "b": Node(LENGTH, 0, slider_support(0.0)),
-        "c": Node(LENGTH / 2, LENGTH / 2),
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "b": el.Node(LENGTH, 0, el.slider_support(0.0)),
+        "c": el.Node(LENGTH / 2, LENGTH / 2),
     }
-    net = Network(nodes, {"x": Beam("a", "b", section), "y": Beam("a", "c", section)})
-    path = trace(net, Displacement("b", 0.0, np.array([1e-3])), Control(imperfection=1e-5))
-    assert path.status is PathStatus.NO_START
+    net = el.Network(nodes, {"x": el.Beam("a", "b", section), "y": el.Beam("a", "c", section)})
+    path = el.trace(net, el.Displacement("b", 0.0, np.array([1e-3])), el.Control(imperfection=1e-5))
+    assert path.status is el.PathStatus.NO_START
     assert path.imperfection == "none: the perfect path has no bifurcation"
 
 
@@ -176,10 +172,10 @@ def test_a_beam_that_is_pulled_and_does_not_stretch_has_no_mode() -> None:
 def test_a_long_first_step_leads_to_the_side_that_a_column_is_bent_to(slenderness: float) -> None:
     """One that jumps over the corner may come to lie on the mirror image, with the mean slope that is expected."""
     first = 26.6 * np.pi**2 / slenderness**2  # in critical shortenings
-    drive = Displacement("b", np.pi, np.array([first, 0.1]) * LENGTH)
+    drive = el.Displacement("b", np.pi, np.array([first, 0.1]) * LENGTH)
     bent = 0.0864 * LENGTH * np.sqrt(12) / slenderness
-    path = trace(column(slenderness, clamped=False), drive, Control(1e-4, imperfection=bent))
-    assert path.status is PathStatus.COMPLETE
+    path = el.trace(column(slenderness, clamped=False), drive, el.Control(1e-4, imperfection=bent))
+    assert path.status is el.PathStatus.COMPLETE
     assert np.sign(path.motion("a")[1:, 2]).tolist() == [np.sign(path.fits["x"].angle(0.0, 0.5))] * (len(path) - 1)
 
 
@@ -190,13 +186,13 @@ def test_a_strip_that_does_not_stretch_is_straight_up_to_its_critical_load(
     """Its poses change by rounding only, which leads nowhere."""
     c, s = np.cos(direction), np.sin(direction)
     nodes = {
-        "a": Node(0, 0, PINNED_SUPPORT),
-        "b": Node(LENGTH * c, LENGTH * s, slider_support(direction, rotates=True)),
+        "a": el.Node(0, 0, el.PINNED_SUPPORT),
+        "b": el.Node(LENGTH * c, LENGTH * s, el.slider_support(direction, rotates=True)),
     }
-    network = Network(nodes, {"x": Beam("a", "b", Section(2e9, 10e-3, 0.3e-3, axial=False))})
+    network = el.Network(nodes, {"x": el.Beam("a", "b", el.Section(2e9, 10e-3, 0.3e-3, axial=False))})
     critical = np.pi**2 * 2e9 * 10e-3 * 0.3e-3**3 / 12 / LENGTH**2
-    load = PointLoad("b", fx=-critical * c, fy=-critical * s)
-    path = trace(network, Loading((load,), np.array([0.3, 0.9, 1.2])), Control(1e-6, branch="primary"))
-    assert path.status is PathStatus.COMPLETE, path.message
+    load = el.PointLoad("b", fx=-critical * c, fy=-critical * s)
+    path = el.trace(network, el.Loading((load,), np.array([0.3, 0.9, 1.2])), el.Control(1e-6, branch="primary"))
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
     assert path.events[0].drive == pytest.approx(1.0, rel=1e-6)

@@ -19,24 +19,7 @@ from batch_networks import two_leaves
 from contact_layouts import with_pads
 
 import cfmkit
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    PointLoad,
-    Polynomial,
-    Rotation,
-    Section,
-    SlideSpring,
-    Taper,
-    arc,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
 from cfmkit.elastica.contact.terms import gaps
 from cfmkit.elastica.mechanics import energy
@@ -118,9 +101,9 @@ def test_stops_and_pads_of_c_and_numpy_are_equal_on_random_layouts(ramp: bool) -
 
 @needs_c
 def test_a_path_with_stops_and_pads_of_c_is_that_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
-    fast = trace(*with_pads(0), Control(tolerance=1e-8))
+    fast = el.trace(*with_pads(0), el.Control(tolerance=1e-8))
     monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
-    slow = trace(*with_pads(0), Control(tolerance=1e-8))
+    slow = el.trace(*with_pads(0), el.Control(tolerance=1e-8))
     events = [[(event.kind, event.number) for event in path.contact_events] for path in (fast, slow)]
     assert events[0] == events[1]
     drives = [[event.drive for event in path.contact_events] for path in (fast, slow)]
@@ -168,9 +151,9 @@ def test_factors_count_what_dense_eigenvalues_count(seed: int) -> None:
 
 
 def coil(turns: float, degree: int) -> Discretisation:
-    beam = Beam("a", "b", Section(2e9, 1e-2, 1e-4), arc(2 * np.pi * turns))
-    net = Network({"a": Node(0.0, 0.0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0)}, {"coil": beam})
-    return discretise(net, Rotation("b", np.array([1.0])), degree)
+    beam = el.Beam("a", "b", el.Section(2e9, 1e-2, 1e-4), el.arc(2 * np.pi * turns))
+    net = el.Network({"a": el.Node(0.0, 0.0, el.CLAMPED_SUPPORT), "b": el.Node(0.1, 0.0)}, {"coil": beam})
+    return discretise(net, el.Rotation("b", np.array([1.0])), degree)
 
 
 @needs_c
@@ -188,12 +171,13 @@ def test_a_coil_of_twenty_turns_is_factored_with_its_inertia() -> None:
 @needs_c
 def test_an_element_that_buckles_between_its_ends_waits_for_its_neighbours() -> None:
     """At the load at which the element alone is singular its unknowns cannot be eliminated first."""
-    stiff = Section(2e9, 1e-2, 1e-3, axial=False)
-    net = Network(
-        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0, slider_support(0.0))}, {"x": Beam("a", "b", stiff)}
+    stiff = el.Section(2e9, 1e-2, 1e-3, axial=False)
+    net = el.Network(
+        {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.1, 0.0, el.slider_support(0.0))},
+        {"x": el.Beam("a", "b", stiff)},
     )
     rigidity = 2e9 * 1e-2 * 1e-9 / 12
-    network = discretise(net, Loading((PointLoad("b", fx=-1.0),), np.array([1.0])), 8, pieces=4)
+    network = discretise(net, el.Loading((el.PointLoad("b", fx=-1.0),), np.array([1.0])), 8, pieces=4)
     alone = 4 * np.pi**2 * rigidity / 0.025**2
     for factor in (0.999999, 1.0, 1.000001):
         own = equations(network)
@@ -204,10 +188,11 @@ def test_an_element_that_buckles_between_its_ends_waits_for_its_neighbours() -> 
 
 
 def test_factors_under_following_loads_solve_and_count_real_eigenvalues() -> None:
-    net = Network(
-        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))}
+    net = el.Network(
+        {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.1, 0.0)},
+        {"x": el.Beam("a", "b", el.Section(2e9, 1e-2, 1e-3))},
     )
-    network = discretise(net, Loading((PointLoad("b", fx=-1.0, follows=True),), np.array([30.0])), 8, pieces=2)
+    network = discretise(net, el.Loading((el.PointLoad("b", fx=-1.0, follows=True),), np.array([30.0])), 8, pieces=2)
     own = equations(network)
     free = 2 * random_state(network, 1)[network.free]
     tangent = own.linearise(free, 30.0).tangent
@@ -269,10 +254,11 @@ def test_several_solutions_and_softest_modes_of_c_and_numpy_are_equal(seed: int,
 
 @pytest.mark.parametrize("kind", [equations, NumpyEquations])
 def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
-    net = Network(
-        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))}
+    net = el.Network(
+        {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.1, 0.0)},
+        {"x": el.Beam("a", "b", el.Section(2e9, 1e-2, 1e-3))},
     )
-    own = kind(discretise(net, Loading((PointLoad("b", fy=1.0),), np.array([1.0])), 8))
+    own = kind(discretise(net, el.Loading((el.PointLoad("b", fy=1.0),), np.array([1.0])), 8))
     border = np.zeros(own.n + 1)
     border[np.flatnonzero(own.mesh.free == own.mesh.bodies["b"][2])] = 1.0
     state = own.solve(np.zeros(own.n), 0.0, border, 0.8)
@@ -283,12 +269,12 @@ def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
 
 @pytest.mark.parametrize("kind", [equations, NumpyEquations])
 def test_a_march_stops_before_a_step_that_is_less_stable(kind: Any) -> None:
-    net = Network(
-        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0, slider_support(0.0))},
-        {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))},
+    net = el.Network(
+        {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.1, 0, el.slider_support(0.0))},
+        {"x": el.Beam("a", "b", el.Section(2e9, 1e-2, 1e-3))},
     )
     critical = 4 * np.pi**2 * 1e-6 / 12 / 0.1  # shortening of a column, both ends clamped, axial strain (t/L)^2 pi^2/3
-    own = kind(discretise(net, Displacement("b", np.pi, np.array([1.2 * critical])), 8))
+    own = kind(discretise(net, el.Displacement("b", np.pi, np.array([1.2 * critical])), 8))
     march = own.march(begin(own), np.array([1.2 * critical]) / 0.1, MarchPlan(0.01 * critical / 0.1, critical / 0.1))
     assert march.code is MarchCode.STABILITY_CHANGES
     assert 0.5 * critical < march.states[-1].way * 0.1 < critical
@@ -297,11 +283,11 @@ def test_a_march_stops_before_a_step_that_is_less_stable(kind: Any) -> None:
 TARGETS = np.linspace(0, 5e-3, 11)[1:]
 
 
-def leaf(thickness: float, taper: bool = False) -> tuple[Network, Displacement]:
-    thick = Taper(np.array([0.0, 1.0]), thickness * np.array([1.0, 0.8])) if taper else thickness
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.08, 0.03, slider_support(0.0, rotates=False))}
-    net = Network(nodes, {"x": Beam("a", "b", Section(2e9, 1e-2, thick), Polynomial((0.0, 1.0, -0.8)))})
-    return net, Displacement("b", np.pi, TARGETS)
+def leaf(thickness: float, taper: bool = False) -> tuple[el.Network, el.Displacement]:
+    thick = el.Taper(np.array([0.0, 1.0]), thickness * np.array([1.0, 0.8])) if taper else thickness
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.08, 0.03, el.slider_support(0.0, rotates=False))}
+    net = el.Network(nodes, {"x": el.Beam("a", "b", el.Section(2e9, 1e-2, thick), el.Polynomial((0.0, 1.0, -0.8)))})
+    return net, el.Displacement("b", np.pi, TARGETS)
 
 
 def leaves(count: int, taper: bool = False) -> NetworkDesigns:
@@ -323,17 +309,17 @@ def test_a_batch_has_the_efforts_of_single_marches(taper: bool) -> None:
 
 
 def test_a_batch_of_several_beams_has_the_efforts_of_single_marches() -> None:
-    pairs = [(two_leaves(bend=bend), Displacement("d", np.pi, TARGETS)) for bend in (0.8, 1.0, 1.3)]
+    pairs = [(two_leaves(bend=bend), el.Displacement("d", np.pi, TARGETS)) for bend in (0.8, 1.0, 1.3)]
     efforts, codes, _ = march_many(set_up(discretise(*pairs[0], 16), pairs[0], pairs), TARGETS)
     assert (codes == MarchCode.DONE).all()
     for pair, row in zip(pairs, efforts, strict=True):
-        path = trace(*pair, Control(tolerance=1e-8))
+        path = el.trace(*pair, el.Control(tolerance=1e-8))
         assert row == pytest.approx(path.effort[path.at_requested], rel=1e-6)
 
 
 def test_designs_of_a_batch_may_differ_in_their_springs() -> None:
     net, drive = leaf(1e-3)
-    pairs = [(replace(net, springs=(SlideSpring("b", 0.0, stiffness),)), drive) for stiffness in (10.0, 500.0)]
+    pairs = [(replace(net, springs=(el.SlideSpring("b", 0.0, stiffness),)), drive) for stiffness in (10.0, 500.0)]
     efforts, *_ = march_many(set_up(discretise(*pairs[0], 8), pairs[0], pairs), TARGETS)
     assert np.abs(efforts[1] - efforts[0]) == pytest.approx(490.0 * TARGETS, rel=1e-9)
 

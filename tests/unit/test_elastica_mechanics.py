@@ -7,20 +7,12 @@ import numpy as np
 import pytest
 from functional_paths import functional_path
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Loading,
-    Network,
-    Node,
-    PointLoad,
-    Section,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.polynomials import basis, integrals, integrals_to_points, interpolation
 
-LENGTH, STRIP = 0.1, Section(2e9, 1e-2, 1e-3)
+LENGTH, STRIP = 0.1, el.Section(2e9, 1e-2, 1e-3)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -45,8 +37,8 @@ def test_integrals_and_interpolation_are_exact_for_polynomials(degree: int) -> N
 
 
 def test_a_pulled_strip_converges_spectrally() -> None:
-    load = Loading((PointLoad("b", fy=0.3),), np.array([1.0]))
-    net = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", STRIP)})
+    load = el.Loading((el.PointLoad("b", fy=0.3),), np.array([1.0]))
+    net = el.Network({"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(LENGTH, 0)}, {"x": el.Beam("a", "b", STRIP)})
     tips = [functional_path(net, load, degree).motion("b")[-1, 1] / LENGTH for degree in (3, 5, 7, 14)]
     errors = np.abs(np.array(tips[:-1]) - tips[-1])
     assert (errors[1:] < 0.1 * errors[:-1]).all()

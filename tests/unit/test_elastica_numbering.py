@@ -5,55 +5,42 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    PINNED_SUPPORT,
-    Beam,
-    Displacement,
-    LineSpring,
-    Link,
-    Network,
-    Node,
-    PointLoad,
-    Polyline,
-    Section,
-    TorsionSpring,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.numbering import find_free, number
 from cfmkit.elastica.model.contact import Stop
 
-STRIP = Section(2e9, 1e-2, 1e-3)
-PLAIN = Network(
-    {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0), "c": Node(0.1, 0), "d": Node(0.2, 0.01)},
-    {"ab": Beam("a", "b", STRIP), "cd": Beam("c", "d", STRIP)},
-    (Link("b", "c"),),
+STRIP = el.Section(2e9, 1e-2, 1e-3)
+PLAIN = el.Network(
+    {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.1, 0), "c": el.Node(0.1, 0), "d": el.Node(0.2, 0.01)},
+    {"ab": el.Beam("a", "b", STRIP), "cd": el.Beam("c", "d", STRIP)},
+    (el.Link("b", "c"),),
 )
-DRIVE = Displacement("d", 0.0, np.array([1e-3]))
-BENT = Polyline(np.array([[0.0, 0.0], [0.05, 0.01], [0.1, 0.0]]))
+DRIVE = el.Displacement("d", 0.0, np.array([1e-3]))
+BENT = el.Polyline(np.array([[0.0, 0.0], [0.05, 0.01], [0.1, 0.0]]))
 
 
-def exchange(**beam: object) -> Network:
+def exchange(**beam: object) -> el.Network:
     """Return the network with another second beam."""
     return replace(PLAIN, beams={**PLAIN.beams, "cd": replace(PLAIN.beams["cd"], **beam)})
 
 
 VARIANTS = {
-    "pin between the beams": replace(PLAIN, links=(Link("b", "c", turns=False),)),
-    "pinned root": replace(PLAIN, nodes={**PLAIN.nodes, "a": Node(0, 0, PINNED_SUPPORT)}),
+    "pin between the beams": replace(PLAIN, links=(el.Link("b", "c", turns=False),)),
+    "pinned root": replace(PLAIN, nodes={**PLAIN.nodes, "a": el.Node(0, 0, el.PINNED_SUPPORT)}),
     "pinned end": exchange(start_joint="pin"),
     "two elements": exchange(shape=BENT),
-    "rigid arm": replace(PLAIN, nodes={**PLAIN.nodes, "c": Node(0.11, 0)}),
+    "rigid arm": replace(PLAIN, nodes={**PLAIN.nodes, "c": el.Node(0.11, 0)}),
     "pin on a rigid arm": replace(
-        PLAIN, nodes={**PLAIN.nodes, "c": Node(0.11, 0)}, links=(Link("b", "c", turns=False),)
+        PLAIN, nodes={**PLAIN.nodes, "c": el.Node(0.11, 0)}, links=(el.Link("b", "c", turns=False),)
     ),
     "offset": exchange(end_offset=(0.01, 0.0)),
     "offset and pinned end": exchange(end_offset=(0.01, 0.0), end_joint="pin"),
-    "force": replace(PLAIN, loads=(PointLoad("d", 1.0),)),
-    "moment": replace(PLAIN, loads=(PointLoad("d", moment=1.0),)),
-    "pinned end and moment there": replace(exchange(end_joint="pin"), loads=(PointLoad("d", moment=1.0),)),
-    "spring": replace(PLAIN, springs=(LineSpring("b", "d", 1.0),)),
-    "torsion spring": replace(exchange(end_joint="pin"), springs=(TorsionSpring("b", "d", 1.0),)),
+    "force": replace(PLAIN, loads=(el.PointLoad("d", 1.0),)),
+    "moment": replace(PLAIN, loads=(el.PointLoad("d", moment=1.0),)),
+    "pinned end and moment there": replace(exchange(end_joint="pin"), loads=(el.PointLoad("d", moment=1.0),)),
+    "spring": replace(PLAIN, springs=(el.LineSpring("b", "d", 1.0),)),
+    "torsion spring": replace(exchange(end_joint="pin"), springs=(el.TorsionSpring("b", "d", 1.0),)),
     "stop": replace(PLAIN, contacts=(Stop("stop", "b", 1e-3, 0.0),)),
 }
 
@@ -77,5 +64,5 @@ def test_a_network_has_its_own_numbers_whatever_came_before(name: str) -> None:
 
 
 def test_networks_of_one_topology_share_their_numbers() -> None:
-    longer = replace(PLAIN, nodes={**PLAIN.nodes, "d": Node(0.3, 0.02)})
+    longer = replace(PLAIN, nodes={**PLAIN.nodes, "d": el.Node(0.3, 0.02)})
     assert discretise(longer, DRIVE, 6).numbering is discretise(PLAIN, DRIVE, 6).numbering

@@ -7,46 +7,35 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Link,
-    Network,
-    Node,
-    Polynomial,
-    Section,
-    TorsionSpring,
-    gradient,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.errors import InputError
 
-FINE = Control(tolerance=1e-10)
-SECTION = Section(2e9, 8e-3, 1e-3)
-PUSH = Displacement("c", -np.pi / 2, np.array([2e-3, 6e-3]))
+FINE = el.Control(tolerance=1e-10)
+SECTION = el.Section(2e9, 8e-3, 1e-3)
+PUSH = el.Displacement("c", -np.pi / 2, np.array([2e-3, 6e-3]))
 NODES = {
-    "a": Node(0.0, 0.0, CLAMPED_SUPPORT),
-    "b": Node(0.05, 0.03),
-    "p": Node(0.05, 0.03),
-    "c": Node(0.1, 0.05, slider_support(np.pi / 2)),
+    "a": el.Node(0.0, 0.0, el.CLAMPED_SUPPORT),
+    "b": el.Node(0.05, 0.03),
+    "p": el.Node(0.05, 0.03),
+    "c": el.Node(0.1, 0.05, el.slider_support(np.pi / 2)),
 }
 
 
-def pinned(stiffness: Any = 0.0, x: Any = 0.05) -> Network:
+def pinned(stiffness: Any = 0.0, x: Any = 0.05) -> el.Network:
     """Two beams that meet at a pin with a torsion spring."""
-    nodes = {**NODES, "b": Node(x, 0.03), "p": Node(x, 0.03)}
-    beams = {"ab": Beam("a", "b", SECTION, Polynomial((0.0, 0.4))), "pc": Beam("p", "c", SECTION)}
-    return Network(nodes, beams, (Link("b", "p", turns=False),), (TorsionSpring("b", "p", stiffness),))
+    nodes = {**NODES, "b": el.Node(x, 0.03), "p": el.Node(x, 0.03)}
+    beams = {"ab": el.Beam("a", "b", SECTION, el.Polynomial((0.0, 0.4))), "pc": el.Beam("p", "c", SECTION)}
+    return el.Network(nodes, beams, (el.Link("b", "p", turns=False),), (el.TorsionSpring("b", "p", stiffness),))
 
 
 def test_a_pin_between_nodes_is_a_pin_at_the_end_of_a_beam() -> None:
-    beams = {"ab": Beam("a", "b", SECTION, Polynomial((0.0, 0.4))), "bc": Beam("b", "c", SECTION, start_joint="pin")}
+    beams = {
+        "ab": el.Beam("a", "b", SECTION, el.Polynomial((0.0, 0.4))),
+        "bc": el.Beam("b", "c", SECTION, start_joint="pin"),
+    }
     nodes = {name: node for name, node in NODES.items() if name != "p"}
-    same = trace(Network(nodes, beams), PUSH, FINE)
-    path = trace(pinned(), PUSH, FINE)
+    same = el.trace(el.Network(nodes, beams), PUSH, FINE)
+    path = el.trace(pinned(), PUSH, FINE)
     np.testing.assert_allclose(path.effort, same.effort, rtol=1e-9)
     np.testing.assert_allclose(path.motion("p")[:, :2], path.motion("b")[:, :2])
     np.testing.assert_allclose(path.end_force("pc", 0)[:, 2], 0.0, atol=1e-12)
@@ -54,34 +43,36 @@ def test_a_pin_between_nodes_is_a_pin_at_the_end_of_a_beam() -> None:
 
 
 def test_a_sprung_pin_transmits_the_moment_of_its_spring() -> None:
-    path = trace(pinned(0.3), PUSH, FINE)
+    path = el.trace(pinned(0.3), PUSH, FINE)
     turn = path.motion("p")[:, 2] - path.motion("b")[:, 2]
     np.testing.assert_allclose(path.end_force("pc", 0)[:, 2], 0.3 * turn, rtol=1e-8)
 
 
 def test_a_stiff_pin_is_a_rigid_joint() -> None:
-    beams = {"ab": Beam("a", "b", SECTION, Polynomial((0.0, 0.4))), "bc": Beam("b", "c", SECTION)}
-    rigid = trace(Network({n: node for n, node in NODES.items() if n != "p"}, beams), PUSH, FINE)
-    np.testing.assert_allclose(trace(pinned(1e6), PUSH, FINE).effort, rigid.effort, rtol=1e-5, atol=1e-11)
+    beams = {"ab": el.Beam("a", "b", SECTION, el.Polynomial((0.0, 0.4))), "bc": el.Beam("b", "c", SECTION)}
+    rigid = el.trace(el.Network({n: node for n, node in NODES.items() if n != "p"}, beams), PUSH, FINE)
+    np.testing.assert_allclose(el.trace(pinned(1e6), PUSH, FINE).effort, rigid.effort, rtol=1e-5, atol=1e-11)
 
 
 def test_a_pin_on_a_rigid_arm_moves_with_the_arm() -> None:
-    nodes = {**NODES, "p": Node(0.055, 0.036)}
-    beams = {"ab": Beam("a", "b", SECTION), "pc": Beam("p", "c", SECTION)}
-    path = trace(Network(nodes, beams, (Link("b", "p", turns=False),)), PUSH, FINE)
-    offset = {"ab": beams["ab"], "bc": Beam("b", "c", SECTION, start_offset=(0.005, 0.006), start_joint="pin")}
-    same = trace(Network({n: node for n, node in NODES.items() if n != "p"}, offset), PUSH, FINE)
+    nodes = {**NODES, "p": el.Node(0.055, 0.036)}
+    beams = {"ab": el.Beam("a", "b", SECTION), "pc": el.Beam("p", "c", SECTION)}
+    path = el.trace(el.Network(nodes, beams, (el.Link("b", "p", turns=False),)), PUSH, FINE)
+    offset = {"ab": beams["ab"], "bc": el.Beam("b", "c", SECTION, start_offset=(0.005, 0.006), start_joint="pin")}
+    same = el.trace(el.Network({n: node for n, node in NODES.items() if n != "p"}, offset), PUSH, FINE)
     np.testing.assert_allclose(path.effort, same.effort, rtol=1e-9)
     with pytest.raises(InputError, match="pinned to a rigid arm"):
-        trace(
-            Network(nodes, {**beams, "pc": Beam("p", "c", SECTION, start_offset=(1e-3, 0))}, (Link("b", "p", False),)),
+        el.trace(
+            el.Network(
+                nodes, {**beams, "pc": el.Beam("p", "c", SECTION, start_offset=(1e-3, 0))}, (el.Link("b", "p", False),)
+            ),
             PUSH,
         )
 
 
 def test_a_pinned_node_carries_offsets_that_turn_with_it() -> None:
-    beams = {"ab": Beam("a", "b", SECTION), "pc": Beam("p", "c", SECTION, start_offset=(2e-3, 4e-3))}
-    path = trace(Network(NODES, beams, (Link("b", "p", turns=False),)), PUSH, FINE)
+    beams = {"ab": el.Beam("a", "b", SECTION), "pc": el.Beam("p", "c", SECTION, start_offset=(2e-3, 4e-3))}
+    path = el.trace(el.Network(NODES, beams, (el.Link("b", "p", turns=False),)), PUSH, FINE)
     force = path.end_force("pc", 0)
     c, s = np.cos(path.motion("p")[:, 2]), np.sin(path.motion("p")[:, 2])
     arm = np.stack([c * 2e-3 - s * 4e-3, s * 2e-3 + c * 4e-3])
@@ -90,15 +81,15 @@ def test_a_pinned_node_carries_offsets_that_turn_with_it() -> None:
 
 
 def test_gradients_go_through_pins() -> None:
-    def build(x: Any) -> Network:
+    def build(x: Any) -> el.Network:
         return pinned(x[0], x[1])
 
     x = np.array([0.3, 0.05])
-    path = trace(build(x), PUSH, FINE)
-    found = gradient(path, build, x)
+    path = el.trace(build(x), PUSH, FINE)
+    found = el.gradient(path, build, x)
     for k in range(2):
         h = 1e-4 * x[k]
-        one, other = (trace(build(x + s * h * np.eye(2)[k]), PUSH, FINE) for s in (1, -1))
+        one, other = (el.trace(build(x + s * h * np.eye(2)[k]), PUSH, FINE) for s in (1, -1))
         np.testing.assert_allclose(
             found.effort[:, k], (one.effort - other.effort)[path.at_requested] / (2 * h), rtol=1e-6
         )
@@ -107,10 +98,10 @@ def test_gradients_go_through_pins() -> None:
 
 
 def test_no_support_acts_on_a_node_that_a_link_moves() -> None:
-    path = trace(pinned(), PUSH)
+    path = el.trace(pinned(), PUSH)
     with pytest.raises(InputError, match="'p' is moved by a link: what is held is its master, 'b'"):
         path.reaction("p")
     with pytest.raises(InputError, match="'q' is not a node; nodes: a, b, p, c"):
         path.reaction("q")
     with pytest.raises(InputError, match="moved by a link"):
-        gradient(path, lambda x: pinned(x=x[0]), np.array([0.05])).reaction["p"]
+        el.gradient(path, lambda x: pinned(x=x[0]), np.array([0.05])).reaction["p"]

@@ -7,32 +7,19 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import fsolve
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    CosineArch,
-    Displacement,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    Section,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 
 LENGTH, MODULUS, WIDTH = 0.1, 200e9, 0.01
 UP = np.pi / 2
 
 
-def pulled(thickness: float, rise: float, direction: float, travel: float, bow: float = 0.0) -> Path:
+def pulled(thickness: float, rise: float, direction: float, travel: float, bow: float = 0.0) -> el.Path:
     """Return the path of a clamped strip whose far end, `rise` higher, is guided along a direction."""
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, rise, slider_support(direction))}
-    section = Section(MODULUS, WIDTH, thickness, axial=True)
-    beam = Beam("a", "b", section, CosineArch(bow, 1.0)) if bow else Beam("a", "b", section)
-    drive = Displacement("b", direction, np.linspace(0, travel, 6)[1:])
-    return trace(Network(nodes, {"x": beam}), drive, Control(tolerance=1e-6))
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(LENGTH, rise, el.slider_support(direction))}
+    section = el.Section(MODULUS, WIDTH, thickness, axial=True)
+    beam = el.Beam("a", "b", section, el.CosineArch(bow, 1.0)) if bow else el.Beam("a", "b", section)
+    drive = el.Displacement("b", direction, np.linspace(0, travel, 6)[1:])
+    return el.trace(el.Network(nodes, {"x": beam}), drive, el.Control(tolerance=1e-6))
 
 
 def end_force(thickness: float, drawn: tuple[float, float], moved: tuple[float, float]) -> tuple[float, float]:
@@ -76,7 +63,7 @@ def end_force(thickness: float, drawn: tuple[float, float], moved: tuple[float, 
 @pytest.mark.parametrize(("thickness", "strain"), [(2e-5, 0.02), (1e-5, 0.03), (8e-6, 0.02)])
 def test_a_straight_strip_is_pulled_to_any_strain(thickness: float, strain: float) -> None:
     path = pulled(thickness, 0.0, 0.0, strain * LENGTH)
-    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.status is el.PathStatus.COMPLETE, path.message
     rounding = 1e-13 * path.effort[-1]  # of places: the first steps are a millionth of a strain
     assert path.effort == pytest.approx(MODULUS * WIDTH * thickness * path.drive / LENGTH, rel=1e-9, abs=rounding)
     assert (path.unstable == 0).all()
@@ -90,7 +77,7 @@ def test_a_strip_pulled_askew_is_straight_but_for_layers_at_its_clamps(
 ) -> None:
     """The clamps stand along the strip as drawn, in which it is at rest."""
     path = pulled(thickness, rise, direction, travel)
-    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.status is el.PathStatus.COMPLETE, path.message
     moved = (travel * np.cos(direction), travel * np.sin(direction))
     fx, fy = end_force(thickness, (LENGTH, rise), moved)
     assert path.effort[-1] == pytest.approx(fx * np.cos(direction) + fy * np.sin(direction), rel=3e-6)
@@ -103,7 +90,7 @@ def test_a_slightly_bowed_strip_is_pulled_straight_and_stretched(bow: float) -> 
     """Straightened it is as long as its arc; what is left of the bow bends it by less than the tolerance."""
     thickness, travel = 1e-5, 0.003
     path = pulled(thickness, 0.0, 0.0, travel, bow)
-    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.status is el.PathStatus.COMPLETE, path.message
     arc = path.fits["x"].length
     assert path.effort[-1] == pytest.approx(MODULUS * WIDTH * thickness * ((LENGTH + travel) / arc - 1), rel=2e-6)
     assert (path.unstable == 0).all()

@@ -5,51 +5,37 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import cfmkit.elastica as el
 import cfmkit.elastica.tracing.trace as tracing
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    PINNED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    Rotation,
-    Section,
-    slider_support,
-    trace,
-)
 
 DOWN = -np.pi / 2
-BENDING = Displacement("d", DOWN, np.array([1e-3, 10e-3, 20e-3, 30e-3]))
+BENDING = el.Displacement("d", DOWN, np.array([1e-3, 10e-3, 20e-3, 30e-3]))
 
 
-def v_beam() -> Network:
+def v_beam() -> el.Network:
     length, angle = 35e-3, np.radians(7)
     nodes = {
-        "wall": Node(0, 0, CLAMPED_SUPPORT),
-        "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
+        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "d": el.Node(length * np.cos(angle), length * np.sin(angle), el.slider_support(np.pi / 2)),
     }
-    return Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, 1e-3))})
+    return el.Network(nodes, {"v": el.Beam("wall", "d", el.Section(1477e6, 6e-3, 1e-3))})
 
 
-def strip() -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.05, 0)}
-    return Network(nodes, {"x": Beam("a", "d", Section(2e9, 8e-3, 1e-3))})
+def strip() -> el.Network:
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "d": el.Node(0.05, 0)}
+    return el.Network(nodes, {"x": el.Beam("a", "d", el.Section(2e9, 8e-3, 1e-3))})
 
 
-def rough(monkeypatch: pytest.MonkeyPatch) -> Path:
+def rough(monkeypatch: pytest.MonkeyPatch) -> el.Path:
     """Return a path of one degree that is too low for the tolerance."""
     monkeypatch.setattr(tracing, "MAX_ROUNDS", 1)
     monkeypatch.setattr(tracing, "_first_degree", lambda *_: 5)
-    return trace(strip(), BENDING, Control(tolerance=1e-10))
+    return el.trace(strip(), BENDING, el.Control(tolerance=1e-10))
 
 
 def test_a_path_that_misses_its_tolerance_is_not_complete(monkeypatch: pytest.MonkeyPatch) -> None:
     path = rough(monkeypatch)
-    assert path.status is PathStatus.INACCURATE
+    assert path.status is el.PathStatus.INACCURATE
     assert path.error > 1e-10
     assert f"{path.error:.3g}" in path.message
 
@@ -59,34 +45,34 @@ def test_points_that_miss_the_tolerance_are_marked_and_the_others_are_not(monkey
     assert path.accurate[0]
     assert not path.accurate[-1]
     monkeypatch.undo()
-    exact = trace(strip(), BENDING, Control(tolerance=1e-12))
+    exact = el.trace(strip(), BENDING, el.Control(tolerance=1e-12))
     wrong = np.abs(path.effort[path.at_requested] - exact.effort[exact.at_requested]) / np.abs(exact.effort).max()
     assert (wrong[path.accurate[path.at_requested]] < 1e-10).all()
     assert wrong[-1] > 1e-11
 
 
 def test_a_path_within_its_tolerance_marks_every_point_accurate() -> None:
-    path = trace(strip(), BENDING)
-    assert path.status is PathStatus.COMPLETE
+    path = el.trace(strip(), BENDING)
+    assert path.status is el.PathStatus.COMPLETE
     assert path.accurate.all()
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-8])
 def test_a_path_on_which_nothing_bears_a_load_is_as_accurate_as_its_poses(tolerance: float) -> None:
     """A strip on pins is turned by one end: forces are rounding, and no mesh makes them agree."""
-    stiff, soft = Section(88e9, 8e-3, 1.2e-3), Section(1.8e9, 8e-3, 0.4e-3)
+    stiff, soft = el.Section(88e9, 8e-3, 1.2e-3), el.Section(1.8e9, 8e-3, 0.4e-3)
     nodes = {
-        "hinge": Node(0.0186, 0.0337, PINNED_SUPPORT),
-        "end": Node(0.0185, 0.0788),
-        "joint": Node(0.0532, 0.0035),
-        "wall": Node(0.0733, 0.0398, CLAMPED_SUPPORT),
+        "hinge": el.Node(0.0186, 0.0337, el.PINNED_SUPPORT),
+        "end": el.Node(0.0185, 0.0788),
+        "joint": el.Node(0.0532, 0.0035),
+        "wall": el.Node(0.0733, 0.0398, el.CLAMPED_SUPPORT),
     }
     beams = {
-        "arm": Beam("joint", "hinge", stiff),
-        "strip": Beam("end", "hinge", soft, start_joint="pin"),
-        "leg": Beam("joint", "wall", stiff),
+        "arm": el.Beam("joint", "hinge", stiff),
+        "strip": el.Beam("end", "hinge", soft, start_joint="pin"),
+        "leg": el.Beam("joint", "wall", stiff),
     }
-    path = trace(Network(nodes, beams), Rotation("end", np.array([-0.3, -0.9])), Control(tolerance))
-    assert path.status is PathStatus.COMPLETE
+    path = el.trace(el.Network(nodes, beams), el.Rotation("end", np.array([-0.3, -0.9])), el.Control(tolerance))
+    assert path.status is el.PathStatus.COMPLETE
     assert path.error < 1e-8
     assert np.abs(path.effort).max() < 1e-9

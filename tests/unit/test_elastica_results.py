@@ -9,25 +9,13 @@ import numpy as np
 import pytest
 from functional_paths import beam_stress, functional_path
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    PointLoad,
-    Polynomial,
-    Rotation,
-    Section,
-    slider_support,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.results.cross_stiffness import cross_stiffness, poles
 from cfmkit.errors import InputError
 
 LENGTH, MODULUS, WIDTH, THICKNESS = 0.1, 2e9, 1e-2, 1e-3
 RIGIDITY = MODULUS * WIDTH * THICKNESS**3 / 12
-STRIP = Section(MODULUS, WIDTH, THICKNESS)
+STRIP = el.Section(MODULUS, WIDTH, THICKNESS)
 
 
 def assert_near(found: Any, known: Any, tolerance: float = 1e-6) -> None:
@@ -36,9 +24,9 @@ def assert_near(found: Any, known: Any, tolerance: float = 1e-6) -> None:
 
 def test_sections_of_a_cantilever_are_those_of_statics() -> None:
     """A force across the tip: the moment is the force times the arm of the bent beam, whatever its shape."""
-    net = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", STRIP)})
+    net = el.Network({"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(LENGTH, 0)}, {"x": el.Beam("a", "b", STRIP)})
     force = 2 * RIGIDITY / LENGTH**2
-    path = functional_path(net, Loading((PointLoad("b", fy=1.0),), np.array([force])), 12, 2)
+    path = functional_path(net, el.Loading((el.PointLoad("b", fy=1.0),), np.array([force])), 12, 2)
     seen, line = path.sections("x"), path.shape("x", 0)
     assert seen.moment[0] == pytest.approx(force * (line[-1, 0] - line[:, 0]), abs=1e-9 * force * LENGTH)
     assert np.hypot(seen.normal, seen.shear) == pytest.approx(force, rel=1e-9)
@@ -52,12 +40,12 @@ def test_sections_of_a_cantilever_are_those_of_statics() -> None:
 
 def test_the_largest_stress_inside_a_beam_is_found_between_its_sampled_places() -> None:
     """An arch that is pressed, pinned at both ends: most bent inside, wherever it is cut."""
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0.2 * LENGTH, slider_support(0.0))}
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(LENGTH, 0.2 * LENGTH, el.slider_support(0.0))}
     found = []
     for pieces in (1, 3):
-        beam = Beam("a", "b", STRIP, Polynomial((0.0, 1.0, -0.7)), start_joint="pin", end_joint="pin")
+        beam = el.Beam("a", "b", STRIP, el.Polynomial((0.0, 1.0, -0.7)), start_joint="pin", end_joint="pin")
         path = functional_path(
-            Network(nodes, {"x": beam}), Displacement("b", np.pi, np.array([0.1 * LENGTH])), 16, pieces
+            el.Network(nodes, {"x": beam}), el.Displacement("b", np.pi, np.array([0.1 * LENGTH])), 16, pieces
         )
         found.append((*beam_stress(path, "x")[:, 0], path.sections("x")))
     (value, place, seen), (again, same, _) = found
@@ -68,20 +56,23 @@ def test_the_largest_stress_inside_a_beam_is_found_between_its_sampled_places() 
 
 
 def test_the_effort_of_a_moment_drive_is_the_rotation() -> None:
-    net = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", STRIP)})
+    net = el.Network({"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(LENGTH, 0)}, {"x": el.Beam("a", "b", STRIP)})
     moment = 2.0 * RIGIDITY / LENGTH
-    path = functional_path(net, Loading((PointLoad("b", moment=1.0),), np.array([moment])), 12)
+    path = functional_path(net, el.Loading((el.PointLoad("b", moment=1.0),), np.array([moment])), 12)
     assert path.effort[0] == pytest.approx(2.0, rel=1e-10)
     assert path.energy[0] == pytest.approx(0.5 * moment * 2.0, rel=1e-10)
-    turned = functional_path(net, Rotation("b", np.array([2.0])), 12)
+    turned = functional_path(net, el.Rotation("b", np.array([2.0])), 12)
     assert turned.effort[0] == pytest.approx(moment, rel=1e-10)
 
 
 def test_the_stiffness_across_a_guided_leaf_is_that_without_its_guide() -> None:
     """A straight leaf moved along its width: the tip gives way along its length by stretch and by bending alone."""
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0, slider_support(np.pi / 2, rotates=False))}
+    nodes = {
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "b": el.Node(LENGTH, 0, el.slider_support(np.pi / 2, rotates=False)),
+    }
     path = functional_path(
-        Network(nodes, {"x": Beam("a", "b", STRIP)}), Displacement("b", np.pi / 2, np.array([1e-7])), 10
+        el.Network(nodes, {"x": el.Beam("a", "b", STRIP)}), el.Displacement("b", np.pi / 2, np.array([1e-7])), 10
     )
     stretch = MODULUS * WIDTH * THICKNESS / LENGTH
     assert cross_stiffness(path, "b", np.pi / 2)[0] == pytest.approx(stretch, rel=1e-6)

@@ -16,43 +16,30 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
 from scipy.special import ellipe, ellipk
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    PINNED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    PathStatus,
-    PointLoad,
-    Section,
-    Support,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 
 RNG = np.random.default_rng(0)
 
 
-def strip(slenderness: float, ends: str, axial: bool = True) -> tuple[Network, float]:
+def strip(slenderness: float, ends: str, axial: bool = True) -> tuple[el.Network, float]:
     """A straight strip of 100 mm, and its bending rigidity; pinned, or clamped and guided."""
     thickness = 0.1 * math.sqrt(12) / slenderness
     start, end = (
-        (PINNED_SUPPORT, Support(False, True, False)) if ends == "pinned" else (CLAMPED_SUPPORT, slider_support(0.0))
+        (el.PINNED_SUPPORT, el.Support(False, True, False))
+        if ends == "pinned"
+        else (el.CLAMPED_SUPPORT, el.slider_support(0.0))
     )
-    section = Section(2e9, 10e-3, thickness, axial=axial)
-    nodes = {"a": Node(0, 0, start), "b": Node(0.1, 0, end)}
-    return Network(nodes, {"strip": Beam("a", "b", section)}), 2e9 * 10e-3 * thickness**3 / 12
+    section = el.Section(2e9, 10e-3, thickness, axial=axial)
+    nodes = {"a": el.Node(0, 0, start), "b": el.Node(0.1, 0, end)}
+    return el.Network(nodes, {"strip": el.Beam("a", "b", section)}), 2e9 * 10e-3 * thickness**3 / 12
 
 
 @pytest.mark.parametrize("slenderness", [100, 1000, 3000, 10000])
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
 def test_a_strip_in_pure_tension_is_stable(slenderness: float, ends: str) -> None:
     network, _ = strip(slenderness, ends)
-    path = trace(network, Displacement("b", 0.0, np.linspace(0, 1e-3, 11)), Control(tolerance=1e-6))
-    assert path.status is PathStatus.COMPLETE
+    path = el.trace(network, el.Displacement("b", 0.0, np.linspace(0, 1e-3, 11)), el.Control(tolerance=1e-6))
+    assert path.status is el.PathStatus.COMPLETE
     assert not path.unstable.any()
     thickness = 0.1 * math.sqrt(12) / slenderness
     assert path.effort[-1] == pytest.approx(2e9 * 10e-3 * thickness * 0.01, rel=1e-9)
@@ -104,9 +91,9 @@ def test_a_slender_column_keeps_to_its_first_mode(slenderness: float, share: flo
     """Slightly bent in its first mode and pressed to 60 % of its length: nothing happens on the way."""
     network, _ = strip(slenderness, ends)
     thickness = 0.1 * math.sqrt(12) / slenderness
-    pressed = Displacement("b", np.pi, np.linspace(0, 0.06, 41))
-    path = trace(network, pressed, Control(imperfection=share * thickness))
-    assert path.status is PathStatus.COMPLETE, path.message
+    pressed = el.Displacement("b", np.pi, np.linspace(0, 0.06, 41))
+    path = el.trace(network, pressed, el.Control(imperfection=share * thickness))
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert not path.unstable.any()
     assert path.events == ()
     for point in (4, 16, 40):
@@ -123,9 +110,9 @@ def test_a_slender_column_that_does_not_stretch_leaves_its_nearly_rigid_start(
     """Bent by as little as 7e-7 of its length, it hardly moves before its critical force; a force leads there, too."""
     network, _ = strip(slenderness, ends, axial=False)
     bow = share * 0.1 * math.sqrt(12) / slenderness
-    control = Control(imperfection=bow)
-    pressed = trace(network, Displacement("b", np.pi, np.linspace(0, 0.06, 5)), control)
-    assert pressed.status is PathStatus.COMPLETE, pressed.message
+    control = el.Control(imperfection=bow)
+    pressed = el.trace(network, el.Displacement("b", np.pi, np.linspace(0, 0.06, 5)), control)
+    assert pressed.status is el.PathStatus.COMPLETE, pressed.message
     assert not pressed.unstable.any()
     assert pressed.events == ()
     forces = pressed.effort[pressed.at_requested]
@@ -134,8 +121,8 @@ def test_a_slender_column_that_does_not_stretch_leaves_its_nearly_rigid_start(
     assert abs(forces[0]) < max(1e-5, rounded) * forces[1]
     expected = shot(slenderness, share, ends, 0.15, axial=False)
     assert forces[1] == pytest.approx(expected, rel=5e-5)
-    loaded = trace(network, Loading((PointLoad("b", -1.0),), forces[1:]), control)
-    assert loaded.status is PathStatus.COMPLETE, loaded.message
+    loaded = el.trace(network, el.Loading((el.PointLoad("b", -1.0),), forces[1:]), control)
+    assert loaded.status is el.PathStatus.COMPLETE, loaded.message
     moved = loaded.motion("b")[loaded.at_requested, 0]
     np.testing.assert_allclose(moved, -pressed.drive[pressed.at_requested][1:], rtol=2e-4)
 
@@ -145,13 +132,15 @@ def test_a_straight_column_that_does_not_stretch_is_rigid_until_it_buckles_which
     """The sine of its angle is not exact: that is no imperfection."""
     network, _ = strip(100, ends, axial=False)
     x, y = 0.1 * math.cos(0.3), 0.1 * math.sin(0.3)
-    free = slider_support(0.3, rotates=ends == "pinned")
-    askew = Network({"a": network.nodes["a"], "b": Node(x, y, free)}, network.beams)
+    free = el.slider_support(0.3, rotates=ends == "pinned")
+    askew = el.Network({"a": network.nodes["a"], "b": el.Node(x, y, free)}, network.beams)
     forces = []
     for column, angle in ((network, math.pi), (askew, math.pi + 0.3)):
-        assert trace(column, Displacement("b", angle - math.pi, np.array([1e-3]))).status is PathStatus.NO_START
-        pressed = trace(column, Displacement("b", angle, np.array([1e-3])))
-        assert pressed.status is PathStatus.COMPLETE
+        assert (
+            el.trace(column, el.Displacement("b", angle - math.pi, np.array([1e-3]))).status is el.PathStatus.NO_START
+        )
+        pressed = el.trace(column, el.Displacement("b", angle, np.array([1e-3])))
+        assert pressed.status is el.PathStatus.COMPLETE
         assert [(event.kind, event.drive < 1e-9) for event in pressed.events] == [("bifurcation", True)]
         forces.append(pressed.effort[-1])
     assert forces == pytest.approx([shot(100, 1e-6, ends, 0.01, axial=False)] * 2, rel=1e-6)

@@ -9,34 +9,20 @@ import pytest
 from functional_paths import beam_stress
 from scipy.integrate import solve_ivp
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    CosineArch,
-    Displacement,
-    Network,
-    Node,
-    Path,
-    Polynomial,
-    Section,
-    Taper,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 
 UP = np.pi / 2
-TAPER = Taper(np.array([0, 0.35, 1]), np.array([1.1e-3, 0.8e-3, 1.2e-3]))
+TAPER = el.Taper(np.array([0, 0.35, 1]), np.array([1.1e-3, 0.8e-3, 1.2e-3]))
 
 
-def pressed(shape: object, thickness: object, travel: float, tolerance: float = 1e-7) -> Path:
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.08, 0.02, slider_support(UP, rotates=True))}
-    beam = Beam("a", "b", Section(2e9, 8e-3, thickness), shape)  # type: ignore[arg-type]
-    drive = Displacement("b", -UP, np.linspace(0, travel, 41))
-    return trace(Network(nodes, {"x": beam}), drive, Control(tolerance=tolerance))
+def pressed(shape: object, thickness: object, travel: float, tolerance: float = 1e-7) -> el.Path:
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.08, 0.02, el.slider_support(UP, rotates=True))}
+    beam = el.Beam("a", "b", el.Section(2e9, 8e-3, thickness), shape)  # type: ignore[arg-type]
+    drive = el.Displacement("b", -UP, np.linspace(0, travel, 41))
+    return el.trace(el.Network(nodes, {"x": beam}), drive, el.Control(tolerance=tolerance))
 
 
-def densely(path: Path, point: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def densely(path: el.Path, point: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return places, bending and axial stress at them, by Reissner's equations from the clamped end."""
     fitted, section = path.fits["x"], path.network.beams["x"].section
     h, v, m = path.end_force("x", 0)[point]
@@ -68,9 +54,9 @@ def densely(path: Path, point: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 @pytest.mark.parametrize(
     ("shape", "thickness", "travel"),
     [
-        (Polynomial((0, 6.5, -6.0)), 1e-3, 0.03),  # from 10 to 12 mm two humps change places
-        (Polynomial((0, 4.0, -9.0, 5.0)), TAPER, 0.02),
-        (CosineArch(0.008), TAPER, 0.03),
+        (el.Polynomial((0, 6.5, -6.0)), 1e-3, 0.03),  # from 10 to 12 mm two humps change places
+        (el.Polynomial((0, 4.0, -9.0, 5.0)), TAPER, 0.02),
+        (el.CosineArch(0.008), TAPER, 0.03),
     ],
 )
 def test_no_place_has_more_stress_than_the_largest(shape: object, thickness: object, travel: float) -> None:
@@ -92,7 +78,7 @@ def test_no_place_has_more_stress_than_the_largest(shape: object, thickness: obj
 
 def test_of_two_humps_of_nearly_one_height_the_higher_is_found() -> None:
     """Where they change places the lower one has the higher sample."""
-    path = pressed(Polynomial((0, 6.5, -6.0)), 1e-3, 0.03)
+    path = pressed(el.Polynomial((0, 6.5, -6.0)), 1e-3, 0.03)
     value, place = beam_stress(path, "x")
     near = np.flatnonzero((path.drive > 9e-3) & (path.drive < 12e-3))
     assert len(near) >= 3
@@ -104,6 +90,6 @@ def test_of_two_humps_of_nearly_one_height_the_higher_is_found() -> None:
 
 def test_a_peak_beside_the_end_of_a_segment_is_found_at_a_loose_tolerance() -> None:
     """There the states of the two segments that meet differ by the tolerance."""
-    loose, fine = (pressed(CosineArch(0.008), 1e-3, 0.03, tolerance) for tolerance in (1e-4, 1e-10))
+    loose, fine = (pressed(el.CosineArch(0.008), 1e-3, 0.03, tolerance) for tolerance in (1e-4, 1e-10))
     found, exact = (path.stress_extremes("x").value[path.at_requested] for path in (loose, fine))
     np.testing.assert_allclose(found, exact, atol=3e-4 * np.abs(exact).max())

@@ -10,18 +10,7 @@ import numpy as np
 import pytest
 from network_cases import differences, from_json, observe, read_cases
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    PINNED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Network,
-    Node,
-    PathStatus,
-    Section,
-    slider_support,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.tracing.trace import DegreeAndPieces, raise_attempt, trace, trace_on
 from cfmkit.elastica.vibration import frequencies
 
@@ -61,16 +50,17 @@ def test_paths_on_the_functional_are_those_of_the_file(name: str, monkeypatch: p
     assert differences(observe(path), case["expected"], LOOSER.get(name, TOLERANCE), length) == []
 
 
-STIFF = Section(2e9, 1e-2, 1e-3, axial=False)
+STIFF = el.Section(2e9, 1e-2, 1e-3, axial=False)
 
 
 def test_a_step_along_the_arc_does_not_lead_to_the_mirror_image() -> None:
     """Bent by 3.5e-5 of its length a column that does not stretch buckles to that side, whatever the steps."""
-    net = Network(
-        {"a": Node(0, 0, PINNED_SUPPORT), "b": Node(0.1, 0, slider_support(0.0, True))}, {"x": Beam("a", "b", STIFF)}
+    net = el.Network(
+        {"a": el.Node(0, 0, el.PINNED_SUPPORT), "b": el.Node(0.1, 0, el.slider_support(0.0, True))},
+        {"x": el.Beam("a", "b", STIFF)},
     )
-    drive = Displacement("b", np.pi, np.array([1e-3, 0.015, 0.03]))
-    sides = [trace(net, drive, Control(imperfection=size)).motion("a")[-1, 2] for size in (3.5e-6, 3.5e-5, -3.5e-6)]
+    drive = el.Displacement("b", np.pi, np.array([1e-3, 0.015, 0.03]))
+    sides = [trace(net, drive, el.Control(imperfection=size)).motion("a")[-1, 2] for size in (3.5e-6, 3.5e-5, -3.5e-6)]
     assert sides[0] == pytest.approx(sides[1], rel=1e-2)
     assert sides[0] == pytest.approx(-sides[2], rel=1e-7)
 
@@ -83,15 +73,15 @@ def test_leaves_on_a_shuttle_that_may_turn_end_at_a_limit_point() -> None:
     case = CASES["leaves on a shuttle that may turn fare alike with any points 1"]
     network, drive = (from_json(case[part]) for part in ("network", "drive"))
     ends = trace(network, drive)
-    assert ends.status is PathStatus.LIMIT_POINT
+    assert ends.status is el.PathStatus.LIMIT_POINT
     limit = ends.drive[-1]
     assert limit == pytest.approx(6.29445e-3, rel=1e-6)
-    loop = trace(network, drive, Control(through_folds=True, most_points=150))
-    assert loop.status is PathStatus.FULL
+    loop = trace(network, drive, el.Control(through_folds=True, most_points=150))
+    assert loop.status is el.PathStatus.FULL
     assert loop.drive.max() < limit * (1 + 1e-6)
     folds = [event.drive for event in loop.events if event.kind == "limit point"]
     assert sum(abs(fold - limit) < 1e-6 * limit for fold in folds) >= 3  # it comes by again
-    straight = trace(network, replace(drive, points=np.array([limit])), Control(branch="primary"))
+    straight = trace(network, replace(drive, points=np.array([limit])), el.Control(branch="primary"))
     assert straight.stable[-1]
     assert straight.energy[-1] < ends.energy[-1] - 1e-7
 
@@ -100,13 +90,13 @@ def test_leaves_on_a_shuttle_that_may_turn_end_at_a_limit_point() -> None:
 def test_an_arch_of_two_straight_beams_that_do_not_stretch_buckles_to_the_same_side(tolerance: float) -> None:
     """It is rigid at rest, so that it reaches many critical loads at once; both beams buckle in their first modes."""
     nodes = {
-        "a": Node(0, 0, CLAMPED_SUPPORT),
-        "t": Node(0.05, 0.0173, slider_support(np.pi / 2)),
-        "b": Node(0.1, 0, PINNED_SUPPORT),
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "t": el.Node(0.05, 0.0173, el.slider_support(np.pi / 2)),
+        "b": el.Node(0.1, 0, el.PINNED_SUPPORT),
     }
-    net = Network(nodes, {"x": Beam("a", "t", STIFF), "y": Beam("t", "b", STIFF)})
-    path = trace(net, Displacement("t", -np.pi / 2, np.linspace(1e-3, 8e-3, 4)), Control(tolerance))
-    assert path.status is PathStatus.COMPLETE, path.message
+    net = el.Network(nodes, {"x": el.Beam("a", "t", STIFF), "y": el.Beam("t", "b", STIFF)})
+    path = trace(net, el.Displacement("t", -np.pi / 2, np.linspace(1e-3, 8e-3, 4)), el.Control(tolerance))
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.stable.all()
     length = float(np.hypot(0.05, 0.0173))
     bending = 2e9 * 1e-2 * 1e-9 / 12 / length**2
@@ -118,11 +108,11 @@ def test_a_path_that_is_raised_is_that_of_its_degree() -> None:
     """Its points and events are corrected on the finer mesh, not followed anew."""
     case = CASES["config: vcfm_pla 2"]
     network, drive = (from_json(case[part]) for part in ("network", "drive"))
-    coarse = trace_on(network, drive, Control(1e-8), DegreeAndPieces(10))
+    coarse = trace_on(network, drive, el.Control(1e-8), DegreeAndPieces(10))
     coarse = coarse._replace(path=replace(coarse.path, error=1e-5))
-    raised = raise_attempt(coarse, DegreeAndPieces(14), Control(1e-8))
+    raised = raise_attempt(coarse, DegreeAndPieces(14), el.Control(1e-8))
     assert raised is not None
-    anew = trace_on(network, drive, Control(1e-8), DegreeAndPieces(14)).path
+    anew = trace_on(network, drive, el.Control(1e-8), DegreeAndPieces(14)).path
     both = [path.effort[path.at_requested] for path in (raised.path, anew)]
     np.testing.assert_allclose(both[0], both[1], rtol=0, atol=1e-9 * np.abs(both[1]).max())
     assert [event.drive for event in raised.path.events] == pytest.approx(

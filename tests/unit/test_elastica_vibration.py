@@ -15,26 +15,7 @@ from functional_paths import functional_path
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    FREE_SUPPORT,
-    PINNED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    Path,
-    PointLoad,
-    Rotation,
-    Section,
-    SlideSpring,
-    Support,
-    arc,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.vibration import NetworkMasses, frequencies
 from cfmkit.errors import InputError
 
@@ -46,15 +27,17 @@ TINY = np.array([1e-9])
 WHOLE = NetworkMasses({"x": DENSITY})
 
 
-def beam(end: Support = FREE_SUPPORT, axial: bool = False, shear: bool = False, pin: bool = False) -> Network:
+def beam(end: el.Support = el.FREE_SUPPORT, axial: bool = False, shear: bool = False, pin: bool = False) -> el.Network:
     """Return a straight beam along x from a clamp, or from a pin, to its end."""
-    section = Section(MODULUS, WIDTH, THICKNESS, axial=axial, shear=shear)
-    start = PINNED_SUPPORT if pin else CLAMPED_SUPPORT
-    return Network({"root": Node(0, 0, start), "tip": Node(LENGTH, 0, end)}, {"x": Beam("root", "tip", section)})
+    section = el.Section(MODULUS, WIDTH, THICKNESS, axial=axial, shear=shear)
+    start = el.PINNED_SUPPORT if pin else el.CLAMPED_SUPPORT
+    return el.Network(
+        {"root": el.Node(0, 0, start), "tip": el.Node(LENGTH, 0, end)}, {"x": el.Beam("root", "tip", section)}
+    )
 
 
-def under(force: float, net: Network, **load: Any) -> Path:
-    return trace(net, Loading((PointLoad("tip", fx=-1.0, **load),), np.array([force])))
+def under(force: float, net: el.Network, **load: Any) -> el.Path:
+    return el.trace(net, el.Loading((el.PointLoad("tip", fx=-1.0, **load),), np.array([force])))
 
 
 def roots(equation: Any, count: int) -> np.ndarray:
@@ -95,15 +78,15 @@ def test_a_flywheel_on_a_light_beam_turns_and_swings_as_two_masses_do() -> None:
 @pytest.mark.parametrize(
     ("end", "pin", "equation"),
     [
-        (CLAMPED_SUPPORT, False, lambda x: np.cos(x) - 1 / np.cosh(x)),
-        (PINNED_SUPPORT, False, lambda x: np.sin(x) - np.cos(x) * np.tanh(x)),
-        (PINNED_SUPPORT, True, np.sin),
+        (el.CLAMPED_SUPPORT, False, lambda x: np.cos(x) - 1 / np.cosh(x)),
+        (el.PINNED_SUPPORT, False, lambda x: np.sin(x) - np.cos(x) * np.tanh(x)),
+        (el.PINNED_SUPPORT, True, np.sin),
     ],
     ids=["clamped", "clamped and pinned", "pinned"],
 )
 def test_a_beam_between_two_supports_has_the_frequencies_of_the_closed_form(end: Any, pin: bool, equation: Any) -> None:
     """Its far support slides, and the drive is a pull so small that it does not stiffen the beam."""
-    support = Support(across=True, rotation=end.rotation)
+    support = el.Support(across=True, rotation=end.rotation)
     found = frequencies(under(-1e-9, beam(support, axial=False, pin=pin)), WHOLE, 4).free[-1]
     betas = roots(equation, 4)
     assert found == pytest.approx(UNIT * betas**2, rel=1e-7)
@@ -111,7 +94,7 @@ def test_a_beam_between_two_supports_has_the_frequencies_of_the_closed_form(end:
 
 def test_a_rod_swings_along_itself_where_it_stretches() -> None:
     """So short that its first axial mode, sqrt(E/rho)/(4 L), lies below its third bending mode."""
-    found = frequencies(under(1e-9, beam(Support(across=True, rotation=True), axial=True)), WHOLE, 12).free[-1]
+    found = frequencies(under(1e-9, beam(el.Support(across=True, rotation=True), axial=True)), WHOLE, 12).free[-1]
     wanted = np.sqrt(MODULUS / DENSITY) / (4 * LENGTH)
     assert np.abs(found / wanted - 1).min() < 1e-7
 
@@ -119,9 +102,11 @@ def test_a_rod_swings_along_itself_where_it_stretches() -> None:
 def test_a_stubby_beam_has_the_frequencies_of_timoshenko() -> None:
     """Shear and the inertia of sections, as the boundary-value problem has them; slenderness 20."""
     length = 20 * THICKNESS
-    section = Section(MODULUS, WIDTH, THICKNESS, axial=True, shear=True)
-    net = Network({"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(length, 0)}, {"x": Beam("root", "tip", section)})
-    path = trace(net, Loading((PointLoad("tip", fx=1.0),), TINY))
+    section = el.Section(MODULUS, WIDTH, THICKNESS, axial=True, shear=True)
+    net = el.Network(
+        {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "tip": el.Node(length, 0)}, {"x": el.Beam("root", "tip", section)}
+    )
+    path = el.trace(net, el.Loading((el.PointLoad("tip", fx=1.0),), TINY))
     found = frequencies(path, WHOLE, 3).free[-1]
     area, second = WIDTH * THICKNESS, WIDTH * THICKNESS**3 / 12
     slip = 5 / 6 * MODULUS / 2.6 * area
@@ -151,22 +136,22 @@ def test_a_column_swings_ever_slower_up_to_eulers_load() -> None:
     """Of one pinned at both ends omega^2 = omega0^2 (1 - P/Pe), exactly."""
     euler = np.pi**2 * RIGIDITY / LENGTH**2
     shares = np.array([-2.0, 0.5, 0.9, 0.999])
-    path = trace(
-        beam(Support(across=True), pin=True),
-        Loading((PointLoad("tip", fx=-1.0),), shares[1:] * euler),
-        Control(branch="primary"),
+    path = el.trace(
+        beam(el.Support(across=True), pin=True),
+        el.Loading((el.PointLoad("tip", fx=-1.0),), shares[1:] * euler),
+        el.Control(branch="primary"),
     )
     found = frequencies(path, WHOLE, 1).free[path.at_requested, 0]
     first = np.pi**2 * UNIT
     assert found == pytest.approx(first * np.sqrt(1 - shares[1:]), rel=1e-6)
-    pulled = under(shares[0] * euler, beam(Support(across=True), pin=True))
+    pulled = under(shares[0] * euler, beam(el.Support(across=True), pin=True))
     assert frequencies(pulled, WHOLE, 1).free[-1, 0] == pytest.approx(first * np.sqrt(3), rel=1e-6)
 
 
 def test_no_frequency_is_told_of_a_column_beyond_eulers_load() -> None:
     euler = np.pi**2 * RIGIDITY / LENGTH**2
-    drive = Loading((PointLoad("tip", fx=-1.0),), np.array([0.9, 1.1]) * euler)
-    path = trace(beam(Support(across=True), pin=True), drive, Control(branch="primary"))
+    drive = el.Loading((el.PointLoad("tip", fx=-1.0),), np.array([0.9, 1.1]) * euler)
+    path = el.trace(beam(el.Support(across=True), pin=True), drive, el.Control(branch="primary"))
     found = frequencies(path, WHOLE, 2)
     assert (np.isfinite(found.free).all(axis=1) == path.stable).all()
     assert not path.stable[-1]
@@ -174,10 +159,13 @@ def test_no_frequency_is_told_of_a_column_beyond_eulers_load() -> None:
 
 def test_what_nothing_holds_has_a_frequency_of_zero_while_the_drive_is_free() -> None:
     """A beam between two slides, moved as one: held it is clamped at both ends; free it is rigid at first."""
-    slides = {"root": Node(0, 0, slider_support(np.pi / 2)), "tip": Node(LENGTH, 0, slider_support(np.pi / 2))}
-    section = Section(MODULUS, WIDTH, THICKNESS, axial=True)
-    path = trace(
-        Network(slides, {"x": Beam("root", "tip", section)}), Displacement("root", np.pi / 2, np.array([1e-3]))
+    slides = {
+        "root": el.Node(0, 0, el.slider_support(np.pi / 2)),
+        "tip": el.Node(LENGTH, 0, el.slider_support(np.pi / 2)),
+    }
+    section = el.Section(MODULUS, WIDTH, THICKNESS, axial=True)
+    path = el.trace(
+        el.Network(slides, {"x": el.Beam("root", "tip", section)}), el.Displacement("root", np.pi / 2, np.array([1e-3]))
     )
     found = frequencies(path, WHOLE, 3)
     held = roots(lambda x: np.sin(x) + np.cos(x) * np.tanh(x), 3)
@@ -188,14 +176,14 @@ def test_what_nothing_holds_has_a_frequency_of_zero_while_the_drive_is_free() ->
 
 def test_held_is_the_drive_that_does_not_move_and_free_is_the_load_that_it_left() -> None:
     """A cantilever bent by a displacement, and by the force that it takes: the same frequencies, named the same."""
-    bent = trace(beam(), Displacement("tip", np.pi / 2, np.array([0.03])))
-    pushed = trace(beam(), Loading((PointLoad("tip", fy=1.0),), bent.effort[-1:]))
+    bent = el.trace(beam(), el.Displacement("tip", np.pi / 2, np.array([0.03])))
+    pushed = el.trace(beam(), el.Loading((el.PointLoad("tip", fy=1.0),), bent.effort[-1:]))
     one = frequencies(bent, WHOLE, 3, points=[len(bent) - 1])
     other = frequencies(pushed, WHOLE, 3, points=[len(pushed) - 1], hold=("tip", np.pi / 2))
     assert one.free == pytest.approx(other.free, rel=1e-6)
     assert one.held == pytest.approx(other.held, rel=1e-6)
-    turned = trace(beam(), Rotation("tip", np.array([0.5])))
-    twisted = trace(beam(), Loading((PointLoad("tip", moment=1.0),), turned.effort[-1:]))
+    turned = el.trace(beam(), el.Rotation("tip", np.array([0.5])))
+    twisted = el.trace(beam(), el.Loading((el.PointLoad("tip", moment=1.0),), turned.effort[-1:]))
     one = frequencies(turned, WHOLE, 3, points=[len(turned) - 1])
     other = frequencies(twisted, WHOLE, 3, points=[len(twisted) - 1], hold=("tip", None))
     assert one.free == pytest.approx(other.free, rel=1e-6)
@@ -205,16 +193,17 @@ def test_held_is_the_drive_that_does_not_move_and_free_is_the_load_that_it_left(
 def test_a_curved_thin_arch_keeps_its_frequencies_when_it_is_cut_in_three() -> None:
     """More unknowns, other panels: the same frequencies to 1e-6, in a bent pose."""
 
-    def arch(pieces: int) -> Path:
+    def arch(pieces: int) -> el.Path:
         angles = np.linspace(0.0, 1.2, pieces + 1)
         places = LENGTH * np.stack([np.sin(angles), 1 - np.cos(angles)], axis=1)
         nodes = {
-            f"n{k}": Node(*place, CLAMPED_SUPPORT if k == 0 else Support()) for k, place in enumerate(places.tolist())
+            f"n{k}": el.Node(*place, el.CLAMPED_SUPPORT if k == 0 else el.Support())
+            for k, place in enumerate(places.tolist())
         }
-        section = Section(MODULUS, WIDTH, 0.1 * THICKNESS)
-        beams = {f"b{k}": Beam(f"n{k}", f"n{k + 1}", section, arc(1.2 / pieces)) for k in range(pieces)}
-        force = PointLoad(f"n{pieces}", fy=2e-3 * RIGIDITY / LENGTH**2)
-        return trace(Network(nodes, beams), Loading((force,), np.array([1.0])))
+        section = el.Section(MODULUS, WIDTH, 0.1 * THICKNESS)
+        beams = {f"b{k}": el.Beam(f"n{k}", f"n{k + 1}", section, el.arc(1.2 / pieces)) for k in range(pieces)}
+        force = el.PointLoad(f"n{pieces}", fy=2e-3 * RIGIDITY / LENGTH**2)
+        return el.trace(el.Network(nodes, beams), el.Loading((force,), np.array([1.0])))
 
     whole, cut = arch(1), arch(3)
     one = frequencies(whole, NetworkMasses({"b0": DENSITY}), 5, [len(whole) - 1]).free[0]
@@ -226,7 +215,7 @@ def test_a_spring_and_a_mass_swing_as_they_should() -> None:
     """A beam without weight to speak of, whose end a spring of ten times its stiffness holds."""
     stiffness = 3 * RIGIDITY / LENGTH**3
     net = beam()
-    sprung = Network(net.nodes, net.beams, springs=(SlideSpring("tip", np.pi / 2, 10 * stiffness),))
+    sprung = el.Network(net.nodes, net.beams, springs=(el.SlideSpring("tip", np.pi / 2, 10 * stiffness),))
     found = frequencies(under(1e-9, sprung), NetworkMasses({"x": 1e-3}, {"tip": (1.0, 0.0)}), 1).free[-1, 0]
     assert found == pytest.approx(np.sqrt(11 * stiffness) / (2 * np.pi), rel=1e-6)
 
@@ -234,7 +223,7 @@ def test_a_spring_and_a_mass_swing_as_they_should() -> None:
 def test_becks_column_flutters_at_its_load() -> None:
     """20.05095 EI/L^2 under a force that turns with the tip: two frequencies meet; it never diverges."""
     loads = np.array([10.0, 20.0, 20.0505, 20.0515, 25.0]) * RIGIDITY / LENGTH**2
-    path = trace(beam(), Loading((PointLoad("tip", fx=-1.0, follows=True),), loads))
+    path = el.trace(beam(), el.Loading((el.PointLoad("tip", fx=-1.0, follows=True),), loads))
     assert path.stable.all()
     found = frequencies(path, WHOLE, 2, points=path.at_requested)
     assert found.flutters.tolist() == [False, False, False, True, True]
@@ -247,9 +236,9 @@ def test_becks_column_flutters_at_its_load() -> None:
 def test_a_column_under_a_load_that_turns_in_part_diverges_where_bolotin_says(share: float) -> None:
     """A share stays tangential: divergence at cos(q L) = -share/(1 - share), with q^2 = P/EI; none beyond a half."""
     critical = np.arccos(-share / (1 - share)) ** 2 * RIGIDITY / LENGTH**2
-    loads = (PointLoad("tip", fx=-share, follows=True), PointLoad("tip", fx=share - 1.0))
-    drive = Loading(loads, np.array([0.5, 0.999, 1.001, 1.05]) * critical)
-    path = trace(beam(), drive, Control(branch="primary"))
+    loads = (el.PointLoad("tip", fx=-share, follows=True), el.PointLoad("tip", fx=share - 1.0))
+    drive = el.Loading(loads, np.array([0.5, 0.999, 1.001, 1.05]) * critical)
+    path = el.trace(beam(), drive, el.Control(branch="primary"))
     found = frequencies(path, WHOLE, 2, points=path.at_requested)
     assert found.diverges.tolist() == [False, False, True, True]
     assert not found.flutters.any()
@@ -261,9 +250,9 @@ def test_a_column_under_a_load_that_turns_in_part_diverges_where_bolotin_says(sh
 def test_a_strip_pulled_taut_swings_as_a_stiff_string(slenderness: float) -> None:
     """n/2l sqrt(T/m) (1 + 2 e + (4 + n^2 pi^2/2) e^2) with e = sqrt(EI/T)/l, of its stretched length [Morse 1948]."""
     thick, strain = LENGTH / slenderness, 1e-3
-    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0, slider_support(0.0))}
-    net = Network(nodes, {"x": Beam("root", "tip", Section(MODULUS, WIDTH, thick))})
-    path = trace(net, Displacement("tip", 0.0, np.array([strain * LENGTH])))
+    nodes = {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "tip": el.Node(LENGTH, 0, el.slider_support(0.0))}
+    net = el.Network(nodes, {"x": el.Beam("root", "tip", el.Section(MODULUS, WIDTH, thick))})
+    path = el.trace(net, el.Displacement("tip", 0.0, np.array([strain * LENGTH])))
     found = frequencies(path, WHOLE, 3, [len(path) - 1]).held[0]
     length, pull = LENGTH * (1 + strain), float(path.effort[-1])
     mass = DENSITY * WIDTH * thick / (1 + strain)
@@ -299,7 +288,7 @@ def test_frequencies_of_networks_with_every_feature_do_not_depend_on_the_degree(
     net = beam_networks.network(seed)
     drive = beam_networks.drives(net, seed)[number]
     masses = NetworkMasses(dict.fromkeys(net.beams, 1000.0), {"b": (1e-3, 1e-7), "bb": (5e-4, 0.0)})
-    old = trace(net, drive, Control(tolerance=1e-9))
+    old = el.trace(net, drive, el.Control(tolerance=1e-9))
     known = frequencies(old, masses, 4, [len(old) - 1])
     found = frequencies(functional_path(net, drive, 14), masses, 4, [1])
     assert found.free[0] == pytest.approx(known.free[0], rel=1e-6, nan_ok=True)

@@ -7,23 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    LineLoad,
-    Loading,
-    Network,
-    Node,
-    PathStatus,
-    PointLoad,
-    Section,
-    Taper,
-    arc,
-    gradient,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.mechanics import energy as functional
 from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.discretise import discretise
@@ -34,21 +18,21 @@ from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 E, B, T, NU, LENGTH = 2e9, 10e-3, 1e-3, 0.35, 50e-3
 PLATE = NU**2 / (1 - NU**2)
-TAPER = Taper(np.array([0, 0.5, 1]), np.array([T, 0.7 * T, T]))
-FINE = Control(tolerance=1e-9)
+TAPER = el.Taper(np.array([0, 0.5, 1]), np.array([T, 0.7 * T, T]))
+FINE = el.Control(tolerance=1e-9)
 
 
-def cantilever(section: Section, turn: float = 0.0) -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}
-    return Network(nodes, {"x": Beam("a", "b", section, arc(turn))})
+def cantilever(section: el.Section, turn: float = 0.0) -> el.Network:
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(LENGTH, 0)}
+    return el.Network(nodes, {"x": el.Beam("a", "b", section, el.arc(turn))})
 
 
-def strip(wide: bool = True, width: float = B, nu: float = NU) -> Section:
-    return Section(E, width, T, axial=False, poisson_ratio=nu, wide=wide)
+def strip(wide: bool = True, width: float = B, nu: float = NU) -> el.Section:
+    return el.Section(E, width, T, axial=False, poisson_ratio=nu, wide=wide)
 
 
-def twisted(network: Network, moment: float) -> Any:
-    return trace(network, Loading((PointLoad("b", 0, 0, 1.0),), np.array([moment])), FINE)
+def twisted(network: el.Network, moment: float) -> Any:
+    return el.trace(network, el.Loading((el.PointLoad("b", 0, 0, 1.0),), np.array([moment])), FINE)
 
 
 def energy(bend: float, rest: float, width: float = B) -> float:
@@ -101,30 +85,30 @@ def test_a_strip_under_an_end_moment_has_the_curvature_that_its_energy_says(turn
 
 def test_a_strip_without_poissons_ratio_and_a_narrow_one_are_beams():
     for section, near in ((strip(nu=0.0), 1e-12), (strip(width=0.2e-3), 1e-7)):
-        usual = Section(E, section.width, T, axial=False, poisson_ratio=section.poisson_ratio)
+        usual = el.Section(E, section.width, T, axial=False, poisson_ratio=section.poisson_ratio)
         wide, beam = (twisted(cantilever(one), 5.0 * section.width).motion("b")[-1] for one in (section, usual))
         assert wide == pytest.approx(beam, rel=near)
 
 
-def strips_and_a_narrow_beam() -> tuple[Network, Displacement]:
-    narrow, wide = Section(E, 2e-3, T), Section(E, B, T, poisson_ratio=NU, shear=True, wide=True)
-    tapered = Section(E, B, TAPER, poisson_ratio=NU, wide=True)
+def strips_and_a_narrow_beam() -> tuple[el.Network, el.Displacement]:
+    narrow, wide = el.Section(E, 2e-3, T), el.Section(E, B, T, poisson_ratio=NU, shear=True, wide=True)
+    tapered = el.Section(E, B, TAPER, poisson_ratio=NU, wide=True)
     nodes = {
-        "a": Node(0, 0, CLAMPED_SUPPORT),
-        "b": Node(0.05, 0.03),
-        "c": Node(0.1, 0, CLAMPED_SUPPORT),
-        "d": Node(0.05, 0, CLAMPED_SUPPORT),
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "b": el.Node(0.05, 0.03),
+        "c": el.Node(0.1, 0, el.CLAMPED_SUPPORT),
+        "d": el.Node(0.05, 0, el.CLAMPED_SUPPORT),
     }
-    beams = {"x": Beam("a", "b", wide, arc(0.9)), "y": Beam("b", "c", tapered), "z": Beam("b", "d", narrow)}
-    return Network(nodes, beams), Displacement("b", 0.3, np.array([0.002, 0.004]))
+    beams = {"x": el.Beam("a", "b", wide, el.arc(0.9)), "y": el.Beam("b", "c", tapered), "z": el.Beam("b", "d", narrow)}
+    return el.Network(nodes, beams), el.Displacement("b", 0.3, np.array([0.002, 0.004]))
 
 
 def test_a_strip_in_a_network_with_narrow_beams_does_the_work_that_it_stores():
     net, drive = strips_and_a_narrow_beam()
-    found = trace(net, drive, Control())
-    assert found.status is PathStatus.COMPLETE
+    found = el.trace(net, drive, el.Control())
+    assert found.status is el.PathStatus.COMPLETE
     x, w = np.polynomial.legendre.leggauss(16)
-    places = trace(net, Displacement("b", 0.3, 0.003 + 0.001 * x), Control())
+    places = el.trace(net, el.Displacement("b", 0.3, 0.003 + 0.001 * x), el.Control())
     work = 0.001 * w @ places.effort[places.at_requested]
     before, after = found.energy[found.at_requested]
     assert after - before == pytest.approx(work, rel=1e-6)
@@ -149,28 +133,32 @@ def test_gradient_and_hessian_of_wide_strips_are_derivatives_and_the_same_in_c(s
 
 @pytest.mark.parametrize("tapered", [False, True])
 def test_derivatives_are_those_of_differences(tapered):
-    def build(x: Any) -> Network:
-        taper = Taper(np.array([0.0, 0.4, 1.0]), np.array([x[2], 0.7 * x[2], x[2]]) * 1e-3)
-        section = Section(x[0] * 1e9, x[1] * 1e-3, taper if tapered else x[2] * 1e-3, poisson_ratio=x[3], wide=True)
-        nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(x[4] * 1e-2, 0.02), "c": Node(0.1, 0, CLAMPED_SUPPORT)}
-        beams = {
-            "ab": Beam("a", "b", section, arc(x[5])),
-            "bc": Beam("b", "c", Section(2e9, 4e-3, x[2] * 1e-3)),
+    def build(x: Any) -> el.Network:
+        taper = el.Taper(np.array([0.0, 0.4, 1.0]), np.array([x[2], 0.7 * x[2], x[2]]) * 1e-3)
+        section = el.Section(x[0] * 1e9, x[1] * 1e-3, taper if tapered else x[2] * 1e-3, poisson_ratio=x[3], wide=True)
+        nodes = {
+            "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+            "b": el.Node(x[4] * 1e-2, 0.02),
+            "c": el.Node(0.1, 0, el.CLAMPED_SUPPORT),
         }
-        return Network(nodes, beams, loads=(LineLoad("ab", 0.0, -20.0),))
+        beams = {
+            "ab": el.Beam("a", "b", section, el.arc(x[5])),
+            "bc": el.Beam("b", "c", el.Section(2e9, 4e-3, x[2] * 1e-3)),
+        }
+        return el.Network(nodes, beams, loads=(el.LineLoad("ab", 0.0, -20.0),))
 
     x0 = np.array([2.0, 10.0, 1.0, 0.35, 5.0, 0.7])
-    drive = Displacement("b", -np.pi / 2, np.array([2e-3, 6e-3]))
-    control = Control(tolerance=1e-11)
+    drive = el.Displacement("b", -np.pi / 2, np.array([2e-3, 6e-3]))
+    control = el.Control(tolerance=1e-11)
 
     def outputs(x: Any) -> Any:
-        path = trace(build(x), drive, control)
+        path = el.trace(build(x), drive, control)
         keep = path.at_requested
         bending = path.sections("ab").bending_stress[keep][:, ::4]
         return np.concatenate([path.effort[keep], 1e3 * path.energy[keep], 1e-6 * bending.ravel()])
 
-    path = trace(build(x0), drive, control)
-    found = gradient(path, build, x0)
+    path = el.trace(build(x0), drive, control)
+    found = el.gradient(path, build, x0)
     stress = found.sections("ab").bending_stress[:, ::4]
     own = np.concatenate([found.effort, 1e3 * found.energy, 1e-6 * stress.reshape(-1, len(x0))])
     for k in range(len(x0)):
@@ -181,9 +169,9 @@ def test_derivatives_are_those_of_differences(tapered):
 
 
 def test_a_tape_that_is_bent_back_ends_where_it_would_snap():
-    thin = Section(2e11, 25e-3, 0.1e-3, axial=False, poisson_ratio=0.3, wide=True)
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.02, 0)}
-    network = Network(nodes, {"x": Beam("a", "b", thin, arc(-5.0))})
-    found = trace(network, Loading((PointLoad("b", 0, 0, 1.0),), np.array([0.2])), Control())
-    assert found.status is not PathStatus.COMPLETE
+    thin = el.Section(2e11, 25e-3, 0.1e-3, axial=False, poisson_ratio=0.3, wide=True)
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.02, 0)}
+    network = el.Network(nodes, {"x": el.Beam("a", "b", thin, el.arc(-5.0))})
+    found = el.trace(network, el.Loading((el.PointLoad("b", 0, 0, 1.0),), np.array([0.2])), el.Control())
+    assert found.status is not el.PathStatus.COMPLETE
     assert np.isfinite(found.motion("b")).all()

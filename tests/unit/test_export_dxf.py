@@ -12,8 +12,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from cfmkit.errors import GeometryError
-from cfmkit.export import files, write_dxf
+from cfmkit.export import files
 from cfmkit.export.contours import Arc, Contour, Curve2D, Drawing, Line, Smooth, circle, polygon, reference_square
+from cfmkit.export.dxf import write_dxf
 
 BRACE, REST, CONSTANT, ROLLER = 0.2, 0.068, 0.015, 0.012
 
@@ -270,7 +271,7 @@ import sys, tempfile
 sys.path.insert(0, sys.argv[1])
 from test_export_dxf import plate
 from cfmkit.errors import OutputError
-from cfmkit.export import write_dxf
+from cfmkit.export.dxf import write_dxf
 tempfile.tempdir = sys.argv[2]
 try:
     write_dxf(plate())

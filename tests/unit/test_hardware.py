@@ -118,6 +118,24 @@ def test_numbers_of_the_assembly_are_those_of_the_list():
         assert len(table(result)) == len(found.parts)
 
 
+def test_shafts_and_hook_bars_of_a_cam_bear_the_springs_beyond_the_braces():
+    """Half of the press acts at each brace, the springs of a side beyond it; half of them above a bar's hole."""
+    result = cfmkit.analyze(cfmkit.load("configs/studies/cam_bought_parts.yaml"))
+    mechanism = result.spec.mechanism
+    springs, stretch = mechanism.springs, result.state.elongation.max()
+    outer, side = springs.wound.coil + springs.wound.wire, 0.5 * springs.total * stretch
+    press = np.nanmax(result.curve.extra["contact_force"].values)
+    bending = 0.5 * press * 8e-3 + side * 0.5 * (8e-3 + outer)
+    rows = {row["place"]: row for row in table(result)}
+    assert 32.0 * bending / (math.pi * 8e-3**3) <= PIN_STRENGTH / 1.5
+    assert rows["shafts of the rollers"]["size"] == f"8 x {24 + 2e3 * outer:g} mm"
+    bar = rows["springs to the shafts"]
+    height, width, thick = (float(side) for side in bar["size"].removesuffix(" mm").split(" x "))
+    assert (bar["count"], height, thick) == (4, pytest.approx(2e3 * outer), 8.0)
+    section = 1e-9 * thick * (width**3 - 8.0**3) / (6.0 * width)
+    assert side * 0.125 * 2.0 * outer / section <= 235e6 / 1.5
+
+
 def test_in_one_column_the_parts_list_stands_below_an_assembly_as_wide_as_the_paper():
     result = cfmkit.analyze(cfmkit.load("configs/cam.yaml"))
     figure = form_of(width="84 mm").draw(cfmkit.figures(result)["assembly"])

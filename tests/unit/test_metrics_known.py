@@ -112,7 +112,7 @@ def test_a_sensitivity_over_torques_takes_requirements_and_their_windows_in_degr
 
 
 def test_a_branch_that_a_family_cannot_have_is_refused_with_those_it_has(tmp_path):
-    assert set(cfmkit.analyze(CAM).curve.branches) == set(family("cam").branches)
+    assert set(cfmkit.analyze(CAM).curve.branches) == set(family("cam").outputs.branches)
     reported = "there is no branch 'lod'; there are 'load', 'unload'"
     with pytest.raises(UsageError, match=reported):
         metrics_of(CAM, ["force_ripple[lod]"])
@@ -126,7 +126,7 @@ def test_default_columns_of_a_torque_are_torques():
     work = prepare(TORQUE, SweepRequest(vary=(parse_variation(f"{STIFFNESS}=[1 N/cm, 1.1 N/cm]"),)))
     sample = sample_curve(TORQUE, work.plan, False)
     assert sample.kind == "torque"
-    own = values_of_family(family("slider-crank").values)
+    own = values_of_family(family("slider-crank").outputs.values)
     assert {*work.study.names} <= {item.name for item in definitions("torque", own)}
 
 

@@ -53,7 +53,9 @@ def test_a_result_measures_itself_as_evaluate_and_the_metrics_do(result):
     assert {name: one.value for name, one in result.metrics.items()} == {
         name: one.value for name, one in cfmkit.evaluate(result).items()
     }
-    assert result.requirements == check(result.spec.part_requirements, result, values_of_family(family("cam").values))
+    assert result.requirements == check(
+        result.spec.part_requirements, result, values_of_family(family("cam").outputs.values)
+    )
 
 
 def test_a_result_is_shown_with_metrics_requirements_and_one_figure(result):

@@ -15,6 +15,7 @@ import spare_family
 import cfmkit
 from cfmkit import families
 from cfmkit.cli.main import main
+from cfmkit.families.base import ResultNames
 
 pytestmark = pytest.mark.lists
 
@@ -141,7 +142,10 @@ def test_the_page_of_a_family_names_no_command_for_which_it_has_no_file(capsys):
     ("record", "reported"),
     [
         (lambda: families.family("cam"), "cfmkit itself has a family of this name"),
-        (lambda: replace(spare_family.FAMILY, branches=["load"]), "the field 'branches' of its record"),
+        (
+            lambda: replace(spare_family.FAMILY, outputs=ResultNames(branches=["load"])),
+            "the field 'outputs.branches' of its record",
+        ),
         (lambda: replace(spare_family.FAMILY, interface=99), "is for interface 99"),
         (lambda: replace(spare_family.FAMILY, name="other"), "'family' of its specifications is 'spare'"),
         (lambda: "cam", "a cfmkit.families.base.Family is needed, not str"),

@@ -12,19 +12,18 @@ import pytest
 from cfmkit import families
 from cfmkit.cli.main import main
 from cfmkit.errors import UsageError
-from cfmkit.families.base import read_packaged
-from cfmkit.runs.dimension_drawing import DRAWING_SUFFIXES, read_dimensions, read_drawing
+from cfmkit.runs.dimension_drawing import DRAWING_FILE, DRAWING_SUFFIXES, read_dimensions, read_drawing
 from cfmkit.specs.keys_and_schema import keys
 
 OWN = ["beam", "cam", "slider-crank", "vcfm"]
-DRAWN = [record.name for record in families.records() if record.dimension_drawing]
+DRAWN = [record.name for record in families.records() if record.file(DRAWING_FILE)]
 every_drawing = pytest.mark.parametrize("name", DRAWN)
 own_drawings = pytest.mark.parametrize("name", OWN)
 
 
 def texts(name):
     """Return every text of a drawing, its table left out."""
-    root = ElementTree.fromstring(read_packaged(families.family(name).dimension_drawing))
+    root = ElementTree.fromstring(families.family(name).read(DRAWING_FILE))
     return ["".join(text.itertext()) for text in root.iterfind(".//{*}text") if text.get("class") != "row"]
 
 
@@ -129,7 +128,7 @@ def test_a_drawing_that_there_is_not_is_refused_in_one_line(tmp_path, monkeypatc
 
 def test_a_family_without_a_drawing_is_refused(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    bare = replace(families.family("cam"), dimension_drawing="")
+    bare = replace(families.family("cam"), folder="")
     monkeypatch.setattr(families, "family", lambda _: bare)
     assert main(["show", "cam", "--figure"]) == 2
     assert "has no drawing; there are " in capsys.readouterr().err
@@ -137,6 +136,6 @@ def test_a_family_without_a_drawing_is_refused(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("text", ["no picture", '<svg><text class="row"><tspan>a</tspan></text></svg>'])
 def test_a_file_that_is_no_drawing_is_refused_with_its_name(monkeypatch, text):
-    monkeypatch.setattr("cfmkit.families.base.read_packaged", lambda _: text)
+    monkeypatch.setattr("cfmkit.families.base.Family.read", lambda _record, _name: text)
     with pytest.raises(UsageError, match=r"^cfmkit/families/cam/dimensions\.svg has no rows of"):
         read_dimensions(families.family("cam"))

@@ -331,14 +331,14 @@ def test_what_lies_outside_the_axes_gets_no_name():
 
 
 def test_a_family_without_pictures_of_its_own_still_gets_its_curve():
-    family = Family("any", "", Spec, lambda spec, run: result_of())
+    family = Family("any", "", Spec, {"only": lambda spec, run: result_of()})
     found = figures(family, result_of())
     assert list(found) == ["curve"]
     assert png(found["curve"]()).startswith(b"\x89PNG")
 
 
 def test_nothing_solved_is_nothing_drawn():
-    family = Family("any", "", Spec, lambda spec, run: result_of())
+    family = Family("any", "", Spec, {"only": lambda spec, run: result_of()})
     assert figures(family, Result(result_of().spec, Status.INFEASIBLE)) == {}
 
 

@@ -10,7 +10,6 @@ from beam_support import cantilever
 
 import cfmkit
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 
 
 def room_of(name, **changes):
@@ -125,7 +124,7 @@ def test_films_stay_within_the_box_of_what_moves():
 
     for name in ("vcfm_pla", "beam_lan2010", "slider_crank_lumped", "cam"):
         room, result = room_of(name)
-        part = function_named(family(result.spec.family).part)(result)
+        part = family(result.spec.family).part(result)
         (left, bottom), (right, top) = box_of(part.bodies)
         assert room.drawn == pytest.approx((right - left, top - bottom))
         assert {body.role for body in part.bodies} >= {"held", "driven"}

@@ -141,7 +141,7 @@ def test_a_torque_with_a_tight_spring_is_the_change_of_its_energy():
 @pytest.mark.parametrize("way", ["load", "unload"])
 def test_springs_that_make_up_for_their_own_friction_hold_the_force_better_than_those_that_do_not(way):
     given = cfmkit.load(CONFIGS / "slider_crank_friction.yaml")
-    found = family("slider-crank").design
+    found = family("slider-crank").design.make
     deviations = {}
     for branch in (None, way):
         made = found(given.replace({"design.branch": branch}), Run())
@@ -153,7 +153,7 @@ def test_springs_that_make_up_for_their_own_friction_hold_the_force_better_than_
 
 def test_the_spring_of_an_adjustment_is_stiff_enough_for_its_screw():
     given = cfmkit.load(CONFIGS / "slider_crank_friction.yaml")
-    made = family("slider-crank").design(
+    made = family("slider-crank").design.make(
         given.replace({"design.adjustment": "0.9 N", "design.anchor_travel": "10 mm"}), Run()
     )
     springs = made.spec.mechanism.springs
@@ -180,13 +180,13 @@ def test_the_unloaded_angle_trims_the_mean_force_by_what_is_stated():
 def test_springs_are_chosen_that_the_unloaded_angle_can_trim_by_what_is_wanted():
     given = cfmkit.load(CONFIGS / "slider_crank_bought.yaml")
     given = given.replace({"design.catalogue": None, "design.tolerance": None, "mechanism.springs": {}})
-    plain = family("slider-crank").design(given, Run())
+    plain = family("slider-crank").design.make(given, Run())
     reached = abs(analyze(plain.spec).values["force_per_degree"].value)
     wanted = {"design.adjustment": 1.2 * reached, "design.angle_travel": "1 deg"}
-    trimmed = family("slider-crank").design(given.replace(wanted), Run())
+    trimmed = family("slider-crank").design.make(given.replace(wanted), Run())
     assert abs(analyze(trimmed.spec).values["force_per_degree"].value) >= 1.2 * reached * (1 - 1e-6)
     capped = wanted | {"design.max_rates": {name: "10 N*mm/rad" for name in ("pivot", "crank_pin", "slider_pin")}}
-    refused = family("slider-crank").design(given.replace(capped), Run())
+    refused = family("slider-crank").design.make(given.replace(capped), Run())
     assert refused.status.exit_code == 4
     assert "when the unloaded angle is turned by 1 deg" in refused.message
 

@@ -721,6 +721,6 @@ def test_friction_that_a_part_of_one_piece_leaves_out_is_said(name: str) -> None
 def test_rubber_that_bears_any_curvature_has_no_thickness_from_the_stress(strength: float) -> None:
     rubber = {"youngs_modulus": 26e6, "poisson_ratio": 0.45, "yield_strength": strength * 1e6}
     strip = spec("strip").replace({"mechanism.material": rubber})
-    design = family("slider-crank").design(strip, Run())
+    design = family("slider-crank").design.make(strip, Run())
     assert design.status is Status.INFEASIBLE
     assert "far thicker than 'design.beam.thickness', 0.5 mm to 2 mm" in design.message

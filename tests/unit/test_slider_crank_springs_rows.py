@@ -158,7 +158,10 @@ def test_the_map_has_the_thresholds_to_six_digits():
     fold, per_degree = 0.1489334776, 180 / np.pi * 1e-2
     rates = fold * per_degree * (1 + np.linspace(-1e-6, 1e-6, 5))
     ((_, found),) = solve_rows(variants(spec, [{PATHS[2]: rate} for rate in rates.tolist()]))
-    words = [api.family("slider-crank").words["stiffness_class"][int(kind)] for kind in found.value("stiffness_class")]
+    words = [
+        api.family("slider-crank").outputs.words["stiffness_class"][int(kind)]
+        for kind in found.value("stiffness_class")
+    ]
     assert words[:2] == ["bistable"] * 2
     assert words[3:] == ["local negative"] * 2
 

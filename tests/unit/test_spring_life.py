@@ -42,6 +42,24 @@ def test_the_stress_in_the_wire_is_that_of_the_longest_spring():
     assert "spring_life" not in found.values
 
 
+def test_the_safety_factor_is_that_of_the_turns_or_of_the_loops():
+    """Shigley, Table 10-7: 45 % of the tensile strength in shear, 75 % in the bending of loops."""
+    values = analyze(with_springs(count=2, wound=WIRE)).values
+    strength = 2211e6 / 1.25**0.145
+    turns, loops = 0.45 * strength / values["wire_stress_max"].value, 0.75 * strength / values["loop_stress_max"].value
+    assert values["spring_safety_factor"].value == pytest.approx(min(turns, loops), rel=1e-12)
+    own = analyze(with_springs(count=2, wound=WIRE | {"shear_modulus": "80 GPa"})).values
+    assert "spring_safety_factor" not in own  # of a wire of no class nothing is known
+
+
+def test_torsion_and_compression_springs_have_their_own_shares():
+    """Shigley, eq. 10-57 (78 %) and Table 10-6 (45 %)."""
+    strength = 2211e6 / 1.25**0.145
+    for kind, share in (("torsion", 0.78), ("compression", 0.45)):
+        spring = HelicalSpring(kind, 1.25e-3, 12.5e-3, 40.0)
+        assert spring.stress(spring.yield_load()) == pytest.approx(share * strength, rel=1e-12)
+
+
 def test_the_life_is_that_of_the_smallest_and_the_largest_load():
     found = analyze(with_springs(count=2, preload="20 mm", wound=WIRE | {"fatigue": BASQUIN}))
     most = found.values["wire_stress_max"].value
@@ -82,6 +100,17 @@ def test_the_stress_allowed_in_the_wire_limits_the_deflection():
     assert wound.stress(2.0 + RATE * spring.offer.largest) == pytest.approx(500e6, rel=1e-12)
     with pytest.raises(ValidationError, match="give 'wire', 'coil' and 'turns'"):
         CatalogueSpring.model_validate({"name": "s", "stiffness": "1 N/mm", "max_stress": "500 MPa"})
+
+
+def test_a_spring_that_yields_too_soon_is_not_chosen():
+    wanted = {"force": "50 N", "stroke": "200 mm", "choose": "catalogue", "catalogue": "generic"}
+    plain, safe = (
+        design(cam(roller_radius="8 mm", design=wanted | more)).spec for more in ({}, {"spring_safety": 1.5})
+    )
+    factors = [cfmkit.analyze(spec).values["spring_safety_factor"].value for spec in (plain, safe)]
+    assert factors[0] < 1.5 <= factors[1]
+    with pytest.raises((ValidationError, SpecError), match="picked from a catalogue"):
+        cam(design={"force": "50 N", "stroke": "200 mm", "spring_safety": 1.5})
 
 
 def test_a_spring_that_does_not_last_is_not_chosen():
@@ -192,7 +221,7 @@ def test_a_spring_that_does_not_last_its_reversals_is_not_chosen():
     """Its life in a design is that between both ends of its motion, as in the analysis."""
     offer = {"name": "T", "kind": "torsion", "wire": "0.8 mm", "coil": "4.8 mm", "turns": 5, "fatigue": FATIGUE}
     offer = CatalogueSpring.model_validate(offer | {"max_angle": "120 deg"}).offer
-    wanted = SimpleNamespace(spring_room=None, spring_life=1000.0)
+    wanted = SimpleNamespace(spring_room=None, spring_safety=None, spring_life=1000.0)
     turned = math.radians(55.0)
     assert why_not(offer, (0.0, turned), wanted) is None
     share, reported = why_not(offer, (-turned, turned), wanted)

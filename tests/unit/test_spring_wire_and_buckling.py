@@ -100,8 +100,8 @@ def test_springs_wound_to_measure_keep_to_the_diameters_of_the_table():
     assert extension_spring(1e5, 0.02, 5.0) is None  # 2000 N take 7.2 mm or more
     assert 4e-3 < extension_spring(5e4, 0.02, 5.0).wire <= MUSIC_WIRE.thickest
     (rate,) = stiffest("torsion", np.array([1.0]), 1.0, 1.0)
-    assert torsion_spring(0.999 * rate, 1.0, 1.0).wire <= MUSIC_WIRE.thickest
-    assert torsion_spring(1.001 * rate, 1.0, 1.0) is None
+    assert torsion_spring(0.98 * rate, 1.0, 1.0).wire <= MUSIC_WIRE.thickest
+    assert torsion_spring(1.02 * rate, 1.0, 1.0) is None
 
 
 COIL = {"wire": "1 mm", "coil": "10 mm", "turns": 20}
@@ -286,7 +286,7 @@ def test_a_design_takes_springs_that_stand_alone_before_those_that_need_a_rod(vc
 
     def made(*catalogue):
         wanted = {"design.catalogue": catalogue, "design.refine": False, "design.rise": "4.6 mm", "requirements": ()}
-        return family("vcfm").design(vcfm.replace(wanted), Run())
+        return family("vcfm").design.make(vcfm.replace(wanted), Run())
 
     assert made(*listed).spec.mechanism.springs.name == "stands"
     alone = made(listed[1])
@@ -319,7 +319,7 @@ def test_a_spring_that_is_wound_up_must_fit_over_its_pin(pin, binds):
 @pytest.mark.slow
 def test_a_design_takes_springs_that_fit_over_the_pins():
     spec = cfmkit.load(CONFIGS / "slider_crank_bought.yaml").replace({"mechanism.pins": {"diameter": "5 mm"}})
-    found = family("slider-crank").design(spec, Run())
+    found = family("slider-crank").design.make(spec, Run())
     result = cfmkit.analyze(found.spec)
     assert "spring_binds_on_pin" not in {one.name for one in result.warnings}
     for one in found.spec.mechanism.springs.bought:
@@ -331,7 +331,7 @@ def test_a_spring_wound_to_measure_fits_over_its_pin():
     free, around = torsion_spring(0.05, 1.0, 0.05), torsion_spring(0.05, 1.0, 0.05, 6e-3)
     assert PIN_SHARE * free.inner_diameter_wound_up(1.0) < 6e-3
     assert PIN_SHARE * around.inner_diameter_wound_up(1.0) >= 6e-3
-    assert around.rate == pytest.approx(0.05)
+    assert around.rate == pytest.approx(0.05, rel=0.005 / around.turns)
 
 
 CRANK = {

@@ -255,7 +255,7 @@ LIST = (
 def cranked(**changes):
     given = cfmkit.load(CONFIGS / "slider_crank_bought.yaml")
     spec = given.replace({f"design.{key}": value for key, value in ({"catalogue": LIST} | changes).items()})
-    return spec, family("slider-crank").design(spec, Run())
+    return spec, family("slider-crank").design.make(spec, Run())
 
 
 def test_of_a_list_the_programme_takes_what_trying_all_of_it_takes():
@@ -350,10 +350,10 @@ def test_free_lengths_are_chosen_for_the_springs_that_can_be_had():
     """With rates of any value another crank is best."""
     ends = {"crank_length": ["50 mm", "58 mm"], "tolerance": "30 %"}
     spec, found = cranked(**ends)
-    any_rate = family("slider-crank").design(spec.replace({"design.catalogue": None}), Run())
+    any_rate = family("slider-crank").design.make(spec.replace({"design.catalogue": None}), Run())
     crank = any_rate.spec.mechanism.crank_length
     other = spec.replace({"mechanism.crank_length": crank, "design.crank_length": None})
-    off = [deviation(one.spec) for one in (found, family("slider-crank").design(other, Run()))]
+    off = [deviation(one.spec) for one in (found, family("slider-crank").design.make(other, Run()))]
     assert off[0] < off[1]
 
 

@@ -158,13 +158,15 @@ def test_the_springs_of_a_proposed_cam_are_stated_and_bear_their_load():
     plain = cfmkit.design(candidate.spec).spec
     spec = function_named(candidate.finish)(plain, asked)
     wire = spec.mechanism.springs.wound
-    assert wire.to_wound("extension").rate == pytest.approx(spec.mechanism.springs.stiffness, rel=1e-9)
+    springs = spec.mechanism.springs
+    assert wire.to_wound("extension").rate * springs.count == pytest.approx(springs.total, rel=1e-12)
+    assert springs.total == pytest.approx(plain.mechanism.springs.total, rel=0.005 / wire.turns)
     assert spec.mechanism.springs.name.startswith("custom, wire")
     result = cfmkit.analyze(spec)
     strength = tensile_strength(wire.wire)
     assert result.values["wire_stress_max"].value <= 0.38 * strength * (1 + 1e-9)
     assert result.values["loop_stress_max"].value <= 0.75 * strength
-    assert result.curve.force.tolist() == cfmkit.analyze(plain).curve.force.tolist()
+    assert result.values["spring_safety_factor"].value >= asked.safety
     boxes = [family("cam").envelope(cfmkit.analyze(one)) for one in (plain, spec)]
     assert boxes[0].depth == pytest.approx(boxes[1].depth, rel=1e-9)
     assert cfmkit.loads(cfmkit.dumps(spec)).mechanism.springs == spec.mechanism.springs

@@ -27,7 +27,7 @@ def spec():
 
 def designed(spec, **changes):
     changes = {f"design.{key}": value for key, value in changes.items()}
-    return family("vcfm").design(spec.replace({"design.refine": False} | changes), Run())
+    return family("vcfm").design.make(spec.replace({"design.refine": False} | changes), Run())
 
 
 def test_springs_add_their_rate_and_nothing_below_their_free_length():
@@ -99,11 +99,11 @@ def test_a_design_does_not_press_its_own_springs_until_their_turns_touch(spec):
     springs = {"kind": "compression", "stiffness": "1 N/mm", "free_length": "19 mm", "wound": wire}
     own = spec.replace({"mechanism.springs": springs, "design": None, "requirements": ()})
     own = own.replace({"design": {"force": "5 N", "adjustment": "3 N", "stroke": "4 mm", "refine": False}})
-    refused = family("vcfm").design(own, Run())
+    refused = family("vcfm").design.make(own, Run())
     assert refused.status is Status.INFEASIBLE
     assert "deflected by 8.333 mm, their turns touch at 7 mm" in refused.message
     longer = own.replace({"mechanism.springs.free_length": "21 mm", "analysis.travel": "7.2 mm"})
-    made = family("vcfm").design(longer, Run())  # the stated travel closes them: what is analysed says so
+    made = family("vcfm").design.make(longer, Run())  # the stated travel closes them: what is analysed says so
     assert made.status is Status.COMPLETE
     assert "spring_closed" in {item.name for item in cfmkit.analyze(made.spec).warnings}
     assert made.spec.mechanism.frame == own.mechanism.frame
@@ -142,7 +142,7 @@ def test_a_design_counts_the_life_of_a_spring_as_its_own_analysis_does(spec, kin
     wanted = {"force": "9 N", "adjustment": "3 N", "stroke": "4 mm", "refine": False, "catalogue": (offer,)}
 
     def lasting(life):
-        return family("vcfm").design(start.replace({"design": wanted | {"spring_life": life}}), Run())
+        return family("vcfm").design.make(start.replace({"design": wanted | {"spring_life": life}}), Run())
 
     life = cfmkit.analyze(lasting(1e3).spec).values["spring_life"].value
     assert lasting(0.98 * life).status is Status.COMPLETE
@@ -220,7 +220,7 @@ def test_a_design_follows_leaves_back_only_as_far_as_a_long_preload_pushes_them(
     monkeypatch.setattr(exact_model, "ExactSampler", asked)
     listed = [{"name": "long", "kind": "compression", "stiffness": "1.302 N/mm", "counts": [2]}]
     with pytest.raises(RuntimeError) as back:
-        family("vcfm").design(spec.replace({"design.catalogue": listed, "design.adjustment": "150 N"}), Run())
+        family("vcfm").design.make(spec.replace({"design.catalogue": listed, "design.adjustment": "150 N"}), Run())
     assert 1e-3 < float(str(back.value)) < 15e-3
 
 
@@ -239,7 +239,7 @@ def test_a_leaf_is_traced_once_with_whichever_springs_stand_beside_it(spec):
 
 @pytest.mark.slow
 def test_the_refined_design_keeps_force_and_stress_by_the_exact_model(spec):
-    found = family("vcfm").design(spec, Run())
+    found = family("vcfm").design.make(spec, Run())
     exact = cfmkit.analyze(found.spec.replace({"analysis.fidelity": "exact"}))
     assert exact.values["window_force"].value == pytest.approx(11.15, rel=2e-3)
     assert exact.values["travel_stress_max"].value <= 30e6 * 1.0002

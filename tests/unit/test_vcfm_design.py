@@ -155,7 +155,7 @@ def test_a_proposal_with_another_structure_is_adjusted_by_preloads_of_its_own_sp
     words = proposals.STRUCTURE_BLOCKS[structure][1].variant
     candidates = proposals.propose(request, Run()).candidates
     chosen = next(one for one in candidates if one.variant.startswith(words))
-    made = family("vcfm").design(chosen.spec.replace({"design.refine": False}), Run()).spec
+    made = family("vcfm").design.make(chosen.spec.replace({"design.refine": False}), Run()).spec
     finished = function_named(chosen.finish)(made, request)
     found = cfmkit.analyze(finished)
     change = next(one.values for one in found.tables["adjustability"]().columns if one.name == "force_change")

@@ -150,14 +150,16 @@ def test_corners_that_no_fillet_fits_are_told_where_the_stress_is_read():
 
 def test_leaves_with_fillets_of_ten_micrometres_are_meshed():
     """A seam along the face of the shuttle had a point on the edge itself, and the part was refused."""
-    leaf = family("vcfm").driven_parts(spec("ding2022", "analysis.fidelity=solid", "mechanism.part.fillet=0.01 mm"))[0]
+    leaf = family("vcfm").elastic.solids(spec("ding2022", "analysis.fidelity=solid", "mechanism.part.fillet=0.01 mm"))[
+        0
+    ]
     grid = leaf.part.create_mesh().refine()[0].problem.elements.mesh
     assert grid.area == pytest.approx(sum(ring.area for ring in leaf.part.rings), rel=1e-9)
 
 
 def test_ends_of_windows_are_poses_of_leaf_and_spring():
     made = spec("ding2022", "analysis.fidelity=solid", "analysis.window=[1.3 mm, 4.3 mm]", "analysis.preloads=[0.5 mm]")
-    leaf, spring = family("vcfm").driven_parts(made)
+    leaf, spring = family("vcfm").elastic.solids(made)
     for place in (1.3e-3, 4.3e-3):
         assert np.abs(np.array(leaf.stops) - place).min() < 1e-12
         assert np.abs(np.array(spring.stops) - 0.5 * (0.5e-3 + place)).min() < 1e-12

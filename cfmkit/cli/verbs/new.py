@@ -78,17 +78,15 @@ def template(name: str) -> str:
     Raises UsageError if there is no such family, or it comes without a template.
     """
     from cfmkit.families import family
-    from cfmkit.families.base import read_packaged
     from cfmkit.specs.keys_and_schema import keys
 
     record = family(name)
-    if not record.template:
+    written = record.read("template.yaml")
+    if not written:
         raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
     known = keys(record.spec_type)
     kinds = {key.path: key.kind for key in known}
-    text = re.sub(
-        r"\{words of (\S+)\}", lambda word: kinds[word[1]].replace(" | ", ", "), read_packaged(record.template)
-    )
+    text = re.sub(r"\{words of (\S+)\}", lambda word: kinds[word[1]].replace(" | ", ", "), written)
     return complete_template(text, known)
 
 

@@ -45,8 +45,8 @@ class SweepOptions(StudyOptions):
         str | None,
         option(
             "--sample",
-            metavar="|".join(f"{kind}:N" for kind in SAMPLE_KINDS),
-            text=f"Draw N points from ranges start:stop: {list_phrases()}.",
+            metavar="KIND:N",
+            text=f"Draw N points from ranges start:stop. KIND: {', '.join(SAMPLE_KINDS)} ({list_phrases()}).",
         ),
     ] = None
     design: Annotated[bool, flag("--design", text="Redesign the mechanism at each point.")] = False

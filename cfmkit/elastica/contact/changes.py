@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.equations import NO_FRICTION, with_closed
-from cfmkit.elastica.contact.side_conditions import SideCondition, SideConditions
-from cfmkit.elastica.contact.side_gaps import LoadStage, carry
+from cfmkit.elastica.contact.side_conditions import SideConditions
+from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.contact.terms import gaps, measure, rub_values, slip_way
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
@@ -45,20 +46,6 @@ SIDES_TOGETHER, NODES_TOGETHER = 6, 40  # states of a march, between which it is
 NEARER = 30  # halvings of a step, in which it is looked for where a contact still sticks
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
-
-
-class ContactChange(NamedTuple):
-    """The begin or end of a contact; unstable directions before and after it."""
-
-    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes", "slips", "sticks"]
-    number: int  # of the contact in the arrays of its piece
-    at: PathEquilibrium
-    before: int
-    after: int
-    contact: int = -1  # in `Network.contacts`
-    condition: SideCondition | None = None  # on the side of a beam, that is met
-    piece: PieceOfPath | None = None  # whose unknowns `at` has; None: that of the piece before
-    states: int = 1  # of friction that are possible behind it
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +147,9 @@ class PieceOfPath:
     @cached_property
     def own_mask(self) -> Any:
         """Which free unknowns of the whole are those of the own problem."""
-        return np.isin(self.whole.mesh.free, self.own.mesh.free)
+        mask = np.zeros(len(self.whole.mesh.free), bool)
+        mask[np.searchsorted(self.whole.mesh.free, self.own.mesh.free)] = True
+        return mask
 
     def shrink(self, at: PathEquilibrium) -> PathEquilibrium:
         """Return an equilibrium without the forces of open contacts."""
@@ -267,10 +256,11 @@ class PieceOfPath:
 
     def roundings(self, values: FloatArray) -> FloatArray:
         """Return by how much a force or a gap (contacts, ..., shares) may be negative, (contacts, ...)."""
-        closed = np.isin(np.arange(len(values)), list(self.closed))
+        closed = list(self.closed)
         largest = np.abs(values[closed]).max(axis=(0, -1), initial=1.0)
         shape = -1, *(1,) * (values.ndim - 2)
-        spread_values = np.where(closed.reshape(shape), FORCE_ROUNDING * largest, GAP_ROUNDING)
+        spread_values = np.full(values.shape[:-1], GAP_ROUNDING)
+        spread_values[closed] = FORCE_ROUNDING * largest
         count = len(self.whole.mesh.contacts)
         spread_values[count : count + len(self.sides.all)] = self.sides.roundings.reshape(shape)
         for row in range(count + len(self.sides.all), len(values)):

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import BeamOnObstacle, Distance, NodeOnBeam
+from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, Distance, NodeOnBeam
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.model.contact import BeamOnBeam, BeamSide
+    from cfmkit.elastica.model.contact import BeamSide
 
 
 def measure_distance(mesh: Discretisation, item: BeamSide, places: Any, z: Any) -> Distance:
@@ -26,7 +26,7 @@ def measure_distance(mesh: Discretisation, item: BeamSide, places: Any, z: Any) 
     if isinstance(item, BeamOnObstacle):
         edge = item.outline.distance(places * length)
         return Distance(edge.value / length, edge.normal, edge.curvature * length)
-    number, radius = _circle(mesh, item)
+    number, radius = find_circle(mesh, item)
     centre = poses(mesh.attachments, z, [number]).place[..., 0, :]
     away = places - centre.reshape(*centre.shape[:-1], *(1,) * (places.ndim - centre.ndim), 2)
     reach = np.hypot(away[..., 0], away[..., 1])
@@ -45,15 +45,21 @@ def find_motion(mesh: Discretisation, item: BeamSide, z: FloatArray) -> EdgeMoti
     """Return what moves an edge in a state (size,)."""
     if isinstance(item, BeamOnObstacle):
         return EdgeMotion(np.zeros(0, np.int64), np.zeros((2, 0)), np.zeros(2))
-    at = poses(mesh.attachments, z, [_circle(mesh, item)[0]])
+    at = poses(mesh.attachments, z, [find_circle(mesh, item)[0]])
     return EdgeMotion(at.unknowns[0, :3], at.jacobian[0], at.arm[0])
 
 
-def _circle(mesh: Discretisation, item: NodeOnBeam | BeamOnBeam) -> tuple[int, float]:
+def find_circle(mesh: Discretisation, item: NodeOnBeam | BeamOnBeam) -> tuple[int, float]:
     """Return the attachment and the radius of the pad, or of the other beam at its place, that a side touches."""
     if isinstance(item, NodeOnBeam):
         return mesh.nodes[item.node], item.radius / mesh.scales.length
     return find_mate(mesh, item).place, half_thickness_of(mesh, item.partner)
+
+
+def find_leading(mesh: Discretisation, contact: ContactAt) -> ContactAt:
+    """Return the contact that has gap and force: of a pair of beams one of both, else the contact itself."""
+    item = contact.item
+    return find_mate(mesh, item) if isinstance(item, BeamOnBeam) and not item.leads else contact
 
 
 def find_mate(mesh: Discretisation, item: BeamOnBeam) -> ContactAt:

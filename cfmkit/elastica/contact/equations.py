@@ -55,7 +55,7 @@ def with_closed(
     )
     held = [unknown for contact in contacts if not contact.closed for unknown in contact.own_unknowns]
     held += [unknown for contact in contacts if contact.rub >= 0 for unknown in (contact.flag, contact.anchor)]
-    pressed = replace(mesh, contacts=contacts, free=np.setdiff1d(mesh.free, held))
+    pressed = replace(mesh, contacts=contacts, free=np.delete(mesh.free, np.searchsorted(mesh.free, held)))
     equations = ((key, made) for key, made in mesh.known.items() if isinstance(made, NumpyEquations))
     exchanged = ((key, made.exchange_contacts(pressed)) for key, made in equations)
     pressed.known.update((key, made) for key, made in exchanged if made is not None)

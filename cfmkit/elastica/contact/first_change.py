@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
+from cfmkit.elastica.contact.changes import PieceOfPath, StepBetween
+from cfmkit.elastica.contact.path_items import ContactChange
 from cfmkit.elastica.contact.side_changes import locate_side_change
 from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.numerics.continuation.correct import correct
@@ -66,7 +67,7 @@ def find_change(piece: PieceOfPath, first: PathEquilibrium, last: PathEquilibriu
     def share(change: ContactChange) -> float:
         return step.share_of(change.at if change.piece is None else change.piece.carry(change.at, piece))
 
-    return min(changes, key=share)
+    return changes[0] if len(changes) == 1 else min(changes, key=share)
 
 
 def _is_beside_change(piece: PieceOfPath, row: int, rows: list[int]) -> bool:

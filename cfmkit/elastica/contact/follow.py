@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import FORCE_ROUNDING, ContactChange, PieceOfPath
+from cfmkit.elastica.contact.changes import FORCE_ROUNDING, PieceOfPath
 from cfmkit.elastica.contact.first_change import find_change, find_change_before_end
 from cfmkit.elastica.contact.friction import RIGID_RATE, ChosenState, choose_friction, is_jammed
+from cfmkit.elastica.contact.path_items import ContactChange, PathItem, Remeshed
 from cfmkit.elastica.contact.side_changes import enter_side_change
 from cfmkit.elastica.contact.terms import slip_way
 from cfmkit.elastica.model.contact import FrictionState
@@ -51,29 +52,14 @@ class EndOfPiece(NamedTuple):
     at: PathEquilibrium
 
 
-class Remeshed(NamedTuple):
-    """The points that follow have other unknowns: sides of beams touch at other places."""
-
-    problem: NetworkProblem
-
-
-Item = Point | PathEvent | PathStop | ContactChange | Remeshed
-
-
 def follow_in_contact(
     problem: NetworkProblem,
     start: PathEquilibrium,
     targets: FloatArray,
     options: Options,
     branch: PathBranch | None = None,
-) -> Iterator[Item]:
-    """Yield points, events and changes of contacts of a path in order, and its ending at last; see `follow`.
-
-    Every change comes behind a point that lies at it.
-    """
-    if not problem.mesh.fits.network.contacts:
-        yield from follow(problem, start, targets, options, branch)
-        return
+) -> Iterator[PathItem]:
+    """Yield what `follow_network` does, of a network with contacts."""
     closed = frozenset(
         number
         for number, contact in enumerate(problem.mesh.contacts)
@@ -104,7 +90,7 @@ def _find_turns(problem: NetworkProblem, start: float, targets: FloatArray) -> l
     return [*turns.tolist(), len(targets)]
 
 
-def _limit_points(items: Iterator[Item], options: Options) -> Iterator[Item]:
+def _limit_points(items: Iterator[PathItem], options: Options) -> Iterator[PathItem]:
     """Yield the items of a path, at most as many points as are allowed."""
     between = 0
     for item in items:
@@ -118,7 +104,7 @@ def _limit_points(items: Iterator[Item], options: Options) -> Iterator[Item]:
 
 def _follow(
     part: PieceOfPath, start: PathEquilibrium, targets: FloatArray, branch: PathBranch | None
-) -> Iterator[Item]:
+) -> Iterator[PathItem]:
     options, turns = part.options, _find_turns(part.whole, start.drive, targets)
     first = targets[: turns[0]]
     items = follow(part.own, part.shrink(start), first, options, branch)
@@ -151,18 +137,17 @@ def _follow(
             yield change._replace(kind="blocks") if after.end is WhyStopped.BLOCKED else change
             yield after
             return
-        names, what = (change.piece or part).say(change.number), change.kind
-        before = part.friction
+        changed, before = change.piece or part, part.friction
         part, at, sense, turned, states = after
         yield change._replace(after=at.unstable, states=states)
         yield from _change_others(ChosenState(part, at, sense, 1), before, change.number)
         if part.whole.mesh is not mesh:
             yield Remeshed(part.whole)
         if turned and not options.through_folds:
-            yield PathStop(WhyStopped.LIMIT_POINT, place, SNAP_MESSAGE.format(names=names, what=what))
+            yield _stop_at_change(WhyStopped.LIMIT_POINT, SNAP_MESSAGE, changed, change)
             return
         if at.unstable > change.before and options.branch != "primary" and not options.through_folds:
-            yield PathStop(WhyStopped.JUMPS, place, STABILITY_LOSS_MESSAGE.format(names=names, what=what))
+            yield _stop_at_change(WhyStopped.JUMPS, STABILITY_LOSS_MESSAGE, changed, change)
             return
         if turned:
             yield PathEvent("limit point", place, change.before, at.unstable, at)
@@ -177,6 +162,12 @@ def _follow(
             iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense),
             at,
         )
+
+
+def _stop_at_change(end: WhyStopped, message: str, changed: PieceOfPath, change: ContactChange) -> PathStop:
+    """Return the end of a path at a change of a contact."""
+    text = message.format(names=changed.say(change.number), what=change.kind)
+    return PathStop(end, change.at.drive, text)
 
 
 def _turn_back(

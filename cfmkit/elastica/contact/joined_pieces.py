@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.side_gaps import LoadStage, carry
+from cfmkit.elastica.contact.carried_states import carry
+from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
 from cfmkit.elastica.mechanics.march import equations
@@ -19,17 +20,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.contact.path_items import StatesOfPiece
 
 FEWEST_APART = 0.02  # of the way between two neighbours, by which an open contact stays away from both
 SAME_POINT = 1e-3  # motion by which a joined state may be corrected
-
-
-class StatesOfPiece(NamedTuple):
-    """States of one piece: all unknowns (n, size) and drives (n,)."""
-
-    mesh: Discretisation
-    z: FloatArray
-    drive: FloatArray
 
 
 class _Slot(NamedTuple):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -37,12 +36,6 @@ class Feet(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class PairGaps(SideGaps):
     """Gaps of the side of one beam to another beam, which has round ends."""
-
-    @cached_property
-    def partner_elements(self) -> Any:
-        """Elements of the other beam, (m,)."""
-        partner = self.item.partner  # type: ignore[union-attr]
-        return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == partner])
 
     def distance(self, places: Any, z: FloatArray, stage: LoadStage) -> tuple[Any, Any]:
         """Return the distances of places (n, ..., 2) from the other beam in n states, and their gradients."""

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
+from cfmkit.elastica.contact.changes import PieceOfPath, StepBetween
 from cfmkit.elastica.contact.edges import find_mate
 from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
+from cfmkit.elastica.contact.path_items import ContactChange
 from cfmkit.elastica.contact.places_of_sides import (
     find_nearest_places,
     find_pads_at,
@@ -277,15 +278,13 @@ def enter_side_change(
             text = BEGINS_TO_LIE if isinstance(condition.item, BeamOnObstacle) else SPREADS_MESSAGE
             text = text.format(names=describe(condition.item), why=why)
             return PathStop(WhyStopped.LOST, change.at.drive, text)
-    lost = PathStop(WhyStopped.LOST, change.at.drive, NO_WAY.format(names=piece.say(change.number)
-                    if change.piece is None else change.piece.say(min(change.number, 0))))  # fmt: skip
     if condition is None:  # a contact of a side ends
         item = piece.whole.mesh.contacts[change.number]
         beyond = piece.with_flanks(list_remaining_places(piece, change.number), piece.closed - {change.number})
         begin_guess = beyond.shrink(piece.carry(change.at, beyond))
         at = beyond.own.solve(begin_guess.x, begin_guess.drive)
         if at is None:
-            return lost
+            return _stop_lost(piece, change)
         number = item.number
         if isinstance(item.item, BeamOnBeam) and not item.item.leads:
             number = find_partner(piece, number)
@@ -299,7 +298,7 @@ def enter_side_change(
         begin_guess = beyond.shrink(change.at)
         at = beyond.own.solve(begin_guess.x, begin_guess.drive)
         if at is None:
-            return lost
+            return _stop_lost(piece, change)
         whole = beyond.grow(at)
         if condition.kind == "touch":
             grows = beyond.grows_along(whole, change.number)
@@ -313,10 +312,16 @@ def enter_side_change(
         ways = {"tangent": _move_into_beam, "spreads": _part_contact, "wraps": _lie_from_root}
         part = ways[condition.kind](piece, change) if condition.kind in ways else _lay(piece, change, sense)
         if part is None:
-            return lost
+            return _stop_lost(piece, change)
         beyond, whole, grows = part
     turned = bool(grows * sense < 0)
     return beyond, whole, (-sense if turned else sense), turned
+
+
+def _stop_lost(piece: PieceOfPath, change: ContactChange) -> PathStop:
+    """Return the end of a path behind whose change nothing was found."""
+    names = piece.say(change.number) if change.piece is None else change.piece.say(min(change.number, 0))
+    return PathStop(WhyStopped.LOST, change.at.drive, NO_WAY.format(names=names))
 
 
 Entered = tuple[PieceOfPath, "PathEquilibrium", float]

@@ -19,7 +19,10 @@ import numpy as np
 
 from cfmkit.elastica.contact.edges import find_mate, measure_distance
 from cfmkit.elastica.contact.pair_gaps import make_gaps
+from cfmkit.elastica.contact.side_gaps import join_sides, search_sides
+from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
+from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, lengths_at
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
@@ -33,6 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
     from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.equations import SideData
 
 ON_OBSTACLE = 1e-9  # mean beam lengths, and rad, within which a clamped end lies on an obstacle
 NEW_PLACE = 1e-4  # of a beam from its end, or from another place, at which a contact that moves or parts begins
@@ -111,14 +115,11 @@ class SideConditions:
 
     def roots(self, item: BeamSide) -> tuple[bool, ...]:
         """Return which ends of a beam are clamped so that they lie on an obstacle: False the first, True the last."""
-        if item not in self._roots:
+        known, key = self.mesh.fits.known, (SideConditions.roots, item)
+        if key not in known:
             ends = (last for last in (False, True) if isinstance(item, BeamOnObstacle) and self._lies_at(item, last))
-            self._roots[item] = tuple(ends)
-        return self._roots[item]
-
-    @cached_property
-    def _roots(self) -> dict[BeamSide, tuple[bool, ...]]:
-        return {}
+            known[key] = tuple(ends)
+        return known[key]  # type: ignore[no-any-return]
 
     def _lies_at(self, item: BeamOnObstacle, last: bool) -> bool:
         mesh, network = self.mesh, self.mesh.fits.network
@@ -174,7 +175,22 @@ class SideConditions:
 
     def values(self, z: FloatArray, stage: LoadStage) -> FloatArray:
         """Return the values of all conditions in n states (n, size), (conditions, n)."""
-        return np.array([self.value(condition, z, stage) for condition in self.all]).reshape(len(self.all), len(z))
+        values = np.empty((len(self.all), len(z)))
+        rows, sides = self._touching
+        together = None if sides is None else search_sides(self.mesh, sides, z, stage, watch=True)
+        for k, condition in enumerate(self.all):
+            if together is None or k not in rows:
+                values[k] = self.value(condition, z, stage)
+            else:
+                values[k] = together[:, rows.index(k), 0]
+        return values
+
+    @cached_property
+    def _touching(self) -> tuple[list[int], SideData | None]:
+        """Rows of sides that may touch, and these as compiled code takes them; None if some thickness varies."""
+        rows = [k for k, condition in enumerate(self.all) if condition.kind == "touch"]
+        packed = [self.gaps_of(self.all[k].item).packed for k in rows]
+        return rows, join_sides(packed) if packed and all(packed) else None  # type: ignore[arg-type]
 
     def value(self, condition: SideCondition, z: FloatArray, stage: LoadStage) -> FloatArray:
         """Return the values of a condition in n states, (n,)."""
@@ -255,6 +271,9 @@ class SideConditions:
     def _relative_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
         """Return the curvature of the gap along a beam at a contact."""
         mesh, item = self.mesh, contact.item
+        curvatures = equations(mesh).measure_curvatures(z)
+        if curvatures is not None:
+            return np.asarray(curvatures[side_contacts(mesh).index(contact)])
         fitted = mesh.fits[item.beam]  # type: ignore[union-attr]
         inside = float(mesh.elements.cuts[contact.element].mean())
         columns = [3, 7, *range(8, mesh.degree + 7)]

@@ -1,4 +1,4 @@
-"""Places along the sides of beams in many states: how near they are to obstacles, and states on other elements."""
+"""Places along the sides of beams in many states: how near they are to obstacles."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.edges import measure_distance
+from cfmkit.elastica.contact.edges import half_thickness_of, measure_distance
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.contact_arrays import edge_rows
-from cfmkit.elastica.mechanics.equations import SideData
+from cfmkit.elastica.mechanics.equations import LineTables, SideData
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, cuts_at, with_places
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import BeamOnObstacle
+from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.problem import NetworkProblem
@@ -125,12 +127,12 @@ def _rows_at(degree: int, places: FloatArray) -> _RowsAtPlaces:
 
 
 @lru_cache(maxsize=64)
-def _packed_tables(degree: int) -> FloatArray:
-    """Return places along an element, Gauss weights and the matrices at these places, in one row."""
+def find_line_tables(degree: int) -> LineTables:
+    """Return what compiled code needs to follow lines."""
     fractions = _even_angles()
     at, rule = _rows_at(degree, fractions), basis(degree)
-    parts = fractions, rule.weights, at.values, at.integrals, at.interpolation, _series_matrix(degree)
-    return read_only(np.concatenate([np.ravel(part) for part in parts]))
+    parts = fractions, rule.weights, at.values.T, at.integrals.T, at.interpolation.T, _series_matrix(degree)
+    return LineTables(read_only(np.concatenate([np.ravel(part) for part in parts])), len(fractions))
 
 
 def _even_angles() -> FloatArray:
@@ -144,6 +146,24 @@ def interpolate_line(degree: int, fractions: FloatArray, start: Any, slopes: Any
     shape = (*fractions.shape, rows.integrals.shape[-1])
     place = start + np.einsum("...q,...qd->...d", rows.integrals.reshape(shape), slopes)
     return place, np.einsum("...q,...qd->...d", rows.interpolation.reshape(shape), slopes)
+
+
+def join_sides(sides: Sequence[SideData]) -> SideData:
+    """Return several sides in one."""
+    elements, numbers, edge = (np.concatenate(arrays) for arrays in zip(*sides, strict=True))
+    counts = np.array([(0, 0), *((len(side.elements), len(side.edge)) for side in sides[:-1])]).cumsum(axis=0)
+    numbers[:, [0, 10]] += counts[:, :1]
+    numbers[:, 4] += counts[:, 1]
+    return SideData(elements, numbers, edge)
+
+
+def search_sides(
+    mesh: Discretisation, sides: SideData, z: FloatArray, stage: LoadStage, watch: bool = False
+) -> FloatArray | None:
+    """Return what compiled code finds of the gaps of sides in n states, (n, sides, 5); None without it."""
+    if not len(z):
+        return None
+    return equations(mesh).search_sides(z, stage.rows(), sides, find_line_tables(mesh.degree), watch)
 
 
 class LeastGap(NamedTuple):
@@ -175,8 +195,8 @@ class SideGaps:
     @cached_property
     def slack(self) -> FloatArray:
         """By how much each element may lie in the obstacle, (m,)."""
-        beside = np.where(np.isin(self.elements, self.touched), BESIDE_CONTACT, 0.0)
-        return np.where(np.isin(self.elements, self.laid), 1.0, beside)
+        beside = dict.fromkeys(self.touched, BESIDE_CONTACT) | dict.fromkeys(self.laid, 1.0)
+        return np.array([beside.get(number, 0.0) for number in self.elements.tolist()])
 
     def half_thickness(self, parameter: Any, element: int) -> Any:
         """Return half the thickness at parameters of an element, in mean beam lengths."""
@@ -257,23 +277,35 @@ class SideGaps:
 
     def _search(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray | None:
         """Return what compiled code finds in n states, (n, 5); None without it, or if the thickness varies."""
-        if self._side is None or not len(z):
-            return None
-        return equations(self.mesh).search_side(z, stage.rows(), self._side, watch)
+        result = None if self.packed is None else search_sides(self.mesh, self.packed, z, stage, watch)
+        return None if result is None else result[:, 0]
 
     @cached_property
-    def _side(self) -> SideData | None:
-        """The side as compiled code takes it."""
-        mesh = self.mesh
-        if not isinstance(self.item, BeamOnObstacle):
+    def packed(self) -> SideData | None:
+        """The side as compiled code takes it; None if the thickness varies."""
+        mesh, item = self.mesh, self.item
+        beams, edge, counts, circle = [item.beam], np.empty((0, 6)), (0, 0, 0), (-1, 0.0)
+        if isinstance(item, BeamOnObstacle):
+            edge, outline = edge_rows(item.outline), item.outline
+            counts = len(outline.length), len(outline.radius), int(outline.closed)
+        elif isinstance(item, BeamOnBeam):
+            beams.append(item.partner)
+            circle = -1, half_thickness_of(mesh, item.partner)
+        else:
+            circle = mesh.nodes[item.node], item.radius / mesh.scales.length
+        if any(isinstance(mesh.fits.network.beams[beam].section.thickness, Taper) for beam in beams):
             return None
-        if isinstance(mesh.fits.network.beams[self.item.beam].section.thickness, Taper):
-            return None
-        edge = self.item.outline
-        half = float(np.ravel(self.half_thickness(0.5, int(self.elements[0])))[0])
-        counts = len(edge.length), len(edge.radius), float(edge.closed), N_ALONG
-        numbers = np.array([half, mesh.scales.length, *counts], float)
-        return SideData(self.elements, self.slack, edge_rows(edge), numbers, _packed_tables(mesh.degree))
+        half, own, partner = half_thickness_of(mesh, item.beam), len(self.elements), self.partner_elements
+        elements = np.zeros((own + len(partner), 2))
+        elements[:own, 0], elements[:own, 1], elements[own:, 0] = self.elements, self.slack, partner
+        numbers = np.array([[0, own, half, mesh.scales.length, 0, *counts, *circle, own, len(partner)]], float)
+        return SideData(elements, numbers, edge)
+
+    @cached_property
+    def partner_elements(self) -> Any:
+        """Elements of the other beam that the side may touch, (m,)."""
+        partner = self.item.partner if isinstance(self.item, BeamOnBeam) else None
+        return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == partner], np.int64)
 
     def _dips(self, z: FloatArray, stage: LoadStage) -> tuple[Any, _Dips, SideStates]:
         """Return gaps at places of elements in n states, and between which of them lies a least one that is near."""
@@ -374,92 +406,3 @@ class _Beside(NamedTuple):
     gap: FloatArray
     slope: FloatArray
     parameter: FloatArray
-
-
-def carry(
-    old: Discretisation, z: FloatArray, stage: LoadStage, new: Discretisation, places: FloatArray | None = None
-) -> FloatArray:
-    """Return states (n, size) of a network on other elements of the same degree: fields are evaluated anew.
-
-    Forces of contacts are those of the same contacts of nodes; of sides they are zero. `places` (n, k) are those of the
-    contacts of sides of the new elements, if they are not those that these were made for.
-    """
-    values = np.zeros((len(z), new.size), z.dtype)
-    for name, place in new.nodes.items():
-        values[:, new.attachments.unknowns[place]] = z[:, old.attachments.unknowns[old.nodes[name]]]
-    cuts = cuts_at(old, z)
-    fresh = np.broadcast_to(new.elements.cuts, (len(z), *new.elements.cuts.shape))
-    if places is not None and new.moving is not None:
-        fresh = fresh.copy()
-        fresh[:, new.moving.elements] = new.moving.fixed + np.einsum("rck,nk->nrc", new.moving.shares, places)
-    rule, columns, bubbles = basis(new.degree), energy.rotation_columns(new.degree), _bubble_matrix(new.degree)
-    for beam in new.fits:
-        before = np.array([k for k, name in enumerate(old.elements.beam) if name == beam])
-        after = np.array([k for k, name in enumerate(new.elements.beam) if name == beam])
-        for k, side in ((0, 0), (-1, 1)):
-            ends = old.elements.ends[before[k], side], new.elements.ends[after[k], side]
-            values[:, new.attachments.unknowns[ends[1]]] = z[:, old.attachments.unknowns[ends[0]]]
-        rows, joints = new.elements.unknowns[after], new.elements.ends[after[:-1], 1]
-        bodies = new.attachments.unknowns[joints]
-        if len(before) == len(after) and np.array_equal(cuts[:, before], fresh[:, after]):
-            values[:, rows[:, 8:]] = z[:, old.elements.unknowns[before, 8:]]
-            last = old.elements.ends[before[:-1], 1]
-            values[:, bodies] = z[:, old.attachments.unknowns[last]]
-            values[:, bodies[:, :2]] += _origins(old, last) - _origins(new, joints)
-            continue
-        left, right = fresh[:, after, :1], fresh[:, after, 1:]
-        at = left + (right - left) * np.append(rule.places, (0.0, 1.0))
-        place, turn, force = _sample(old, z, stage, before, cuts[:, before], at)
-        values[:, bodies[:, :2]] = place[:, :-1] - _origins(new, joints)
-        values[:, bodies[:, 2]] = turn[:, :-1, -1]
-        rest = turn[..., :-2] - turn[..., -2:-1] * rule.values[:, 0] - turn[..., -1:] * rule.values[:, 1]
-        values[:, rows[:, columns[2:]]] = rest @ bubbles.T
-        values[:, rows[:, -2:]] = force
-    number_of = {contact.number: contact.own_unknowns for contact in old.contacts if contact.slide < 0}
-    for contact in new.contacts:
-        if contact.slide < 0:
-            values[:, list(contact.own_unknowns)] = z[:, list(number_of[contact.number])]
-        else:
-            values[:, contact.slide], values[:, contact.flag] = fresh[:, contact.element, 1], contact.laid
-    return values
-
-
-@lru_cache(maxsize=64)
-def _bubble_matrix(degree: int) -> FloatArray:
-    """Return the matrix from rotations at the Gauss points, those of both ends taken off, to bubbles."""
-    return read_only(np.linalg.pinv(basis(degree).values[:, 2:]))
-
-
-def _origins(mesh: Discretisation, places: Any) -> FloatArray:
-    return np.asarray(mesh.attachments.origin[places] + mesh.attachments.arm[places])
-
-
-def _sample(
-    mesh: Discretisation, z: FloatArray, stage: LoadStage, elements: Any, cuts: FloatArray, at: FloatArray
-) -> tuple[Any, Any, Any]:
-    """Return where m parts of a beam end in n states, (n, m, 2), rotations at parameters (n, m, k), and end forces."""
-    count = len(z)
-    flat = at.reshape(count, -1)
-    home = np.minimum((flat[..., None] > cuts[:, None, :, 1]).sum(axis=-1), len(elements) - 1)
-    left, right = np.moveaxis(np.take_along_axis(cuts, home[..., None], axis=1), -1, 0)
-    fractions = np.clip((flat - left) / (right - left), 0.0, 1.0)
-    stages = stage.rows()
-    numbers = elements[home]
-    result = equations(mesh).locate(z, stages, np.stack([numbers, fractions], axis=-1), _series_matrix(mesh.degree))
-    if result is None:
-        result = np.array([_locate(mesh, z[k], stage.take([k]), numbers[k], fractions[k]) for k in range(count)])
-    result = result.reshape(*at.shape, 4)
-    last, states = numbers.reshape(at.shape)[..., -1], np.arange(count)[:, None]
-    load = energy.line_load(mesh, stages[:, 0], stages[:, 1, None, None])[states, last]
-    force = z[states[..., None], mesh.elements.unknowns[last, -2:]] + load * result[..., -1, 3:]
-    return result[..., -1, :2], result[..., 2], force
-
-
-def _locate(mesh: Discretisation, z: FloatArray, stage: LoadStage, numbers: Any, fractions: FloatArray) -> FloatArray:
-    """Return x, y, rotation, arc length to the end of the element, at places in one state, (k, 4)."""
-    result = np.empty((len(numbers), 4))
-    for number in np.unique(numbers).tolist():
-        rows = numbers == number
-        seen = side_states(mesh, z[None], stage, np.array([number]), fractions[rows])
-        result[rows, :2], result[rows, 2], result[rows, 3] = seen.place[0, 0], seen.turn[0, 0], seen.ahead[0, 0]
-    return result

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.edges import find_mate, find_motion, measure_distance
+from cfmkit.elastica.contact.edges import find_leading, find_motion, measure_distance
 from cfmkit.elastica.contact.equations import GapBounds, number_free_unknowns, open_all_contacts
 from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics import energy
@@ -33,7 +33,6 @@ from cfmkit.elastica.mechanics.moving_elements import (
 )
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import BeamOnBeam
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
@@ -280,7 +279,7 @@ class SlidingEquations(NumpyEquations):
             side, value = self.side_at(contact, z), float(z[contact.unknown])
             inside, rate = slots[side.unknowns] >= 0, moved[side.unknowns]
             indices, press_row, turn_row = slots[side.unknowns][inside], side.gap_row[inside], side.tangency_row[inside]
-            leading = self._find_leading(contact)
+            leading = find_leading(self.mesh, contact)
             if leading is contact:
                 residual[indices] -= value * press_row
                 change[indices] -= value * (side.hessian @ rate)[inside]
@@ -310,16 +309,11 @@ class SlidingEquations(NumpyEquations):
     def _couple_places(self, pivots: FloatArray, pressing: dict[int, tuple[SideAt, int]], z: FloatArray) -> None:
         """Put the mixed curvature of the gap of two beams, by both places, among the pivots of conditions."""
         for contact in self._sides:
-            leading = self._find_leading(contact)
+            leading = find_leading(self.mesh, contact)
             if leading is not contact and contact.unknown in pressing:
                 (side, row), (partner, row_of_leading) = pressing[contact.unknown], pressing[leading.unknown]
                 mixed = float(partner.tangency_row[3:5] @ side.along) / max(float(z[leading.unknown]), SMALLEST_FORCE)
                 pivots[[row, row_of_leading], [row_of_leading, row]] = -mixed
-
-    def _find_leading(self, contact: ContactAt) -> ContactAt:
-        """Return the contact that has gap and force: of a pair of beams one of both, else the contact itself."""
-        item = contact.item
-        return find_mate(self.mesh, item) if isinstance(item, BeamOnBeam) and not item.leads else contact
 
     def _lay_rows(self, part: LaidPart, z: FloatArray, residual: FloatArray, tangent: FloatArray) -> None:
         """Put the equations of an element that lies on an obstacle in the place of those of a free one."""
@@ -338,7 +332,7 @@ class SlidingEquations(NumpyEquations):
 
     def is_pressing(self, contact: ContactAt, z: FloatArray) -> bool:
         """Return True if the side of a beam counts as touching: as it was set, or where it has a force."""
-        return contact.closed if contact.closed is not None else bool(z[self._find_leading(contact).unknown] > 0)
+        return contact.closed if contact.closed is not None else bool(z[find_leading(self.mesh, contact).unknown] > 0)
 
     def _add_nodes(
         self, z: FloatArray, moved: FloatArray, residual: FloatArray, change: FloatArray, tangent: FloatArray,
@@ -480,7 +474,7 @@ class SlidingEquations(NumpyEquations):
                 term = press(self.mesh, contact, z)
                 total[term.unknowns] += term.gradient
                 continue
-            if (leading := self._find_leading(contact)) is not contact:
+            if (leading := find_leading(self.mesh, contact)) is not contact:
                 total[contact.unknown] += z[leading.unknown] - z[contact.unknown]
                 continue
             side = self.side_at(contact, z)

@@ -28,6 +28,7 @@ from cfmkit.elastica.mechanics.discretise import BeamElements
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
     LinearEquations,
+    LineTables,
     MarchCode,
     MarchPlan,
     MarchState,
@@ -35,7 +36,6 @@ from cfmkit.elastica.mechanics.equations import (
     NumpyEquations,
     SideData,
     SolvedStates,
-    force_units,
 )
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.network import LineSpring, SlideSpring
@@ -116,18 +116,22 @@ class CompiledEquations(NumpyEquations):
         return self._exchange(replace(self.mesh, base=base), {"base": np.ascontiguousarray(base, float)})
 
     def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
-        """Return the equations of the same network with other contacts closed."""
-        unit, arrays = force_units(mesh), free_arrays(mesh)
+        """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
+        slot, kept = np.full(mesh.size, -1, np.int64), np.searchsorted(self.mesh.free, mesh.free)
+        slot[mesh.free] = np.arange(len(mesh.free))
+        unit, nodes = self.unit[kept], node_contacts(mesh)
+        arrays = {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
         for name, column, contacts in (
-            ("contact_at", CLOSED_NODE, node_contacts(mesh)),
+            ("contact_at", CLOSED_NODE, nodes),
             ("side_at", CLOSED_SIDE, side_contacts(mesh)),
         ):
             if contacts:
                 arrays[name] = self.arrays[name].copy()
                 arrays[name][:, column] = [-1 if contact.closed is None else contact.closed for contact in contacts]
-        exchanged = self._exchange(mesh, {**arrays, "unit": unit})
+        exchanged = self._exchange(mesh, arrays)
         object.__setattr__(exchanged, "unit", unit)
-        exchanged.row[: len(COUNT_FIELDS)] = list(model_counts(mesh, self.ramp).values())
+        exchanged.row[COUNT_FIELDS.index("free")] = len(mesh.free)
+        exchanged.row[COUNT_FIELDS.index("presses")] = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
         return exchanged
 
     def _exchange(self, mesh: Discretisation, arrays: Mapping[str, Any]) -> CompiledEquations:
@@ -159,28 +163,28 @@ class CompiledEquations(NumpyEquations):
         self.code.contact_gaps(self.row, np.ascontiguousarray(z, float), gaps)
         return gaps
 
-    def search_side(self, z: FloatArray, stages: FloatArray, side: SideData, watch: bool = False) -> FloatArray | None:
-        """Return the least gaps of a side in n states, (n, 5); None if an element vanishes in one.
+    def search_sides(
+        self, z: FloatArray, stages: FloatArray, sides: SideData, tables: LineTables, watch: bool = False
+    ) -> FloatArray | None:
+        """Return the least gaps of sides in n states, (n, s, 5); None if an element vanishes in one.
 
         Least gap with its slack, the gap, the row of its element, the place on it, and the range of all gaps seen. To
-        `watch` for contact a gap that is not near may be a lower bound: that takes a third of the time.
+        `watch` for contact a gap that is not near may be a lower bound, and alone: that takes a fraction of the time.
         """
-        result = np.empty((len(z), 5))
-        elements = np.column_stack([side.elements, side.slack, side.slack]).astype(float)
-        inputs = np.ascontiguousarray(z, float), np.ascontiguousarray(stages, float), elements
-        good = self.code.side_gaps(self.row, *inputs, side.edge, side.numbers, side.tables, result, watch)
+        result = np.empty((len(z), len(sides.numbers), 5))
+        inputs = np.ascontiguousarray(z, float), np.ascontiguousarray(stages, float)
+        good = self.code.side_gaps(self.row, *inputs, *sides, tables.packed, result, tables.n_places, watch)
         return result if good else None
 
-    def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, series: FloatArray) -> FloatArray | None:
+    def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, tables: LineTables) -> FloatArray | None:
         """Return place and rotation from rest in n states at places (n, k, 2); None if an element vanishes.
 
         (n, k, 4): x, y, rotation, arc length from there to the end of the element.
-        A place is the number of an element and a fraction of it; `series` (q, q) takes values at Gauss points to
-        coefficients of Legendre polynomials.
+        A place is the number of an element and a fraction of it.
         """
-        result, weights = np.empty((*places.shape[:2], 4)), basis(self.mesh.degree).weights
+        result = np.empty((*places.shape[:2], 4))
         inputs = (np.ascontiguousarray(array, float) for array in (z, stages, places))
-        return result if self.code.side_places(self.row, *inputs, weights, series, result) else None
+        return result if self.code.side_places(self.row, *inputs, tables.packed, result, tables.n_places) else None
 
     def linearise(self, free: FloatArray, place: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
@@ -283,7 +287,7 @@ def model_counts(mesh: Discretisation, ramp: bool) -> dict[str, int]:
     elements, points = mesh.elements.weight.shape
     follows = any(load.item.follows for load in mesh.loads)
     nodes, sides = node_contacts(mesh), side_contacts(mesh)
-    presses = int(np.isin([at.unknown for at in nodes], mesh.free).sum()) if nodes else 0
+    presses = len({at.unknown for at in nodes}.intersection(mesh.free.tolist())) if nodes else 0
     values = (elements, points, mesh.degree, mesh.size, len(mesh.free), len(mesh.springs))
     more = (len(mesh.loads), int(ramp), int(follows), len(nodes), presses, len(sides))
     moved = (len(mesh.moving.elements), mesh.fits.bundle.coefficients.shape[-1]) if mesh.moving is not None else (0, 0)

@@ -1,4 +1,4 @@
-"""Sides of beams that touch obstacles at points, in compiled code (`sides.c`); what lies on an obstacle is in numpy.
+"""Sides of beams that touch at points, in compiled code (`sides.c`); what lies on an obstacle is in numpy.
 
 `SlidingEquations` is the specification (tests/unit/test_elastica_march.py).
 """
@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.elastica.contact.edges import find_circle, find_leading, half_thickness_of
 from cfmkit.elastica.mechanics.contact_arrays import edge_rows, side_contacts
 from cfmkit.elastica.mechanics.polynomials import basis
-from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, Stop
+from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, NodeOnBeam, NodeOnObstacle, Stop
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def are_sides_compiled(mesh: Discretisation) -> bool:
     return (
         not follows
         and mesh.elements.curl is None
-        and kinds <= {Stop, NodeOnObstacle, BeamOnObstacle}
+        and kinds <= {Stop, NodeOnObstacle, BeamOnObstacle, NodeOnBeam, BeamOnBeam}
         and all(contact.rub < 0 and not contact.laid for contact in mesh.contacts)
         and all(is_plain(mesh.fits.network.beams[beam]) for beam in beams)
     )
@@ -44,13 +45,17 @@ def side_arrays(mesh: Discretisation, first_part: int, products: Any) -> tuple[d
     rows, values, parts = [], [], [np.empty((0, 6))]
     for contact in sides:
         item: Any = contact.item
-        edge, closed = item.outline, -1 if contact.closed is None else int(contact.closed)
+        edge = item.outline if isinstance(item, BeamOnObstacle) else None
+        closed = -1 if contact.closed is None else int(contact.closed)
         at = contact.element, contact.place, contact.unknown, contact.slide, contact.flag, closed
         row = int(np.flatnonzero(numbers == contact.element)[0])
-        rows.append((*at, first_part, 0, row, len(edge.length), len(edge.radius), int(edge.closed)))
-        values.append((_half_thickness(mesh, item.beam), length))
-        parts.append(edge_rows(edge))
-        first_part += len(parts[-1])
+        counts = (len(edge.length), len(edge.radius), int(edge.closed)) if edge else (0, 0, 0)
+        circle, radius = (-1, 0.0) if edge else find_circle(mesh, item)
+        rows.append((*at, first_part, circle, row, *counts, sides.index(find_leading(mesh, contact))))
+        values.append((half_thickness_of(mesh, item.beam), length, radius))
+        if edge:
+            parts.append(edge_rows(edge))
+            first_part += len(parts[-1])
     names = [bundle.names[k] for k in bundle.plain]
     plain = [names.index(mesh.elements.beam[number]) for number in numbers]
     rigidity = bundle.rigidities[0][plain] / (mesh.scales.force * length**2)
@@ -61,7 +66,3 @@ def side_arrays(mesh: Discretisation, first_part: int, products: Any) -> tuple[d
         "unit_bend": rule.weights @ products,
     }  # fmt: skip
     return arrays, np.concatenate(parts)
-
-
-def _half_thickness(mesh: Discretisation, beam: str) -> float:
-    return 0.5 * float(mesh.fits.network.beams[beam].section.thickness_at(0.5, 0.5)) / mesh.scales.length

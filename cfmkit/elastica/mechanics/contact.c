@@ -24,12 +24,13 @@ static double from_segment(const double *part, int first, int last, double x, do
 
 static double from_arc(const double *part, double x, double y, Distance *d) {
     const double dx = x - part[0], dy = y - part[1], reach = sqrt(dx * dx + dy * dy), safe = reach == 0.0 ? 1.0 : reach;
-    double turned = fmod((part[4] > 0.0 ? 1.0 : -1.0) * (atan2(dy, dx) - part[3]), ROUND);
-    if (turned < 0.0) turned += ROUND;
     d->value = part[5] * (reach - part[2]);
     d->normal[0] = part[5] * dx / safe;
     d->normal[1] = part[5] * dy / safe;
     d->curvature = part[5] / safe;
+    if (fabs(part[4]) >= ROUND - BESIDE_END) return fabs(d->value);
+    double turned = fmod((part[4] > 0.0 ? 1.0 : -1.0) * (atan2(dy, dx) - part[3]), ROUND);
+    if (turned < 0.0) turned += ROUND;
     return turned <= fabs(part[4]) + BESIDE_END || turned >= ROUND - BESIDE_END ? fabs(d->value) : HUGE_VAL;
 }
 

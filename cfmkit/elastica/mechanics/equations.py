@@ -67,14 +67,19 @@ class MarchState(NamedTuple):
     target: int = -1  # number of the target it lies at, -1 if at none
 
 
-class SideData(NamedTuple):
-    """The side of a beam of one thickness, and an obstacle, as `gaps.c` takes them."""
+class LineTables(NamedTuple):
+    """Tables by which `gaps.c` follows the lines of elements of one degree."""
 
-    elements: FloatArray  # (m,)
-    slack: FloatArray  # (m,) by how much each may lie in the obstacle
-    edge: FloatArray  # (parts, 6)
-    numbers: FloatArray  # half the thickness, unit of length [m], segments, arcs, whether it is closed, places
-    tables: FloatArray  # places and matrices, in one row
+    packed: FloatArray  # places along an element, Gauss weights, matrices to these places, and to Legendre coefficients
+    n_places: int
+
+
+class SideData(NamedTuple):
+    """Sides of beams of one thickness, and what they may touch, as `gaps.c` takes them: s sides."""
+
+    elements: FloatArray  # (k, 2) of each side, then of its other beam: number, how far it may lie inside
+    numbers: FloatArray  # (s, 12) see `side_gaps` in gaps.c
+    edge: FloatArray  # (parts, 6) of outlines
 
 
 class SolvedStates(NamedTuple):
@@ -170,11 +175,17 @@ class NumpyEquations:
         """Return the gaps of all contacts of nodes in states (n, size), (contacts, n); None without compiled code."""
         return None
 
-    def search_side(self, z: FloatArray, stages: FloatArray, side: SideData, watch: bool = False) -> FloatArray | None:
-        """Return what compiled code finds of the gaps of a side, (n, 5): see `CompiledEquations`; None without it."""
+    def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
+        """Return the curvatures of gaps at contacts of sides in compiled code, (sides, n); None without it."""
         return None
 
-    def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, series: FloatArray) -> FloatArray | None:
+    def search_sides(
+        self, z: FloatArray, stages: FloatArray, sides: SideData, tables: LineTables, watch: bool = False
+    ) -> FloatArray | None:
+        """Return what compiled code finds of the gaps of sides, (n, s, 5): see `CompiledEquations`; None without it."""
+        return None
+
+    def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, tables: LineTables) -> FloatArray | None:
         """Return what compiled code finds at places of elements, (n, k, 4): see `CompiledEquations`; None without."""
         return None
 

@@ -8,6 +8,7 @@
 #define MAX_SHAPES (MAX_DEGREE + 1)
 #define MAX_POINTS (MAX_DEGREE + 4) /* Gauss points of an element */
 #define MAX_LOCAL (MAX_DEGREE + 9) /* unknowns of an element */
+#define SIDE_WIDE 13               /* columns of `side_at` */
 
 typedef int64_t Int;
 
@@ -46,9 +47,10 @@ typedef struct {
     const Int *contact_at; /* (contacts, 8): kind, place, force, closed or -1, first part, segments, arcs, whether closed */
     const double *contact; /* (contacts, 6): gap or radius of a pad [m], sense, direction, compliance, unit of length [m] */
     const double *edge;    /* (parts, 6): segments, start, along, length; arcs, centre, radius, first, sweep, bulge [m] */
-    const Int *side_at;    /* (sides, 12): element that ends there, place, force, parameter, flag, closed or -1, first part,
-                            * nothing, row of the element among those that move, segments, arcs, whether the outline is closed */
-    const double *side;    /* (sides, 2): half the thickness, unit of length [m] */
+    const Int *side_at;    /* (sides, 13): element that ends there, place, force, parameter, flag, closed or -1, first part,
+                            * place of an edge that moves or -1, row of the element among those that move, segments, arcs,
+                            * whether the outline is closed, contact that has gap and force: of two beams one of both */
+    const double *side;    /* (sides, 3): half the thickness, unit of length [m], radius of an edge that moves */
     const Int *moved_at;   /* (moved): elements */
     const double *moved_fixed, *moved_shares; /* (moved, 2), (moved, 2, sides): their ends are fixed + shares . parameters */
     const double *moved_law; /* (moved, 2 + coefficients): length and rigidity of the beam, its unloaded angle by the parameter */
@@ -98,15 +100,17 @@ void contact_gaps(const Model *m, const double *z, Int n, double *gaps);
 
 int sides_move(const Model *m, const double *z);
 int side_presses(const Model *m, Int number, const double *z);
-int side_term(const Model *m, Int number, const double *z, Term *t, double *frozen);
+Int side_term(const Model *m, Int number, const double *z, Term *t, double *frozen);
+int sides_couple(const Model *m, Int number, const double *z, Factors *f);
 void sides_columns(const Model *m, const double *z, Stage at, Term *t, Factors *f);
+int side_curvatures(const Model *m, const double *z, Int n, double *curvatures);
 int sides_stiffen(const Model *m, Factors *f, const Term *element, Int number);
 
-int side_gaps(const Model *m, const double *z, const double *stages, Int n, double *elements, Int count,
-              const double *edge, const double *numbers, const double *packed, int watches, double *found);
-
+int side_gaps(const Model *m, const double *z, const double *stages, Int n, const double *elements, Int rows,
+              const double *numbers, Int count, const double *edge, const double *packed, Int along, int watches,
+              double *found);
 int side_places(const Model *m, const double *z, const double *stages, Int n, const double *places, Int count,
-                const double *weights, const double *series, double *found);
+                const double *packed, Int along, double *found);
 
 int factors_open(Factors *f, Int n, int unsymmetric);
 void factors_close(Factors *f);

@@ -33,7 +33,6 @@ from cfmkit.elastica.mechanics.equations import (
     MarchState,
     NaturalMarch,
     NumpyEquations,
-    SideData,
     SolvedStates,
     begin,
 )
@@ -115,13 +114,19 @@ class CompiledSides(CompiledEquations):
         """Return the gradient by all unknowns, (size,)."""
         return self.reference.gradient(free, place)
 
-    def search_side(self, z: FloatArray, stages: FloatArray, side: SideData, watch: bool = False) -> FloatArray | None:
-        """Return the least gaps of a side in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().search_side(z, stages, side, watch)
+    def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
+        """Return the curvatures of gaps at contacts of sides in n states, (sides, n); None where something lies."""
+        curvatures, states = np.empty((len(side_contacts(self.mesh)), len(z))), np.ascontiguousarray(z, float)
+        lies = self._lies(z[:, self.mesh.free]).any()
+        return None if lies or not self.code.side_curvatures(self.row, states, curvatures) else curvatures
 
-    def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, series: FloatArray) -> FloatArray | None:
+    def search_sides(self, z: FloatArray, *rest: Any, **named: Any) -> FloatArray | None:
+        """Return the least gaps of sides in n states; None where something lies on an obstacle."""
+        return None if self._lies(z[:, self.mesh.free]).any() else super().search_sides(z, *rest, **named)
+
+    def locate(self, z: FloatArray, *rest: Any) -> FloatArray | None:
         """Return places and rotations in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().locate(z, stages, places, series)
+        return None if self._lies(z[:, self.mesh.free]).any() else super().locate(z, *rest)
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""

@@ -180,17 +180,17 @@ static PyObject *py_march_many(PyObject *self, PyObject *arguments) {
     return PyLong_FromLong(code);
 }
 
-/* side_gaps(model, z, stages, elements, edge, numbers, tables, found, watches) -> whether no element vanishes */
+/* side_gaps(model, z, stages, elements, numbers, edge, tables, found, along, watches) -> whether no element vanishes */
 static PyObject *py_side_gaps(PyObject *self, PyObject *arguments) {
     Buffers b;
-    double watches;
+    double along, watches;
     int good;
     (void)self;
-    if (!number(arguments, 8, &watches) || !take(arguments, 0, 8, &b)) return NULL;
+    if (!number(arguments, 8, &along) || !number(arguments, 9, &watches) || !take(arguments, 0, 8, &b)) return NULL;
     Py_BEGIN_ALLOW_THREADS
     const Int wide = (Int)sizeof(double);
-    good = side_gaps(at(&b, 0), at(&b, 1), at(&b, 2), b.view[2].len / (2 * wide), at(&b, 3), b.view[3].len / (3 * wide),
-                     at(&b, 4), at(&b, 5), at(&b, 6), watches != 0.0, at(&b, 7));
+    good = side_gaps(at(&b, 0), at(&b, 1), at(&b, 2), b.view[2].len / (2 * wide), at(&b, 3), b.view[3].len / (2 * wide),
+                     at(&b, 4), b.view[4].len / (12 * wide), at(&b, 5), at(&b, 6), (Int)along, watches != 0.0, at(&b, 7));
     Py_END_ALLOW_THREADS
     release(&b);
     return PyLong_FromLong(good);
@@ -210,16 +210,31 @@ static PyObject *py_contact_gaps(PyObject *self, PyObject *arguments) {
     return Py_None;
 }
 
-/* side_places(model, z, stages, places, weights, series, found) -> whether no element vanishes */
-static PyObject *py_side_places(PyObject *self, PyObject *arguments) {
+/* side_curvatures(model, z, curvatures) -> whether no element vanishes */
+static PyObject *py_side_curvatures(PyObject *self, PyObject *arguments) {
     Buffers b;
     int good;
     (void)self;
-    if (!take(arguments, 0, 7, &b)) return NULL;
+    if (!take(arguments, 0, 3, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    const Model *m = at(&b, 0);
+    good = side_curvatures(m, at(&b, 1), b.view[1].len / (m->size * (Int)sizeof(double)), at(&b, 2));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromLong(good);
+}
+
+/* side_places(model, z, stages, places, tables, found, along) -> whether no element vanishes */
+static PyObject *py_side_places(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    double along;
+    int good;
+    (void)self;
+    if (!number(arguments, 6, &along) || !take(arguments, 0, 6, &b)) return NULL;
     Py_BEGIN_ALLOW_THREADS
     const Int wide = (Int)sizeof(double), n = b.view[2].len / (2 * wide);
     const Int count = n ? b.view[3].len / (2 * wide * n) : 0;
-    good = side_places(at(&b, 0), at(&b, 1), at(&b, 2), n, at(&b, 3), count, at(&b, 4), at(&b, 5), at(&b, 6));
+    good = side_places(at(&b, 0), at(&b, 1), at(&b, 2), n, at(&b, 3), count, at(&b, 4), (Int)along, at(&b, 5));
     Py_END_ALLOW_THREADS
     release(&b);
     return PyLong_FromLong(good);
@@ -230,7 +245,8 @@ static PyMethodDef methods[] = {
     {"resolve", py_resolve, METH_VARARGS, NULL},   {"solve", py_solve, METH_VARARGS, NULL},
     {"solve_many", py_solve_many, METH_VARARGS, NULL}, {"soften", py_soften, METH_VARARGS, NULL},
     {"place", py_place, METH_VARARGS, NULL},
-    {"contact_gaps", py_contact_gaps, METH_VARARGS, NULL}, {"side_gaps", py_side_gaps, METH_VARARGS, NULL}, {"side_places", py_side_places, METH_VARARGS, NULL},
+    {"contact_gaps", py_contact_gaps, METH_VARARGS, NULL}, {"side_gaps", py_side_gaps, METH_VARARGS, NULL},
+    {"side_places", py_side_places, METH_VARARGS, NULL}, {"side_curvatures", py_side_curvatures, METH_VARARGS, NULL},
     {"march", py_march, METH_VARARGS, NULL},       {"march_many", py_march_many, METH_VARARGS, NULL},
     {NULL, NULL, 0, NULL},
 };

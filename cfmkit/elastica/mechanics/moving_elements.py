@@ -53,7 +53,8 @@ def with_places(mesh: Discretisation, z: Any) -> Discretisation:
 
 def cuts_at(mesh: Discretisation, z: Any) -> Any:
     """Return where all elements begin and end in states (..., size), (..., e, 2)."""
-    cuts = np.broadcast_to(mesh.elements.cuts, (*z.shape[:-1], *mesh.elements.cuts.shape)).copy()
+    cuts = np.empty((*z.shape[:-1], *mesh.elements.cuts.shape))
+    cuts[...] = mesh.elements.cuts
     if mesh.moving is not None:
         moving = mesh.moving
         cuts[..., moving.elements, :] = moving.fixed + np.einsum(

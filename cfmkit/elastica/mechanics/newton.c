@@ -54,19 +54,33 @@ static void symmetrise(Term *t) {
         }
 }
 
+/* Add the change of the residual on the way by the unknowns of a term that are held. */
+static void add_to_change(const Model *m, Work *w, Stage at, const Term *t, const Int *slots) {
+    for (Int j = 0; j < t->count; j++) {
+        const double moves = at.by_share * m->base[t->at[j]] + at.by_drive * m->rate[t->at[j]];
+        if (slots[j] >= 0 || moves == 0.0) continue;
+        for (Int i = 0; i < t->count; i++)
+            if (slots[i] >= 0) w->change[slots[i]] += t->hessian[i * t->count + j] * moves;
+    }
+}
+
 /* Add what contacts of sides of beams give to the gradient, the tangent and the matrix with places held. */
 static int assemble_sides(const Model *m, Work *w, Stage at, int with_factors) {
     Term *t = &w->term;
-    Int slots[6];
-    double frozen[25];
+    Int slots[10];
+    double frozen[64];
     for (Int k = 0; k < m->sides; k++) {
-        const int presses = side_term(m, k, w->z, t, frozen);
+        const Int bodies = side_term(m, k, w->z, t, frozen);
         add_to_gradient(w, t);
         if (!with_factors) continue;
-        for (int i = 0; i < 6; i++) slots[i] = m->slot[t->at[i]];
-        if (!factors_add(&w->factors, slots, 6, t->hessian)) return 0;
-        if (presses && !factors_add(&w->symmetric, slots, 5, frozen)) return 0;
-        w->rows += 2 * presses;
+        for (Int i = 0; i < t->count; i++) slots[i] = m->slot[t->at[i]];
+        add_to_change(m, w, at, t, slots);
+        if (!factors_add(&w->factors, slots, t->count, t->hessian)) return 0;
+        if (!bodies) continue;
+        const int leads = t->count == bodies + 3; /* the second of two beams has no row for the gap */
+        if (!leads) slots[bodies] = -1;
+        if (!factors_add(&w->symmetric, slots, bodies + 2, frozen) || !sides_couple(m, k, w->z, &w->symmetric)) return 0;
+        w->rows += 1 + leads;
     }
     if (with_factors) sides_columns(m, w->z, at, t, &w->factors);
     return 1;
@@ -94,12 +108,7 @@ static int assemble(const Model *m, Work *w, Stage at, int with_factors) {
             slots[i] = m->slot[t->at[i]];
             if (slots[i] >= 0) w->change[slots[i]] += t->change[i];
         }
-        for (Int j = 0; j < t->count; j++) {
-            const double moves = at.by_share * m->base[t->at[j]] + at.by_drive * m->rate[t->at[j]];
-            if (slots[j] >= 0 || moves == 0.0) continue;
-            for (Int i = 0; i < t->count; i++)
-                if (slots[i] >= 0) w->change[slots[i]] += t->hessian[i * t->count + j] * moves;
-        }
+        add_to_change(m, w, at, t, slots);
         if (!factors_add(&w->factors, slots, t->count, t->hessian)) return 0;
         const Int element = k + m->elements - terms(m);
         if (!is_dense(m)) {
@@ -137,9 +146,9 @@ int evaluate(const Model *m, const double *z, const double *drive, double share,
         const Stage at = {drive[p], share, 0.0, 0.0};
         if (m->sides && !sides_move(m, z)) { free(t); return DIVERGED; }
         for (Int k = 0; k < m->sides; k++) { /* by their places and flags nothing changes */
-            double frozen[25];
+            double frozen[64];
             side_term(m, k, z, t, frozen);
-            for (Int i = 0; i < 4; i++) gradient[t->at[i]] += t->gradient[i];
+            for (Int i = 0; t->at[i] != m->side_at[SIDE_WIDE * k + 3]; i++) gradient[t->at[i]] += t->gradient[i];
         }
         for (Int k = 0; k < terms(m); k++) {
             term(m, k, z, at, hessian != NULL, t);

@@ -1,4 +1,5 @@
-/* Sides of beams that touch obstacles at places that are unknowns: elements that end there, and the rows of a contact.
+/* Sides of beams that touch obstacles, pads and each other at places that are unknowns: elements that end there, and the
+ * rows of a contact.
  *
  * The formulas are those of contact/sliding.py, for beams of one thickness whose unloaded angle is a polynomial, and
  * contacts at points; a test holds them equal. The matrix is not symmetric. Unstable directions are counted from another
@@ -28,7 +29,7 @@ static void cuts_of(const Model *m, const double *z, Int row, double *cuts) {
     for (int end = 0; end < 2; end++) {
         cuts[end] = m->moved_fixed[2 * row + end];
         for (Int k = 0; k < m->sides; k++)
-            cuts[end] += m->moved_shares[(2 * row + end) * m->sides + k] * z[m->side_at[12 * k + 3]];
+            cuts[end] += m->moved_shares[(2 * row + end) * m->sides + k] * z[m->side_at[SIDE_WIDE * k + 3]];
     }
 }
 
@@ -98,8 +99,12 @@ static void change_by_end(const Model *m, Int row, int end, const double *cuts, 
     t->gradient[count - 1] = -reach[1];
 }
 
-/* The side of a beam at a contact: gap, tangency, their derivatives by x, y and rotation, and the gap's curvature. */
-typedef struct { double gap, tangency, gap_row[3], tangency_row[3], bulge[2][2], by_place, curvature; Int at[3]; } Side;
+/* The side of a beam at a contact: gap, tangency, their derivatives by x, y and rotation of its body and, if the edge that
+ * it touches moves, of that one's; and the gap's curvature. */
+typedef struct {
+    Int count, at[6];
+    double gap, tangency, gap_row[6], tangency_row[6], hessian[6][6], along[2], by_place, curvature;
+} Side;
 
 /* Curvature of the rotation at an end of an element, by the arc length. */
 static double bend_at(const Model *m, const double *z, Int e, int end) {
@@ -111,70 +116,112 @@ static double bend_at(const Model *m, const double *z, Int e, int end) {
 }
 
 static Side side_at(const Model *m, Int number, const double *z) {
-    const Int *given = m->side_at + 12 * number, *places = m->places + 4 * given[1], row = given[8];
-    const double *value = m->side + 2 * number, *law = m->moved_law + row * (N_LAW + m->coefficients), length = value[1];
-    double turning;
-    Side side;
+    const Int *given = m->side_at + SIDE_WIDE * number, *places = m->places + 4 * given[1], row = given[8];
+    const double *value = m->side + 3 * number, *law = m->moved_law + row * (N_LAW + m->coefficients), length = value[1];
+    double turning, apart[2][6] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}}; /* change of the place, as seen from the edge */
+    Side side = {.count = 3, .at = {places[0], places[1], places[2]}};
+    Distance d;
+    Pose edge;
     const double angle = polynomial(law + N_LAW, m->coefficients, z[given[3]], &turning) + z[places[2]];
-    const double along[2] = {cos(angle), sin(angle)}, x = m->origin[2 * given[1]] + z[places[0]];
-    const double y = m->origin[2 * given[1] + 1] + z[places[1]];
-    const Outline o = {m->edge + 6 * given[6], given[9], given[10], given[11]};
-    const Distance d = outline_distance(&o, x * length, y * length);
-    const double sideways[2] = {d.normal[1], -d.normal[0]}, bend = d.curvature * length;
-    const double rises = d.normal[1] * along[0] - d.normal[0] * along[1];
-    for (int i = 0; i < 2; i++) {
-        for (int j = 0; j < 2; j++) side.bulge[i][j] = bend * sideways[i] * sideways[j];
-        side.gap_row[i] = d.normal[i];
-        side.tangency_row[i] = side.bulge[i][0] * along[0] + side.bulge[i][1] * along[1];
+    const double x = m->origin[2 * given[1]] + z[places[0]], y = m->origin[2 * given[1] + 1] + z[places[1]];
+    if (given[7] < 0) {
+        const Outline o = {m->edge + 6 * given[6], given[9], given[10], given[11]};
+        d = outline_distance(&o, x * length, y * length);
+        d.value /= length;
+        d.curvature *= length;
+    } else { /* a circle about a place that moves */
+        edge = pose(m, z, given[7]);
+        const double dx = x - edge.place[0], dy = y - edge.place[1], reach = sqrt(dx * dx + dy * dy);
+        d = (Distance){reach - value[2], {dx / reach, dy / reach}, 1.0 / reach};
+        side.count = 6;
+        for (int j = 0; j < 3; j++) {
+            side.at[3 + j] = edge.at[j];
+            for (int i = 0; i < 2; i++) apart[i][3 + j] = -edge.by[i][j];
+        }
     }
-    for (int i = 0; i < 3; i++) side.at[i] = places[i];
-    side.gap = d.value / length - value[0];
-    side.tangency = d.normal[0] * along[0] + d.normal[1] * along[1];
-    side.gap_row[2] = 0.0;
+    side.along[0] = cos(angle);
+    side.along[1] = sin(angle);
+    const double rises = d.normal[1] * side.along[0] - d.normal[0] * side.along[1];
+    for (Int i = 0; i < side.count; i++) {
+        const double across = d.normal[1] * apart[0][i] - d.normal[0] * apart[1][i];
+        side.gap_row[i] = d.normal[0] * apart[0][i] + d.normal[1] * apart[1][i];
+        side.tangency_row[i] = d.curvature * rises * across;
+        for (Int j = 0; j < side.count; j++)
+            side.hessian[i][j] = d.curvature * across * (d.normal[1] * apart[0][j] - d.normal[0] * apart[1][j]);
+    }
+    if (given[7] >= 0) side.hessian[5][5] += d.normal[0] * edge.arm[0] + d.normal[1] * edge.arm[1];
+    side.gap = d.value - value[0];
+    side.tangency = d.normal[0] * side.along[0] + d.normal[1] * side.along[1];
     side.tangency_row[2] = rises;
     side.by_place = rises * turning;
     const double bent = turning / law[0] + 0.5 * (bend_at(m, z, given[0], 1) + bend_at(m, z, given[0] + 1, 0));
-    side.curvature = bent * rises + side.tangency_row[0] * along[0] + side.tangency_row[1] * along[1];
+    side.curvature = bent * rises + d.curvature * rises * rises;
     return side;
 }
 
-int side_presses(const Model *m, Int number, const double *z) {
-    const Int *given = m->side_at + 12 * number;
-    return given[5] < 0 ? z[given[2]] > 0.0 : given[5] != 0;
+/* Number of the contact that has gap and force: of two beams one of both, else the contact itself. */
+static Int leading(const Model *m, Int number) { return m->side_at[SIDE_WIDE * number + 12]; }
+
+static double force_at(const Model *m, Int number, const double *z) {
+    return z[m->side_at[SIDE_WIDE * leading(m, number) + 2]];
 }
 
-/* Rows of a contact at x, y, rotation, force, place, flag; `frozen` is the symmetric matrix of the first five. */
-int side_term(const Model *m, Int number, const double *z, Term *t, double *frozen) {
-    const Int *given = m->side_at + 12 * number;
+int side_presses(const Model *m, Int number, const double *z) {
+    const Int closed = m->side_at[SIDE_WIDE * number + 5];
+    return closed < 0 ? force_at(m, number, z) > 0.0 : closed != 0;
+}
+
+/* Rows of a contact at x, y, rotation of one or two bodies (n), force, place, flag, and of the second of two beams the
+ * force of the first; `frozen` is the symmetric matrix of the first n + 2. Return n where it presses, else 0. */
+Int side_term(const Model *m, Int number, const double *z, Term *t, double *frozen) {
+    const Int *given = m->side_at + SIDE_WIDE * number, first = leading(m, number);
     const Side side = side_at(m, number, z);
-    const double force = z[given[2]];
+    const Int n = side.count, force = n, place = n + 1, flag = n + 2, wide = n + 3 + (first != number), small = n + 2;
     double *h = t->hessian;
-    t->count = 6;
-    for (int i = 0; i < 3; i++) t->at[i] = side.at[i];
-    for (int i = 0; i < 3; i++) t->at[3 + i] = given[2 + i];
-    memset(t->gradient, 0, 6 * sizeof(double));
-    memset(t->change, 0, 6 * sizeof(double));
-    memset(h, 0, 36 * sizeof(double));
-    memset(frozen, 0, 25 * sizeof(double));
-    h[35] = 1.0;
-    if (given[5] >= 0) t->gradient[5] = z[given[4]];
+    t->count = wide;
+    for (Int i = 0; i < n; i++) t->at[i] = side.at[i];
+    for (Int i = 0; i < 3; i++) t->at[n + i] = given[2 + i];
+    if (first != number) t->at[n + 3] = m->side_at[SIDE_WIDE * first + 2];
+    memset(t->gradient, 0, (size_t)wide * sizeof(double));
+    memset(h, 0, (size_t)(wide * wide) * sizeof(double));
+    memset(frozen, 0, (size_t)(small * small) * sizeof(double));
+    h[flag * wide + flag] = 1.0;
+    if (given[5] >= 0) t->gradient[flag] = z[given[4]];
+    h[force * wide + force] = -1.0;
+    t->gradient[force] = -z[given[2]];
     if (!side_presses(m, number, z)) {
-        t->gradient[3] = -force;
-        h[21] = -1.0;
-        h[28] = 1.0;
+        h[place * wide + place] = 1.0;
         return 0;
     }
-    t->gradient[3] = -side.gap;
-    t->gradient[4] = side.tangency;
-    for (int i = 0; i < 3; i++) {
-        t->gradient[i] = -force * side.gap_row[i];
-        h[6 * i + 3] = h[18 + i] = frozen[5 * i + 3] = frozen[15 + i] = -side.gap_row[i];
-        h[24 + i] = frozen[5 * i + 4] = frozen[20 + i] = side.tangency_row[i];
-        for (int j = 0; i < 2 && j < 2; j++) h[6 * i + j] = frozen[5 * i + j] = -force * side.bulge[i][j];
+    if (first != number) {
+        t->gradient[force] += force_at(m, number, z);
+        h[force * wide + n + 3] = 1.0;
+    } else {
+        t->gradient[force] = -side.gap;
+        h[force * wide + force] = 0.0;
+        for (Int i = 0; i < n; i++) {
+            t->gradient[i] = -z[given[2]] * side.gap_row[i];
+            h[i * wide + force] = h[force * wide + i] = frozen[i * small + force] = frozen[force * small + i] = -side.gap_row[i];
+            for (Int j = 0; j < n; j++) h[i * wide + j] = frozen[i * small + j] = -z[given[2]] * side.hessian[i][j];
+        }
     }
-    h[28] = side.by_place;
-    frozen[24] = -larger(side.curvature, 0.0) / larger(force, SMALLEST_FORCE);
-    return 1;
+    t->gradient[place] = side.tangency;
+    for (Int i = 0; i < n; i++)
+        h[place * wide + i] = frozen[i * small + place] = frozen[place * small + i] = side.tangency_row[i];
+    h[place * wide + place] = side.by_place;
+    frozen[place * small + place] = -larger(side.curvature, 0.0) / larger(z[given[2]], SMALLEST_FORCE);
+    return n;
+}
+
+/* Couple the places of two beams that press, in the symmetric matrix: by the mixed curvature of their gap. */
+int sides_couple(const Model *m, Int number, const double *z, Factors *f) {
+    const Int first = leading(m, number);
+    if (first == number) return 1;
+    const Side side = side_at(m, number, z), other = side_at(m, first, z);
+    const double mixed = other.tangency_row[3] * side.along[0] + other.tangency_row[4] * side.along[1];
+    const double coupling = -mixed / larger(force_at(m, number, z), SMALLEST_FORCE), matrix[4] = {0.0, coupling, coupling, 0.0};
+    const Int slots[2] = {m->slot[m->side_at[SIDE_WIDE * number + 3]], m->slot[m->side_at[SIDE_WIDE * first + 3]]};
+    return factors_add(f, slots, 2, matrix);
 }
 
 /* Add the change of the residual with the places of contacts that press to the dense matrix. */
@@ -190,7 +237,7 @@ void sides_columns(const Model *m, const double *z, Stage at, Term *t, Factors *
             change_by_end(m, row, end, cuts, z, at, t);
             for (Int k = 0; k < m->sides; k++) {
                 if (shares[k] == 0.0 || !side_presses(m, k, z)) continue;
-                const Int column = m->slot[m->side_at[12 * k + 3]];
+                const Int column = m->slot[m->side_at[SIDE_WIDE * k + 3]];
                 for (Int i = 0; i < t->count; i++) {
                     const Int slot = m->slot[t->at[i]];
                     if (slot >= 0) f->dense[slot * f->n + column] += shares[k] * t->gradient[i];
@@ -208,6 +255,15 @@ int sides_stiffen(const Model *m, Factors *f, const Term *element, Int number) {
         int twice = 0;
         for (Int j = 0; j < i; j++) twice |= element->at[j] == element->at[i];
         if (slot >= 0 && !twice && m->leaves[slot] == number && !factors_add(f, &slot, 1, &stiffness)) return 0;
+    }
+    return 1;
+}
+
+/* Curvatures of the gaps along the beams in states (n, size), (sides, n). Return 0 if an element vanishes. */
+int side_curvatures(const Model *m, const double *z, Int n, double *curvatures) {
+    for (Int k = 0; k < n; k++, z += m->size) {
+        if (!sides_move(m, z)) return 0;
+        for (Int c = 0; c < m->sides; c++) curvatures[c * n + k] = side_at(m, c, z).curvature;
     }
     return 1;
 }

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cfmkit.arrays import distinct
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.model.shapes import STRAIGHT_SHAPE, FittedShape, Shape, direction
 from cfmkit.errors import InputError
@@ -114,7 +115,7 @@ class Fit:
         piece = np.searchsorted(self.course.breaks, edges[panel], side="right") - 1
         middles = 0.5 * (self.course.breaks[1:] + self.course.breaks[:-1])
         found = lengths[panel]
-        for one in np.unique(piece):
+        for one in distinct(piece):
             own = piece == one
             found[own] += (self.course.speed(places[own], middles[one]) * _GAUSS_WEIGHTS).sum(axis=-1) * half[own]
         return (found / lengths[-1]).reshape(np.shape(t))[()]

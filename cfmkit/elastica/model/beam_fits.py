@@ -32,6 +32,7 @@ class BeamFits(Mapping[str, Fit]):
         ends = np.array([[beam_end_at(network, name, side) for side in (0, 1)] for name in network.beams])
         self.network, self.bundle = network, Bundle(network, ends)
         self._known: dict[str, Fit] = {}
+        self.known: dict[Any, Any] = {}  # what else was found of the unloaded network, by its maker
 
     def __getitem__(self, name: str) -> Fit:
         """Return the fit of a beam."""

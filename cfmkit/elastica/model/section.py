@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import distinct, read_only
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class Section:
     def stations(self) -> FloatArray:
         """Places where the thickness has a kink or a step, ends included (fractions of the arc length)."""
         if isinstance(self.thickness, Taper):
-            return read_only(np.unique(self.thickness.stations.real))
+            return read_only(distinct(self.thickness.stations.real))
         return read_only([0.0, 1.0])
 
     @property

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
-from cfmkit.elastica.contact.pair_gaps import least_side_gaps
 from cfmkit.elastica.contact.terms import gaps, press
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
@@ -235,6 +234,8 @@ class EquilibriumPath(ShortRepr):
         """
         item = self.network.contacts[number]
         if isinstance(item, BeamSide):
+            from cfmkit.elastica.contact.pair_gaps import least_side_gaps
+
             return read_only(least_side_gaps(self.mesh, item, self.at.z, self.at.drive) * self.mesh.scales.length)
         mesh, contact = self.mesh, next(one for one in self.mesh.contacts if one.number == number)
         unit = 1.0 if contact.item.turns else mesh.scales.length

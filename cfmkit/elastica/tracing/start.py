@@ -7,19 +7,21 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange
-from cfmkit.elastica.contact.follow import Remeshed, follow_in_contact
+from cfmkit.elastica.contact.path_items import ContactChange, Remeshed
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.mechanics.similar_arrays import make_inextensible
 from cfmkit.elastica.results.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
+from cfmkit.numerics.continuation.follow import follow
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.contact.path_items import PathItem
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.drive import Control
     from cfmkit.numerics.continuation.problem import PathEquilibrium
@@ -72,7 +74,7 @@ def find_start(mesh: Discretisation, control: Control, remesh: Remesh | None = N
         begin = correct(ramp, at.x, 0.0)
         if begin is None:
             return DriveStart(problem, None, tuple(events), branch, first, (what, PathStop(WhyStopped.LOST, 0.0)))
-        for item in follow_in_contact(ramp, begin, np.ones(1), options, branch):
+        for item in follow_network(ramp, begin, np.ones(1), options, branch):
             if isinstance(item, ContactChange):
                 continue
             if isinstance(item, Remeshed):
@@ -190,3 +192,21 @@ def is_stretched(mesh: Discretisation, z: np.ndarray) -> bool:
     elements = np.flatnonzero(mesh.floored)
     force = np.abs(z[:, mesh.elements.unknowns[elements][:, -2:]]).max(axis=(0, 2))
     return bool((force * mesh.axial[elements].max(axis=1) > FLOOR_STRAIN).any())
+
+
+def follow_network(
+    problem: NetworkProblem,
+    start: PathEquilibrium,
+    targets: FloatArray,
+    options: Options,
+    branch: PathBranch | None = None,
+) -> Iterator[PathItem]:
+    """Yield points, events and changes of contacts of a path in order, and its ending at last; see `follow`.
+
+    Every change comes behind a point that lies at it.
+    """
+    if not problem.mesh.fits.network.contacts:
+        return follow(problem, start, targets, options, branch)
+    from cfmkit.elastica.contact.follow import follow_in_contact
+
+    return follow_in_contact(problem, start, targets, options, branch)

@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.changes import ContactChange
-from cfmkit.elastica.contact.follow import Remeshed, follow_in_contact
-from cfmkit.elastica.contact.joined_pieces import StatesOfPiece, join_pieces
+from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
@@ -23,7 +21,7 @@ from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
-from cfmkit.elastica.tracing.start import DriveStart, find_start, is_stretched
+from cfmkit.elastica.tracing.start import DriveStart, find_start, follow_network, is_stretched
 from cfmkit.elastica.tracing.taut_beams import drop_locked_points, find_tension
 from cfmkit.numerics.continuation.events import relocate
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
@@ -326,7 +324,7 @@ def trace_on(
     unit = arrays.scales.drive
     if start.at is not None and limit != 0 and not (first_only and first):
         options = _options(drive, control, unit)
-        for item in follow_in_contact(start.problem, start.at, drive.points / unit, options, start.branch):
+        for item in follow_network(start.problem, start.at, drive.points / unit, options, start.branch):
             if isinstance(item, Point):
                 points.append(item)
             elif isinstance(item, Remeshed):
@@ -385,6 +383,8 @@ def _states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points:
         pieces.append(StatesOfPiece(arrays, z, drives))
     if len(pieces) == 1 or start.problem.remesh is None:
         return Equilibria(*pieces[0])
+    from cfmkit.elastica.contact.joined_pieces import join_pieces
+
     drives = np.concatenate([piece.drive for piece in pieces])
     return Equilibria(*join_pieces([piece for piece in pieces if len(piece.drive)], start.problem.remesh), drives)
 

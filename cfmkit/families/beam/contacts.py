@@ -11,8 +11,6 @@ import numpy as np
 
 from cfmkit.arrays import LazyMapping
 from cfmkit.curves import Column
-from cfmkit.elastica.contact.pair_gaps import make_gaps
-from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, BeamSide, NodeOnBeam, NodeOnObstacle, Stop
 from cfmkit.elastica.results.beam_states import states
@@ -59,6 +57,9 @@ def refuse_overlap_at_rest(assembly: Assembly) -> None:
     sides = [contact for contact in network.contacts if isinstance(contact, BeamSide)]
     if not sides:
         return
+    from cfmkit.elastica.contact.pair_gaps import make_gaps
+    from cfmkit.elastica.contact.side_gaps import LoadStage
+
     mesh = discretise(network, assembly.drive())
     rest = np.zeros((1, mesh.size))
     for contact in sides:

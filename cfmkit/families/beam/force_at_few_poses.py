@@ -14,7 +14,7 @@ import numpy as np
 from cfmkit.elastica import PathStatus, gradient, trace
 from cfmkit.elastica.model.drive import Displacement
 from cfmkit.errors import CfmError
-from cfmkit.families.base import Sampled, SampledSlopes
+from cfmkit.families.base import Sampled
 from cfmkit.families.beam.network_from_spec import assemble
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ _SMOOTH_KEYS = re.compile(
 """Values of which every number of the network is a smooth function that takes complex ones."""
 
 
-def sample_poses(spec: BeamSpec, places: FloatArray) -> Sampled | None:
+def sample_poses(spec: BeamSpec, places: FloatArray, paths: Sequence[str] = ()) -> Sampled | None:
     """Return force and stress at places, each beam's own stress; None if the path does not reach them all.
 
     Parameters
@@ -45,42 +45,28 @@ def sample_poses(spec: BeamSpec, places: FloatArray) -> Sampled | None:
         Driven by a displacement, not solved as a solid.
     places : (p,) array
         Displacements, increasing, all to one side of rest [m].
+    paths : sequence of str, optional
+        Of values by which slopes are wanted; of nodes, shapes, sections, moduli and springs they are known, others are
+        left out, and all of them where the tangent is singular at a place.
     """
-    found = _follow_path(spec, places)
-    if found is None:
+    followed = _follow_path(spec, places)
+    if followed is None:
         return None
-    assembly, path, at = found
-    axial = spec.stress == "total"
-    stress = path.beam_stresses(axial)[0][:, at]
-    return Sampled({"load": assembly.effort_unit * path.effort[at]}, stress)
+    assembly, path, at = followed
+    stress = path.beam_stresses(spec.stress == "total")[0][:, at]
+    slopes = _find_slopes(assembly, path, at, paths) if paths else {}
+    return Sampled({"load": assembly.effort_unit * path.effort[at]}, stress, slopes)
 
 
-def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> SampledSlopes | None:
-    """Return force and stress at places with their exact derivatives by values of the specification.
-
-    Parameters
-    ----------
-    spec : BeamSpec
-        Driven by a displacement, not solved as a solid.
-    places : (p,) array
-        Displacements, increasing, all to one side of rest [m].
-    paths : sequence of str
-        Of values; those of nodes, shapes, sections, moduli and springs are known, others are left out.
-
-    Returns
-    -------
-    SampledSlopes or None
-        None if `sample_poses` is None, and where the tangent is singular at a place.
-    """
+def _find_slopes(assembly: Assembly, path: Path, at: NDArray[np.int64], paths: Sequence[str]) -> dict[str, Sampled]:
+    """Return derivatives of force and stress at some points of a path by values of the specification."""
     # other nodes of a chain follow from its beams, and other stages from the first, through numbers that stay real
-    copies = spec.mechanism.copies
+    spec, copies = assembly.spec, assembly.spec.mechanism.copies
     if spec.mechanism.closure == "chain" or (copies is not None and copies.layers > 1):
-        return None
-    known = [path for path in paths if _SMOOTH_KEYS.fullmatch(path) and isinstance(spec.get_value(path), float)]
-    found = _follow_path(spec, places)
-    if found is None or not known:
-        return None
-    assembly, path, at = found
+        return {}
+    known = [name for name in paths if _SMOOTH_KEYS.fullmatch(name) and isinstance(spec.get_value(name), float)]
+    if not known:
+        return {}
 
     def build(x: Any) -> Network:
         return assemble(_replace_values(spec, dict(zip(known, x, strict=True)))).network
@@ -88,21 +74,17 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
     try:
         slopes = gradient(path, build, np.array([spec.get_value(one) for one in known]), at)
         axial = spec.stress == "total"
-        stress, by_stress = [], []
+        by_stress = []
         for name in path.network.beams:
             extremes = path.stress_extremes(name, axial).value[at].reshape(len(at), 4)
             worst = np.abs(extremes).argmax(axis=1)
             pick = np.arange(len(at)), worst
-            stress.append(np.abs(extremes[pick]))
             by = slopes.stress_extremes(name, axial).reshape(len(at), 4, -1)
             by_stress.append(np.sign(extremes[pick])[:, None] * by[pick])
         by_effort = assembly.effort_unit * slopes.effort
     except (CfmError, np.linalg.LinAlgError):
-        return None
-    return SampledSlopes(
-        Sampled({"load": assembly.effort_unit * path.effort[at]}, np.array(stress)),
-        {one: Sampled({"load": by_effort[:, k]}, np.array(by_stress)[:, :, k]) for k, one in enumerate(known)},
-    )
+        return {}
+    return {name: Sampled({"load": by_effort[:, k]}, np.array(by_stress)[:, :, k]) for k, name in enumerate(known)}
 
 
 def _follow_path(spec: BeamSpec, places: FloatArray) -> tuple[Assembly, Path, NDArray[np.int64]] | None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import distinct
 from cfmkit.elastica import Path, PointLoad
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.export.contours import Contour
@@ -315,4 +316,4 @@ def choose_points(solution: Solution, count: int) -> NDArray[Any]:
     """Return so many points of the curve, evenly, its ends included; none if it has none."""
     if not len(solution.keep):
         return np.zeros(0, int)
-    return np.unique(np.linspace(0, len(solution.keep) - 1, count).astype(int))
+    return distinct(np.linspace(0, len(solution.keep) - 1, count).astype(int))

@@ -16,12 +16,21 @@ from cfmkit.families.end_stops_spec import contact_requirement_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.formula_of_x import formula
-from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, PositiveLength, SolidAnalysis, Spec, refuse
+from cfmkit.specs.spec import (
+    Analysis,
+    DesignBlock,
+    Displacement,
+    Model,
+    PositiveLength,
+    SolidAnalysis,
+    Spec,
+    is_made,
+    refuse,
+)
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import DIMENSIONS_BY_NAME, Factor, Force, Length, Ratio, Torque, format_short
 from cfmkit.specs.units.fields import MAX_QUANTITY
 from cfmkit.stock.material_and_part_spec import sheet_faults, sheet_of, stated_sheet
-from cfmkit.stock.springs.spec import is_made
 from cfmkit.stock.stock_series import stock_faults
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]

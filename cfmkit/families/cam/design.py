@@ -319,10 +319,10 @@ def _with_spring(
         reached = _stroke_of(law, target, springs)
         text = f"{problem.finding.name.replace('_', ' ')} (for a stroke of {mm(reached)})"
         return Miss(label, target.stroke / max(reached, 1e-9) - 1.0, text)
-    if target.spring_life is not None:
-        most = 2.0 * (reach(law, target.stroke)[1] - law.rest_half_width) + preload
-        if missed := SpringInUse.from_offer(item, preload - opened, most - opened).misses_life(target.spring_life):
-            return Miss(label, *missed)
+    most = 2.0 * (reach(law, target.stroke)[1] - law.rest_half_width) + preload
+    use = SpringInUse.from_offer(item, preload - opened, most - opened)
+    if weak := use.why_too_weak(target.spring_life, target.spring_safety):
+        return Miss(label, *weak)
     rest = spec.mechanism.rest_half_width - 0.5 * preload
     gap = two_way_gap(law, target, loads_of(spec, springs.total, rest), spec.mechanism.rolling_friction)
     if gap == float("inf"):

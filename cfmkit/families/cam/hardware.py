@@ -1,12 +1,14 @@
 """Braces, pins, shafts, bearings, guide and screws of a cam mechanism, dimensioned for the forces of its travel.
 
 A brace hangs beside the plate on each side: it is pulled from its roller's shaft to the slider's pin, both of which
-stand out of the plate by half of plate and brace. The four springs' hooks, or however many there are, sit on the
-shafts. Forces are the largest on both branches; where they diverge at a dead point, the next computed ones.
+stand out of the plate by half of plate and brace. The springs hook on the ends of the shafts, beyond the braces; more
+than one on a side hook above each other on bars that the shafts carry. Forces are the largest on both branches; where
+they diverge at a dead point, the next computed ones.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,10 +17,19 @@ from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc
 from cfmkit.export.posed_part import PosedBody
 from cfmkit.families.cam.bought_parts import springs_in_words
 from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.part_sizes import BRACE_WIDTH, PLATE_THICKNESS, count_of, pin_path, roller_path
+from cfmkit.families.cam.part_sizes import (
+    BRACE_WIDTH,
+    PLATE_THICKNESS,
+    coil_diameter,
+    count_of,
+    pin_path,
+    roller_path,
+    stack_height,
+)
 from cfmkit.families.findings import mm as length_in_words
 from cfmkit.families.findings import newton
 from cfmkit.families.hardware import (
+    LEAST_WALL,
     Hardware,
     PartStrength,
     guide_part,
@@ -51,6 +62,9 @@ BEARING_IN_ROLLER = 0.9
 SHAFT_IN_ROLLER = 0.7
 """Diameter of a plain shaft over that of the roller around it, and of the pin over the slider's side, at most."""
 
+MAX_BAR_WIDTH = 1.0
+"""Width of a bar for springs over half of the rollers' distance at the start, at most: two of them stand in it."""
+
 
 def hardware(solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism."""
@@ -71,7 +85,9 @@ def hardware(solution: Solution) -> Hardware:
                 f"too weak for the {newton(pull)} of a brace {length_in_words(arm)} beside it: use at least "
                 f"{length_in_words(least)} ('mechanism.pins.diameter')"
             )
-    shaft, bearing = _shaft(solution, press, arm, thick, strength)
+    hooks = _hooks(solution, brace)
+    # half of the press at each brace, and the springs of a side beyond it
+    shaft, bearing = _shaft(solution, press, 0.5 * arm + hooks.pull * hooks.arm / max(press, 1e-9), thick, strength)
     for place, diameter in (("slider pin", pin), ("shafts of the rollers", shaft)):
         if diameter > SHAFT_IN_ROLLER * 2.0 * mechanism.roller_radius:
             faults[place] = (
@@ -81,6 +97,11 @@ def hardware(solution: Solution) -> Hardware:
     sizes = mechanism.envelope
     stated = sizes.brace_width if sizes else 0.0
     width = stated or link_width(pull, brace, max(pin, shaft), strength)
+    bar = hooks.bar_width(shaft, strength)
+    if bar > MAX_BAR_WIDTH * mechanism.rest_half_width:
+        faults["springs to the shafts"] = (
+            f"{length_in_words(bar)} wide for springs {length_in_words(hooks.height)} high: use fewer springs"
+        )
     across = float(np.hypot(abs(solution.assembly.loads.sideways[1]), solution.assembly.loads.off_plane))
     travel, radius = float(np.ptp(solution.travel)), mechanism.roller_radius
     rod = guide_rod(across, force, travel, 2.0 * radius, mechanism.guide, system, strength)
@@ -93,13 +114,55 @@ def hardware(solution: Solution) -> Hardware:
             f"too weak for {newton(force)}: use {needed.name}, with holes of {length_in_words(needed.hole)} "
             "('mechanism.plate.hole_diameter')"
         )
-    parts = tuple(_parts(solution, strength, (thick, brace, width), (pin, shaft, bearing), (pull, press)))
+    parts = tuple(_parts(solution, strength, (thick, brace, width), (pin, shaft, bearing), (pull, press), hooks.outer))
+    parts = (*parts, *_hook_bars(hooks, bar, shaft, strength))
     parts = (*parts, guide_part(rod, 1, mechanism.guide is None))
     if holes:
         parts = (*parts, screw_part("plate to its base", len(holes), screw, thick, "screw"))
     standing = tuple(_standing(solution, rod.bush, rod.diameter, holes, screw))
     drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft)))
     return Hardware(with_faults(parts, faults), standing, drawn, pin, in_sentences(faults))
+
+
+@dataclass(frozen=True)
+class _Hooks:
+    """Springs of one side of the plate, which pull at one end of each shaft."""
+
+    pull: float  # of all of them [N]
+    arm: float  # from the middle of a brace to their middle, along the shaft [m]
+    outer: float  # diameter of a coil [m]
+    height: float  # of those above each other [m]; zero if one hooks on the shaft itself
+    thickness: float  # of the bar that carries them [m]
+
+    def bar_width(self, hole: float, strength: PartStrength) -> float:
+        """Return the width of a bar around a shaft's hole that bears the upper and lower springs [m]; zero for none.
+
+        The resultant of each half acts at a quarter of the height.
+        """
+        if not self.height:
+            return 0.0
+        moment, width = 0.125 * self.pull * self.height, hole
+        while 6.0 * moment * width > strength.allowable * self.thickness * (width**3 - hole**3):
+            width += 1e-3
+        return max(width, hole * (1.0 + 2.0 * LEAST_WALL))
+
+
+def _hooks(solution: Solution, brace: float) -> _Hooks:
+    springs = solution.assembly.spec.mechanism.springs
+    stretch, half_width = float(solution.elongation.max()), solution.assembly.spec.mechanism.rest_half_width
+    count, outer = count_of(springs), coil_diameter(springs, stretch, half_width) or 0.0
+    share = (count + 1) // 2 / count
+    pull = share * (springs.total * stretch + springs.initial_tension * count)
+    height = stack_height(outer, count) if count > 2 else 0.0
+    return _Hooks(pull, 0.5 * (brace + outer), outer, height, min(brace, outer))
+
+
+def _hook_bars(hooks: _Hooks, width: float, shaft: float, strength: PartStrength) -> Iterator[ListedPart]:
+    """Yield the bars that carry springs above each other, at both ends of both shafts."""
+    if hooks.height:
+        of = strength.name + (", assumed" if strength.assumed else "")
+        data = f"{of}; a hole of {mm(shaft)} in its middle and one for each hook, bears {newton(hooks.pull)}"
+        yield ListedPart("springs to the shafts", "hook bar", 4, data, "make", mm(hooks.height, width, hooks.thickness))
 
 
 def _largest(solution: Solution, name: str) -> float:
@@ -135,6 +198,7 @@ def _parts(
     sizes: tuple[float, float, float],
     pins: tuple[float, float, Bearing | None],
     loads: tuple[float, float],
+    coil: float,
 ) -> Iterator[ListedPart]:
     """Yield plate, braces, rollers, slider, pins, shafts, bearings and springs."""
     mechanism = solution.assembly.spec.mechanism
@@ -151,7 +215,8 @@ def _parts(
     size = mm(2.0 * radius, 2.0 * radius, thick)
     yield ListedPart("on its guide", "slider", 1, f"with a hole of {mm(pin)}", "make", size, "", "slider")
     yield pin_part("slider pin", 1, pin, thick + 2.0 * brace, 2.0 * pull, "slider pin")
-    yield pin_part("shafts of the rollers", 2, shaft, thick + 2.0 * brace, press, "shaft")
+    long = thick + 2.0 * brace + min(count_of(mechanism.springs), 2) * coil
+    yield pin_part("shafts of the rollers", 2, shaft, long, press, "shaft")
     stated, count = mechanism.bearings, 2 * (mechanism.bearings.per_roller if mechanism.bearings else 1)
     if stated is not None:
         rated = f", C {newton(stated.dynamic_rating)}" if stated.dynamic_rating else ""

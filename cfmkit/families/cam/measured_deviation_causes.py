@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.measured_deviation_definitions import DEVIATION_DEFINITIONS
 from cfmkit.families.cam.solution import Solution
 from cfmkit.families.cam.solution_of_measured_cam import Built, Sides
 from cfmkit.results import Quantity, quantities
@@ -30,22 +31,6 @@ if TYPE_CHECKING:
     from cfmkit.families.base import MeasuredLoop
     from cfmkit.families.cam.statics import Loads
     from cfmkit.results import Result
-
-DEVIATION_DEFINITIONS = {
-    "data_friction": (
-        "ratio",
-        "rolling friction whose loop has the measured area, over the displacements that are compared",
-    ),
-    "data_rest_error": (
-        "length",
-        "by how much the springs' rest length must exceed the stated one to explain the measured midline",
-    ),
-    "data_off_design": ("force", "root mean square of the measured force less that of the design without friction"),
-    "data_by_profile": ("force", "root mean square contribution of the measured errors of the profile"),
-    "data_by_friction": ("force", "root mean square contribution of the friction that gives the measured loop area"),
-    "data_by_rest_length": ("force", "root mean square contribution of the springs' rest length, its error included"),
-    "data_unexplained": ("force", "root mean square of the remainder"),
-}
 
 _MAX_ROUNDS = 12
 _DIFFERENCE_STEP = 1e-6

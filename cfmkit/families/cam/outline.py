@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import distinct
 from cfmkit.export.contours import (
     OUTLINE_TOLERANCE,
     Arc,
@@ -117,7 +118,7 @@ def _coordinates(profile: CamProfile, start: float) -> FloatArray:
     """
     share = np.linspace(0.0, 1.0, N_OUTLINE_POINTS)
     ends = np.concatenate([share**4, 1.0 - share**4, 0.3 * share + 0.7 * share**2])
-    fine = np.unique(start + (profile.end - start) * ends)
+    fine = distinct(start + (profile.end - start) * ends)
     slope = profile.path.law.slope(fine)
     steps = np.hypot(np.diff(fine), np.diff(profile.path.height(fine)))
     measure = np.zeros_like(fine)

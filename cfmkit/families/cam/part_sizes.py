@@ -32,7 +32,7 @@ BRACE_WIDTH = 0.010
 """Thickness of a brace where the plate is thicker [m]: it is pulled along, the plate is pressed on its edge."""
 
 
-def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) -> float | None:
+def depth_of(thick: float, springs: Springs, stretch: float, half_width: float, safety: float = 1.0) -> float | None:
     """Return the depth with springs of a known wire, else wound of steel wire [m]; None if no such spring fits.
 
     Parameters
@@ -43,19 +43,21 @@ def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) 
         How many of what stiffness: half of them on either side, above each other.
     stretch, half_width : float
         Their largest elongation, and half their length at rest [m].
+    safety : float
+        Of springs whose wire is not known, against yield.
     """
-    outer = coil_diameter(springs, stretch, half_width)
+    outer = coil_diameter(springs, stretch, half_width, safety)
     return None if outer is None else thick + 2.0 * min(thick, BRACE_WIDTH) + min(count_of(springs), 2) * outer
 
 
-def coil_diameter(springs: Springs, stretch: float, half_width: float) -> float | None:
+def coil_diameter(springs: Springs, stretch: float, half_width: float, safety: float = 1.0) -> float | None:
     """Return the outer diameter of each spring, of its known wire or else wound of steel wire [m]; None if none fits.
 
-    `stretch`, `half_width`: as of `depth_of`.
+    `stretch`, `half_width`, `safety`: as of `depth_of`.
     """
     if springs.wound is not None:
         return springs.wound.coil + springs.wound.wire
-    coil = extension_spring(springs.total / count_of(springs), stretch, 2.0 * half_width)
+    coil = extension_spring(springs.total / count_of(springs), stretch, 2.0 * half_width, safety)
     return None if coil is None else coil.outer_diameter
 
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.errors import SolutionError
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.hardware import SHAFT_IN_ROLLER
 from cfmkit.families.cam.part_sizes import BRACE_WIDTH, coil_diameter, count_of, depth_of, stack_height
@@ -66,8 +67,8 @@ ROLLER_MIN = 0.0015
 SHAFT_ARM = 0.004
 """About how far from the braces a roller presses on its shaft [m]: half of a plate of 5 mm and of a brace."""
 
-SPRING_COUNTS = (2, 1, 4, 6, 8, 12, 20, 40)
-"""Numbers of springs that are tried."""
+SPRING_COUNTS = (2, 4, 6, 8, 12, 20, 40)
+"""Numbers of springs that are tried: an odd one would pull on one side of the plate."""
 
 SPARE_SHARE, SPARE_LENGTH = 0.03, 0.3e-3
 """Of the travel, and [m]: beyond the window where made parts have to be good; holes that lie 0.05 mm off move the end
@@ -92,7 +93,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     candidates: list[Candidate] = []
     for index in chosen:
         made = _candidate(request, {name: float(values[index]) for name, values in found.items()})
-        candidates += [made, _from_catalogue(made)] if made else []
+        candidates += [made, _from_catalogue(made, request)] if made else []
         if len(candidates) >= MAX_PROPOSALS:
             break
     if not candidates:
@@ -173,10 +174,10 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
         pin = _slider_pin(request, size, thick, material)
         for count in SPRING_COUNTS if pin is not None else ():
             springs = Springs(stiffness=total / count, count=count)
-            depth = depth_of(thick, springs, stretch, size["start"])
+            depth = depth_of(thick, springs, stretch, size["start"], request.safety)
             if depth is None or depth > (request.depth or sum(request.envelope)):
                 continue
-            stack = stack_height(coil_diameter(springs, stretch, size["start"]) or 0.0, count)
+            stack = stack_height(coil_diameter(springs, stretch, size["start"], request.safety) or 0.0, count)
             below = 0.5 * stack - max(size["roller"], TAB_HEIGHT_RATIO * request.envelope[1])
             if size["height"] + max(below, 0.0) <= request.envelope[1]:
                 depths[count] = depth
@@ -204,7 +205,7 @@ def _slider_pin(request: Request, size: dict[str, float], thick: float, material
     return max(pin, PIN_SHARE * 2.0 * size["roller"]) if pin_bears and shaft_bears and max(pin, shaft) <= most else None
 
 
-def with_wire(spec: CamSpec, _request: Request) -> CamSpec:
+def with_wire(spec: CamSpec, request: Request) -> CamSpec:
     """Return a designed cam whose springs have wire, coil and turns: the slimmest that fit between the rollers.
 
     They are those that its depth counts with (`part.depth_of`).
@@ -216,10 +217,11 @@ def with_wire(spec: CamSpec, _request: Request) -> CamSpec:
     if springs.wound is not None or solution is None:
         return spec
     stretch, length = float(solution.elongation.max()), 2.0 * spec.mechanism.rest_half_width
-    coil = extension_spring(springs.total / count_of(springs), stretch, length)
+    coil = extension_spring(springs.total / count_of(springs), stretch, length, request.safety)
     if coil is None:
         return spec
-    return spec.replace({f"mechanism.springs.{key}": value for key, value in as_stated(coil).items()})
+    stated = {"count": springs.count, "preload": springs.preload} if springs.preload else {"count": springs.count}
+    return spec.replace({"mechanism.springs": {**stated, **as_stated(coil)}})
 
 
 def with_plate(spec: CamSpec, request: Request) -> CamSpec:
@@ -228,6 +230,8 @@ def with_plate(spec: CamSpec, request: Request) -> CamSpec:
     from cfmkit.families.run_control import Run
     from cfmkit.metrics import evaluate
 
+    if count_of(spec.mechanism.springs) % 2:
+        raise SolutionError("an odd number of springs of the catalogue would pull on one side of the plate")
     factor = evaluate(analyze(spec, Run()), ["safety_factor"])["safety_factor"].value
     if factor is None or factor >= request.safety or spec.mechanism.contact is None:
         return spec
@@ -236,9 +240,11 @@ def with_plate(spec: CamSpec, request: Request) -> CamSpec:
     )
 
 
-def _from_catalogue(made: Candidate) -> Candidate:
+def _from_catalogue(made: Candidate, request: Request) -> Candidate:
     """Return the same proportions with springs of the generic series; from these the force constant follows."""
-    spec = made.spec.replace({"design.choose": "catalogue", "design.catalogue": "generic"})
+    spec = made.spec.replace(
+        {"design.choose": "catalogue", "design.catalogue": "generic", "design.spring_safety": request.safety}
+    )
     return replace(
         made,
         variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant),

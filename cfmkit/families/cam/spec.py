@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
 from cfmkit.families.cam.springs_spec import Springs
-from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, PositiveLength, Spec, refuse
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, PositiveLength, Spec, is_made, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Time, format_short
 from cfmkit.stock.material_and_part_spec import (
@@ -22,7 +22,7 @@ from cfmkit.stock.material_and_part_spec import (
     ProcessField,
     SafetyFactor,
 )
-from cfmkit.stock.springs.spec import Catalogue, Life, is_made
+from cfmkit.stock.springs.spec import Catalogue, Life, SpringSafety
 from cfmkit.stock.stock_series import StockSize, System, stock_faults
 
 Positive = Field(gt=0)
@@ -305,6 +305,7 @@ class CamDesign(DesignBlock):
     spring_life: Life | None = Field(
         None, description="cycles that a spring of the catalogue must last; one of unknown life is not chosen"
     )
+    spring_safety: SpringSafety | None = None
     friction: DesignFriction = Field(
         0.0,
         description="rolling friction that the profile is cut for; positive: exact on the way up, negative: on "
@@ -330,8 +331,9 @@ class CamDesign(DesignBlock):
     def _catalogue_where_needed(self) -> Self:
         if (self.choose == "catalogue") != bool(self.catalogue):
             raise ValueError("'catalogue' and 'choose: catalogue' belong together: give both or neither")
-        if self.spring_life is not None and not self.catalogue:
-            raise ValueError("'spring_life' applies only to springs picked from a catalogue: give 'catalogue', too")
+        for name in ("spring_life", "spring_safety"):
+            if getattr(self, name) is not None and not self.catalogue:
+                raise ValueError(f"{name!r} applies only to springs picked from a catalogue: give 'catalogue', too")
         return self
 
 

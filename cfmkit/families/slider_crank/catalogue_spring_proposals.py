@@ -48,7 +48,7 @@ def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     for sheet in sheets_of_links(request):
         targets = {
             "force": request.target, "travel": window, "springs": JOINT_NAMES[:3],
-            "catalogue": _catalogue_springs(spec, request, sheet),
+            "catalogue": _catalogue_springs(spec, request, sheet), "spring_safety": request.safety,
         }  # fmt: skip
         changes = {"design": targets, "analysis": pushed_analysis(window), "mechanism.part.sheet": sheet}
         designed = design(spec.replace(changes), Run())

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.families.base import function_named
+from cfmkit.families.deferred_imports import deferred_imports
+
+with deferred_imports():
+    from cfmkit.families.slider_crank.printed.design import design as design_part
+    from cfmkit.families.slider_crank.springs.design import design as design_springs
 
 if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
@@ -16,7 +20,4 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
     """Return the design of springs, or of the part that the block `design` asks for."""
     wanted = spec.design
     part = wanted is not None and (wanted.beam is not None or wanted.flexures is not None)
-    found: Design = function_named(f"cfmkit.families.slider_crank.{'printed' if part else 'springs'}.design:design")(
-        spec, run
-    )
-    return found
+    return (design_part if part else design_springs)(spec, run)

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.families.base import function_named
+from cfmkit.families.deferred_imports import deferred_imports
+
+with deferred_imports():
+    from cfmkit.families.slider_crank.printed.figures import figures as figures_of_part
+    from cfmkit.families.slider_crank.printed.figures import moving as moving_part
+    from cfmkit.families.slider_crank.springs.figures import figures as figures_of_springs
+    from cfmkit.families.slider_crank.springs.figures import moving as moving_springs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,17 +25,11 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a result of the family, by file stem; empty if nothing was solved."""
     if result.state is None or not result.curves:
         return {}
-    made: dict[str, Callable[[], Figure]] = _in_room(result, "figures")
-    return made
+    spec: Any = result.spec
+    return (figures_of_springs if spec.built_as == "springs" else figures_of_part)(result)
 
 
 def moving(result: Result) -> Moving | None:
     """Return the linkage or the part over its motion, for a film; None of a part solved as a solid."""
-    made: Moving | None = _in_room(result, "moving")
-    return made
-
-
-def _in_room(result: Result, name: str) -> Any:
-    """Return what a function of the room that solved a mechanism draws of it; imported when it is to draw."""
     spec: Any = result.spec
-    return function_named(f"cfmkit.families.slider_crank.{spec.built_as}.figures:{name}")(result)
+    return (moving_springs if spec.built_as == "springs" else moving_part)(result)

@@ -33,8 +33,8 @@ PIVOT_ENVELOPE_SHARES = (0.5, 0.3, 0.7)
 TRAVEL_RTOL = 1e-9
 """Travels below this share of the slider's travel count as zero."""
 
-RATE_SHARE = 0.999
-"""Share of the largest rate that is used: it is known to a few digits."""
+RATE_SHARE = 0.98
+"""Share of the largest rate that is used: coils and turns are rounded."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,7 @@ class SprungMotion:
     widest: float  # largest outer diameter of a torsion spring [m]
     deep: float  # room for springs out of the plane, on both sides of the links together [m]
     shared: bool = False  # whether the pivot's spring and the others have to share that room
+    safety: float = 1.0  # of springs, against yield
 
     @property
     def goes_so_far(self) -> bool:
@@ -86,9 +87,11 @@ class SprungMotion:
         deep = np.array([(below, above, above) for below, above in self.depths])[:, :, None]
         # all depths in one call: there are few places, and a call takes longer than they do
         alike = np.broadcast_to(turns[:3], (len(deep), *turns[:3].shape))
-        pins = stiffest("torsion", alike.ravel(), self.widest, (deep + np.zeros_like(alike)).ravel())
+        pins = stiffest("torsion", alike.ravel(), self.widest, (deep + np.zeros_like(alike)).ravel(), self.safety)
         wide = deep[:, 2] + np.zeros_like(turns[3])
-        slider = stiffest("extension", np.tile(turns[3], len(deep)), wide.ravel(), rest).reshape(wide.shape)
+        slider = stiffest("extension", np.tile(turns[3], len(deep)), wide.ravel(), rest, self.safety).reshape(
+            wide.shape
+        )
         return np.concatenate([pins.reshape(alike.shape), np.where(pushed, 0.0, slider)[:, None]], axis=1)
 
 

@@ -15,12 +15,14 @@ from cfmkit.families.slider_crank.printed.model import chain_of
 from cfmkit.families.slider_crank.printed.solution import Solution
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.printed.solution import ChainModel
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
-def sample_poses(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
+def sample_poses(spec: SliderCrankSpec, places: FloatArray, paths: Sequence[str] = ()) -> Sampled | None:
     """Return force and stress at travels; None of springs, and where the chain has no equilibrium at one of them.
 
     Parameters
@@ -29,6 +31,8 @@ def sample_poses(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
         With flexures or a strip.
     places : (p,) array
         Increasing travels [m].
+    paths : sequence of str, optional
+        Of values by which slopes are wanted; none are known.
     """
     if spec.fidelity in ("prb", "solid") or spec.analysis.side is not None or places[0] < 0:
         return None

@@ -8,8 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc, Line, Smooth, polygons
-from cfmkit.families.base import function_named
+from cfmkit.families.deferred_imports import deferred_imports
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
+
+with deferred_imports():
+    from cfmkit.families.slider_crank.printed.outline import drawing as draw_part
+    from cfmkit.families.slider_crank.springs.outline import drawing as draw_links
 
 if TYPE_CHECKING:
     from cfmkit.export.contours import Contour, Drawing, Edge
@@ -24,7 +28,7 @@ def drawing(spec: SliderCrankSpec, tolerance: float = OUTLINE_TOLERANCE) -> Draw
     cfmkit.families.no_mechanism.CannotBuild
         If it cannot be assembled.
     """
-    made: Drawing = function_named(f"cfmkit.families.slider_crank.{spec.built_as}.outline:drawing")(resolve(spec))
+    made = (draw_links if spec.built_as == "springs" else draw_part)(resolve(spec))
     legs = spec.mechanism.legs
     notes = (f"one of {legs} equal legs is drawn: make it {legs} times",) if legs > 1 else ()
     if spec.mechanism.copies == "mirrored":

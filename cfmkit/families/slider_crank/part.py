@@ -7,9 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.export.contours import OUTLINE_TOLERANCE
 from cfmkit.export.posed_part import PosedBody
-from cfmkit.families.base import function_named
+from cfmkit.families.deferred_imports import deferred_imports
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.outline import drawing
+
+with deferred_imports():
+    from cfmkit.families.slider_crank.printed.model import analyze
+    from cfmkit.families.slider_crank.printed.part import part_over_motion as of_printed
+    from cfmkit.families.slider_crank.springs.part import part_over_motion as of_springs
 
 if TYPE_CHECKING:
     from cfmkit.export.posed_part import PosedPart
@@ -24,15 +29,13 @@ def part_over_motion(result: Result) -> PosedPart | None:
     """
     spec: Any = result.spec
     if result.state is not None and spec.fidelity == "solid":
-        from cfmkit.families.slider_crank.printed.model import analyze
-
         result = analyze(spec.replace({"analysis.fidelity": spec.piece, "requirements": ()}), Run())
     if result.state is None:
         return None
     spec = result.spec
-    found: PosedPart = function_named(f"cfmkit.families.slider_crank.{spec.built_as}.part:part_over_motion")(result)
     if spec.built_as == "springs":
-        return found
+        return of_springs(result)
     cut = (one for one in drawing(spec).contours if one.layer == "cut" and not one.hole)
     as_cut = (PosedBody.polygon("as cut", "free", one.points(OUTLINE_TOLERANCE)) for one in cut)
-    return replace(found, bodies=(*as_cut, *found.bodies))
+    moving = of_printed(result)
+    return replace(moving, bodies=(*as_cut, *moving.bodies))

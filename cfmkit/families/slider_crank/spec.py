@@ -12,10 +12,9 @@ from cfmkit.families.end_stops_spec import stop_faults
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
 from cfmkit.families.slider_crank.springs.spec import Limits, Links, SpringDesign, Springs
 from cfmkit.metrics.fatigue_and_relaxation import Durability
-from cfmkit.specs.spec import PositiveLength, SolidAnalysis, Spec, refuse
+from cfmkit.specs.spec import PositiveLength, SolidAnalysis, Spec, is_made, refuse
 from cfmkit.specs.units import Angle, Length, Ratio, format_short
 from cfmkit.stock.material_and_part_spec import Guide, Pins, sheet_faults, stated_sheet
-from cfmkit.stock.springs.spec import is_made
 from cfmkit.stock.stock_series import StockSize, stock_faults
 
 

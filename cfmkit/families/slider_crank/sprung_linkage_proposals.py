@@ -35,15 +35,20 @@ from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.families.suggestion_request import Candidate, FamilyOffer
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.springs.helical_spring_formulas import YOUNGS_MODULUS, tensile_strength
-from cfmkit.stock.springs.made_to_measure import as_stated, extension_spring, shortest_torsion_spring, torsion_spring
-from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE
+from cfmkit.stock.springs.helical_spring_formulas import YOUNGS_MODULUS, HelicalSpring
+from cfmkit.stock.springs.made_to_measure import (
+    MAX_INDEX,
+    as_stated,
+    extension_spring,
+    shortest_torsion_spring,
+    torsion_spring,
+)
+from cfmkit.stock.springs.offer_type_and_generic_series import largest_load
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.flattest_springs_that_fit import HeldEffort
     from cfmkit.families.slider_crank.springs.link_strength import LinkLoads
     from cfmkit.families.suggestion_request import MaterialBlock, Request
-    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
 
 @dataclass(frozen=True)
@@ -75,9 +80,6 @@ WOUND_UP = -math.radians(60.0)
 
 RELATIVE_SIZES = (0.99, 0.8)
 """Sizes of linkages for a torque over the largest that fits the envelope; smaller ones leave room for wider springs."""
-
-WIRE_ENERGY_DENSITY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
-"""What round wire in bending holds at most, over its volume [J/m^3]."""
 
 MAX_TORQUE_RATIO = 4.0
 """Torque that springs can hold by the bound over the one required, above which more of it says nothing."""
@@ -127,7 +129,9 @@ def _too_weak(request: Request, most: float) -> str:
 
 def explain_overfilled(request: Request) -> str | None:
     """Return what is wrong where springs at pins would fill more than the envelope, taken as deep as it is wide."""
-    wire = request.target * request.travel / WIRE_ENERGY_DENSITY
+    thin = HelicalSpring("torsion", 1e-3, MAX_INDEX * 1e-3, 1.0)
+    stress = float(32.0 * largest_load(thin, request.safety) / (math.pi * thin.wire**3))
+    wire = 8.0 * YOUNGS_MODULUS * request.target * request.travel / stress**2
     deep = wire / (request.envelope[0] * request.envelope[1])
     if deep <= (request.depth or max(request.envelope[:2])):
         return None
@@ -194,7 +198,7 @@ def _sprung(
 ) -> SprungMotion:
     """Return what springs have to do where the effort may be held between two ends of the motion."""
     deep = depth_of_springs(request, sheets_of_links(request)[0] if sheet is None else sheet)
-    return SprungMotion(assembly, *ends, request.travel, widest, deep, shared=request.depth is not None)
+    return SprungMotion(assembly, *ends, request.travel, widest, deep, request.depth is not None, request.safety)
 
 
 def depth_of_springs(request: Request, sheet: float) -> float:
@@ -389,20 +393,21 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
     deep = room = depth_of_springs(request, (part.sheet if part else None) or 0.0)
     if request.depth is not None and "pivot" in turns:
         # that of the pivot is on the other side of the links: first it takes as little as it can
-        least = shortest_torsion_spring(*turns["pivot"], widest, pin)
+        least = shortest_torsion_spring(*turns["pivot"], widest, pin, request.safety)
         deep = room - (0.0 if least is None else least.body_length_wound_up(turns["pivot"][1]))
     bought: dict[str, HelicalSpring] = {}
     for name in sorted(turns, key="pivot".__eq__):
         if name == "pivot" and request.depth is not None:
             deep = room - max((height_of(other, coil, turns[other][1]) for other, coil in bought.items()), default=0.0)
         if name == "slider":
-            coil = extension_spring(*turns[name], rest if pulled else 0.0)
+            coil = extension_spring(*turns[name], rest if pulled else 0.0, request.safety)
         else:
-            coil = torsion_spring(*turns[name], deep, pin)
+            coil = torsion_spring(*turns[name], deep, pin, request.safety)
         if coil is None or coil.outer_diameter > (deep if name == "slider" else widest):
             raise SolutionError(_no_spring(name, turns[name], coil))
         bought[name] = coil
-    return spec.replace({"mechanism.springs.bought": tuple({"at": name, **as_stated(bought[name])} for name in turns)})
+    # the rates are those of the wires
+    return spec.replace({"mechanism.springs": {"bought": [{"at": name, **as_stated(bought[name])} for name in turns]}})
 
 
 def _no_spring(name: str, turn: tuple[float, float], coil: HelicalSpring | None) -> str:

@@ -274,10 +274,10 @@ def _find_miss(spec: VcfmSpec, target: VcfmDesign, leaves: LeavesAroundSprings, 
             )
     if leaf.angle > MAX_LEAF_ANGLE * (1 + 1e-9):
         return Miss(leaves.label, float(leaf.angle) / MAX_LEAF_ANGLE - 1.0, "leaves steeper than 15 deg")
-    if offer is not None and target.spring_life is not None:
-        wanted = target.spring_life
-        short = [miss for use in _in_use(spec, leaves, offer) if (miss := use.misses_life(wanted)) is not None]
-        return Miss(leaves.label, *max(short)) if short else None
+    life, safety = target.spring_life, target.spring_safety
+    if offer is not None and (life is not None or safety is not None):
+        weak = [miss for use in _in_use(spec, leaves, offer) if (miss := use.why_too_weak(life, safety)) is not None]
+        return Miss(leaves.label, *max(weak)) if weak else None
     return None
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from cfmkit.arrays import LazySequence, ShortRepr
+from cfmkit.arrays import LazySequence, ShortRepr, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.rows import SolvedRows, findings_of_one, valid, values_of_one
@@ -170,11 +170,11 @@ def _is_complete(solution: Solution) -> NDArray[np.bool_]:
 def _kind(spec: VcfmSpec) -> Hashable | None:
     """Return what mechanisms that are solved together have in common; None if the model of one is not a closed form."""
     analysis = spec.analysis
-    if analysis.fidelity not in ("truss", "analytic") or spec.target_curve is not None or spec.mechanism.stops:
+    if analysis.fidelity not in ("truss", "analytic") or spec.mechanism.stops:
         return None
     stated = analysis.window is None, analysis.measured is None
     settings = analysis.points, len(analysis.preloads), analysis.flatness
-    return analysis.fidelity, spec.mechanism.kinds, *stated, *settings
+    return analysis.fidelity, spec.mechanism.kinds, spec.target_curve, *stated, *settings
 
 
 def _solve_kind(specs: Sequence[VcfmSpec]) -> Solution:
@@ -426,7 +426,7 @@ class DenseCurve(ShortRepr):
     @cached_property
     def places(self) -> FloatArray:
         """Increasing travels of the shuttle [m]."""
-        return np.unique(self.solution.dense)
+        return distinct(self.solution.dense)
 
     @property
     def peaks(self) -> FloatArray:

@@ -411,5 +411,6 @@ class Solution(ShortRepr):
             (low, np.minimum(high, self.reach)),
             self.part_efforts,
             StressRows(self._stress_samples, self.stress, self.allowable_stress),
+            followed=self.spec.target_curve,
         )
         return {"load": found}

@@ -23,12 +23,13 @@ from cfmkit.specs.spec import (
     PositiveLength,
     SolidAnalysis,
     Spec,
+    is_made,
     refuse,
 )
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Force, Length, Ratio, Stiffness, format_short
 from cfmkit.stock.material_and_part_spec import MaterialField, SafetyFactor, sheet_faults, stated_sheet
-from cfmkit.stock.springs.spec import Catalogue, Life, is_made
+from cfmkit.stock.springs.spec import Catalogue, Life, SpringSafety
 from cfmkit.stock.stock_series import StockSize, stock_faults
 
 if TYPE_CHECKING:
@@ -139,6 +140,7 @@ class VcfmDesign(DesignBlock):
     spring_life: Life | None = Field(
         None, description="cycles that a spring of the catalogue must last; one of unknown life is not chosen"
     )
+    spring_safety: SpringSafety | None = None
     leaf_length: PositiveLength | None = Field(None, description="L2; default: the shortest that the stress allows")
     min_thickness: PositiveLength | None = Field(None, description="thinnest leaf that can be made")
     max_span: PositiveLength | None = Field(
@@ -382,10 +384,9 @@ class VcfmSpec(Spec):
             raise ValueError(
                 "'design' needs either 'preload' or 'rise': one follows from the other, rise = force/adjustment preload"
             )
-        if free and not self.design.catalogue and (self.design.spring_life or self.design.spring_room):
-            raise ValueError(
-                "'spring_life' and 'spring_room' apply only to springs picked from a catalogue: give 'catalogue', too"
-            )
+        for name in ("spring_life", "spring_safety", "spring_room"):
+            if free and not self.design.catalogue and getattr(self.design, name):
+                raise ValueError(f"{name!r} applies only to springs picked from a catalogue: give 'catalogue', too")
         return self
 
     @property

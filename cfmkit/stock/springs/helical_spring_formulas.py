@@ -31,9 +31,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WireName
+import numpy as np
+
+from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireName, WireOutOfRange
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -72,7 +74,7 @@ class HelicalSpring:
     turns: float  # active turns, which bend or twist
     shear_modulus: float = SHEAR_MODULUS  # of the wire [Pa]
     youngs_modulus: float = YOUNGS_MODULUS  # of the wire [Pa]
-    material: WireName = MUSIC_WIRE.name  # class of the wire, which its moduli may differ from
+    material: WireName | None = MUSIC_WIRE.name  # class of the wire, which its moduli may differ from; None: unknown
 
     @property
     def index(self) -> float:
@@ -109,6 +111,32 @@ class HelicalSpring:
         c = self.index
         curved = (4.0 * c * c - c - 1.0) / (4.0 * c * (c - 1.0))
         return load * (curved * 16.0 * self.coil / (math.pi * self.wire**3) + 4.0 / (math.pi * self.wire**2))
+
+    def yield_load(self) -> Any:
+        """Return the force [N] or couple [N m] at which turns or loops yield; of an array of coils, of each.
+
+        Raises
+        ------
+        WireOutOfRange
+            If no strength is published for this diameter, or the class of the wire is not known.
+
+        Examples
+        --------
+        >>> spring = HelicalSpring("extension", 2e-3, 12e-3, 20.0)
+        >>> load = spring.yield_load()
+        >>> round(float(load)), round(float(spring.stress(load)) / tensile_strength(2e-3), 3)
+        (166, 0.397)
+        """
+        if self.material is None:
+            raise WireOutOfRange("the class of the wire is not known, nor its strength: state 'material'")
+        wire = WIRES_BY_NAME[self.material]
+        strength, shares = wire.tensile_strength(self.wire), wire.yields
+        if self.kind == "torsion":
+            return shares.bending * strength / self.stress(1.0)
+        turns = shares.shear * strength / self.stress(1.0)
+        if self.kind == "compression":
+            return turns
+        return np.minimum(turns, shares.loops * strength / self.loop_stress(1.0))
 
     @property
     def body_length(self) -> float:

@@ -1,30 +1,47 @@
 """Custom springs: the slimmest one of a rate that can be stretched, or turned, so far, where no list has it.
 
-The formulas are those of `cfmkit.stock.springs.helical_spring_formulas`, the wire is music wire of the diameters in its
-table, the share of the strength is that of the generic series. Bodies are close-wound, loops are as high as the inside
-of the coil.
+The formulas are those of `cfmkit.stock.springs.helical_spring_formulas`, the wire is music wire in the diameters of the
+metric series, coils and turns are in steps that a winder sets. The load is that which the generic series allows, or
+where it is less that at which the spring yields over a safety factor. Bodies are close-wound, loops are as high as the
+inside of the coil.
 """
 
 from __future__ import annotations
 
-from math import log2, pi
-from typing import TYPE_CHECKING, Any
+from functools import lru_cache
+from math import pi
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from cfmkit.specs.units import format_short
-from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring, Kind, tensile_strength
-from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE, SHEAR_SHARE
+from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring, Kind
+from cfmkit.stock.springs.offer_type_and_generic_series import largest_load
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE
+from cfmkit.stock.stock_series import ALL_SERIES
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.arrays import FloatArray
 
-SPRING_INDICES = (5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
+MIN_INDEX, MAX_INDEX = 5.0, 16.0
 """Mean diameter of the coil over that of the wire: what is wound easily."""
+
+N_INDICES = 12
+"""Indices that are compared for the largest rate."""
 
 MIN_WIRE_DIAMETER = 0.2e-3
 """Wire that springs are usually wound of [m]."""
+
+WIRE_DIAMETERS = tuple(
+    size
+    for series in ALL_SERIES
+    if (series.kind, series.system) == ("wire", "metric")
+    for size in series.sizes
+    if MIN_WIRE_DIAMETER <= size <= MUSIC_WIRE.thickest
+)
+"""Wire on offer [m], of the metric series."""
 
 MIN_TURNS = 3.0
 """Turns below which the loops decide the rate."""
@@ -32,23 +49,28 @@ MIN_TURNS = 3.0
 PIN_SHARE = 0.9
 """Diameter of a pin over the inside of a torsion spring that is wound up: what spring makers leave as clearance."""
 
-N_HALVINGS = 16
-"""Of the wire's diameter, where the length decides it."""
+COIL_STEP, COIL_STEP_OF_LARGE, LARGE_COIL = 1e-5, 5e-5, 1e-2
+"""Steps of coil diameters, and those above a diameter [m]."""
+
+STEPS_PER_TURN = 100.0
+"""Steps of turns: a torsion spring's legs stand within 4 deg of where they should."""
 
 
-def extension_spring(rate: float, stretch: float, room: float) -> HelicalSpring | None:
+def extension_spring(rate: float, stretch: float, room: float, safety: float = 1.0) -> HelicalSpring | None:
     """Return the slimmest extension spring of a rate [N/m] that can be stretched so far [m] from at most a length [m].
 
-    None if there is none: the body would be longer than the room.
+    None if there is none: the body would be longer than the room. Its rate is off by
+    what the turns are rounded by.
 
     Examples
     --------
     >>> spring = extension_spring(690.0, 0.132, 0.136)
-    >>> round(spring.rate, 6), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), round(spring.turns)
-    (690.0, 1.68, 15.1, 48)
+    >>> round(spring.rate, 1), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), spring.turns
+    (690.0, 1.6, 12.7, 71.72)
     """
-    fitting = [spring for spring in _candidates("extension", rate, stretch) if loaded_length(spring) <= room]
-    return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
+    return min(
+        _springs("extension", rate, stretch, room, safety), key=lambda spring: spring.outer_diameter, default=None
+    )
 
 
 def as_stated(spring: HelicalSpring) -> dict[str, Any]:
@@ -60,7 +82,9 @@ def as_stated(spring: HelicalSpring) -> dict[str, Any]:
     }
 
 
-def torsion_spring(rate: float, turn: float, room: float, pin: float = 0.0) -> HelicalSpring | None:
+def torsion_spring(
+    rate: float, turn: float, room: float, pin: float = 0.0, safety: float = 1.0
+) -> HelicalSpring | None:
     """Return the slimmest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so long [m].
 
     None if there is none: the body, which is longest when it is wound up, would be longer, or the inside, which is
@@ -69,27 +93,30 @@ def torsion_spring(rate: float, turn: float, room: float, pin: float = 0.0) -> H
     Examples
     --------
     >>> spring = torsion_spring(0.05, 1.0, 0.05)
-    >>> round(spring.rate, 9), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), round(spring.turns)
-    (0.05, 0.76, 4.5, 6)
+    >>> round(spring.rate, 4), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), spring.turns
+    (0.05, 0.8, 4.8, 6.59)
     >>> torsion_spring(0.05, 1.0, 0.002) is None
     True
     """
-    springs = _fit_over_pin(_candidates("torsion", rate, turn), turn, pin)
-    fitting = [spring for spring in springs if spring.body_length_wound_up(turn) <= room]
-    return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
+    return min(
+        _springs("torsion", rate, turn, room, safety, pin), key=lambda spring: spring.outer_diameter, default=None
+    )
 
 
-def shortest_torsion_spring(rate: float, turn: float, widest: float, pin: float = 0.0) -> HelicalSpring | None:
+def shortest_torsion_spring(
+    rate: float, turn: float, widest: float, pin: float = 0.0, safety: float = 1.0
+) -> HelicalSpring | None:
     """Return the shortest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so wide [m].
 
     None if there is none: the coil would be wider, or too narrow for a pin of that diameter [m].
     """
-    springs = _fit_over_pin(_candidates("torsion", rate, turn), turn, pin)
-    fitting = [spring for spring in springs if spring.outer_diameter <= widest]
-    return min(fitting, key=lambda spring: spring.body_length, default=None)
+    springs = _springs("torsion", rate, turn, np.inf, safety, pin, widest)
+    return min(springs, key=lambda spring: spring.body_length, default=None)
 
 
-def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, room: float | FloatArray) -> FloatArray:
+def stiffest(
+    kind: Kind, deflection: FloatArray, widest: float | FloatArray, room: float | FloatArray, safety: float = 1.0
+) -> FloatArray:
     """Return the largest rates of springs that can be stretched [m], or turned [rad], so far and fit: zero for none.
 
     Parameters
@@ -100,35 +127,32 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, roo
         How far they are stretched or turned.
     widest, room : float or (n,) array
         Largest outer diameter, and length with the loops of one that is stretched [m].
+    safety : float
+        Against yield.
 
     Examples
     --------
     >>> (rate,) = stiffest("torsion", np.array([1.0]), 5e-3, 30e-3)
-    >>> [bool(torsion_spring(share * rate, 1.0, 30e-3).outer_diameter <= 5e-3) for share in (0.999, 1.001)]
-    [True, False]
+    >>> bool(torsion_spring(0.98 * rate, 1.0, 30e-3).outer_diameter <= 5e-3)
+    True
     """
-    units = [HelicalSpring(kind, 1e-3, index * 1e-3, 1.0) for index in SPRING_INDICES]
-    rate, stress = (np.array(one)[:, None] for one in zip(*((one.rate, one.stress(1.0)) for one in units), strict=True))
-    power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
-    index = np.array(SPRING_INDICES)[:, None]
-    # in wires: one more than the turns, and what winds up, or both loops
-    ends = 1.0 + (deflection / (2.0 * pi) if kind == "torsion" else 2.0 * (index - 1.0))
-    falls = log2(tensile_strength(1e-3) / tensile_strength(2e-3))
-    each = rate * stress * np.maximum(deflection, 1e-12) / (share * tensile_strength(1e-3))
+    deflection, widest, room = (np.asarray(values, dtype=float) for values in (deflection, widest, room))
+    windings = np.array(_windings(kind, safety))
+    slim = windings[:, windings[0] + windings[1] <= widest.max(initial=0.0)]
+    wire, coil, one_turn, load = (values[:, None] for values in slim)
+    rate = np.minimum(load / np.maximum(deflection, 1e-12), one_turn / MIN_TURNS)
+    long = _length(kind, wire, coil, one_turn / rate, deflection)
+    return np.asarray(np.where((long <= room) & (coil + wire <= widest), rate, 0.0).max(axis=0, initial=0.0))
 
-    def turns(wire: FloatArray) -> FloatArray:  # of a wire in mm at its allowed stress: load is as its square or cube
-        return np.asarray(np.maximum(each * wire ** (power - max(power, 2.0) + falls), MIN_TURNS))
 
-    # the thicker the wire, the stiffer, and the longer
-    thickest = np.minimum(1e3 * widest / (index + 1.0), 1e3 * MUSIC_WIRE.thickest) + np.zeros(each.shape)
-    low = np.full(each.shape, MIN_WIRE_DIAMETER / 1e-3)
-    high = np.maximum(thickest, low)
-    for _ in range(N_HALVINGS):
-        middle = 0.5 * (low + high)
-        fits = (turns(middle) + ends) * middle * 1e-3 <= room
-        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-    there = (thickest >= MIN_WIRE_DIAMETER / 1e-3) & ((turns(low) + ends) * low * 1e-3 <= room)
-    return np.asarray(np.where(there, rate * low**power / turns(low), 0.0).max(axis=0))
+@lru_cache(maxsize=8)
+def _windings(kind: Kind, safety: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return wire and coil of all sizes and indices [m], their rate with one turn and their largest load, (n,) each."""
+    indices = np.linspace(MIN_INDEX, MAX_INDEX, N_INDICES)
+    springs: list[Any] = [HelicalSpring(kind, wire, cast("Any", wire * indices), 1.0) for wire in WIRE_DIAMETERS]
+    rows = [(0.0 * each.coil + each.wire, each.coil, each.rate, largest_load(each, safety)) for each in springs]
+    wire, coil, rate, load = np.concatenate(rows, axis=1)
+    return wire, coil, rate, load
 
 
 def loaded_length(spring: HelicalSpring) -> float:
@@ -136,28 +160,49 @@ def loaded_length(spring: HelicalSpring) -> float:
     return spring.body_length + 2.0 * (spring.coil - spring.wire)
 
 
-def _candidates(kind: Kind, rate: float, deflection: float) -> list[HelicalSpring]:
-    """Return the spring of each index whose wire is drawn so thick."""
-    springs = [_size_spring(kind, index, rate, deflection) for index in SPRING_INDICES]
-    return [spring for spring in springs if spring.wire <= MUSIC_WIRE.thickest]
+def _length(kind: Kind, wire: Any, coil: Any, turns: Any, deflection: Any) -> Any:
+    """Return the length of a body that winds up, or of one with both loops [m]."""
+    if kind == "torsion":
+        return (turns + 1.0 + deflection / (2.0 * pi)) * wire
+    return (turns + 1.0) * wire + 2.0 * (coil - wire)
 
 
-def _fit_over_pin(springs: list[HelicalSpring], turn: float, pin: float) -> list[HelicalSpring]:
-    """Return the torsion springs that fit over a pin [m] when they are wound up by an angle [rad]."""
-    return [spring for spring in springs if PIN_SHARE * spring.inner_diameter_wound_up(turn) >= pin]
+def _springs(
+    kind: Kind, rate: float, deflection: float, room: float, safety: float, pin: float = 0.0, widest: float = np.inf
+) -> Iterator[HelicalSpring]:
+    """Yield of each wire on offer the slimmest spring that fits; if only its width is limited, the widest.
+
+    A pin [m] has to fit into a torsion spring that is wound up.
+    """
+    slimmest = np.inf
+    for wire in WIRE_DIAMETERS:
+        if wire * (MIN_INDEX + 1.0) >= min(slimmest, widest):  # no coil of this or of thicker wire is slimmer
+            return
+        coil, one_turn, most = _coils_of(kind, wire, safety)
+        turns = np.maximum(np.round(one_turn / rate * STEPS_PER_TURN), 1.0) / STEPS_PER_TURN
+        fits = (turns >= MIN_TURNS) & (one_turn / turns * deflection <= most) & (coil + wire <= widest)
+        fits &= _length(kind, wire, coil, turns, deflection) <= room
+        fits &= PIN_SHARE * (coil * turns / (turns + abs(deflection) / (2.0 * pi)) - wire) >= pin if pin else True
+        places = np.flatnonzero(fits)
+        if len(places):
+            place = places[0 if np.isfinite(room) else -1]
+            spring = HelicalSpring(kind, wire, float(coil[place]), float(turns[place]))
+            slimmest = spring.outer_diameter if np.isfinite(room) else np.inf
+            yield spring
 
 
-def _size_spring(kind: Kind, index: float, rate: float, deflection: float) -> HelicalSpring:
-    """Return the spring of an index whose wire is at its allowed stress when deflected, or with the fewest turns."""
-    unit = HelicalSpring(kind, 1e-3, index * 1e-3, MIN_TURNS)
-    # the rate of wire of an index is as a power of its diameter, and so is its stress but for the strength, which falls
-    # with the 0.145th power: with 1 mm as the unit of the wire
-    power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
-    falls = log2(tensile_strength(1e-3) / tensile_strength(2e-3))
-    exponent = (3.0 if kind == "torsion" else 2.0) - falls
-    wire = (unit.stress(rate * deflection) / (share * tensile_strength(1e-3))) ** (1.0 / exponent)
-    wire = max(wire, MIN_WIRE_DIAMETER / 1e-3)
-    turns = MIN_TURNS * unit.rate * wire**power / rate
-    if turns < MIN_TURNS:
-        wire, turns = (rate / unit.rate) ** (1.0 / power), MIN_TURNS
-    return HelicalSpring(kind, 1e-3 * wire, 1e-3 * index * wire, turns)
+@lru_cache(maxsize=512)
+def _coils_of(kind: Kind, wire: float, safety: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the coils of a wire [m], the rate that each has with one turn and the load that it bears, (n,) each."""
+    coil = _coil_diameters(wire)
+    spring: Any = HelicalSpring(kind, wire, cast("Any", coil), 1.0)
+    return coil, spring.rate, largest_load(spring, safety)
+
+
+def _coil_diameters(wire: float) -> FloatArray:
+    """Return the mean diameters in which a wire [m] is wound [m], increasing."""
+    low, high = MIN_INDEX * wire, MAX_INDEX * wire
+    small = np.arange(np.ceil(low / COIL_STEP - 1e-6), min(high, LARGE_COIL) / COIL_STEP + 1e-6) * COIL_STEP
+    start = max(low, LARGE_COIL + COIL_STEP_OF_LARGE)
+    large = np.arange(np.ceil(start / COIL_STEP_OF_LARGE - 1e-6), high / COIL_STEP_OF_LARGE + 1e-6) * COIL_STEP_OF_LARGE
+    return np.round(np.concatenate([small, large]), 8)

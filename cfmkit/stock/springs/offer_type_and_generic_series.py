@@ -15,7 +15,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from cfmkit.stock.springs.helical_spring_formulas import (
     HelicalSpring,
@@ -97,9 +99,21 @@ def generic(kind: Kind) -> tuple[Offer, ...]:
     return tuple(found)
 
 
+def largest_load(wound: HelicalSpring, safety: float) -> Any:
+    """Return the load that a spring of music wire may bear [N or N m]; of an array of coils, of each.
+
+    That which the series allows, or where it is less that at which the spring yields over a safety factor.
+    """
+    return np.minimum(_allowed_stress(wound) / wound.stress(1.0), wound.yield_load() / safety)
+
+
+def _allowed_stress(wound: HelicalSpring) -> float:
+    """Return the stress that the series allows [Pa]."""
+    return (BENDING_SHARE if wound.kind == "torsion" else SHEAR_SHARE) * tensile_strength(wound.wire)
+
+
 def _generic(wound: HelicalSpring) -> Offer:
-    share = BENDING_SHARE if wound.kind == "torsion" else SHEAR_SHARE
-    largest = wound.deflection_at(share * tensile_strength(wound.wire))
+    largest = wound.deflection_at(_allowed_stress(wound))
     free_length = {
         "extension": wound.body_length + 2.0 * (wound.coil - wound.wire),
         "compression": wound.body_length + SOLID_RESERVE * largest,

@@ -8,11 +8,11 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, WrapValidator, model_validator
 
 from cfmkit.errors import DataError, reason_of
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.specs.spec import AS_MADE, Model, refuse
+from cfmkit.specs.spec import Model, is_made, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
 from cfmkit.specs.units.unit_size import is_unit
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue
@@ -61,8 +61,12 @@ class WireLimits(Model):
         description="S-N points or Basquin's line of the wire, in terms of that stress, for the life; needs the same",
     )
 
+    _class: WireName | None = PrivateAttr(MUSIC_WIRE.name)  # None: it has own moduli, and no class is stated
+
     @model_validator(mode="after")
     def _moduli_are_known(self) -> Self:
+        own = self.model_fields_set & {"shear_modulus", "youngs_modulus"}
+        self._class = None if own and "material" not in self.model_fields_set else self.material
         for key in ("shear_modulus", "youngs_modulus"):
             if getattr(self, key) is None:
                 # past the frozen model, and not counted as set: another material then has others
@@ -72,21 +76,17 @@ class WireLimits(Model):
     def wound_of(self, kind: Kind, wire: float, coil: float, turns: float) -> HelicalSpring:
         """Return a spring of this wire."""
         return HelicalSpring(
-            kind, wire, coil, turns, self.shear_modulus or 0.0, self.youngs_modulus or 0.0, self.material
+            kind, wire, coil, turns, self.shear_modulus or 0.0, self.youngs_modulus or 0.0, self._class
         )
 
     def check_wire(self, wire: float | None, coil: float | None) -> None:
-        """Raise `ValueError` for a coil that does not wind, or a wire thinner or thicker than its class is drawn.
-
-        A wire of own moduli is of no class unless that is stated.
-        """
+        """Raise `ValueError` for a coil that does not wind, or a wire thinner or thicker than its class is drawn."""
         if wire and coil and coil < 2.0 * wire:
             raise ValueError("'coil' is the mean diameter: at least twice the wire's")
-        own = self.model_fields_set & {"shear_modulus", "youngs_modulus"}
-        if wire is None or (own and "material" not in self.model_fields_set):
+        if wire is None or self._class is None:
             return
         try:
-            WIRES_BY_NAME[self.material].check_diameter(wire)
+            WIRES_BY_NAME[self._class].check_diameter(wire)
         except WireOutOfRange as error:
             other = ", ".join(
                 one.name for one in WIRES_BY_NAME.values() if one.thinnest <= wire <= one.thickest < float("inf")
@@ -97,6 +97,15 @@ class WireLimits(Model):
 
 Life = Annotated[
     float, Field(gt=0, description="life in cycles up to the largest deflection, as stated by the manufacturer")
+]
+
+
+SpringSafety = Annotated[
+    float,
+    Field(
+        ge=1,
+        description="least 'spring_safety_factor' of a spring of the catalogue; one of unknown wire is not chosen",
+    ),
 ]
 
 
@@ -135,11 +144,6 @@ def _disagree(wound: HelicalSpring, stated: float) -> str:
         f"wire, coil and turns give {wound.rate / stated:.3g} times the rate that is stated: leave one of them out, or "
         f"give the wire's 'material'{other} or modulus"
     )
-
-
-def is_made(info: ValidationInfo) -> bool:
-    """Return True if the values are those of one manufactured part."""
-    return bool(info.context) and bool(info.context.get(AS_MADE))  # type: ignore[union-attr]
 
 
 def check_initial_tension(wound: HelicalSpring | None, tension: float) -> None:
@@ -359,7 +363,7 @@ def wire_of(offer: Offer) -> SpringWire | None:
     wound = offer.wound
     if wound is None:
         return None
-    known = WIRES_BY_NAME[wound.material]
+    known = WIRES_BY_NAME[wound.material or MUSIC_WIRE.name]
     about = {
         "wire": wound.wire,
         "coil": wound.coil,

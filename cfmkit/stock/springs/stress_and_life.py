@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.metrics.branches_cut_to_window import Undefined
 from cfmkit.results import Quantity
+from cfmkit.stock.springs.wire_materials import WireOutOfRange
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +34,11 @@ WIRE_DEFINITIONS = {
         "stress",
         "largest bending stress in the loops of bought extension springs over the travel: full loops as wide as the "
         "coil (Shigley, eq. 10-34), which springs with a stated 'wound' are assumed to have",
+    ),
+    "spring_safety_factor": (
+        "factor",
+        "load at which a bought spring yields over its largest load over the travel: Shigley's shares of the tensile "
+        "strength (music wire: 45 % in shear, 78 % in bending of torsion springs, 75 % in loops)",
     ),
     "spring_life": (
         "count",
@@ -61,7 +67,26 @@ class SpringInUse:
         low, high = (offer.initial_tension + offer.rate * one for one in (least, largest))
         return cls(offer.wound, low, high, offer.fatigue, offer.life)
 
-    def misses_life(self, wanted: float) -> tuple[float, str] | None:
+    @property
+    def safety_factor(self) -> float | None:
+        """Load at which it yields over its largest load; None if that of its wire is not published."""
+        if self.wound is None or self.largest <= 0.0:
+            return None
+        try:
+            return float(self.wound.yield_load() / self.largest)
+        except WireOutOfRange:
+            return None
+
+    def why_too_weak(self, life: float | None, safety: float | None) -> tuple[float, str] | None:
+        """Return by what share the spring misses a life in cycles or a safety factor, and why; None if it has both."""
+        factor = self.safety_factor
+        if safety is not None and factor is None:
+            return 1.0, "its strength is not known: give 'wire', 'coil', 'turns' and a 'material' with a strength"
+        if safety is not None and factor is not None and factor < safety * (1 - 1e-9):
+            return safety / factor - 1.0, f"its safety factor is {factor:.3g} of {safety:.3g}"
+        return None if life is None else self._misses_life(life)
+
+    def _misses_life(self, wanted: float) -> tuple[float, str] | None:
         """Return by what share of it the spring misses a life in cycles, and why; None if it lasts."""
         try:
             life = self.life()
@@ -112,6 +137,8 @@ def wire_quantities(springs: Sequence[SpringInUse]) -> dict[str, Quantity]:
     ):
         if stresses := [stress for stress in each if stress is not None]:
             found[name] = Quantity(max(stresses), *WIRE_DEFINITIONS[name])
+    if factors := [factor for factor in (one.safety_factor for one in springs) if factor is not None]:
+        found["spring_safety_factor"] = Quantity(min(factors), *WIRE_DEFINITIONS["spring_safety_factor"])
     try:
         lives = [life for life in (one.life() for one in springs) if life is not None]
     except Undefined as error:

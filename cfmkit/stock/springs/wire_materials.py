@@ -6,7 +6,8 @@ table prints with them; a wire outside of these is refused, not extrapolated.
 Reference
 ---------
 [Sh] R. G. Budynas, J. K. Nisbett, Shigley's Mechanical Engineering Design, 9th ed., McGraw-Hill (2011): Table 10-4
-    (A, m and their diameters) and Table 10-5 (moduli).
+    (A, m and their diameters), Table 10-5 (moduli), Tables 10-6 and 10-7 and eq. 10-57 (shares of the tensile strength
+    at which turns and loops yield, set not removed).
 [G] Gutekunst Federn, Federn-EinMalEins, Table 1.1: moduli that a maker calculates with, of the wires of EN 10270-1,
     EN 10270-3 and EN 12166. Those of EN 10270-1 are in the standard, too, for all of its diameters (0.05 to 20 mm).
 """
@@ -57,6 +58,21 @@ class Strength:
 
 
 @dataclass(frozen=True)
+class YieldShares:
+    """Stresses at which a spring yields under a load at rest, over the tensile strength of its wire."""
+
+    shear: float  # in the turns of extension and compression springs
+    bending: float  # in those of torsion springs
+    loops: float  # bending in the loops of extension springs
+
+
+COLD_DRAWN = YieldShares(0.45, 0.78, 0.75)
+HARDENED_TEMPERED = YieldShares(0.50, 0.87, 0.75)
+STAINLESS_OR_NONFERROUS = YieldShares(0.35, 0.61, 0.55)
+"""[Sh, Tables 10-6 and 10-7, eq. 10-57], of a range the smaller share."""
+
+
+@dataclass(frozen=True)
 class WireMaterial:
     """Class of spring wire."""
 
@@ -65,6 +81,7 @@ class WireMaterial:
     youngs_modulus: float  # [Pa]
     shear_modulus: float  # [Pa]
     source: str  # of the moduli
+    yields: YieldShares
     strengths: tuple[Strength, ...] = ()  # [Sh, Table 10-4], by increasing diameter; empty where it has none
 
     @property
@@ -118,27 +135,33 @@ WIRES_BY_NAME: Mapping[str, WireMaterial] = MappingProxyType(
         for one in (
             WireMaterial(
                 "music-wire", "music wire (ASTM A228, EN 10270-1 SH and DH)", 206e9, 81.5e9, _EN_10270_1,
+                COLD_DRAWN,
                 (Strength(0.10, 6.5, 2211.0, 0.145),),
             ),
             WireMaterial(
                 "hard-drawn", "hard-drawn wire (ASTM A227, EN 10270-1 SL and SM)", 206e9, 81.5e9, _EN_10270_1,
+                COLD_DRAWN,
                 (Strength(0.7, 12.7, 1783.0, 0.190),),
             ),
             WireMaterial(
                 "oil-tempered", "oil-tempered wire (ASTM A229)", 196.5e9, 77.2e9, "[Sh, Table 10-5]",
+                HARDENED_TEMPERED,
                 (Strength(0.5, 12.7, 1855.0, 0.187),),
             ),
             WireMaterial(
                 "chrome-vanadium", "chrome-vanadium wire (ASTM A232)", 203.4e9, 77.2e9, "[Sh, Table 10-5]",
+                HARDENED_TEMPERED,
                 (Strength(0.8, 11.1, 2005.0, 0.168),),
             ),
             WireMaterial(
                 "chrome-silicon", "chrome-silicon wire (ASTM A401)", 203.4e9, 77.2e9, "[Sh, Table 10-5]",
+                HARDENED_TEMPERED,
                 (Strength(1.6, 9.5, 1974.0, 0.108),),
             ),
             WireMaterial(
                 "stainless-302", "stainless wire (302 and 304, ASTM A313; 1.4310, EN 10270-3)", 185e9, 70e9,
                 "1.4310 of EN 10270-3 [G]; [Sh, Table 10-5] has 193 and 69.0 GPa",
+                STAINLESS_OR_NONFERROUS,
                 (
                     Strength(0.3, 2.5, 1867.0, 0.146),
                     Strength(2.5, 5.0, 2065.0, 0.263),
@@ -148,9 +171,11 @@ WIRES_BY_NAME: Mapping[str, WireMaterial] = MappingProxyType(
             WireMaterial(
                 "stainless-17-7ph", "stainless wire (17-7 PH, ASTM A313 type 631; 1.4568, EN 10270-3)", 195e9, 73e9,
                 "1.4568 of EN 10270-3 [G]; [Sh, Table 10-5] has 203 and 75.8 GPa",
+                STAINLESS_OR_NONFERROUS,
             ),
             WireMaterial(
                 "phosphor-bronze", "phosphor bronze (ASTM B159; CuSn6, EN 12166)", 115e9, 42e9, "CuSn6 of EN 12166 [G]",
+                STAINLESS_OR_NONFERROUS,
                 (
                     Strength(0.1, 0.6, 1000.0, 0.0),
                     Strength(0.6, 2.0, 913.0, 0.028),
@@ -160,6 +185,7 @@ WIRES_BY_NAME: Mapping[str, WireMaterial] = MappingProxyType(
             WireMaterial(
                 "beryllium-copper", "beryllium copper (ASTM B197; CuBe2, EN 12166)", 120e9, 47e9,
                 "CuBe2 of EN 12166 [G]; [Sh, Table 10-5] has 117 and 44.8, or 131 and 50.3 GPa",
+                STAINLESS_OR_NONFERROUS,
             ),
         )
     }

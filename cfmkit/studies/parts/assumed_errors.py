@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.specs.study_spec import Tolerance
 from cfmkit.stock.materials import MATERIALS_BY_NAME
 from cfmkit.stock.processes import PROCESSES_BY_NAME, SPRING_RATE, usual
@@ -51,9 +50,8 @@ def assume_errors(spec: Spec, process: str | None = None) -> Assumed | None:
 
     None of what is no part.
     """
-    errors = family(spec.family).errors
-    every: Mapping[str, str] = {} if errors is None else function_named(errors)(spec)
-    kinds = {path: kind for path, kind in every.items() if kind != "friction"}  # of which nothing is assumed
+    errors = family(spec.family).errors(spec)
+    kinds = {path: kind for path, kind in errors.items() if kind != "friction"}  # of which nothing is assumed
     if not kinds:
         return None
     accuracy, (shared, owned) = accuracy_of(spec, process), _materials(spec)

@@ -13,7 +13,6 @@ import numpy as np
 from cfmkit.designing.first_order import SIGMA_STEP, NearParts, differentiate
 from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.metrics import window_of
 from cfmkit.specs.units import format_short
 from cfmkit.stock.processes import SPRING_RATE
@@ -93,7 +92,7 @@ def _complete(found: FloatArray | None) -> FloatArray:
 
 
 def _refuse_many(parts: Parts, quick: bool = True) -> None:
-    quick = quick and family(parts.spec.family).sampled is not None
+    quick = quick and family(parts.spec.family).sample is not None
     count = 2 * len(parts.paths)
     if count > (MAX_QUICK if quick else MAX_ANALYSES):
         raise Unknown(f"it needs {count} {'parts' if quick else 'analyses'}, and takes a while")
@@ -219,8 +218,7 @@ def expected_yield(result: Result, run: Run) -> str:
         shares = expected_shares(result, Parts.from_assumed_errors(spec, run.seed), run)
     except Unknown as why:
         return f"not estimated ({name}, assumed tolerances): {why}; {again} draws parts"
-    chosen = family(spec.family).free
-    if chosen is None or not function_named(chosen)(spec, spec):
+    if not family(spec.family).free(spec, spec):
         return f"{_yield_sentence(found, shares)}; margins need 'design.free' to name values that may change"
     return f"{_yield_sentence(found, shares)}; with margins: {again} --set design.yield=90%"
 

@@ -30,7 +30,6 @@ from cfmkit.designing.run_many_starts import Clock
 from cfmkit.errors import CfmError, SpecError
 from cfmkit.errors import Problem as Fault
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.results import Design, Status
 from cfmkit.studies.parts.parts import NO_TOLERANCE, Parts
@@ -207,8 +206,7 @@ def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
         if faults:
             raise SpecError(faults)
         return ranges
-    record = family(designed.family)
-    return dict(function_named(record.free)(given, designed)) if record.free is not None else {}
+    return dict(family(designed.family).free(given, designed))
 
 
 def _range_of(spec: Spec, path: str, ends: tuple[str, str]) -> tuple[float, float]:

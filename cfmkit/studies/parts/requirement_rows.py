@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.families.base import ENVELOPE_METRICS, Sampled, function_named
+from cfmkit.families.base import ENVELOPE_METRICS, Sampled
 from cfmkit.families.rows import Variants
 from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
@@ -310,8 +310,8 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run, reached: tuple[float, .
 
 def quickly_sampled(spec: Spec, places: FloatArray) -> Sampled | None:
     """Return effort and stress of a part at places by the family's quick way; None if it has none."""
-    quick = family(spec.family).sampled
-    return None if quick is None else function_named(quick)(spec, places)
+    quick = family(spec.family).sample
+    return None if quick is None else quick(spec, places)
 
 
 def sampled_on_curves(result: Result, places: FloatArray, reached: tuple[float, ...]) -> Sampled | None:
@@ -452,12 +452,12 @@ def numbers_of_known(result: Result, quick: Sampled | None, rows: RequirementRow
 
 def exact_derivatives(spec: Spec, places: FloatArray, paths: Sequence[str]) -> dict[str, Sampled]:
     """Return the derivatives of effort and stress at places, by those values of a design by which they are known."""
-    name = family(spec.family).sampled_slopes
+    quick = family(spec.family).sample
     try:
-        derivatives = None if name is None else function_named(name)(spec, places, tuple(paths))
+        sampled = None if quick is None else quick(spec, places, tuple(paths))
     except CfmError:
         return {}
-    return {} if derivatives is None else dict(derivatives.by)
+    return {} if sampled is None else dict(sampled.slopes)
 
 
 def _has_columns(sampled: Sampled | None, rows: RequirementRows) -> TypeGuard[Sampled]:

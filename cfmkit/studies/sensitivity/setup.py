@@ -221,7 +221,7 @@ def _with_nominal(study: Study, result: Result) -> tuple[Study, Nominal, tuple[F
         Finding("no_value", f"{label} has no value for the specification itself ({reason}): left out")
         for label, reason in reported.items()
     )
-    outcomes = check(study.spec.part_requirements, result, values_of_family(family(study.spec.family).values))
+    outcomes = check(study.spec.part_requirements, result, values_of_family(family(study.spec.family).outputs.values))
     values = np.array([row.values[k] for k in valued], dtype=np.float64)
     kept = replace(study, metrics=tuple(study.metrics[k] for k in valued))
     return kept, Nominal(result, outcomes, values), without

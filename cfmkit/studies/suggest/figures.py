@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.families import family
@@ -116,7 +115,9 @@ def _find_drawing(proposal: Proposal) -> Any:
     """Return what draws a proposal, and its own envelope."""
     record = family(proposal.family)
     result = record.analyze(by_own_model(proposal), Run())
-    return import_module(str(record.draw)).moving(result), record.envelope(result)
+    assert record.draw is not None
+    assert record.draw.moving is not None
+    return record.draw.moving(result), record.envelope(result)
 
 
 def _envelope_in_drawing(space: Any, request: Request) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE_METRICS, add_size, function_named
+from cfmkit.families.hardware import SAFETY_METRICS
 from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
@@ -191,7 +192,7 @@ def _design_candidate(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]
         return None, OUT_OF_TIME
     if job.candidate.design and record.design is not None:
         seconds, begun = _seconds(clock), time.time()
-        design = record.design(spec, Run(job.seed, time_budget=seconds))
+        design = record.design.make(spec, Run(job.seed, time_budget=seconds))
         if design.spec is None or design.status is not Status.COMPLETE:
             ended = time.time() - begun >= seconds
             return None, OUT_OF_TIME if clock.late() else ENDED_EARLY if ended else design.message
@@ -357,7 +358,7 @@ def judge_proposal(
     if result.status is not Status.COMPLETE:
         return Proposal(name, variant, message=result.message)
     space: BoundingBox | None = record.envelope(result)
-    result, values = add_size(result, space), values_of_family(record.values)
+    result, values = add_size(result, space), values_of_family(record.outputs.values)
     required = plain.replace(
         {"requirements": list_requirements(request, result, space, values), "design": block_for_redesign(spec, request)}
     )
@@ -466,8 +467,8 @@ def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> d
 
 
 def _least_factor(found: Mapping[str, Any]) -> float | None:
-    """Return the smallest safety factor: of the part that bends, or of links."""
-    known = [found[name].value for name in ("safety_factor", "link_safety_factor") if name in found]
+    """Return the smallest safety factor: of the part that bends, of links, or of springs."""
+    known = [found[name].value for name in SAFETY_METRICS if name in found]
     return min((value for value in known if value is not None), default=None)
 
 

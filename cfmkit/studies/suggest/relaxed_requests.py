@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.families.findings import percent
 from cfmkit.families.run_control import Run
 from cfmkit.specs.units import format_short, read_quantity
@@ -26,8 +25,8 @@ if TYPE_CHECKING:
     Relaxed = tuple[Request, str]
     Relaxation = Callable[[Request, float], Relaxed | None]
 
-RELAXATION_FACTORS = (1.15, 2.2, 6.0, 20.0)
-"""Factors at which a request is relaxed for a family; one that is farther off is not near."""
+RELAXATION_FACTORS = (1.15, 2.2, 6.0)
+"""Factors at which a request is relaxed for a family: a mechanism six times as large is no alternative any more."""
 
 N_HALVINGS = 3
 """Of the last step, on a logarithmic scale: what is left is less than what the laws leave out."""
@@ -92,7 +91,8 @@ def confirm(request: Request, seed: int, clock: Clock, edge: Edge) -> str | None
     relaxation = _relaxations(request)[edge.key]
     tried: set[str] = set()
     for more in FURTHER_FACTORS:
-        relaxed = relaxation(request, edge.factor * more)
+        factor = edge.factor * more
+        relaxed = relaxation(request, factor) if factor <= RELAXATION_FACTORS[-1] else None
         if relaxed is None:
             return None
         # the sides that were just enough by the laws may be too little: then all of them
@@ -129,7 +129,7 @@ def _offer(request: Request, name: str, seed: int) -> Sequence[Candidate]:
     if not propose:
         return ()
     asked = request.with_strengths[-1]
-    candidates: Sequence[Candidate] = function_named(propose)(asked, Run(seed)).candidates
+    candidates = propose(asked, Run(seed)).candidates
     return sorted(candidates, key=lambda candidate: candidate.doubtful)
 
 

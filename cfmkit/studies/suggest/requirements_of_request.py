@@ -124,6 +124,8 @@ def _of_stress(request: Request, result: Result, found: Mapping[str, Quantity]) 
     if _value_of(found, "link_safety_factor") is not None:
         yield {"metric": "link_safety_factor", "min": least}
         yield {"metric": "link_turn_share_max", "max": STRAIGHT_LINKS}
+    if _value_of(found, "spring_safety_factor") is not None:
+        yield {"metric": "spring_safety_factor", "min": least}
 
 
 def _of_box(request: Request, space: BoundingBox | None) -> Iterator[dict[str, Any]]:

@@ -21,7 +21,6 @@ import numpy as np
 
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families import Unusable, family, names
-from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.families.suggestion_request import FamilyOffer
 from cfmkit.results import Status
@@ -117,6 +116,7 @@ class Suggestions:
     reused: int = 0  # candidates that were found in the journal
     bugs: tuple[str, ...] = ()  # the traceback of each family or candidate that a bug ended
     unjudged: tuple[Proposal, ...] = ()  # those that miss nothing of what was judged, but not all was, the best first
+    remote: bool = False  # whether it would not help either to relax one requirement up to `RELAXATION_FACTORS[-1]`
 
     @property
     def listed(self) -> tuple[Proposal, ...]:
@@ -159,9 +159,10 @@ def suggest(
             cut = True
             break
     done = making.done
-    counts = {name: sum(proposal.family == name for proposal in done) for name in queues}
+    counts, remote = {name: sum(proposal.family == name for proposal in done) for name in queues}, False
     if not cut and not any(proposal.passes for proposal in done):
-        answers = _with_nearest(answers, request, run, times.without, bugs)
+        answers, complete = _with_nearest(answers, request, run, times.without, bugs)
+        remote = complete and not any(answer.nearest for answer in answers)
     passing = distinct([proposal for proposal in done if proposal.passes])
     return Suggestions(
         request,
@@ -173,6 +174,7 @@ def suggest(
         making.reused,
         tuple(bugs),
         tuple(order_proposals([proposal for proposal in passing if not proposal.good], prefer)),
+        remote,
     )
 
 
@@ -280,12 +282,13 @@ class _Making:
 
 def _with_nearest(
     answers: list[Answered], request: Request, run: Run, deadline: float | None, bugs: list[str]
-) -> list[Answered]:
-    """Return answers with the nearest requests that a family could meet, as far as the time allows."""
+) -> tuple[list[Answered], bool]:
+    """Return answers with the nearest requests that a family could meet, and whether the time sufficed for all."""
     families = tuple(answer.family for answer in answers)
     key = stable_hash({"nearest": repr(request), "of": families, "seed": run.seed, "code": code_stamp()})[:32]
     record = run.notes.find(key)
     named: dict[str, dict[str, str]] = {} if record is None else dict(record)
+    complete = True
     if record is None:
         clock, keys = Clock(deadline), set[str]()
         waiting = (edge for edge in edges(request, families, run.seed, clock) if edge.key not in keys)
@@ -298,9 +301,11 @@ def _with_nearest(
                     named.setdefault(edge.family, {}).setdefault(edge.key, outcome)
         except Exception as error:  # the laws of a family have a bug: what was found is kept
             bugs.append(lost_to(error).bug)
-        if not clock.late():
+        if clock.late():
+            complete = False
+        else:
             run.notes.add(key, named)
-    return [replace(answer, nearest=named.get(answer.family, {})) for answer in answers]
+    return [replace(answer, nearest=named.get(answer.family, {})) for answer in answers], complete
 
 
 def _made_of(jobs: Sequence[ProposalJob], index: int) -> Proposal:
@@ -338,8 +343,6 @@ def _ask_family(request: Request, run: Run, name: str) -> FamilyOffer:
         record = family(name)
     except Unusable:  # of another package; `families.skipped` says why
         return FamilyOffer()
-    if record.propose is None:
-        return FamilyOffer()
     return offer_of(record, request, run)
 
 
@@ -354,11 +357,12 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
     solids; those with a reserve are tried first. Where the strength of a material is not known, parts of a small strain
     come before those of a larger one.
     """
-    propose = function_named(str(record.propose))
-    reserves = (1.0,) if record.elastic_parts is None else (RESERVE_FOR_FILLETS, 1.0)
+    if record.propose is None:
+        return FamilyOffer()
+    reserves = (1.0,) if record.elastic is None else (RESERVE_FOR_FILLETS, 1.0)
     candidates: dict[tuple[str, str], Candidate] = {}
     for requested, reserve in product(request.with_strengths, reserves):
-        offer: FamilyOffer = propose(replace(requested, reserve=reserve), run)
+        offer = record.propose(replace(requested, reserve=reserve), run)
         for candidate in offer.candidates:
             if None not in (candidate.springs, request.springs) and candidate.springs != request.springs:
                 continue

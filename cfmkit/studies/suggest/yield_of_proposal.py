@@ -21,7 +21,6 @@ from cfmkit.designing.bounds_and_rounding import range_about
 from cfmkit.designing.robust_design import NoPart, with_margins
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
@@ -229,11 +228,10 @@ def moved_for_yield(candidate: Candidate, spec: Spec, request: Request, asked: f
 
 def _free(candidate: Candidate, spec: Spec, request: Request) -> dict[str, tuple[float, float]]:
     """Return what may move, and in which ranges [SI]."""
-    choose = family(spec.family).free
     given = candidate.spec
     found: dict[str, tuple[float, float]] = {}
-    if candidate.design and choose is not None:
-        found |= function_named(choose)(given, spec)
+    if candidate.design:
+        found |= family(spec.family).free(given, spec)
     for path in candidate.free:
         value: Any = spec.get_value(path)
         if isinstance(value, float):

@@ -238,9 +238,7 @@ def _why_not(offer: Offer, ends: tuple[float, float], wanted: CrankDesign) -> tu
     if offer.largest is not None and offer.largest < moved * (1 - 1e-9):
         allowed, needed = format_short(offer.largest, kind), format_short(moved, kind)
         return moved / offer.largest - 1.0, f"deflected by {needed}, it allows {allowed}"
-    return (
-        SpringInUse.from_offer(offer, *ends).misses_life(wanted.spring_life) if wanted.spring_life is not None else None
-    )
+    return SpringInUse.from_offer(offer, *ends).why_too_weak(wanted.spring_life, wanted.spring_safety)
 
 
 def _binds(offer: Offer, turned: float, pins: Pins | None) -> tuple[float, str] | None:

@@ -119,7 +119,7 @@ def solve_rows(variants: Variants) -> Iterator[tuple[NDArray[np.intp], SolvedRow
     plain = _plain_numbers(variants.spec, variants.as_made)
     kind = repr(_kind(variants.spec)) if plain >= variants.values.keys() else None
     for index, spec in variants.of_plain_numbers(plain):
-        if spec.fidelity != "prb" or spec.target_curve is not None or not any(spec.mechanism.springs.rates):
+        if spec.fidelity != "prb" or not any(spec.mechanism.springs.rates):
             continue
         try:
             resolved = resolve(spec)
@@ -130,7 +130,7 @@ def solve_rows(variants: Variants) -> Iterator[tuple[NDArray[np.intp], SolvedRow
         if assembly.clip_motion(*asked) == asked:
             built[index] = resolved, assembly, asked
             own = repr(_kind(resolved)) if kind is None else kind
-            alike.setdefault((own, *_flags(assembly), is_wide(assembly, *asked)), []).append(index)
+            alike.setdefault((own, spec.target_curve, *_flags(assembly), is_wide(assembly, *asked)), []).append(index)
     for members in alike.values():
         for start in range(0, len(members), ROWS_TOGETHER):
             chosen = members[start : start + ROWS_TOGETHER]

@@ -435,6 +435,7 @@ class Solution(ShortRepr):
                 self.part_efforts,
                 kind=self.drive,
                 pose=self.reference[:, 0],
+                followed=self.spec.target_curve,
             )
             for name, effort in efforts.items()
         }

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from cfmkit.specs.spec import DesignBlock, Model, PositiveForce, PositiveLength, refuse
+from cfmkit.specs.spec import DesignBlock, Model, PositiveForce, PositiveLength, is_made, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, Torque
 from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
-from cfmkit.stock.springs.spec import RATE_RTOL, Catalogue, Life, SpringWire, is_made
+from cfmkit.stock.springs.spec import RATE_RTOL, Catalogue, Life, SpringSafety, SpringWire
 from cfmkit.stock.springs.support_spec import SpringSupport
 
 if TYPE_CHECKING:
@@ -211,6 +211,7 @@ class SpringDesign(DesignBlock):
     spring_life: Life | None = Field(
         None, description="cycles that springs of the catalogue must last; one of unknown life is not chosen"
     )
+    spring_safety: SpringSafety | None = None
     spring_room: PositiveLength | None = Field(
         None,
         description="space for the slider's spring of the catalogue: one that is longer when relaxed is not chosen",
@@ -270,7 +271,7 @@ class SpringDesign(DesignBlock):
     @model_validator(mode="after")
     def _springs_are_picked(self) -> Self:
         if not self.catalogue:
-            for name in ("spring_life", "spring_room"):
+            for name in ("spring_life", "spring_safety", "spring_room"):
                 if getattr(self, name) is not None:
                     raise ValueError(f"{name!r} applies only to springs picked from a catalogue: give 'catalogue', too")
             return self
