@@ -65,17 +65,7 @@ def ignore_progress(_error: Exception) -> None:
 
 
 class ExplorerServer(ThreadingHTTPServer):
-    """The server of one explorer.
-
-    Attributes
-    ----------
-    explorer : Explorer
-        What answers.
-    token : str
-        What a request must have.
-    failed : callable
-        Callback for the exception of an answer that a bug ended; the page has one line of it.
-    """
+    """The server of one explorer, which answers requests that have its token."""
 
     daemon_threads = True
     allow_reuse_address = os.name == "posix"  # elsewhere it lets another program listen on the same port

@@ -45,29 +45,8 @@ _MOST_TRIES = 20
 class RunFolder:
     """A context manager: enter to lock the folder, `write` files, `commit` them as a set.
 
-    Leaving without `commit` leaves the folder as it was found.
-
-    Parameters
-    ----------
-    path : path-like
-        The folder; it is created on entry, with what is missing above it.
-
-    Attributes
-    ----------
-    path : Path
-        The folder, links resolved.
-    previous : Manifest or None
-        What the run before wrote; after `commit`, what this one wrote.
-    kept : mapping of str to str
-        After `commit`: files that were edited since the run before -> the name under
-        which the edited version was kept.
-
-    Raises
-    ------
-    cfmkit.errors.FolderInUse
-        On entry, if another live run has the folder.
-    cfmkit.errors.OutputError
-        On entry, if it cannot be created, locked or repaired.
+    Leaving without `commit` leaves the folder as it was found. It is created on entry, with what is missing above it,
+    which raises FolderInUse if another live run has it, and OutputError if it cannot be created, locked or repaired.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -75,7 +54,8 @@ class RunFolder:
         if "\0" in os.fspath(path) or not os.fspath(path):
             raise OutputError(f"{os.fspath(path)!a} is not a name for a folder")
         self.path = Path(os.path.realpath(path))
-        self.previous: Manifest | None = None
+        self.previous: Manifest | None = None  # what the run before wrote; after `commit`, what this one wrote
+        # after `commit`: files that were edited since the run before -> the name under which the edited version is kept
         self.kept: Mapping[str, str] = MappingProxyType({})
         self._staged: dict[str, FileRecord] = {}
         self._created: list[Path] = []

@@ -35,23 +35,13 @@ _INT64_RANGE = range(-(2**63), 2**63)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TableColumn(ShortRepr):
-    """One column: its name, its values, and its unit if it has one.
+    """One column: its name, its values, and its unit if it has one."""
 
-    Parameters
-    ----------
-    name : str
-        Without brackets, e.g. ``force``.
-    values : sequence
-        Floats, integers, texts and None; truth values become ``true`` and ``false``.
-        Kept as a read-only array if all are floats (None is NaN there) or all are
-        integers, else as a tuple.
-    unit : str, optional
-        Unit of the border, ``"1"`` for a ratio; None for names, states and counts.
-        A column with a unit holds no texts.
-    """
-
-    name: str
+    name: str  # without brackets, e.g. ``force``
+    # floats, integers, texts and None; truth values become ``true`` and ``false``. Kept as a read-only array if all are
+    # floats (None is NaN there) or all are integers, else as a tuple
     values: Values
+    # of the border, ``"1"`` for a ratio; None for names, states and counts. A column with a unit holds no texts
     unit: str | None = None
 
     def __post_init__(self) -> None:

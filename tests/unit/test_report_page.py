@@ -29,7 +29,7 @@ from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 HOSTILE = "</script><img src=x onerror=alert(1)> \"quoted\" & 'more'"
-VOID = {"meta", "input", "br", "img", "path", "use", "line", "circle", "link", "hr"}
+VOID = {"meta", "input", "br", "wbr", "img", "path", "use", "line", "circle", "link", "hr"}
 EXAMPLES = {
     "cam": "cam.yaml",
     "beam": "beam_lan2010.yaml",

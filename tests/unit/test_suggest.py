@@ -348,8 +348,9 @@ def test_a_key_of_a_request_is_listed_as_it_is_written():
 def test_words_of_before_are_refused_with_the_new_ones(tmp_path):
     file = tmp_path / "old.yaml"
     file.write_text("cfmkit: 1\nwish: {force: 10 N}\n")
-    with pytest.raises(SpecError, match="the key 'wish' was removed; write 'suggest'"):
+    with pytest.raises(SpecError, match="the key 'wish' was removed; write 'suggest'") as error:
         read_request(str(file), {})
+    assert len(error.value.problems) == 1  # one message: that 'suggest' is missing follows
     with pytest.raises(SpecError, match="the key 'room' was removed; write 'envelope'"):
         request(room="[1 mm, 2 mm]")
 

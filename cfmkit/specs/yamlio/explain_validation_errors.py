@@ -182,11 +182,11 @@ def list_allowed(words: str, items: Sequence[Any]) -> str:
 
 
 def _drop_echoes(complaints: list[Complaint]) -> list[Complaint]:
-    """Drop missing keys that a misspelt key beside them explains."""
+    """Drop missing keys that a misspelt key beside them, or one of an earlier version, explains."""
     hinted = {
         (complaint.path[:-1], match[1])
         for complaint in complaints
-        if complaint.at_key and (match := re.search("did you mean '(.+)'", complaint.message))
+        if complaint.at_key and (match := re.search("(?:did you mean|was removed; write) '(.+)'", complaint.message))
     }
     kept = []
     for complaint in complaints:
