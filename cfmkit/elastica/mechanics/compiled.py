@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.mechanics.compiled_sides import CLOSED_SIDE, IN_PLACE, N_LAW, side_arrays
+from cfmkit.elastica.mechanics.compiled_sides import CLOSED_SIDE, IN_PLACE, N_LAW, N_SIDE_COLUMNS, side_arrays
 from cfmkit.elastica.mechanics.contact_arrays import (
     CLOSED_NODE,
     contact_arrays,
@@ -74,7 +74,8 @@ def _module() -> Any:
         from cfmkit.elastica.mechanics import _march  # type: ignore[attr-defined]
     except ImportError:
         return None
-    return _march if getattr(_march, "FIELDS", 0) == len(COUNT_FIELDS) + len(ADDRESS_FIELDS) else None
+    fields = len(COUNT_FIELDS) + len(ADDRESS_FIELDS) + N_SIDE_COLUMNS + N_LAW
+    return _march if getattr(_march, "FIELDS", 0) == fields else None
 
 
 def load_compiled() -> Any:

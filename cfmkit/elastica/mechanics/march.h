@@ -9,6 +9,7 @@
 #define MAX_POINTS (MAX_DEGREE + 4) /* Gauss points of an element */
 #define MAX_LOCAL (MAX_DEGREE + 9) /* unknowns of an element */
 #define SIDE_WIDE 13               /* columns of `side_at` */
+#define N_LAW 3                    /* numbers of `moved_law` before the coefficients of an angle */
 
 typedef int64_t Int;
 

@@ -253,9 +253,9 @@ static PyMethodDef methods[] = {
 
 static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "_march", NULL, -1, methods, NULL, NULL, NULL, NULL};
 
-/* Code that was compiled before Python's side changed is told by the number of fields, and not used. */
+/* Code that was compiled before Python's side changed is told by the number of fields and columns, and not used. */
 PyMODINIT_FUNC PyInit__march(void) {
     PyObject *module = PyModule_Create(&definition);
-    if (module && PyModule_AddIntConstant(module, "FIELDS", sizeof(Model) / sizeof(Int))) Py_CLEAR(module);
+    if (module && PyModule_AddIntConstant(module, "FIELDS", sizeof(Model) / sizeof(Int) + SIDE_WIDE + N_LAW)) Py_CLEAR(module);
     return module;
 }

@@ -13,8 +13,6 @@
 #define SMALLEST_FORCE 1e-12    /* of a contact that begins, in the curvature of its gap over its force */
 #define NEUTRAL_STIFFNESS 1e-6  /* of motions below which a direction counts as stable */
 
-enum { N_LAW = 3 }; /* numbers of a moving element before the coefficients of its angle */
-
 static double polynomial(const double *coefficients, Int count, double t, double *slope) {
     double value = 0.0;
     *slope = 0.0;
