@@ -69,8 +69,7 @@ class Effort:
     # `_MIN_VIOLATION_FALL`: the constraints contradict each other there, and the steps are the rounding of a line
     # search
     patience: int | None = None
-    # end where a point without violation was seen, and so many evaluations in a row brought no better one: the line
-    # search is among rounding, or at a kink
+    # end where so many evaluations in a row brought no better point: the line search is among rounding, or at a kink
     idle: int | None = None
 
 
@@ -169,7 +168,7 @@ class _Memory:
         self.slope: Any = None
         self.best: tuple[tuple[float, float], FloatArray, float, FloatArray] | None = None
         self.fell, self.since = np.inf, 0
-        self.improved = 0  # evaluations up to the last point that was better, or up to the first without violation
+        self.improved = 0  # evaluations up to the last point that was better
 
     def evaluate(self, z: FloatArray) -> Any:
         if self.point is None or not np.array_equal(z, self.point):
@@ -187,12 +186,20 @@ class _Memory:
         excess = _excess(constraints)
         self._wait(excess)
         rank = (0.0, objective) if excess <= self.effort.violation else (excess, objective)
-        if self.best is None or rank < (0.0, self.best[0][1] - self.effort.tolerance) or self.best[0][0] > 0:
+        if self.best is None or self._is_better(rank):
             self.improved = self.evaluations
         if self.best is None or rank < self.best[0]:
             self.best = rank, z.copy(), objective, constraints
         if self.effort.idle is not None and self.evaluations - self.improved >= self.effort.idle:
             raise _Enough(SearchEnding.STUCK)
+
+    def _is_better(self, rank: tuple[float, float]) -> bool:
+        """Return True if a point is better than the best one by more than what counts as nothing."""
+        assert self.best is not None
+        excess, objective = self.best[0]
+        if excess > 0:
+            return rank[0] < (1.0 - _MIN_VIOLATION_FALL) * excess
+        return rank[0] == 0 and rank[1] < objective - self.effort.tolerance
 
     def _wait(self, excess: float) -> None:
         patience = self.effort.patience
