@@ -180,10 +180,10 @@ def driven_parts() -> Iterator[tuple[str, DrivenPart]]:
         for name, tree in PARTS.items():
             path.write_text(json.dumps(tree), encoding="utf-8")
             spec = cfmkit.load(path)
-            yield name, family(spec.family).driven_parts(spec)[0]
+            yield name, family(spec.family).elastic.solids(spec)[0]
     for name in CONFIGS:
         spec = cfmkit.load(f"configs/{name}.yaml", ["analysis.fidelity=solid"])
-        parts = family(spec.family).driven_parts(spec)
+        parts = family(spec.family).elastic.solids(spec)
         for part in parts:
             yield name if len(parts) == 1 else f"{name}, {part.name.removeprefix('vcfm-')}", part
 

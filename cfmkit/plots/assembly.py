@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.stock.parts_list import ListedPart
 
 SHEET_SIZE = (220.0, 150.0)
-"""Of the figure where the list stands beside the picture, unless another width is asked for [mm]."""
+"""Of the figure where the list stands beside the picture, unless another width is requested [mm]."""
 
 LIST_WIDTH = 92.0
 """Of the parts list [mm]."""

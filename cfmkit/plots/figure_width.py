@@ -95,7 +95,7 @@ def active_layout() -> FigureLayout | None:
 
 
 def print_width(usual: float) -> float:
-    """Return the width that is asked for [mm], for a drawing that lays itself out in any width: without `axes_mm`."""
+    """Return the requested width [mm], for a drawing that lays itself out in any width: without `axes_mm`."""
     layout = active_layout()
     return usual if layout is None or layout.width is None else layout.width
 

@@ -289,7 +289,7 @@ def test_a_solver_that_stops_on_the_way_leaves_the_curve_up_to_there(monkeypatch
 @pytest.mark.parametrize(("fillet", "largest"), [("0.5 mm", 1.0), ("5 mm", 1.0), ("20 mm", 4.0)])
 def test_a_part_that_is_mostly_fillets_has_larger_elements_in_its_blocks(fillet, largest):
     spec = cfmkit.load("configs/beam_lan2010.yaml", ["analysis.fidelity=solid", f"mechanism.part.fillet={fillet}"])
-    (one,) = family("beam").driven_parts(spec)
+    (one,) = family("beam").elastic.solids(spec)
     assert one.part.largest == largest
     if largest > 1.0:
         assert (
@@ -323,7 +323,7 @@ def test_a_node_on_a_link_is_moved_over_its_whole_section(tmp_path):
     path = tmp_path / "braced.yaml"
     path.write_text(BRACED)
     spec = cfmkit.load(str(path))
-    (one,) = family("beam").driven_parts(spec)
+    (one,) = family("beam").elastic.solids(spec)
     solved = one.part.create_mesh().refine()[0].follow_stops([0.0, 1e-3, 2e-3])
     (driven,) = (group for group in solved.problem.supports.groups if group.name == "c")
     at = solved.problem.elements.mesh.nodes[driven.nodes]
@@ -352,7 +352,7 @@ def test_turns_do_not_count_as_displacements_where_branches_are_told_apart():
 @pytest.mark.slow
 def test_a_leaf_is_followed_past_both_of_its_bifurcations():
     """Where its branch joins the other path again, the path had been lost on this mesh, which rounds the corner."""
-    (one,) = family("beam").driven_parts(cfmkit.loads(VEE))
+    (one,) = family("beam").elastic.solids(cfmkit.loads(VEE))
     course = one.part.create_mesh().follow_stops([0.0, 2e-3, 4e-3, 4.4e-3]).course
     assert course.ending is PathEnd.COMPLETE
     assert all(pose.unstable == 0 for pose in course.poses)
@@ -364,7 +364,7 @@ def test_a_leaf_is_followed_past_both_of_its_bifurcations():
 
 def test_the_moving_part_of_each_stage_in_series_is_a_piece_of_its_own():
     spec = cfmkit.load("configs/beam_two_layers.yaml", ["analysis.fidelity=solid", "mechanism.copies.layers=3"])
-    (one,) = family("beam").driven_parts(spec)
+    (one,) = family("beam").elastic.solids(spec)
     heights = {place.name: np.concatenate(place.shapes)[:, 1] for place in one.part.places}
     for below, stage in enumerate(("n5", "n5.2", "n5.3")):
         assert 39e-3 + below * 46e-3 < heights[stage].min()
@@ -376,7 +376,7 @@ def test_the_moving_part_of_each_stage_in_series_is_a_piece_of_its_own():
 @pytest.mark.slow
 def test_stages_in_series_share_the_travel_and_carry_one_force():
     spec = cfmkit.load("configs/beam_two_layers.yaml", ["analysis.fidelity=solid"])
-    (one,) = family("beam").driven_parts(spec)
+    (one,) = family("beam").elastic.solids(spec)
     solved = one.part.create_mesh(1.5e-3).follow_stops([0.0, 1e-3])
     last, supports = solved.course.poses[-1], solved.problem.supports
     names = [group.name for group in supports.groups]

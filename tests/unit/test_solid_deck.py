@@ -135,7 +135,7 @@ def test_a_deck_of_beams_read_back_is_the_network(made):
 
 def test_links_of_a_deck_of_beams_are_stiff_and_every_set_that_is_used_is_there():
     spec = cfmkit.load("configs/slider_crank_lumped.yaml", ["analysis.travel=[0 mm, 2 mm]"])
-    (network,) = family(spec.family).driven_networks(spec)
+    (network,) = family(spec.family).elastic.beams(spec)
     text = beam_deck("title", network, 10)
     read = blocks(text)
     links = [numbers(lines)[0] for head, lines in read if head == "*ELEMENT, TYPE=B32, ELSET=LINKS"]
@@ -221,7 +221,7 @@ analysis: {travel: 10 deg, points: 11, fidelity: solid, solid: {poses: 5, error:
 def test_calculix_finds_the_force_of_the_beams(made, tmp_path):
     """Its beams become bricks with rigid ends: within 1 % of the engine's stretching and shearing beams."""
     spec, _ = made
-    for network in family(spec.family).driven_networks(spec):
+    for network in family(spec.family).elastic.beams(spec):
         end = float(network.drive.points[-1])
         drive = Displacement(network.drive.node, network.drive.direction, np.linspace(0.0, end, 9)[1:])
         own = float(trace(network.network, drive, Control(branch="primary")).effort[-1])
@@ -302,7 +302,7 @@ def test_calculix_runs_the_deck_of_a_strip_whose_driven_end_is_free(tmp_path, la
     spec, data = deck_of(tmp_path, law=law, **PUSHED)
     reported, share = run_by_ccx(tmp_path, data)
     x, y = map(float, re.findall(r"for set ROOT-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)", reported)[0])
-    (one,) = family("beam").driven_parts(spec)
+    (one,) = family("beam").elastic.solids(spec)
     pose = one.part.create_mesh().refine()[0].follow_stops([0.0, 2.5e-3, 5e-3]).course.poses[-1]
     assert -(0.5 * x - np.sqrt(0.75) * y) / share == pytest.approx(pose.effort, rel=1e-3)
 
@@ -314,7 +314,7 @@ def test_calculix_finds_the_torque_on_an_end_that_is_turned_and_moves_freely(tmp
     x, y, angle = map(float, re.search(r"\(x, y\) = \((\S+), (\S+)\) mm turned by (\S+) rad", data.decode()).groups())
     fx, fy = map(float, re.findall(r"-ARM and time  0.1000000E\+01\s+\d+\s+(\S+)\s+(\S+)", reported)[0])
     c, s = np.cos(angle), np.sin(angle)
-    (one,) = family("beam").driven_parts(spec)
+    (one,) = family("beam").elastic.solids(spec)
     pose = one.part.create_mesh().refine()[0].follow_stops(np.linspace(0.0, one.stops[-1], 3).tolist()).course.poses[-1]
     torque = (x * c - y * s) * fy - (x * s + y * c) * fx
     assert 1e-3 * torque / share == pytest.approx(pose.effort, rel=1e-3)

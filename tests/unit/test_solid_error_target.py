@@ -115,7 +115,7 @@ def test_the_key_for_the_size_of_elements_is_gone_and_its_message_names_the_new_
     with pytest.raises(SpecError, match=r"analysis\.solid\.mesh: the key 'mesh' was removed; write 'error'"):
         cfmkit.load("configs/beam_lan2010.yaml", ["analysis.solid.mesh=1 mm"])
     spec = cfmkit.load("configs/beam_lan2010.yaml", ["analysis.fidelity=solid", "analysis.solid.error=0.2 %"])
-    (part,) = family("beam").driven_parts(spec)
+    (part,) = family("beam").elastic.solids(spec)
     assert part.error == pytest.approx(2e-3)
 
 

@@ -114,5 +114,5 @@ def test_a_stiffness_across_is_refused_of_a_solid():
 def test_reactions_are_read_off_solved_poses_only():
     spec = cfmkit.loads(VEE)
     for reactions in (["root"], []):
-        (part,) = family("beam").driven_parts(spec.replace({"analysis.outputs.reactions": reactions}))
+        (part,) = family("beam").elastic.solids(spec.replace({"analysis.outputs.reactions": reactions}))
         assert part.every_pose == bool(reactions)
