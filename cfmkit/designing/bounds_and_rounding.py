@@ -24,19 +24,13 @@ def round_within_bounds(values: FloatArray, bounds: FloatArray, digits: int, uni
     return np.clip(whole, *bounds.T)
 
 
-def find_active_bounds(values: FloatArray, bounds: FloatArray, close: float, share: float = 0.0) -> NDArray[np.int_]:
+def find_active_bounds(
+    values: FloatArray,  # (n,): the numbers
+    bounds: FloatArray,  # (n, 2): lowest and highest values
+    close: float,  # so near to a bound a number is at it
+    share: float = 0.0,  # the same as a share of the bound, in addition
+) -> NDArray[np.int_]:
     """Return at which end of its bounds each number is: -1 at the lowest, 1 at the highest, 0 between.
-
-    Parameters
-    ----------
-    values : (n,) array
-        The numbers.
-    bounds : (n, 2) array
-        Lowest and highest values.
-    close : float
-        So near to a bound a number is at it.
-    share : float
-        The same as a share of the bound, in addition.
 
     Examples
     --------

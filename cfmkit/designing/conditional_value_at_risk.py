@@ -34,23 +34,15 @@ def tail_risk(parts: FloatArray, share: float) -> float:
 
 
 def best_move(
-    parts: FloatArray, slopes: NDArray[np.float64], share: float, bounds: FloatArray, x: FloatArray, trust: float
+    parts: FloatArray,  # (k, m): rows of each part
+    slopes: NDArray[np.float64],  # (k, m, n): their derivatives by the values
+    share: float,  # of parts that are to be good
+    # bounds, x: (n, 2) and (n,): bounds of the values, and where these are
+    bounds: FloatArray,
+    x: FloatArray,
+    trust: float,  # largest move, as a share of the ranges
 ) -> FloatArray | None:
-    """Return the move of the values (n,) that lowers the risk most within the trust; None if there is none.
-
-    Parameters
-    ----------
-    parts : (k, m) array
-        Rows of each part.
-    slopes : (k, m, n) array
-        Their derivatives by the values.
-    share : float
-        Of parts that are to be good.
-    bounds, x : (n, 2) and (n,) array
-        Bounds of the values, and where these are.
-    trust : float
-        Largest move, as a share of the ranges.
-    """
+    """Return the move of the values (n,) that lowers the risk most within the trust; None if there is none."""
     kept = min(FIRST_ROWS, parts.shape[1])
     # a program with every row of every part is large, and nearly all of its rows are idle: those that its answer would
     # break come in, until it breaks none

@@ -213,22 +213,14 @@ def _by_errors(problem: RobustProblem, x: FloatArray, seen: SeenPart, known: Par
     return differentiate(numbers, np.column_stack([about - step, about + step]), exact)
 
 
-def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> RobustResult:
+def with_margins(
+    problem: RobustProblem,  # what may vary and what must hold
+    x: FloatArray,  # (n,): where to begin
+    most: int = 40,  # steps
+) -> RobustResult:
     """Return values for which the yield, by linear estimate, is what was requested, or largest.
 
-    Parameters
-    ----------
-    problem : RobustProblem
-        What may vary and what must hold.
-    x : (n,) array
-        Where to begin.
-    most : int
-        Steps.
-
-    Raises
-    ------
-    NoPart
-        If the first design has no numbers.
+    Raises NoPart if the first design has no numbers.
     """
     seen = _Counted(problem)
     now = linear(problem, np.clip(x, *problem.bounds.T), seen)
@@ -313,23 +305,13 @@ class _Parts:
 
 
 def optimise_on_samples(
-    problem: RobustProblem, found: RobustResult, count: int, worst: bool = False, most: int = 25
+    problem: RobustProblem,  # what may vary and what must hold
+    found: RobustResult,  # where to begin
+    count: int,  # parts that are drawn
+    worst: bool = False,  # whether the worst of them counts, and not the mean of the worst share
+    most: int = 25,  # steps
 ) -> RobustResult:
-    """Return values for which drawn parts, each solved itself, are good: from a design that first order led to.
-
-    Parameters
-    ----------
-    problem : RobustProblem
-        What may vary and what must hold.
-    found : RobustResult
-        Where to begin.
-    count : int
-        Parts that are drawn.
-    worst : bool
-        Whether the worst of them counts, and not the mean of the worst share.
-    most : int
-        Steps.
-    """
+    """Return values for which drawn parts, each solved itself, are good: from a design that first order led to."""
     asked = replace(problem, share=1.0) if worst else problem
     seen = _Counted(problem)
     parts = _Parts(problem, problem.errors[-count:], seen)

@@ -121,20 +121,14 @@ class Done:
     lost: tuple[str, ...]  # why processes died
 
 
-def run_stage(stage: Stage, means: Means, clock: Clock, tell: Callable[[Mapping[int, dict[str, Any]]], None]) -> Done:
-    """Return what the jobs of a stage led to, as far as the time allows.
-
-    Parameters
-    ----------
-    stage : Stage
-        The jobs.
-    means : Means
-        The processes, and where finished jobs are noted: a job that ran out of time is not.
-    clock : Clock
-        Late, no more jobs are begun.
-    tell : callable
-        Takes the records so far, at the beginning and after each job.
-    """
+def run_stage(
+    stage: Stage,  # the jobs
+    means: Means,  # the processes, and where finished jobs are noted: a job that ran out of time is not
+    clock: Clock,  # late, no more jobs are begun
+    # takes the records so far, at the beginning and after each job
+    tell: Callable[[Mapping[int, dict[str, Any]]], None],
+) -> Done:
+    """Return what the jobs of a stage led to, as far as the time allows."""
     keys = {job: hashlib.sha256(f"{stage.identity} {job}".encode()).hexdigest()[:KEY_DIGITS] for job in stage.jobs}
     records = {job: record for job, key in keys.items() if (record := means.notes.find(key)) is not None}
     reused, lost = len(records), list[str]()

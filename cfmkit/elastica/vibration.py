@@ -104,33 +104,18 @@ class Frequencies(ShortRepr):
 
 @one_blas_thread
 def frequencies(
-    path: EquilibriumPath,
-    masses: NetworkMasses,
-    count: int,
-    points: Any = None,
+    path: EquilibriumPath,  # the equilibria
+    masses: NetworkMasses,  # density of every beam, masses of nodes. Sections rotate with inertia where they shear, too
+    count: int,  # how many frequencies, at least 1
+    points: Any = None,  # (p,) int: indices of the points of the path; all unless given
+    # (str, float or None): of a drive by loads: which node stands still while the drive is held, along which direction
+    # [rad]; None: it does not rotate. Without it, held and free are the same
     hold: tuple[str, float | None] | None = None,
 ) -> Frequencies:
     """Return the lowest `count` natural frequencies of a network about equilibria of its path.
 
-    Parameters
-    ----------
-    path : EquilibriumPath
-        The equilibria.
-    masses : NetworkMasses
-        Density of every beam, masses of nodes. Sections rotate with inertia where they shear, too.
-    count : int
-        How many frequencies, at least 1.
-    points : (p,) int array, optional
-        Indices of the points of the path; all unless given.
-    hold : (str, float or None), optional
-        Of a drive by loads: which node stands still while the drive is held, along which direction [rad]; None: it
-        does not rotate. Without it, held and free are the same.
-
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If a beam has no density, a mass is at no node, the count is not positive, the unknowns are too many, or there
-        are contacts.
+    Raises InputError if a beam has no density, a mass is at no node, the count is not positive, the unknowns are too
+    many, or there are contacts.
     """
     _check(path, masses, count)
     chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)

@@ -64,10 +64,7 @@ class AimedCurve:
 def middle(curve: Curve, branches: Sequence[str], places: FloatArray) -> FloatArray:
     """Return the mean of some branches of a curve at some places; branches that it does not have are left out.
 
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If a branch turns back.
+    Raises SolutionError if a branch turns back.
     """
     own = [name for name in branches if name in curve.branches] or list(curve.branches[:1])
     try:
@@ -80,10 +77,7 @@ def middle(curve: Curve, branches: Sequence[str], places: FloatArray) -> FloatAr
 def analyze_part(spec: Spec) -> Result:
     """Return the result of a part.
 
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If it has no curve.
+    Raises SolutionError if it has no curve.
     """
     result: Result = family(spec.family).analyze(spec, Run())
     if not result.curves:

@@ -123,10 +123,7 @@ class Cycles:
 def read_cycles(text: str | None) -> Cycles | None:
     """Return what ``--cycles`` says: ``2:5`` or ``3``; None for None.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is malformed.
+    Raises UsageError if it is malformed.
     """
     if text is None:
         return None
@@ -139,10 +136,7 @@ def read_cycles(text: str | None) -> Cycles | None:
 def choose(strokes: Strokes, cycles: Cycles | None, name: str) -> Strokes:
     """Return strokes of which some cycles are measured.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If one of them is not there, or not complete.
+    Raises DataError if one of them is not there, or not complete.
     """
     if cycles is None:
         return strokes
@@ -160,15 +154,11 @@ def covered_fraction(cycle: tuple[Stroke, Stroke]) -> float:
     return ways[0] / ways[1]
 
 
-def turning_points(motion: FloatArray, threshold: float) -> list[int]:
+def turning_points(
+    motion: FloatArray,  # (n,): in the order of time
+    threshold: float,  # how far the motion must come back from an extreme for it to be a reversal
+) -> list[int]:
     """Return the indices of first point, reversals and last point.
-
-    Parameters
-    ----------
-    motion : (n,) array
-        In the order of time.
-    threshold : float
-        How far the motion must come back from an extreme for it to be a reversal.
 
     Examples
     --------
@@ -200,21 +190,15 @@ def turning_points(motion: FloatArray, threshold: float) -> list[int]:
     return sorted({*found, last})
 
 
-def split(recording: Recording, reversal: float = REVERSAL_SHARE) -> Strokes:
+def split(
+    recording: Recording,  # in the order of time
+    # part of the range by which the motion must turn back to count as a reversal; at least eight standard deviations of
+    # the jitter
+    reversal: float = REVERSAL_SHARE,
+) -> Strokes:
     """Return the strokes of a recording.
 
-    Parameters
-    ----------
-    recording : Recording
-        In the order of time.
-    reversal : float
-        Part of the range by which the motion must turn back to count as a reversal;
-        at least eight standard deviations of the jitter.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If no stroke has enough points.
+    Raises DataError if no stroke has enough points.
     """
     motion = recording.motion
     extent = float(np.ptp(motion))
@@ -265,16 +249,11 @@ def jitter_of(motion: FloatArray) -> float:
     return 1.4826 * float(np.median(bends)) / 6.0**0.5 if len(bends) else 0.0
 
 
-def pauses(motion: FloatArray, turns: Sequence[int]) -> NDArray[np.bool_]:
-    """Return which points belong to pauses, the first and the last of each not counted.
-
-    Parameters
-    ----------
-    motion : (n,) array
-        In the order of time.
-    turns : sequence of int
-        First point, reversals, last point.
-    """
+def pauses(
+    motion: FloatArray,  # (n,): in the order of time
+    turns: Sequence[int],  # first point, reversals, last point
+) -> NDArray[np.bool_]:
+    """Return which points belong to pauses, the first and the last of each not counted."""
     steps = np.abs(np.diff(motion))
     jitter = jitter_of(motion) * 6.0**0.5
     travelled = float(np.abs(np.diff(motion[np.asarray(turns)])).sum())

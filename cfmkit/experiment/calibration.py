@@ -110,10 +110,7 @@ class ModelCurves:
     def spec_with(self, parameters: Sequence[FitParameter], values: FloatArray) -> Spec:
         """Return the specification with the values of parameters; those of the recording change nothing.
 
-        Raises
-        ------
-        cfmkit.errors.SpecError
-            If they are not valid together.
+        Raises SpecError if they are not valid together.
         """
         changes = self._changes(parameters, values)
         return self.spec.replace(changes, self.as_made) if changes else self.spec
@@ -121,10 +118,7 @@ class ModelCurves:
     def solve_at(self, parameters: Sequence[FitParameter], values: FloatArray) -> Curve:
         """Return the curve of that specification.
 
-        Raises
-        ------
-        cfmkit.errors.CfmError
-            If there is none.
+        Raises CfmError if there is none.
         """
         key = tuple(sorted(self._changes(parameters, values).items()))
         if key not in self._solved:
@@ -173,29 +167,16 @@ def calibrate(
 
 
 def fit_samples(
-    before: Comparison,
-    curves: ModelCurves,
+    before: Comparison,  # the samples beside the start
+    curves: ModelCurves,  # of the specification that is fitted
+    # parameters, loss: as for `calibrate`
     parameters: Sequence[FitParameter],
     loss: Loss = "soft_l1",
-    tolerance: float = LeastSquares.tolerance,
+    tolerance: float = LeastSquares.tolerance,  # relative change of values at which the search ends
 ) -> Calibration:
     """Return a specification whose model fits measured samples.
 
-    Parameters
-    ----------
-    before : Comparison
-        The samples beside the start.
-    curves : ModelCurves
-        Of the specification that is fitted.
-    parameters, loss
-        As for `calibrate`.
-    tolerance : float
-        Relative change of values at which the search ends.
-
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If the data do not determine the parameters, which are named.
+    Raises SolutionError if the data do not determine the parameters, which are named.
     """
     problem = replace(_problem(curves, before, parameters), tolerance=tolerance)
     _check(problem, problem.start, parameters)
@@ -297,10 +278,7 @@ def _problem(curves: ModelCurves, before: Comparison, parameters: Sequence[FitPa
 def scaled_jacobian(curves: ModelCurves, before: Comparison, parameters: Sequence[FitParameter]) -> FloatArray:
     """Return the derivatives of the errors at the start by the parameters in their sizes, (n, p) [N or N m].
 
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If the model has no value at some of the samples.
+    Raises SolutionError if the model has no value at some of the samples.
     """
     problem = _problem(curves, before, parameters)
     if not np.isfinite(problem.residuals(problem.start)).all():

@@ -172,22 +172,14 @@ _ERROR_METRICS: dict[str, Measure] = {
 """What is reported of the errors: name -> (function, definition)."""
 
 
-def compare(result: Result, source: MeasuredCurves, window: Window | None = None) -> Comparison:
+def compare(
+    result: Result,  # with a curve
+    source: MeasuredCurves,  # what was measured; its raw points are compared
+    window: Window | None = None,  # default: ``analysis.window``; in any case only where both exist on every branch
+) -> Comparison:
     """Return a model beside a measurement.
 
-    Parameters
-    ----------
-    result : Result
-        With a curve.
-    source : MeasuredCurves
-        What was measured; its raw points are compared.
-    window : Window, optional
-        Default: ``analysis.window``; in any case only where both exist on every branch.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If they are of different kinds, or have no travel in common.
+    Raises DataError if they are of different kinds, or have no travel in common.
     """
     curve, name = result.curve, source.recording.name
     if curve.kind != source.recording.kind:
@@ -212,10 +204,7 @@ def model_branch(curve: Curve, measured: str) -> str:
 def model_at(curve: Curve, branch: str, motion: FloatArray) -> FloatArray:
     """Return the effort of a model's branch at some places, linearly between its points.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If the branch turns back: it is many-valued, and a measurement does not say which value is meant.
+    Raises DataError if the branch turns back: it is many-valued, and a measurement does not say which value is meant.
     """
     try:
         return effort_at(curve, branch, motion)

@@ -139,10 +139,7 @@ def least(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
 def read_largest_hole(text: str | float | None) -> float:
     """Return which part of a window a hole may take, from text such as ``5 %``; by default `MAX_HOLE_SHARE`.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is no share.
+    Raises UsageError if it is no share.
     """
     if text is None:
         return MAX_HOLE_SHARE

@@ -82,32 +82,19 @@ class MeasuredCurves(ShortRepr):
 
 
 def measure_recording(
-    recording: Recording,
+    recording: Recording,  # in the order of time
+    # default: order 6 per pass, 60 cycles over the whole travel; left out, with a warning, where there are too few
+    # points for that. None: no filter
     low_pass: LowPass | Literal["default"] | None = "default",
+    # ``"reversals"`` for the points next to them at which the force passes between the branches, ``"spikes"`` for
+    # points far off their neighbours
     leave_out: Collection[str] = ("reversals",),
-    cycles: Cycles | None = None,
+    cycles: Cycles | None = None,  # which are measured; default: the complete ones of full travel
 ) -> MeasuredCurves:
     """Return a recording as raw and filtered curves.
 
-    Parameters
-    ----------
-    recording : Recording
-        In the order of time.
-    low_pass : LowPass, "default" or None
-        Default: order 6 per pass, 60 cycles over the whole travel; left out, with a
-        warning, where there are too few points for that. None: no filter.
-    leave_out : collection of str
-        ``"reversals"`` for the points next to them at which the force passes between the branches,
-        ``"spikes"`` for points far off their neighbours.
-    cycles : Cycles, optional
-        Which are measured; default: the complete ones of full travel.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If there is no stroke in the recording, a cycle that was chosen, or a filter that was named cannot be used.
-    cfmkit.errors.UsageError
-        If another word stands for the filter, or for what is left out.
+    Raises DataError if there is no stroke in the recording, a cycle that was chosen, or a filter that was named cannot
+    be used; UsageError if another word stands for the filter, or for what is left out.
     """
     _check_words(low_pass, leave_out)
     strokes, reached, passage, left_out = _strokes(recording, leave_out, cycles)
@@ -144,29 +131,16 @@ def _check_words(low_pass: LowPass | str | None, leave_out: Collection[str]) -> 
 
 
 def read_measured(
-    path: str | os.PathLike[str],
-    units: str | None = None,
+    path: str | os.PathLike[str],  # as for `cfmkit.experiment.reading.read_recording`
+    units: str | None = None,  # likewise
+    # tare, zero, flip: as for `cfmkit.experiment.zeros_and_signs.correct_recording`
     tare: str | float | None = None,
     zero: str | float | None = None,
     flip: Collection[str] = (),
-    cycles: str | None = None,
-    group: str | None = None,
+    cycles: str | None = None,  # which are measured: ``"2:5"``
+    group: str | None = None,  # which specimen of several, as ``"Specimen=2"``
 ) -> MeasuredCurves:
-    """Return the raw curves in a lab file, spikes and passages at reversals left out.
-
-    Parameters
-    ----------
-    path : path-like
-        As for `cfmkit.experiment.reading.read_recording`.
-    units : str, optional
-        Likewise.
-    tare, zero, flip
-        As for `cfmkit.experiment.zeros_and_signs.correct_recording`.
-    cycles : str, optional
-        Which are measured: ``"2:5"``.
-    group : str, optional
-        Which specimen of several, as ``"Specimen=2"``.
-    """
+    """Return the raw curves in a lab file, spikes and passages at reversals left out."""
     chosen = read_cycles(cycles)
     recording = correct_recording(read_recording(path, units, group), tare, zero, flip)
     return measure_recording(recording, None, LEFT_OUT, chosen)
@@ -304,28 +278,14 @@ class Measurement:
 
 
 def numbers_of(
-    source: MeasuredCurves,
-    frame: MeasuringFrame | None = None,
-    window: Window | None = None,
-    largest_hole: float = MAX_HOLE_SHARE,
+    source: MeasuredCurves,  # with at least one cycle or branch
+    frame: MeasuringFrame | None = None,  # target and so on
+    window: Window | None = None,  # default: what every branch of every cycle covers
+    largest_hole: float = MAX_HOLE_SHARE,  # part of the window: a branch with a larger hole in it has no values
 ) -> Measurement:
     """Return the metrics of a measured mechanism, raw and filtered, its coverage and its repeatability.
 
-    Parameters
-    ----------
-    source : MeasuredCurves
-        With at least one cycle or branch.
-    frame : MeasuringFrame, optional
-        Target and so on.
-    window : Window, optional
-        Default: what every branch of every cycle covers.
-    largest_hole : float
-        Part of the window: a branch with a larger hole in it has no values.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If a branch does not cover the window.
+    Raises DataError if a branch does not cover the window.
     """
     window, warnings = _window(source, window)
     frame, kind = replace(frame or MeasuringFrame(), over_motion=True), source.recording.kind
@@ -407,10 +367,7 @@ def _cut(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
 def common_window(curves: Sequence[Curve]) -> Window:
     """Return the interval that every branch of every curve covers.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If there is none.
+    Raises DataError if there is none.
     """
     parts = [curve.motion[curve.branch == name] for curve in curves for name in curve.branches]
     lo, hi = max(float(part.min()) for part in parts), min(float(part.max()) for part in parts)
@@ -425,10 +382,7 @@ def common_window(curves: Sequence[Curve]) -> Window:
 def require_loop(source: MeasuredCurves) -> None:
     """Refuse a recording that has no way back.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        Naming the branch that there is.
+    Raises DataError naming the branch that there is.
     """
     if not source.strokes.cycles:
         only = source.strokes.measured[0][0].branch

@@ -117,10 +117,7 @@ class Explanation:
     def part_of(self, drawn: Spec, values: FloatArray | None = None) -> Spec:
         """Return the part that is made of a drawing with these errors, or with other values of them.
 
-        Raises
-        ------
-        cfmkit.errors.SpecError
-            If no such part can exist.
+        Raises SpecError if no such part can exist.
         """
         changes: dict[str, float] = {}
         for item, value in zip(self.errors, self.values if values is None else values, strict=True):
@@ -205,35 +202,19 @@ def _thinnest(spec: Spec, paths: tuple[str, ...]) -> float:
 
 
 def explain(
-    spec: Spec,
-    source: MeasuredCurves,
+    spec: Spec,  # what was drawn, resolved
+    source: MeasuredCurves,  # what was measured of the part
+    # what errs, by the paths of `calibrate`; default: what the recording tells apart of `errors_that_can_be_told`
     fit: Sequence[str] | None = None,
-    tared: bool = False,
-    tell: Callable[[str], None] = lambda _: None,
+    tared: bool = False,  # whether the zero of the force is known; else it is fitted
+    tell: Callable[[str], None] = lambda _: None,  # is called with a sentence on what is being fitted
 ) -> tuple[Explanation, ...]:
     """Return the errors with which the model fits a recording as well as with any others, the best first.
 
     One without errors is among them where the recording cannot be told from that of a perfect part.
 
-    Parameters
-    ----------
-    spec : Spec
-        What was drawn, resolved.
-    source : MeasuredCurves
-        What was measured of the part.
-    fit : sequence of str, optional
-        What errs, by the paths of `calibrate`; default: what the recording tells apart of `errors_that_can_be_told`.
-    tared : bool
-        Whether the zero of the force is known; else it is fitted.
-    tell : callable
-        Is called with a sentence on what is being fitted.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If the recording is not of such a part.
-    cfmkit.errors.SolutionError
-        If the specification has no curve, or the recording determines nothing.
+    Raises DataError if the recording is not of such a part; SolutionError if the specification has no curve, or the
+    recording determines nothing.
     """
     result = family(spec.family).analyze(spec, Run())
     if not result.curves:
@@ -308,10 +289,7 @@ class Distinction:
     def estimate(cls, curves: ModelCurves, before: Comparison, parameters: tuple[FitParameter, ...]) -> Distinction:
         """Return it for the samples of a recording beside the start.
 
-        Raises
-        ------
-        cfmkit.errors.SolutionError
-            If the model has no value at some of the samples.
+        Raises SolutionError if the model has no value at some of the samples.
         """
         level = float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
         noise = max(_noise(before), FORCE_RESOLUTION * level)

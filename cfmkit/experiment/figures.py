@@ -154,18 +154,12 @@ def thin_curve(curve: Curve, bins: int = MAX_DRAWN_BINS) -> Curve:
 
 
 @apply_style
-def overlay(comparison: Comparison, before: Comparison | None, heading: tuple[str, str]) -> Figure:
-    """Return model and measurement overlaid, and their difference below.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        Of the model to judge.
-    before : Comparison, optional
-        Of the model that a fit started from.
-    heading : (str, str)
-        Whose picture it is, and what it shows.
-    """
+def overlay(
+    comparison: Comparison,  # of the model to judge
+    before: Comparison | None,  # of the model that a fit started from
+    heading: tuple[str, str],  # (str, str): whose picture it is, and what it shows
+) -> Figure:
+    """Return model and measurement overlaid, and their difference below."""
     figure = new_figure()
     write_heading(figure, Heading(*heading))
     upper, lower = axes_mm(figure, (17, 41, 138, 49.5)), axes_mm(figure, (17, 12, 138, 24))

@@ -23,33 +23,25 @@ REVERSED_LOOP_SHARE = 1e-3
 """A loop runs the wrong way round if its area is negative by more than this part of mean force times travel."""
 
 
-def branch_at(curve: Curve, branch: str, places: FloatArray) -> FloatArray:
-    """Return the effort of one branch at some places, by linear interpolation.
-
-    Parameters
-    ----------
-    curve : Curve
-        Whose branch never turns back.
-    branch : str
-        Its name.
-    places : (n,) array
-        Motion [m or rad], inside what the branch covers.
-    """
+def branch_at(
+    curve: Curve,  # whose branch never turns back
+    branch: str,  # its name
+    places: FloatArray,  # (n,): motion [m or rad], inside what the branch covers
+) -> FloatArray:
+    """Return the effort of one branch at some places, by linear interpolation."""
     part = curve.select_branch(branch)
     way = 1 if part.motion[-1] >= part.motion[0] else -1
     values: FloatArray = np.interp(places, part.motion[::way], part.effort[::way])
     return values
 
 
-def loop_area(motion: FloatArray, up: FloatArray, down: FloatArray) -> float:
+def loop_area(
+    motion: FloatArray,  # (n,): increasing [m or rad]
+    # up, down: (n,): effort on each branch there [N or N m]
+    up: FloatArray,
+    down: FloatArray,
+) -> float:
     """Return the area between the branches: the integral of (up - down) over the motion [J].
-
-    Parameters
-    ----------
-    motion : (n,) array
-        Increasing [m or rad].
-    up, down : (n,) array
-        Effort on each branch there [N or N m].
 
     Examples
     --------
@@ -59,14 +51,10 @@ def loop_area(motion: FloatArray, up: FloatArray, down: FloatArray) -> float:
     return float(np.trapezoid(up - down, motion))
 
 
-def turned_loop(curves: Sequence[Curve]) -> bool:
-    """Return whether the loops run the wrong way round, by more than rounding of the forces explains.
-
-    Parameters
-    ----------
-    curves : sequence of Curve
-        One a cycle; a cycle without a way back says nothing.
-    """
+def turned_loop(
+    curves: Sequence[Curve],  # one a cycle; a cycle without a way back says nothing
+) -> bool:
+    """Return whether the loops run the wrong way round, by more than rounding of the forces explains."""
     areas, sizes = [], []
     for curve in curves:
         if len(curve.branches) < 2:

@@ -47,15 +47,12 @@ class LowPass:
     def sections(self, step: float) -> FloatArray:
         """Return the second-order sections of one pass for samples `step` [s, m or rad] apart.
 
+        Raises DataError if the samples are too far apart for the cut-off.
+
         Returns
         -------
         (m, 6) array
             Rows b0, b1, b2, 1, a1, a2.
-
-        Raises
-        ------
-        cfmkit.errors.DataError
-            If the samples are too far apart for the cut-off.
         """
         if self.cutoff * step >= 0.5:
             raise DataError(
@@ -91,18 +88,12 @@ class LowPass:
         )
 
 
-def read_filter(text: str) -> LowPass | None:
+def read_filter(
+    text: str,  # such as ``2 Hz``, ``0.24 1/mm, order 3`` or ``2 Hz, corrected``
+) -> LowPass | None:
     """Return the filter that a text says; None for ``none``.
 
-    Parameters
-    ----------
-    text : str
-        Such as ``2 Hz``, ``0.24 1/mm, order 3`` or ``2 Hz, corrected``.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it says none.
+    Raises UsageError if it says none.
     """
     if text.strip() == "none":
         return None
@@ -129,23 +120,16 @@ def _read_cutoff(text: str) -> tuple[float, Per]:
     return value, "time" if dimension == "frequency" else "length"
 
 
-def low_passed(values: FloatArray, over: FloatArray, filtered_by: LowPass) -> FloatArray:
+def low_passed(
+    values: FloatArray,  # (n,): in the order of the branch
+    # (n,): time [s], displacement [m] or angle [rad] of each, never turning back. Where the steps are uneven the values
+    # are taken at even ones and brought back
+    over: FloatArray,
+    filtered_by: LowPass,  # what to let through
+) -> FloatArray:
     """Return values of one branch, filtered.
 
-    Parameters
-    ----------
-    values : (n,) array
-        In the order of the branch.
-    over : (n,) array
-        Time [s], displacement [m] or angle [rad] of each, never turning back. Where the steps
-        are uneven the values are taken at even ones and brought back.
-    filtered_by : LowPass
-        What to let through.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If there are too few values, or they are too far apart.
+    Raises DataError if there are too few values, or they are too far apart.
     """
     steps = np.diff(over)
     step = float(over[-1] - over[0]) / max(len(over) - 1, 1)

@@ -205,19 +205,11 @@ def _column_name(name: str) -> str:
 
 
 def files(
-    reports: Mapping[str, MeasureReport], plots: bool = True, form: FigureForm | None = None
+    reports: Mapping[str, MeasureReport],  # by specimen
+    plots: bool = True,  # whether to draw
+    form: FigureForm | None = None,  # how figures are written; default: as PNG, as they are drawn
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield every file of a measurement as (name below the folder, content).
-
-    Parameters
-    ----------
-    reports : mapping of str to MeasureReport
-        By specimen.
-    plots : bool
-        Whether to draw.
-    form : FigureForm, optional
-        How figures are written; default: as PNG, as they are drawn.
-    """
+    """Yield every file of a measurement as (name below the folder, content)."""
     from cfmkit.tables.json_writing import json_bytes
 
     yield "curve.csv", to_csv(_stack_tables({name: curves_table(report.source) for name, report in reports.items()}))

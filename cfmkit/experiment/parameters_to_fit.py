@@ -64,28 +64,14 @@ class FitParameter:
 
 
 def parameters(
-    spec: Spec,
-    paths: Iterable[str],
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    recording: Recording | None = None,
+    spec: Spec,  # whose values are the start
+    paths: Iterable[str],  # dotted paths of numbers; those that begin with ``data.`` are values of the recording
+    bounds: Mapping[str, tuple[float, float]] | None = None,  # SI; the specification's own bounds hold besides
+    recording: Recording | None = None,  # whose zeros may be fitted
 ) -> tuple[FitParameter, ...]:
     """Return the parameters at some paths of a specification.
 
-    Parameters
-    ----------
-    spec : Spec
-        Whose values are the start.
-    paths : iterable of str
-        Dotted paths of numbers; those that begin with ``data.`` are values of the recording.
-    bounds : mapping of str to (float, float)
-        SI; the specification's own bounds hold besides.
-    recording : Recording, optional
-        Whose zeros may be fitted.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is nothing to fit at a path, or a start is not inside its bounds.
+    Raises UsageError if there is nothing to fit at a path, or a start is not inside its bounds.
     """
     names = [path.strip() for path in paths]
     if not names or not all(names):
@@ -208,10 +194,7 @@ def read_bounds(
 ) -> dict[str, tuple[float, float]]:
     """Return what ``--bounds a.b=0:0.01`` says, by path, SI.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If one is malformed.
+    Raises UsageError if one is malformed.
     """
     found = {}
     for option in options:
@@ -232,10 +215,7 @@ def read_bounds(
 def split_bounds(options: Iterable[str]) -> dict[str, str]:
     """Return what ``--bounds a.b=low:high`` says as text, by path.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If one has no ``=``.
+    Raises UsageError if one has no ``=``.
     """
     found = {}
     for option in options:

@@ -130,25 +130,17 @@ class Recording(ShortRepr):
         return [*(self.decisions.lines() if self.decisions else []), *self.notes]
 
 
-def read_recording(path: str | os.PathLike[str], units: str | None = None, group: str | None = None) -> Recording:
+def read_recording(
+    path: str | os.PathLike[str],  # text with columns: displacement and force, or angle and torque, and perhaps time
+    # units that the header does not state, by name or number of the column: ``"s=mm,F=N"``. Where several columns
+    # qualify, those named here are used
+    units: str | None = None,
+    group: str | None = None,  # which specimen of several, as ``"Specimen=2"``; ``"none"``: all rows are of one
+) -> Recording:
     """Return the measured curve in a lab file.
 
-    Parameters
-    ----------
-    path : path-like
-        Text with columns: displacement and force, or angle and torque, and perhaps time.
-    units : str, optional
-        Units that the header does not state, by name or number of the column: ``"s=mm,F=N"``.
-        Where several columns qualify, those named here are used.
-    group : str, optional
-        Which specimen of several, as ``"Specimen=2"``; ``"none"``: all rows are of one.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the file cannot be read, or `units` is malformed.
-    cfmkit.errors.DataError
-        If it holds no curve, or those of several specimens.
+    Raises UsageError if the file cannot be read, or `units` is malformed; DataError if it holds no curve, or those of
+    several specimens.
     """
     found = read_recordings(path, units, group)
     if len(found) > 1:
@@ -158,25 +150,18 @@ def read_recording(path: str | os.PathLike[str], units: str | None = None, group
 
 
 def read_recordings(
-    path: str | os.PathLike[str], units: str | None = None, group: str | None = None
+    # path, units: as for `read_recording`
+    path: str | os.PathLike[str],
+    units: str | None = None,
+    # ``"COLUMN"``: one curve for each of its values; ``"COLUMN=VALUE"``: that one; ``"table"`` and ``"table=2"``
+    # likewise of tables one below the other; ``"none"``: all rows of a table are of one specimen, whatever its columns
+    # say. Default: all rows, where nothing speaks for several specimens
+    group: str | None = None,
 ) -> dict[str, Recording]:
     """Return the measured curve of each specimen in a lab file, by what `group` tells them apart.
 
-    Parameters
-    ----------
-    path, units
-        As for `read_recording`.
-    group : str, optional
-        ``"COLUMN"``: one curve for each of its values; ``"COLUMN=VALUE"``: that one; ``"table"`` and ``"table=2"``
-        likewise of tables one below the other; ``"none"``: all rows of a table are of one specimen, whatever its
-        columns say. Default: all rows, where nothing speaks for several specimens.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the file cannot be read, or `units` is malformed.
-    cfmkit.errors.DataError
-        If it holds no curve, or those of several specimens and `group` does not say of which.
+    Raises UsageError if the file cannot be read, or `units` is malformed; DataError if it holds no curve, or those of
+    several specimens and `group` does not say of which.
     """
     name = Path(path).name
     stated = read_units(units)

@@ -89,10 +89,7 @@ def limits_of(spec: Spec) -> dict[str, DrawnRange]:
     These are the values that the design chooses, and widths and thicknesses; not widths that a sheet decides, nor what
     is bought. Where nothing of that is there, the places of joints.
 
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        If a path of `design.free` is not in the specification.
+    Raises SpecError if a path of `design.free` is not in the specification.
     """
     kinds = dict(family(spec.family).errors(spec))
     design = getattr(spec, "design", None)
@@ -196,10 +193,7 @@ class Redesign:
     def drawing(self, x: FloatArray) -> Spec:
         """Return the drawing with other values.
 
-        Raises
-        ------
-        cfmkit.errors.SpecError
-            If they are not valid together.
+        Raises SpecError if they are not valid together.
         """
         return self.drawn.replace(dict(zip(self.limits, x.tolist(), strict=True)))
 
@@ -209,10 +203,7 @@ class Redesign:
         Widths change alone if that is enough: neither shape nor stress change with them. Then thicknesses change, too,
         then all.
 
-        Raises
-        ------
-        cfmkit.errors.SolutionError
-            If nothing may change.
+        Raises SolutionError if nothing may change.
         """
         if not self.limits:
             raise SolutionError(

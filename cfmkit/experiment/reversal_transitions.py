@@ -159,14 +159,10 @@ def _shorten_stroke(recording: Recording, stroke: Stroke, ends: Sequence[tuple[E
     return replace(stroke, points=stroke.points[keep]) if keep.sum() >= _MIN_SAMPLES else stroke
 
 
-def passage(ends: Sequence[End]) -> float:
-    """Return over which way from ends of the travel the force is not yet, or no more, of one branch [m or rad].
-
-    Parameters
-    ----------
-    ends : sequence of End
-        Of one kind; together they are looked at as one.
-    """
+def passage(
+    ends: Sequence[End],  # of one kind; together they are looked at as one
+) -> float:
+    """Return over which way from ends of the travel the force is not yet, or no more, of one branch [m or rad]."""
     if not ends:
         return 0.0
     reach = min(end.reach for end in ends)

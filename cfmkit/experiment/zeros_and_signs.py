@@ -28,26 +28,18 @@ def words_of(kind: str) -> tuple[str, str]:
 
 
 def correct_recording(
-    recording: Recording, tare: str | float | None = None, zero: str | float | None = None, flip: Collection[str] = ()
+    recording: Recording,  # as recorded
+    # force or torque that the sensor shows without load: a text with its unit, a number [N or N m], or ``start`` for
+    # the mean of the points before the machine moves
+    tare: str | float | None = None,
+    # displacement or angle that the sensor shows at the mechanism's zero, likewise [m or rad]
+    zero: str | float | None = None,
+    # ``force`` and ``displacement``, or ``torque`` and ``angle``: what is recorded with the sign reversed
+    flip: Collection[str] = (),
 ) -> Recording:
     """Return a recording with other zeros and signs: (reading - zero), turned where it is to be.
 
-    Parameters
-    ----------
-    recording : Recording
-        As recorded.
-    tare : str or float, optional
-        Force or torque that the sensor shows without load: a text with its unit, a number [N or N m], or
-        ``start`` for the mean of the points before the machine moves.
-    zero : str or float, optional
-        Displacement or angle that the sensor shows at the mechanism's zero, likewise [m or rad].
-    flip : collection of str
-        ``force`` and ``displacement``, or ``torque`` and ``angle``: what is recorded with the sign reversed.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If a value cannot be read, or there is nothing of that name to turn.
+    Raises UsageError if a value cannot be read, or there is nothing of that name to turn.
     """
     effort, motion = words_of(recording.kind)
     if strange := next((word for word in flip if word not in (effort, motion)), None):

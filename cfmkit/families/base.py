@@ -344,10 +344,7 @@ def with_own_metrics(result: Result) -> Result:
 def _own_quantity(metric: OwnMetric, result: Result) -> Quantity:
     """Return what a function of the user makes of a result.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the function fails, or returns something else than a number.
+    Raises UsageError if the function fails, or returns something else than a number.
     """
     about = metric.dimension, metric.definition
     if not result.curves:

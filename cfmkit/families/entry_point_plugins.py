@@ -110,10 +110,7 @@ def usable_names(taken: Iterable[str]) -> tuple[str, ...]:
 def record_of(offer: InstalledFamily, taken: Iterable[str]) -> Family:
     """Return the family that a package offers; its code is imported.
 
-    Raises
-    ------
-    Unusable
-        With the reason in one line, if it cannot be used.
+    Raises Unusable with the reason in one line, if it cannot be used.
     """
     found = _clash(offer, taken) or _import_record(offer)
     if isinstance(found, str):

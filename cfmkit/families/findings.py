@@ -45,15 +45,11 @@ def finder(meanings: Mapping[str, str]) -> Finder:
     return finding
 
 
-def sharp_inside(fillet: float, notes: Sequence[str]) -> str:
+def sharp_inside(
+    fillet: float,  # requested radius [m]
+    notes: Sequence[str],  # one for each corner that no such fillet fits, with its place
+) -> str:
     """Return what is wrong with the inside corners of a part that is solved as a solid; empty if all are round.
-
-    Parameters
-    ----------
-    fillet : float
-        Requested radius [m].
-    notes : sequence of str
-        One for each corner that no such fillet fits, with its place.
 
     Examples
     --------

@@ -153,29 +153,17 @@ class GuideRod:
 
 
 def guide_rod(
+    # across, force: largest loads across the guide and along it [N]
     across: float,
     force: float,
+    # travel, bush: of the slider, and its length where `guide` states none [m]
     travel: float,
     bush: float,
-    guide: Guide | None,
-    system: System | None,
-    strength: PartStrength,
+    guide: Guide | None,  # as stated
+    system: System | None,  # of its diameter
+    strength: PartStrength,  # of the rod
 ) -> GuideRod:
-    """Return the rod for a load across it, at least a share of the force along it, over a travel.
-
-    Parameters
-    ----------
-    across, force : float
-        Largest loads across the guide and along it [N].
-    travel, bush : float
-        Of the slider, and its length where `guide` states none [m].
-    guide : Guide or None
-        As stated.
-    system : {"metric", "inch"} or None
-        Of its diameter.
-    strength : PartStrength
-        Of the rod.
-    """
+    """Return the rod for a load across it, at least a share of the force along it, over a travel."""
     length = bush if guide is None or guide.length is None else guide.length
     couple = 0.0 if guide is None else 2.0 * force * guide.offset / length  # at each end of the bush
     load = max(across + couple, SIDE_SHARE * force)

@@ -72,10 +72,7 @@ class RowsDiffer(Exception):
 def agree(condition: Any) -> bool:
     """Return a condition on one mechanism, or the one answer of a column (m, 1).
 
-    Raises
-    ------
-    RowsDiffer
-        If rows of the column differ.
+    Raises RowsDiffer if rows of the column differ.
     """
     if not np.ndim(condition):
         return bool(condition)
@@ -88,10 +85,7 @@ def agree(condition: Any) -> bool:
 def fails(condition: Any) -> bool:
     """Return what is wrong with one mechanism; of a column (m, 1) nothing may be.
 
-    Raises
-    ------
-    RowsDiffer
-        If it holds for a row of the column: what is wrong with it is said of one mechanism.
+    Raises RowsDiffer if it holds for a row of the column: what is wrong with it is said of one mechanism.
     """
     if np.ndim(condition) and np.any(condition):
         raise RowsDiffer(np.ravel(condition))
@@ -131,12 +125,7 @@ def refuse_columns(*values: Any) -> None:
 def root_between(function: Callable[[Any], Any], low: Any, high: Any) -> Any:
     """Return `bracketed_root` of one mechanism, or of each row of a column.
 
-    Raises
-    ------
-    ValueError
-        If the function of one mechanism has no root there.
-    RowsDiffer
-        If that is so of some rows.
+    Raises ValueError if the function of one mechanism has no root there; RowsDiffer if that is so of some rows.
     """
     if not is_column(low, high, function(low)):
         return bracketed_root(function, low, high)

@@ -80,10 +80,7 @@ def rising(told: Callable[[float, str], None]) -> Callable[[float, str], None]:
 def read_time(time: str | float | None, name: str = "time_budget") -> float | None:
     """Return a time [s] of a number or a text with its unit; None for None.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is no time, with the name of what it was given for.
+    Raises UsageError if it is no time, with the name of what it was given for.
 
     Examples
     --------

@@ -210,18 +210,12 @@ def _join_differences(differences: Mapping[str, Difference]) -> Difference:
     return Difference(values, gaps[0] if gaps else items[0].reason, np.concatenate(weights))
 
 
-def counterpart(curve: Curve, branch: str, way: float) -> str:
-    """Return the branch of a curve to compare with one of another: by name, else by its direction.
-
-    Parameters
-    ----------
-    curve : Curve
-        Where the branch is looked for.
-    branch : str
-        Name of the other curve's branch.
-    way : float
-        Positive if the motion grows along the other curve's branch.
-    """
+def counterpart(
+    curve: Curve,  # where the branch is looked for
+    branch: str,  # name of the other curve's branch
+    way: float,  # positive if the motion grows along the other curve's branch
+) -> str:
+    """Return the branch of a curve to compare with one of another: by name, else by its direction."""
     if branch in curve.branches or len(curve.branches) == 1:
         return branch if branch in curve.branches else curve.branches[0]
     for name in curve.branches:
@@ -234,10 +228,7 @@ def counterpart(curve: Curve, branch: str, way: float) -> str:
 def effort_at(curve: Curve, branch: str, places: FloatArray) -> FloatArray:
     """Return the effort of a branch at some places, linearly between its points; NaN where it has none.
 
-    Raises
-    ------
-    Undefined
-        If the branch turns back.
+    Raises Undefined if the branch turns back.
     """
     trace = next(item for item in traces(curve) if item.name == branch)
     if not trace.way:

@@ -69,24 +69,17 @@ def mean_of_rows(
 
 
 def extremes(
+    # values at any places of each row, (d, m) -> (d, m); where it is not a number, it does not count
     function: Callable[[FloatArray], FloatArray],
+    # motion, effort: (d, n): samples, monotonic in the motion; their values
     motion: FloatArray,
     effort: FloatArray,
+    # bool or (d,): whether samples stand closer in some places than in others: then their number does not tell how
+    # close
     uneven: bool | NDArray[np.bool_] = False,
-    last: NDArray[np.intp] | None = None,
+    last: NDArray[np.intp] | None = None,  # (d,): index of the last sample of each row; what follows repeats it
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest and the smallest value of each row next to its samples, (d,) each.
-
-    Parameters
-    ----------
-    function : callable
-        Values at any places of each row, (d, m) -> (d, m); where it is not a number, it does not count.
-    motion, effort : (d, n) array
-        Samples, monotonic in the motion; their values.
-    uneven : bool or (d,) array
-        Whether samples stand closer in some places than in others: then their number does not tell how close.
-    last : (d,) array, optional
-        Index of the last sample of each row; what follows repeats it.
 
     Examples
     --------
@@ -105,23 +98,17 @@ def extremes(
 
 
 def extremes_of_all(
+    # function, uneven: as there
     function: Callable[[FloatArray], FloatArray],
+    # (d, n), (d, n), (d,) of int: motion, increasing, values, and the index of the last of each row
     samples: tuple[FloatArray, FloatArray, NDArray[np.intp]],
+    # places, values: (d, k): others, in order, between the ends of a row; those that are at a sample or at each other
+    # count once
     places: FloatArray,
     values: FloatArray,
     uneven: bool | NDArray[np.bool_],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return `extremes` of samples and other places in one order, without sorting all of them.
-
-    Parameters
-    ----------
-    function, uneven
-        As there.
-    samples : (d, n) array, (d, n) array, (d,) array of int
-        Motion, increasing, values, and the index of the last of each row.
-    places, values : (d, k) array
-        Others, in order, between the ends of a row; those that are at a sample or at each other count once.
-    """
+    """Return `extremes` of samples and other places in one order, without sorting all of them."""
     motion, effort, last = samples
     motion, rows = np.broadcast_to(motion, effort.shape), np.arange(len(effort))[:, None]
     highest = np.stack([effort.argmax(axis=1), effort.argmin(axis=1)], axis=1)

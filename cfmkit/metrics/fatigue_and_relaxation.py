@@ -41,10 +41,8 @@ class FatigueLaw:
 
         Below the lowest S-N point it is the cycles of that point: more have not been shown.
 
-        Raises
-        ------
-        Undefined
-            If there is no amplitude, the mean is above the ultimate strength, or the amplitude above every S-N point.
+        Raises Undefined if there is no amplitude, the mean is above the ultimate strength, or the amplitude above every
+        S-N point.
         """
         amplitude, mean = 0.5 * (largest - least), 0.5 * (largest + least)
         if amplitude <= 0:
@@ -87,10 +85,7 @@ class RelaxationLaw:
     def ratio(self, time: float) -> float:
         """Return E(t)/E(0) after a time [s]: by the Prony series, or along log t between the points.
 
-        Raises
-        ------
-        Undefined
-            If the time is beyond the last point.
+        Raises Undefined if the time is beyond the last point.
         """
         if self.terms:
             return 1.0 - sum(share * -math.expm1(-time / tau) for share, tau in self.terms)

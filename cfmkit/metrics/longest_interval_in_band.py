@@ -32,24 +32,12 @@ N_MODEL_ZOOMS, MODEL_ZOOM_STEPS, MODEL_ZOOM_FACTOR = 6, np.linspace(-2.0, 2.0, 6
 
 
 def extremes(
-    function: Callable[[FloatArray], FloatArray],
-    place: FloatArray,
-    step: FloatArray | float,
-    span: tuple[FloatArray, FloatArray],
+    function: Callable[[FloatArray], FloatArray],  # values of each function, (k, m) -> (k, m)
+    place: FloatArray,  # (k,): near which each is largest
+    step: FloatArray | float,  # (k, 1) or float: how far off that may be
+    span: tuple[FloatArray, FloatArray],  # pair of (k,): within which it is looked for
 ) -> FloatArray:
-    """Return where functions are largest near places, (k,), within spans; `step` says how far off these may be.
-
-    Parameters
-    ----------
-    function : callable
-        Values of each function, (k, m) -> (k, m).
-    place : (k,) array
-        Near which each is largest.
-    step : (k, 1) array or float
-        How far off that may be.
-    span : pair of (k,) array
-        Within which it is looked for.
-    """
+    """Return where functions are largest near places, (k,), within spans; `step` says how far off these may be."""
     (low, high), rows = span, np.arange(len(place))
     for _ in range(N_MODEL_ZOOMS):
         near = np.clip(place[:, None] + MODEL_ZOOM_STEPS * step, low[:, None], high[:, None])

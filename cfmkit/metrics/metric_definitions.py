@@ -187,10 +187,7 @@ def definition_of(name: str, known: Mapping[str, Definition], branches: Sequence
 def time_of(text: str) -> float:
     """Return the time in the brackets of a metric [s].
 
-    Raises
-    ------
-    cfmkit.errors.QuantityError
-        If it is none, or not above 0.
+    Raises QuantityError if it is none, or not above 0.
     """
     found = read_quantity(text, "time")
     if found <= 0:

@@ -99,18 +99,12 @@ class Survey:
         return known[worst_branch(definition.worst, heights, self.subject.frame.target).item()]
 
 
-def worst_branch(rule: str, values: FloatArray, target: FloatArray | float | None) -> NDArray[np.intp]:
-    """Return which branch of each curve counts where none is named, (n,).
-
-    Parameters
-    ----------
-    rule : {"largest", "smallest", "farthest-from-target"}
-        `Definition.worst`; without a target the smallest is the farthest from it.
-    values : (b, n) array
-        Of b branches of n curves; a NaN counts first.
-    target : (n,) array, float or None
-        Of the force or torque.
-    """
+def worst_branch(
+    rule: str,  # `Definition.worst`; without a target the smallest is the farthest from it
+    values: FloatArray,  # (b, n): of b branches of n curves; a NaN counts first
+    target: FloatArray | float | None,  # (n,), float or None: of the force or torque
+) -> NDArray[np.intp]:
+    """Return which branch of each curve counts where none is named, (n,)."""
     if rule == "largest":
         return np.asarray(values.argmax(axis=0))
     if rule == "smallest" or target is None:

@@ -54,10 +54,7 @@ def band_range(branch: Branch, tolerance: float) -> float:
 def _value_of_branch(values: FloatArray) -> float:
     """Return the value of one branch.
 
-    Raises
-    ------
-    Undefined
-        If it is none: the model gives no force at the places that are asked about.
+    Raises Undefined if it is none: the model gives no force at the places that are asked about.
     """
     value = float(values[0])
     if not isfinite(value):

@@ -227,25 +227,14 @@ def _bands(many: ManyBranches) -> tuple[FloatArray, ...]:
 
 
 def usable_interval(
-    branches: Sequence[ManyBranches],
-    target: FloatArray,
-    band: FloatArray | float,
+    branches: Sequence[ManyBranches],  # of one motion
+    target: FloatArray,  # (d,): what the efforts are compared with, not zero
+    band: FloatArray | float,  # (d,) or float: half width of the band, as a fraction
+    # valid, until: (d,): where the mechanism starts to work as intended, and where it ceases to, by default nowhere
     valid: FloatArray,
     until: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return start and end of the largest usable interval of each row, (d,) each; NaN where there is none.
-
-    Parameters
-    ----------
-    branches : sequence of ManyBranches
-        Of one motion.
-    target : (d,) array
-        What the efforts are compared with, not zero.
-    band : (d,) array or float
-        Half width of the band, as a fraction.
-    valid, until : (d,) array
-        Where the mechanism starts to work as intended, and where it ceases to, by default nowhere.
-    """
+    """Return start and end of the largest usable interval of each row, (d,) each; NaN where there is none."""
     motion = branches[0].motion
     last = motion[:, -1]
     if until is None:

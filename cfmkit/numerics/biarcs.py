@@ -158,16 +158,15 @@ class Biarc:
         return 4 * (atan(self.bulges[0]) + atan(self.bulges[1]))
 
 
-def biarc(p0: complex, t0: complex, p1: complex, t1: complex) -> Biarc | None:
-    """Return the biarc with equal tangent lengths, or None if the ends face the wrong way [BM].
-
-    Parameters
-    ----------
-    p0, p1 : complex
-        End points.
-    t0, t1 : complex
-        Unit tangents there.
-    """
+def biarc(
+    # p0, p1: end points
+    p0: complex,
+    # t0, t1: unit tangents there
+    t0: complex,
+    p1: complex,
+    t1: complex,
+) -> Biarc | None:
+    """Return the biarc with equal tangent lengths, or None if the ends face the wrong way [BM]."""
     chord, both, square = p1 - p0, t0 + t1, abs(p1 - p0) ** 2
     ahead = (chord * both.conjugate()).real
     if ahead <= 0:
@@ -187,6 +186,8 @@ def biarc(p0: complex, t0: complex, p1: complex, t1: complex) -> Biarc | None:
 def fit_arcs(points: FloatArray, tangents: FloatArray, tolerance: float, lean: float = np.inf) -> ArcChain:
     """Return a tangent-continuous chain of arcs within `tolerance` of the curve.
 
+    Raises CoarseDataError if the samples are too far apart for the tolerance, or the curve has a corner.
+
     Parameters
     ----------
     points : (n, 2) array
@@ -203,11 +204,6 @@ def fit_arcs(points: FloatArray, tangents: FloatArray, tolerance: float, lean: f
     -------
     ArcChain
         Begins and ends in the first and the last sample, with their tangents.
-
-    Raises
-    ------
-    CoarseDataError
-        If the samples are too far apart for the tolerance, or the curve has a corner.
     """
     curve = _Curve.from_samples(points, tangents, (tolerance, lean), _SEARCH_PARTS)
     check = _Curve.from_samples(points, tangents, (tolerance, lean), _CHECK_PARTS)

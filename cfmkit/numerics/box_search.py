@@ -54,20 +54,13 @@ class Lowest:
 
 
 def lowest(
-    function: Callable[[tuple[float, ...]], float], axes: tuple[BoxAxis, ...], grid: int = 15, fine: int = 30
+    # of a tuple of as many values as there are axes; infinite where it does not exist
+    function: Callable[[tuple[float, ...]], float],
+    axes: tuple[BoxAxis, ...],  # the first is the outermost
+    grid: int = 15,  # values of each variable on the grid
+    fine: int = 30,  # at most so many more around the best of them
 ) -> Lowest:
     """Return where a function of bounded variables is smallest.
-
-    Parameters
-    ----------
-    function : callable
-        Of a tuple of as many values as there are axes; infinite where it does not exist.
-    axes : tuple of BoxAxis
-        The first is the outermost.
-    grid : int
-        Values of each variable on the grid.
-    fine : int
-        At most so many more around the best of them.
 
     Examples
     --------

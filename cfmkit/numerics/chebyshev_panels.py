@@ -82,20 +82,15 @@ def coefficients(panel: tuple[float, float], x: FloatArray, values: FloatArray) 
 
 
 def resolve_panels(
-    functions: Callable[[FloatArray], FloatArray], ends: FloatArray, close: Sequence[float], halvings: int
+    # all functions at increasing places, (n,) -> (m, n). Where halves lack a value, their panel is kept as it is
+    functions: Callable[[FloatArray], FloatArray],
+    ends: FloatArray,  # (k + 1,): of the panels at first, increasing
+    # size of the last coefficients of each function, relative to the largest value seen, at which it has converged
+    close: Sequence[float],
+    # at most so many of a panel, for functions with corners; none follows a round of more than `MAX_PLACES` places
+    halvings: int,
 ) -> tuple[ChebyshevPanels, ...]:
     """Return functions as panels, each halved until the polynomials of all functions have converged on it.
-
-    Parameters
-    ----------
-    functions : callable
-        All functions at increasing places, (n,) -> (m, n). Where halves lack a value, their panel is kept as it is.
-    ends : (k + 1,) array
-        Of the panels at first, increasing.
-    close : sequence of float
-        Size of the last coefficients of each function, relative to the largest value seen, at which it has converged.
-    halvings : int
-        At most so many of a panel, for functions with corners; none follows a round of more than `MAX_PLACES` places.
 
     Examples
     --------

@@ -175,15 +175,13 @@ def dual_of_steps(value: Any, stepped: Any) -> Any:
     return DualArray(value, slopes) if slopes.any() else value
 
 
-def chain(value: Any, partials: Sequence[Any], arguments: Sequence[Any]) -> Any:
+def chain(
+    value: Any,  # (...): of the function
+    # partials, arguments: derivatives of the function by its arguments, (...) each, and these arguments
+    partials: Sequence[Any],
+    arguments: Sequence[Any],
+) -> Any:
     """Return a function's values with their derivatives, from its partial derivatives; the values if none is dual.
-
-    Parameters
-    ----------
-    value : (...) array
-        Of the function.
-    partials, arguments : sequences of arrays
-        Derivatives of the function by its arguments, (...) each, and these arguments.
 
     Examples
     --------

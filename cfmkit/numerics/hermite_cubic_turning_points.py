@@ -33,21 +33,14 @@ class Monotone(ShortRepr):
 
 @np.errstate(all="ignore")
 def monotone(
-    place: FloatArray,
+    place: FloatArray,  # (n,) or (m, n): increasing
+    # value, slope: (m, n): curves and their derivatives; a slope that is not finite counts as that of the chord
     value: FloatArray,
     slope: FloatArray,
+    # the curves at places of each row, (m, k) -> (m, k): the cubics say where to look only
     function: Callable[[FloatArray], FloatArray],
 ) -> Monotone:
     """Return curves at their samples and turning points.
-
-    Parameters
-    ----------
-    place : (n,) or (m, n) array
-        Increasing.
-    value, slope : (m, n) array
-        Curves and their derivatives; a slope that is not finite counts as that of the chord.
-    function : callable
-        The curves at places of each row, (m, k) -> (m, k): the cubics say where to look only.
 
     Examples
     --------

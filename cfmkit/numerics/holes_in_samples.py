@@ -57,14 +57,10 @@ def holes_between(places: FloatArray, low: float, high: float) -> list[tuple[flo
     return [(start, stop) for start, stop in inside if start < stop]
 
 
-def sample_weights(places: FloatArray) -> FloatArray:
-    """Return the length that each sample represents, half of each step beside it, (n,); holes count as usual steps.
-
-    Parameters
-    ----------
-    places : (n,) array
-        In increasing order [m or rad].
-    """
+def sample_weights(
+    places: FloatArray,  # (n,): in increasing order [m or rad]
+) -> FloatArray:
+    """Return the length that each sample represents, half of each step beside it, (n,); holes count as usual steps."""
     steps = np.diff(places)
     found = np.zeros(len(places))
     if len(steps):

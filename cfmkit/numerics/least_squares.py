@@ -118,26 +118,18 @@ def unidentifiable(problem: LeastSquares, values: FloatArray) -> tuple[tuple[int
 
     A group of one has no effect; in a group of several each can make up for the others.
 
-    Raises
-    ------
-    NotFinite
-        If the residuals are not finite there.
+    Raises NotFinite if the residuals are not finite there.
     """
     if not np.isfinite(problem.residuals(values)).all():
         raise NotFinite
     return dependent_columns(problem.jacobian(values), problem.level) if len(values) else ()
 
 
-def dependent_columns(jacobian: FloatArray, level: float) -> tuple[tuple[int, ...], ...]:
-    """Return groups of columns that vanish (alone) or are linearly dependent (together).
-
-    Parameters
-    ----------
-    jacobian : (n, p) array
-        Scaled.
-    level : float
-        What its entries are compared with.
-    """
+def dependent_columns(
+    jacobian: FloatArray,  # (n, p): scaled
+    level: float,  # what its entries are compared with
+) -> tuple[tuple[int, ...], ...]:
+    """Return groups of columns that vanish (alone) or are linearly dependent (together)."""
     largest = np.abs(jacobian).max(axis=0)
     groups: list[tuple[int, ...]] = [(int(k),) for k in np.flatnonzero(largest <= NO_EFFECT * level)]
     alive = np.flatnonzero(largest > NO_EFFECT * level)
@@ -149,21 +141,15 @@ def dependent_columns(jacobian: FloatArray, level: float) -> tuple[tuple[int, ..
     return tuple(dict.fromkeys(groups))
 
 
-def solve(problem: LeastSquares, loss: Loss = "soft_l1") -> FittedValues:
+def solve(
+    problem: LeastSquares,  # whose Jacobian is not singular: ask `unidentifiable` first
+    # how large residuals count. A robust loss starts from the linear fit and takes twice the robust standard deviation
+    # of its residuals as the size beyond which they count less
+    loss: Loss = "soft_l1",
+) -> FittedValues:
     """Return the best values, by a trust-region method within the bounds.
 
-    Parameters
-    ----------
-    problem : LeastSquares
-        Whose Jacobian is not singular: ask `unidentifiable` first.
-    loss : {"linear", "soft_l1", "huber", "cauchy"}
-        How large residuals count. A robust loss starts from the linear fit and takes twice
-        the robust standard deviation of its residuals as the size beyond which they count less.
-
-    Raises
-    ------
-    NotFinite
-        If the residuals are not finite at the start.
+    Raises NotFinite if the residuals are not finite at the start.
     """
     if not np.isfinite(problem.residuals(problem.start)).all():
         raise NotFinite
@@ -241,19 +227,15 @@ MAX_BLOCKS = 24
 _SAMPLES_A_BLOCK = 8
 
 
-def lack_of_fit(branches: Sequence[FloatArray], fitted: int) -> LackOfFit:
+def lack_of_fit(
+    branches: Sequence[FloatArray],  # sequence of (n,): residuals of each branch in the order of its places
+    fitted: int,  # number of fitted values
+) -> LackOfFit:
     """Return the F test of means of neighbouring residuals against the scatter inside each group of neighbours.
 
     Neighbours count as pure error, as repeated points do in the classical test; where they are alike
     over less than a stretch, as under vibration, so many of them count as one. Residuals beyond five
     robust standard deviations count as that much.
-
-    Parameters
-    ----------
-    branches : sequence of (n,) array
-        Residuals of each branch in the order of its places.
-    fitted : int
-        Number of fitted values.
 
     References
     ----------

@@ -93,18 +93,15 @@ class ThroughPoints:
         own = t * (a + t * (b / 2.0 + t * (c / 3.0 + t * d / 4.0)))
         return self._before[piece] + own + beyond * (a + t * (b + t * (c + t * d)))
 
-    def invert_integral(self, values: FloatArray, less: float = 0.0) -> FloatArray:
+    def invert_integral(
+        self,
+        values: FloatArray,  # wanted
+        less: float = 0.0,  # below the function, or little above where that is near zero
+    ) -> FloatArray:
         """Return places up to which the integral of the function less a constant is as wanted.
 
         By Newton's method on the piece of each value: exact in the digits of the way into the piece. Where a piece
         bends much, or a value is beyond the ends, it may not get there: the integral tells.
-
-        Parameters
-        ----------
-        values : array
-            Wanted.
-        less : float
-            Below the function, or little above where that is near zero.
 
         Examples
         --------

@@ -116,18 +116,12 @@ def turn_points(points: FloatArray, angle: float, shift: FloatArray) -> FloatArr
     return moved
 
 
-def feet(curve: SmoothCurve, points: FloatArray, guess: FloatArray | None = None) -> FloatArray:
-    """Return the parameters of the closest points on a curve, by Newton's method.
-
-    Parameters
-    ----------
-    curve : SmoothCurve
-        Between its ends.
-    points : (n, 2) array
-        Near it.
-    guess : (n,) array, optional
-        First estimates; default: the nearest of some samples.
-    """
+def feet(
+    curve: SmoothCurve,  # between its ends
+    points: FloatArray,  # (n, 2): near it
+    guess: FloatArray | None = None,  # (n,): first estimates; default: the nearest of some samples
+) -> FloatArray:
+    """Return the parameters of the closest points on a curve, by Newton's method."""
     low, high = curve.ends
     if guess is None:
         samples = np.linspace(low, high, _N_SAMPLES)
@@ -291,20 +285,13 @@ def _registration(
     )  # fmt: skip
 
 
-def gaps_across(curve: SmoothCurve, points: FloatArray, parameters: FloatArray, axis: int = 0) -> FloatArray:
-    """Return how far points are from a curve along one axis: point less curve, at the same other coordinate.
-
-    Parameters
-    ----------
-    curve : SmoothCurve
-        Not parallel to the axis.
-    points : (n, 2) array
-        Registered.
-    parameters : (n,) array
-        Of their feet, to start from.
-    axis : {0, 1}
-        0 for the distance in x at the same y.
-    """
+def gaps_across(
+    curve: SmoothCurve,  # not parallel to the axis
+    points: FloatArray,  # (n, 2): registered
+    parameters: FloatArray,  # (n,): of their feet, to start from
+    axis: int = 0,  # 0 for the distance in x at the same y
+) -> FloatArray:
+    """Return how far points are from a curve along one axis: point less curve, at the same other coordinate."""
     low, high = curve.ends
     u = np.array(parameters)
     for _ in range(_N_FOOT_STEPS):

@@ -56,17 +56,14 @@ def neighbour_noise(places: FloatArray, values: FloatArray) -> float:
     return robust_scale(gaps / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
 
 
-def spikes(values: FloatArray) -> FloatArray:
+def spikes(
+    values: FloatArray,  # (n,): in the order of time
+) -> FloatArray:
     """Return how far samples stand off their neighbours as neither noise nor a smooth signal does; 0 for all others.
 
     A running median (Hampel's filter, seven samples) follows steps and slopes; what is off it by more
     than noise, usual steps and rounding explain is a spike. Spikes may be up to three samples long;
     the first and the last sample, which have neighbours on one side only, are none.
-
-    Parameters
-    ----------
-    values : (n,) array
-        In the order of time.
 
     References
     ----------

@@ -81,10 +81,7 @@ def bracketed_root(evaluate: Callable[[float], float], low: float, high: float, 
     Chandrupatla's method: inverse quadratic interpolation where it is safe, else bisection;
     it stops when the bracket is down to rounding.
 
-    Raises
-    ------
-    ValueError
-        If the function has the same sign at both ends, or is NaN on the way.
+    Raises ValueError if the function has the same sign at both ends, or is NaN on the way.
 
     References
     ----------

@@ -38,22 +38,14 @@ class SmoothedFunction:
         return values if derivative == 0 else np.where(inside == places, values, 0.0)
 
 
-def fit_smoothing_spline(places: FloatArray, values: FloatArray, noise: float) -> SmoothedFunction:
+def fit_smoothing_spline(
+    places: FloatArray,  # (n,): strictly increasing
+    values: FloatArray,  # (n,): noisy
+    noise: float,  # standard deviation of the noise; 0 interpolates
+) -> SmoothedFunction:
     """Return the smoothest cubic spline that is as near to the points as their noise.
 
-    Parameters
-    ----------
-    places : (n,) array
-        Strictly increasing.
-    values : (n,) array
-        Noisy.
-    noise : float
-        Standard deviation of the noise; 0 interpolates.
-
-    Raises
-    ------
-    ValueError
-        If there are too few points, or they do not increase.
+    Raises ValueError if there are too few points, or they do not increase.
     """
     from scipy.interpolate import BSpline
 

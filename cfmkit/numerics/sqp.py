@@ -100,20 +100,13 @@ def _excess(constraints: FloatArray) -> float:
     return max(0.0, -float(constraints.min(initial=np.inf)))
 
 
-def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Effort | None = None) -> Optimum:
-    """Return the best point found from a start, or the last one where that is requested.
-
-    Parameters
-    ----------
-    program : Program
-        What is minimised.
-    start : (n,) array
-        Where to begin; moved into the bounds.
-    bounds : (n, 2) array
-        Lowest and highest values; never left.
-    effort : Effort, optional
-        When to end.
-    """
+def minimize(
+    program: Program,  # what is minimised
+    start: FloatArray,  # (n,): where to begin; moved into the bounds
+    bounds: FloatArray,  # (n, 2): lowest and highest values; never left
+    effort: Effort | None = None,  # when to end
+) -> Optimum:
+    """Return the best point found from a start, or the last one where that is requested."""
     effort = effort or Effort()
     z = np.clip(start, *bounds.T)
     memory = _Memory(program, effort)

@@ -35,18 +35,14 @@ def list_phrases() -> str:
     return f"{', '.join(others)} or {last}"
 
 
-def sample_unit_cube(name: str, dimension: int, count: int, seed: int) -> FloatArray:
-    """Return points of the unit cube, (count, dimension).
-
-    Parameters
-    ----------
-    name : str
-        One of `SAMPLE_KINDS`.
-    dimension, count : int
-        Of the cube, and number of points.
-    seed : int
-        Of the permutations or the scrambling.
-    """
+def sample_unit_cube(
+    name: str,  # one of `SAMPLE_KINDS`
+    # dimension, count: of the cube, and number of points
+    dimension: int,
+    count: int,
+    seed: int,  # of the permutations or the scrambling
+) -> FloatArray:
+    """Return points of the unit cube, (count, dimension)."""
     import numpy as np
     from scipy.stats import qmc
 

@@ -149,10 +149,7 @@ class DrivenPart:
     def solve(self, report: Report = lambda _share, _text: None) -> AdaptiveSolution:
         """Return the part on a mesh on which its force is known as requested, or as closely as `MAX_NODES` allow.
 
-        Raises
-        ------
-        cfmkit.errors.GeometryError
-            If the outline cannot be meshed, or no node is where the part is held.
+        Raises GeometryError if the outline cannot be meshed, or no node is where the part is held.
         """
         meshed = self.part.create_mesh()
         coarse = meshed.densely(

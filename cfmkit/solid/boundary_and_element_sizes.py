@@ -158,25 +158,17 @@ class Sizes:
         return np.minimum(self.sizes[nearest] + SIZE_GRADING * distance, self.largest), np.asarray(distance)
 
 
-def sizes(rings: tuple[Ring, ...], largest: float, share: float, across: float) -> Sizes:
+def sizes(
+    rings: tuple[Ring, ...],  # its boundary
+    largest: float,  # largest size [m]
+    share: float,  # of the radius of a curved edge
+    # elements across the thickness at least: two six-node triangles carry the bending stress of a strip to 1e-3
+    across: float,
+) -> Sizes:
     """Return element sizes for a part.
 
-    Parameters
-    ----------
-    rings : tuple of Ring
-        Its boundary.
-    largest : float
-        Largest size [m].
-    share : float
-        Of the radius of a curved edge.
-    across : float
-        Elements across the thickness at least: two six-node triangles carry the bending stress of a strip to 1e-3.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the part is so thin somewhere, or its edge so sharply curved, that it would need elements `MOST_REFINED`
-        times smaller than the largest.
+    Raises GeometryError if the part is so thin somewhere, or its edge so sharply curved, that it would need elements
+    `MOST_REFINED` times smaller than the largest.
     """
     coarse = _resolve_sizes(*_wanted_sizes(rings, 0.5 * largest, largest, share, across), largest)[1]
     around = sum(float(ring.places[-1]) for ring in rings)

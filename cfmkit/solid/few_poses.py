@@ -188,23 +188,14 @@ def solve_some(guide: PoseGuide, travels: Sequence[float]) -> tuple[Balance, ...
 
 
 def follow_some(
-    guide: PoseGuide, poses: Sequence[Balance], stops: Sequence[float], allowed: float, report: Callable[[float], None]
+    guide: PoseGuide,  # with the path on the coarse mesh
+    poses: Sequence[Balance],  # that are solved on the fine mesh, the first and the last one of the path among them
+    stops: Sequence[float],  # travels at which poses were wanted, before steps were cut [m or rad]
+    # difference of the cubics and a pose, in parts of the largest effort, below which enough are solved
+    allowed: float,
+    report: Callable[[float], None],  # is given the share that is done
 ) -> MeshSolution | None:
-    """Return the path on a fine mesh at all travels of the coarse one; None if it has not the same course.
-
-    Parameters
-    ----------
-    guide : PoseGuide
-        With the path on the coarse mesh.
-    poses : sequence of Balance
-        That are solved on the fine mesh, the first and the last one of the path among them.
-    stops : sequence of float
-        Travels at which poses were wanted, before steps were cut [m or rad].
-    allowed : float
-        Difference of the cubics and a pose, in parts of the largest effort, below which enough are solved.
-    report : callable
-        Is given the share that is done.
-    """
+    """Return the path on a fine mesh at all travels of the coarse one; None if it has not the same course."""
     course, travels = guide.coarse.course, guide.coarse.course.travel.tolist()
     if course.ending is not PathEnd.COMPLETE or course.bifurcations or len(poses) < 3:
         return None

@@ -70,38 +70,19 @@ class TriangleMesh:
 
 
 def mesh(
-    rings: tuple[Ring, ...],
-    size: float,
-    share: float = 0.4,
-    across: float = 2.0,
+    rings: tuple[Ring, ...],  # boundary: around, and round every hole
+    size: float,  # side of an element where nothing asks for smaller ones [m]; single ones are up to 1.7 times as long
+    share: float = 0.4,  # the same on a curved edge, in its radii
+    across: float = 2.0,  # elements across the thickness at least
+    # sequence of (2, 2): ends of lines through the part along which elements meet [m]: where a clamp begins
     seams: Sequence[FloatArray] = (),
-    near: float = 0.0,
-    seed: int = 0,
+    near: float = 0.0,  # a node stands where a smooth edge that comes along a seam is farther from it than this [m]
+    seed: int = 0,  # of the points that are thrown
 ) -> TriangleMesh:
     """Return a mesh of the part within some rings.
 
-    Parameters
-    ----------
-    rings : tuple of Ring
-        Boundary: around, and round every hole.
-    size : float
-        Side of an element where nothing asks for smaller ones [m]; single ones are up to 1.7 times as long.
-    share : float
-        The same on a curved edge, in its radii.
-    across : float
-        Elements across the thickness at least.
-    seams : sequence of (2, 2) array
-        Ends of lines through the part along which elements meet [m]: where a clamp begins.
-    near : float
-        A node stands where a smooth edge that comes along a seam is farther from it than this [m].
-    seed : int
-        Of the points that are thrown.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the boundary crosses itself, the part is thinner somewhere than elements can resolve, or the mesh would have
-        more than `MOST_NODES`.
+    Raises GeometryError if the boundary crosses itself, the part is thinner somewhere than elements can resolve, or the
+    mesh would have more than `MOST_NODES`.
     """
     region = _region(rings)
     if (around := sum(float(ring.places[-1]) for ring in rings)) > size * MOST_NODES:

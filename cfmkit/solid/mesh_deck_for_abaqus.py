@@ -41,20 +41,13 @@ LINE_RTOL = 1e-6
 """Height of what counts as a line, in its length: outlines are drawn a little beside the line across a beam."""
 
 
-def deck(name: str, driven: DrivenPart) -> bytes:
+def deck(
+    name: str,  # for its heading
+    driven: DrivenPart,  # its travel is taken in as many even increments as it has stops
+) -> bytes:
     """Return a deck that runs as it is, of the mesh of an analysis before it is refined where the error asks for it.
 
-    Parameters
-    ----------
-    name : str
-        For its heading.
-    driven : DrivenPart
-        Its travel is taken in as many even increments as it has stops.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If constant loads act on it.
+    Raises UsageError if constant loads act on it.
     """
     part, stops = driven.part, driven.stops
     if any(place.load.any() for place in part.places):

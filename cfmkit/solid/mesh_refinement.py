@@ -71,17 +71,12 @@ class RefinedMesh:
         return np.asarray(csr_array((self.node_shares.ravel(), self.node_parents.ravel(), starts), shape) @ values)
 
 
-def refine(mesh: TriangleMesh, rings: tuple[Ring, ...], marked: NDArray[np.bool_] | None = None) -> RefinedMesh:
-    """Return a mesh with some triangles split in four, and neighbours as far as they must be.
-
-    Parameters
-    ----------
-    mesh : TriangleMesh
-    rings : tuple of Ring
-        The boundary that it was made on.
-    marked : (m,) array of bool, optional
-        Which triangles are split in four; all if left out.
-    """
+def refine(
+    mesh: TriangleMesh,
+    rings: tuple[Ring, ...],  # the boundary that it was made on
+    marked: NDArray[np.bool_] | None = None,  # (m,) of bool: which triangles are split in four; all if left out
+) -> RefinedMesh:
+    """Return a mesh with some triangles split in four, and neighbours as far as they must be."""
     rotated, halved = _halved_sides(mesh, marked)
     corners, parents, places = [], [], []
     patterns = halved[rotated[:, 3:]]

@@ -132,10 +132,7 @@ class Part:
         the thinnest
         place.
 
-        Raises
-        ------
-        cfmkit.errors.GeometryError
-            If the outline cannot be meshed so, or no node is where the part is held.
+        Raises GeometryError if the outline cannot be meshed so, or no node is where the part is held.
         """
         size = self.thinnest / ELEMENTS_ACROSS if size is None else size
         share = FILLET_ELEMENT_RATIO * size / (self.thinnest / ELEMENTS_ACROSS)
@@ -324,18 +321,13 @@ def largest_in(rings: Sequence[Ring], thinnest: float) -> float:
     return BLOCK_ELEMENT_RATIO if area > BULKY_AREA_RATIO * 0.5 * around * thinnest else 1.0
 
 
-def rings_of(contours: Sequence[Contour], thinnest: float = math.inf) -> tuple[Ring, ...]:
-    """Return the boundary that closed contours draw, as rings.
-
-    Parameters
-    ----------
-    contours : sequence of Contour
-        Outlines and holes.
-    thinnest : float
-        Thinnest place of the part [m]: rings are within `BOUNDARY_TOLERANCE` of it from arcs; smooth edges are taken
-        by their
-        points.
-    """
+def rings_of(
+    contours: Sequence[Contour],  # outlines and holes
+    # thinnest place of the part [m]: rings are within `BOUNDARY_TOLERANCE` of it from arcs; smooth edges are taken by
+    # their points
+    thinnest: float = math.inf,
+) -> tuple[Ring, ...]:
+    """Return the boundary that closed contours draw, as rings."""
     step = NODE_DISTANCE_TOL * thinnest if math.isfinite(thinnest) else 0.0
     return tuple(
         Ring.from_points(contour.points(BOUNDARY_TOLERANCE * thinnest, MAX_ARC_TURN), contour.hole, step)

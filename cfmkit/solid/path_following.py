@@ -91,14 +91,11 @@ class PosePath:
         """Of the poses that are solved, not put together, (j,) [m or rad]."""
         return np.array([pose.travel for pose in self.poses if pose.solved])
 
-    def law(self, sense: float = 1.0) -> CubicHermiteSpline:
-        """Return the cubics through the efforts and stiffnesses of the poses, of travel and effort times a sign.
-
-        Parameters
-        ----------
-        sense : float
-            1 or -1: that of a travel to the negative side makes it increase along the path.
-        """
+    def law(
+        self,
+        sense: float = 1.0,  # 1 or -1: that of a travel to the negative side makes it increase along the path
+    ) -> CubicHermiteSpline:
+        """Return the cubics through the efforts and stiffnesses of the poses, of travel and effort times a sign."""
         from scipy.interpolate import CubicHermiteSpline
 
         rising = sorted(self.poses, key=lambda pose: sense * pose.travel)
@@ -111,27 +108,14 @@ class PosePath:
 
 
 def follow(
-    problem: SolidProblem,
-    stops: Sequence[float],
-    report: Callable[[float], None] = lambda _share: None,
+    problem: SolidProblem,  # the part and its supports
+    stops: Sequence[float],  # travels, from rest on in one direction [m or rad]
+    report: Callable[[float], None] = lambda _share: None,  # is given the share of the travel that is done
+    # is given the effort of a pose [N or N m], and tells whether it is the last
     enough: Callable[[float], bool] = lambda _effort: False,
-    guide: PathGuide | None = None,
+    guide: PathGuide | None = None,  # predicts the unknowns
 ) -> PosePath:
-    """Return the poses of a part at some travels, on its stable branch.
-
-    Parameters
-    ----------
-    problem : SolidProblem
-        The part and its supports.
-    stops : sequence of float
-        Travels, from rest on in one direction [m or rad].
-    report : callable
-        Is given the share of the travel that is done.
-    enough : callable
-        Is given the effort of a pose [N or N m], and tells whether it is the last.
-    guide : PathGuide, optional
-        Predicts the unknowns.
-    """
+    """Return the poses of a part at some travels, on its stable branch."""
     part = FollowedPart(problem, guide=guide)
     start = _start(part, stops[0])
     if start is None:

@@ -75,25 +75,14 @@ def first_maximum(course: PosePath, sense: float) -> float:
 
 
 def travel_for(
-    meshed: Meshed, load: float, guess: float, poses: int, through_maxima: bool, report: Callable[[float], None]
+    meshed: Meshed,  # the part, coarsely
+    load: float,  # [N or N m]
+    guess: float,  # travel at which it may be [m or rad]
+    poses: int,  # solved for in the first range that is looked at
+    through_maxima: bool,  # whether maxima of the effort are passed
+    report: Callable[[float], None],  # is given the share that is done
 ) -> float:
-    """Return the travel within which a part reaches a load, or a maximum before it, with a margin [m or rad].
-
-    Parameters
-    ----------
-    meshed : Meshed
-        The part, coarsely.
-    load : float
-        [N or N m]
-    guess : float
-        Travel at which it may be [m or rad].
-    poses : int
-        Solved for in the first range that is looked at.
-    through_maxima : bool
-        Whether maxima of the effort are passed.
-    report : callable
-        Is given the share that is done.
-    """
+    """Return the travel within which a part reaches a load, or a maximum before it, with a margin [m or rad]."""
     travel, sense = guess, np.sign(load)
     for times in TRAVEL_RANGES:
         stops = np.linspace(0.0, times * guess, poses).tolist()

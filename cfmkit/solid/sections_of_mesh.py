@@ -26,10 +26,7 @@ def check_mesh(grid: TriangleMesh, area: float, sections: Sequence[BeamSection])
     Pieces of beams that are shorter than they are thick are not judged: where a thickness changes from station to
     station elements smooth the kinks between them.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        With the place and the values.
+    Raises GeometryError with the place and the values.
     """
     if abs(grid.area - area) > SECTION_RTOL * area:
         raise GeometryError(f"the mesh covers {1e6 * grid.area:.6g} mm2 of the part's {1e6 * area:.6g} mm2")

@@ -112,15 +112,11 @@ class FilletStress:
         return float(np.copysign(found[worst], self.stress[nearest])), float(places[worst])
 
 
-def stressed_fillets(solved: MeshSolution, radius: float) -> tuple[FilletStress, ...]:
-    """Return the fillets of a solved part, as its boundary runs; without those of its rigid pieces.
-
-    Parameters
-    ----------
-    solved : MeshSolution
-    radius : float
-        Of its fillets [m]; 0 if it has none.
-    """
+def stressed_fillets(
+    solved: MeshSolution,
+    radius: float,  # of its fillets [m]; 0 if it has none
+) -> tuple[FilletStress, ...]:
+    """Return the fillets of a solved part, as its boundary runs; without those of its rigid pieces."""
     grid, rising = solved.problem.elements.mesh, np.argsort(solved.course.travel)
     stress, nodes = solved.along_edges
     ring_of = np.zeros(len(grid.nodes), int)

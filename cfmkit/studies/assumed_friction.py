@@ -17,16 +17,11 @@ PLAIN_FRICTION = 0.15
 """Coefficient of pins and guide, assumed: dry steel on steel has 0.1 to 0.2."""
 
 
-def friction_note(result: Result, run: Run) -> str:
-    """Return the mean force both ways with pins and guide that rub as assumed; empty where friction is stated.
-
-    Parameters
-    ----------
-    result : Result
-        Of a design; mechanisms without pins have no note.
-    run : Run
-        For the analysis with friction.
-    """
+def friction_note(
+    result: Result,  # of a design; mechanisms without pins have no note
+    run: Run,  # for the analysis with friction
+) -> str:
+    """Return the mean force both ways with pins and guide that rub as assumed; empty where friction is stated."""
     record, mechanism = family(result.spec.family), getattr(result.spec, "mechanism", None)
     stated = [getattr(mechanism, key, False) for key in ("pins", "guide")]
     if stated != [None, None] or not record.part or not result.status.usable:

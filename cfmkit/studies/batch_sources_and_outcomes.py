@@ -86,21 +86,15 @@ class Entry:
         }
 
 
-def sources(named: Iterable[str], out: str) -> tuple[str, ...]:
+def sources(
+    # a folder stands for all YAML files in it and below; ``*``, ``?``, ``[...]`` and ``**`` are patterns unless there
+    # is a file of that very name
+    named: Iterable[str],
+    out: str,  # the output folder, which is not searched
+) -> tuple[str, ...]:
     """Return the files that names stand for: files, folders and patterns, each file once, in order.
 
-    Parameters
-    ----------
-    named : iterable of str
-        A folder stands for all YAML files in it and below; ``*``, ``?``, ``[...]`` and
-        ``**`` are patterns unless there is a file of that very name.
-    out : str
-        The output folder, which is not searched.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If a name stands for no file.
+    Raises UsageError if a name stands for no file.
     """
     paths: dict[str, str] = {}
     for name in named:
@@ -126,20 +120,13 @@ def _matches(name: str, out: str) -> list[str]:
     return paths
 
 
-def files_below(folder: str, out: str = OUTPUT_FOLDER) -> list[str]:
+def files_below(
+    folder: str,  # where to look
+    out: str = OUTPUT_FOLDER,  # an output folder, which is not searched
+) -> list[str]:
     """Return the YAML files in a folder and below, those in folders of results left out.
 
-    Parameters
-    ----------
-    folder : str
-        Where to look.
-    out : str
-        An output folder, which is not searched.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is none.
+    Raises UsageError if there is none.
     """
     paths = [
         os.path.join(folder, path) for path in _search("**/*", out, folder) if path.lower().endswith(SPEC_SUFFIXES)

@@ -31,25 +31,17 @@ NEED_TIME = ("force_after", "torque_after")
 """Metrics of a time, which their name says: without one there is nothing to note."""
 
 
-def metrics_of(spec: Spec, names: Iterable[str], sample: Curve | None = None) -> tuple[Metric, ...]:
+def metrics_of(
+    spec: Spec,  # its family knows more metrics
+    names: Iterable[str],  # what is requested; none for the default
+    sample: Curve | None = None,  # a curve of the study, which says whether it is about forces or torques
+) -> tuple[Metric, ...]:
     """Return the metrics with these names; without names, every one that such a curve can have.
 
     The default has one column per metric, over all branches, and then the family's own
     values. A branch is had by name only: ``force_mean[load]``.
 
-    Parameters
-    ----------
-    spec : Spec
-        Its family knows more metrics.
-    names : iterable of str
-        What is requested; none for the default.
-    sample : Curve, optional
-        A curve of the study, which says whether it is about forces or torques.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If a metric or its branch is not known.
+    Raises UsageError if a metric or its branch is not known.
     """
     outputs, kind = family(spec.family).outputs, sample.kind if sample is not None else "force"
     own = values_of_family(outputs.values)

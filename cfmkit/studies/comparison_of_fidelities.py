@@ -138,12 +138,7 @@ def _side(item: Variant) -> Compared:
 def choices_of(spec: Spec) -> Choices:
     """Return the models that a specification can be run by.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the family has one model only.
-    cfmkit.errors.SpecError
-        If the specification has data for one of them only.
+    Raises UsageError if the family has one model only; SpecError if the specification has data for one of them only.
     """
     record = family(spec.family)
     names = tuple(record.models)
@@ -161,18 +156,12 @@ def choices_of(spec: Spec) -> Choices:
     return Choices(names, specs, obstacles)
 
 
-def compare(nominal: Result, choices: Choices, run: Run) -> FidelityComparison:
-    """Return a result beside those of all other models that can run.
-
-    Parameters
-    ----------
-    nominal : Result
-        Of the specification as it is.
-    choices : Choices
-        Of the same specification.
-    run : Run
-        For the other models.
-    """
+def compare(
+    nominal: Result,  # of the specification as it is
+    choices: Choices,  # of the same specification
+    run: Run,  # for the other models
+) -> FidelityComparison:
+    """Return a result beside those of all other models that can run."""
     own = fidelity_of(nominal)
     analyze = family(nominal.spec.family).analyze
     others = (Variant(name, windows_judged(analyze(spec, run))) for name, spec in choices.specs.items() if name != own)
@@ -182,10 +171,7 @@ def compare(nominal: Result, choices: Choices, run: Run) -> FidelityComparison:
 def fidelity_of(result: Result) -> str:
     """Return the fidelity of the model that a result comes from.
 
-    Raises
-    ------
-    cfmkit.errors.CfmError
-        If the family does not write it into the specification of its results.
+    Raises CfmError if the family does not write it into the specification of its results.
     """
     # A result that failed early has the specification as it was given: there the family's own rule applies.
     name = result.spec.get_value(FIDELITY_KEY) or getattr(result.spec, "fidelity", None)

@@ -18,20 +18,15 @@ if TYPE_CHECKING:
     from cfmkit.studies.point_evaluation import Designer
 
 
-def run_design(spec: Spec, designer: Designer, run: Run) -> Design:
-    """Return the design of a specification, with all that its block `design` asks for, or why there is none.
-
-    Parameters
-    ----------
-    spec : Spec
-        With a `design` block.
-    designer : callable
-        What designs perfect parts of the family.
-    run : Run
-        Seed, progress, time budget. If a yield is requested, the search for the perfect part has half of the time, and
-        that for its margins what is left. A part from a sheet is designed again for its solid, with the whole budget:
-        with what is left, the finished design could be lost.
-    """
+def run_design(
+    spec: Spec,  # with a `design` block
+    designer: Designer,  # what designs perfect parts of the family
+    # seed, progress, time budget. If a yield is requested, the search for the perfect part has half of the time, and
+    # that for its margins what is left. A part from a sheet is designed again for its solid, with the whole budget:
+    # with what is left, the finished design could be lost
+    run: Run,
+) -> Design:
+    """Return the design of a specification, with all that its block `design` asks for, or why there is none."""
     from cfmkit.studies.stock_and_digits import with_digits_of_process, with_stock_sheet, with_whole_strands
 
     found = _finished_design(spec, designer, run)

@@ -273,24 +273,12 @@ class Records:
 
 
 def run(
-    work: Work,
-    executor: Executor = serial,
-    journal: Journal | Memory | None = None,
-    monitor: Monitor | None = None,
+    work: Work,  # study and plan
+    executor: Executor = serial,  # how jobs get done: `serial`, a `Pool`, a `Cluster`
+    journal: Journal | Memory | None = None,  # where rows are noted; without one they are kept in memory
+    monitor: Monitor | None = None,  # progress callback with cancellation
 ) -> Records:
-    """Return the rows of a study; those that the journal has are not computed again.
-
-    Parameters
-    ----------
-    work : Work
-        Study and plan.
-    executor : callable
-        How jobs get done: `serial`, a `Pool`, a `Cluster`.
-    journal : Journal, optional
-        Where rows are noted; without one they are kept in memory.
-    monitor : Monitor, optional
-        Progress callback with cancellation.
-    """
+    """Return the rows of a study; those that the journal has are not computed again."""
     study = work.study
     if study.design and family(study.spec.family).design is None:
         raise UsageError(f"{family(study.spec.family).phrase} cannot be designed, only analysed")

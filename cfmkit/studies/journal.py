@@ -97,10 +97,7 @@ class Journal:
     def read(self, key: str) -> Any:
         """Return the record of a key.
 
-        Raises
-        ------
-        cfmkit.errors.OutputError
-            If it is not there any more.
+        Raises OutputError if it is not there any more.
         """
         record = self._record("", key)
         if record is None:
@@ -110,10 +107,7 @@ class Journal:
     def add(self, key: str, record: Any) -> None:
         """Keep a record of JSON values; it survives the death of the process from now on.
 
-        Raises
-        ------
-        cfmkit.errors.OutputError
-            If it cannot be written.
+        Raises OutputError if it cannot be written.
         """
         packed = zlib.compress(json.dumps(record, separators=(",", ":")).encode(), 1)
         with self._reporting("write"):
@@ -131,10 +125,7 @@ class Journal:
 
         Those of a writer that opened the file later stay.
 
-        Raises
-        ------
-        cfmkit.errors.OutputError
-            If it cannot be written; what was there is still there.
+        Raises OutputError if it cannot be written; what was there is still there.
         """
         with self._reporting("write"):
             self._db.execute("CREATE TEMP TABLE IF NOT EXISTS used (key BLOB PRIMARY KEY) WITHOUT ROWID")

@@ -53,10 +53,7 @@ class BatchComparison:
 def read_earlier_batch(folder: str) -> Known:
     """Return the results of an earlier batch by folder of the specification; one that wrote nothing has no metrics.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the folder is not one of a batch.
+    Raises UsageError if the folder is not one of a batch.
     """
     whole = _read_json(os.path.join(folder, "metrics.json"))
     if whole is None or not isinstance(listed := whole.get("specs"), list):
@@ -80,21 +77,12 @@ def _read_json(path: str) -> dict[str, Any] | None:
 
 
 def changes(
-    known: Known, entries: Sequence[Entry], folder: str, tolerance: float = COMPARISON_RTOL
+    known: Known,  # the earlier results, from `read_earlier_batch`
+    entries: Sequence[Entry],  # what was found now; those that the earlier batch did not have are new, and no change
+    folder: str,  # where they have their folders
+    tolerance: float = COMPARISON_RTOL,  # relative change of a metric up to which it counts as the same
 ) -> tuple[MetricChange, ...]:
-    """Return what is not as it was, in the order of the specifications and their metrics.
-
-    Parameters
-    ----------
-    known : mapping of str to Earlier
-        The earlier results, from `read_earlier_batch`.
-    entries : sequence of Entry
-        What was found now; those that the earlier batch did not have are new, and no change.
-    folder : str
-        Where they have their folders.
-    tolerance : float
-        Relative change of a metric up to which it counts as the same.
-    """
+    """Return what is not as it was, in the order of the specifications and their metrics."""
     found: list[MetricChange] = []
     for entry in entries:
         before = known.get(entry.folder)

@@ -53,21 +53,12 @@ def findings(records: Records, summary: Summary) -> StudyMarks:
 
 
 def scales(
-    spec: Spec, varied: Sequence[tuple[str, str]], shown: Sequence[Any], words: Sequence[Sequence[str]]
+    spec: Spec,  # whose keys they are
+    varied: Sequence[tuple[str, str]],  # path and dimension of each
+    shown: Sequence[Any],  # their values at every point, in border units
+    words: Sequence[Sequence[str]],  # of those that are not numbers: what they may be, in order
 ) -> tuple[DrawnScale, ...]:
-    """Return what varied as it is drawn.
-
-    Parameters
-    ----------
-    spec : Spec
-        Whose keys they are.
-    varied : sequence of (str, str)
-        Path and dimension of each.
-    shown : sequence of (n,) sequence
-        Their values at every point, in border units.
-    words : sequence of sequence of str
-        Of those that are not numbers: what they may be, in order.
-    """
+    """Return what varied as it is drawn."""
     about = {key.path: key.description for key in keys(type(spec))}
     names = short_names([path for path, _ in varied])
     return tuple(
@@ -154,19 +145,13 @@ def _branches(table: Table) -> dict[str, tuple[FloatArray, FloatArray]]:
 
 
 def makers_of_tables(
-    spec: Spec, summary: Mapping[str, Any], table: Table, curves: Table | None
+    spec: Spec,  # what was swept
+    summary: Mapping[str, Any],  # as metrics.json
+    # table, curves: as results.csv and curves.csv, which not every sweep has
+    table: Table,
+    curves: Table | None,
 ) -> dict[str, Callable[[], Figure]]:
-    """Return what draws each picture of a sweep, by name.
-
-    Parameters
-    ----------
-    spec : Spec
-        What was swept.
-    summary : mapping
-        As metrics.json.
-    table, curves : Table
-        As results.csv and curves.csv, which not every sweep has.
-    """
+    """Return what draws each picture of a sweep, by name."""
     found = _marks(spec, summary, table)
     lines, labels = _curves(curves, found)
     return figures(found, lines, labels)

@@ -115,10 +115,7 @@ def _array(values: Levels) -> NDArray[Any]:
 def grid(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
     """Return every combination; the first axis varies slowest.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there are more points than allowed; nothing is allocated before that is known.
+    Raises UsageError if there are more points than allowed; nothing is allocated before that is known.
     """
     size = math.prod(item.count or 0 for item in axes)
     refuse_too_many(size, most)
@@ -128,10 +125,7 @@ def grid(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
 def zip_axes(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
     """Return the values side by side: the first of each, the second of each, ...
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the axes have different numbers of values, or too many.
+    Raises UsageError if the axes have different numbers of values, or too many.
     """
     counts = {item.leaf.path: item.count or 0 for item in axes}
     if len(set(counts.values())) > 1:
@@ -161,10 +155,7 @@ def sample_axes(axes: Sequence[Axis], draw: Draw, most: int = MOST_POINTS) -> Pl
 
     Lists and whole numbers get each of their values with the same probability.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there are more points than allowed.
+    Raises UsageError if there are more points than allowed.
     """
     refuse_too_many(draw.count, most)
     unit = sample_unit_cube(draw.method, len(axes), draw.count, draw.seed)
@@ -174,10 +165,7 @@ def sample_axes(axes: Sequence[Axis], draw: Draw, most: int = MOST_POINTS) -> Pl
 def refuse_too_many(size: int, most: int) -> None:
     """Raise if a study has more points than allowed.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        With both numbers and the way out.
+    Raises UsageError with both numbers and the way out.
     """
     if size > most:
         raise UsageError(f"{size} points are more than {most}; vary less, or allow them with --max-points {size}")

@@ -153,10 +153,7 @@ class Study:
     def variant(self, values: Sequence[Any]) -> Spec:
         """Return the specification of one point.
 
-        Raises
-        ------
-        cfmkit.errors.SpecError
-            If it is not valid.
+        Raises SpecError if it is not valid.
         """
         return self.plain.replace(dict(zip(self.paths, values, strict=True)), as_made=self.manufactured)
 

@@ -115,10 +115,7 @@ class Pool:
     def __call__(self, work: Work, jobs: Iterator[Any], stopping: Stopping = never) -> Iterator[tuple[Any, Any]]:
         """Yield (job, outcome) as they finish; a lost job's outcome is `Lost`.
 
-        Raises
-        ------
-        cfmkit.errors.CfmError
-            If the processes cannot be started.
+        Raises CfmError if the processes cannot be started.
         """
         with _Crew(self, work, jobs, stopping) as crew:
             while crew.hire():
@@ -244,10 +241,7 @@ class _Crew:
 def pack_registrations() -> bytes:
     """Return what a worker registers before it begins: families and metrics that were added to this process.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If another process cannot import one of them.
+    Raises UsageError if another process cannot import one of them.
     """
     from cfmkit import families
     from cfmkit.specs import own_metrics

@@ -49,16 +49,11 @@ class AsDrawn:
         return drawn
 
 
-def move_free_values(spec: Spec, run: Run) -> Design:
-    """Return a specification whose free values were moved until all requirements are met, or why there is none.
-
-    Parameters
-    ----------
-    spec : Spec
-        With a block `design` that states `free`, and no target of its family.
-    run : Run
-        Seed, progress, time budget.
-    """
+def move_free_values(
+    spec: Spec,  # with a block `design` that states `free`, and no target of its family
+    run: Run,  # seed, progress, time budget
+) -> Design:
+    """Return a specification whose free values were moved until all requirements are met, or why there is none."""
     from cfmkit.experiment.aimed_curve import aim_of
     from cfmkit.experiment.redrawn_values import Redesign, limits_of
     from cfmkit.studies.verify_design_by_solid_model import verify_by_solid

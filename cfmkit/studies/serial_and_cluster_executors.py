@@ -150,11 +150,8 @@ class Cluster:
     def __call__(self, work: Work, jobs: Iterator[Any], stopping: Stopping = never) -> Iterator[tuple[Any, Any]]:
         """Yield (job, outcome) as they finish; a lost job's outcome is `Lost`.
 
-        Raises
-        ------
-        cfmkit.errors.UsageError
-            If Dask is not installed, the scheduler does not answer or goes away, there are no workers, or a worker has
-            other code or libraries.
+        Raises UsageError if Dask is not installed, the scheduler does not answer or goes away, there are no workers, or
+        a worker has other code or libraries.
         """
         _refuse_odd(self.address)
         with _client(self.address, self.workers) as client:
@@ -280,10 +277,7 @@ class _ClusterRun:
     def _threads(self) -> int:
         """Return how many threads the workers have.
 
-        Raises
-        ------
-        cfmkit.errors.UsageError
-            If the scheduler has gone, or there has been no worker for too long.
+        Raises UsageError if the scheduler has gone, or there has been no worker for too long.
         """
         with self._check_connection():
             threads = int(sum(self.client.nthreads().values()))

@@ -52,12 +52,8 @@ class SweepRequest:
 def prepare(spec: Spec, request: SweepRequest) -> Work:
     """Return what a sweep has to do, with everything checked that can be before a point is computed.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is nothing to vary, too much, or a metric that does not exist.
-    cfmkit.errors.SpecError
-        If a path or value is wrong.
+    Raises UsageError if there is nothing to vary, too much, or a metric that does not exist; SpecError if a path or
+    value is wrong.
     """
     block = spec.sweep
     asked = request.vary or (collect_variations(block.vary) if block else ())

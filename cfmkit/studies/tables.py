@@ -24,16 +24,11 @@ if TYPE_CHECKING:
     Watch = Callable[[NDArray[np.int64], ResultRows], None]
 
 
-def results_csv(records: Records, watch: Watch | None = None) -> Iterator[bytes]:
-    """Yield results.csv: what varies, the metrics, whether the requirements are met, status, warnings, message.
-
-    Parameters
-    ----------
-    records : Records
-        Finished rows; others are left out.
-    watch : callable, optional
-        Is shown every piece, (indices, rows), on the way.
-    """
+def results_csv(
+    records: Records,  # finished rows; others are left out
+    watch: Watch | None = None,  # is shown every piece, (indices, rows), on the way
+) -> Iterator[bytes]:
+    """Yield results.csv: what varies, the metrics, whether the requirements are met, status, warnings, message."""
     first = True
     for indices, rows in records.batches():
         if watch is not None:

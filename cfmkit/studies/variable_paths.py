@@ -47,10 +47,7 @@ class Leaf:
     def read(self, given: Any) -> tuple[Value, str]:
         """Return (value as `Spec.replace` takes it, dimension) of what a user wrote.
 
-        Raises
-        ------
-        CannotVary
-            If it is not what this leaf holds.
+        Raises CannotVary if it is not what this leaf holds.
         """
         if self.kind == "quantity" and self.quantity is not None:
             return self._quantity(given, self.quantity)
@@ -104,10 +101,7 @@ def _lengths(tree: Any, path: str) -> Iterator[tuple[str, float]]:
 def leaf(spec_type: type[Spec], path: str) -> Leaf:
     """Return what stands at a dotted path of a specification.
 
-    Raises
-    ------
-    CannotVary
-        If there is nothing, or nothing that can be varied; a near miss is named.
+    Raises CannotVary if there is nothing, or nothing that can be varied; a near miss is named.
     """
     here: tuple[Slot, ...] = (Slot(spec_type),)
     parts = path.split(".")

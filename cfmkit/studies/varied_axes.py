@@ -47,12 +47,7 @@ class Axis:
 def parse_variation(option: str) -> WantedVariation:
     """Return what ``--vary PATH=...`` asks for.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is malformed.
-    cfmkit.errors.SpecError
-        If its list holds what no specification may.
+    Raises UsageError if it is malformed; SpecError if its list holds what no specification may.
     """
     from cfmkit.specs.units.strict_decimal_number import quote
     from cfmkit.specs.yamlio.tree_builder import read_text
@@ -82,24 +77,15 @@ def collect_variations(vary: Mapping[str, Any]) -> tuple[WantedVariation, ...]:
     return tuple(found)
 
 
-def axes(spec: Spec, wanted: Iterable[WantedVariation], drawn: bool = False, joint: bool = False) -> tuple[Axis, ...]:
+def axes(
+    spec: Spec,  # what is varied
+    wanted: Iterable[WantedVariation],  # in order; the first varies slowest
+    drawn: bool = False,  # whether values are drawn from ranges (``start:stop``) rather than stepped through
+    joint: bool = False,  # whether the lists are gone through side by side, so that one of them may repeat a value
+) -> tuple[Axis, ...]:
     """Return what varies, checked against a specification.
 
-    Parameters
-    ----------
-    spec : Spec
-        What is varied.
-    wanted : iterable of WantedVariation
-        In order; the first varies slowest.
-    drawn : bool
-        Whether values are drawn from ranges (``start:stop``) rather than stepped through.
-    joint : bool
-        Whether the lists are gone through side by side, so that one of them may repeat a value.
-
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        With every fault of every request.
+    Raises SpecError with every fault of every request.
     """
     asked = tuple(wanted)
     problems = [Problem(one.source, 0, 0, "", message) for one, message in faults(spec, asked, drawn, joint)]
@@ -130,10 +116,7 @@ def faults(
 def axis(spec: Spec, one: WantedVariation, drawn: bool) -> Axis:
     """Return one thing that varies.
 
-    Raises
-    ------
-    CannotVary
-        If path or values are wrong.
+    Raises CannotVary if path or values are wrong.
     """
     found = leaf(type(spec), one.path)
     made = _listed_axis(found, one.content) if isinstance(one.content, tuple) else _range(found, one.content, drawn)

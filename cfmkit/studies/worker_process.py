@@ -49,14 +49,10 @@ def receive(pipe: IO[bytes] | None) -> bytes | None:
     return message if head and len(message) == length else None
 
 
-def main(parent: int) -> None:
-    """Serve jobs until the parent ends this process, or has gone.
-
-    Parameters
-    ----------
-    parent : int
-        The parent's process id if the kernel may watch it, else 0.
-    """
+def main(
+    parent: int,  # the parent's process id if the kernel may watch it, else 0
+) -> None:
+    """Serve jobs until the parent ends this process, or has gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     warnings.simplefilter("ignore")
     _ask_the_kernel(parent)

@@ -41,30 +41,14 @@ class ChosenState(NamedTuple):
 
 
 def choose_friction(
-    piece: PieceOfPath,
-    at: PathEquilibrium,
-    senses: tuple[float, ...],
-    changed: int | None = None,
-    settled: int | None = None,
-    turns: bool = False,
+    piece: PieceOfPath,  # with the contacts that are closed there, and what friction did before
+    at: PathEquilibrium,  # in the unknowns of all contacts
+    senses: tuple[float, ...],  # senses of the drive, the first that is possible is taken
+    changed: int | None = None,  # contact that begins or ends there
+    settled: int | None = None,  # contact that can only go on as the piece says
+    turns: bool = False,  # whether the drive turns back: what slips is tried to stick first
 ) -> ChosenState | None:
-    """Return the first combination of states of friction that can go on from an equilibrium; None if none can.
-
-    Parameters
-    ----------
-    piece : PieceOfPath
-        With the contacts that are closed there, and what friction did before.
-    at : PathEquilibrium
-        In the unknowns of all contacts.
-    senses : tuple of float
-        Senses of the drive, the first that is possible is taken.
-    changed : int, optional
-        Contact that begins or ends there.
-    settled : int, optional
-        Contact that can only go on as the piece says.
-    turns : bool
-        Whether the drive turns back: what slips is tried to stick first.
-    """
+    """Return the first combination of states of friction that can go on from an equilibrium; None if none can."""
     numbers = [k for k in sorted(piece.closed) if piece.whole.mesh.contacts[k].rub >= 0]
     choices = [[piece.friction[k]] if k == settled else list(_continuations(piece, at, k, turns)) for k in numbers]
     several = [k for k, states in enumerate(choices) if len(states) > 1]

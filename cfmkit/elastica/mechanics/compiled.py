@@ -198,10 +198,7 @@ class CompiledEquations(NumpyEquations):
     def resolve(self, free: FloatArray, place: float, right: FloatArray) -> tuple[FloatArray, int]:
         """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable directions.
 
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            If the tangent is singular.
+        Raises LinAlgError if the tangent is singular.
         """
         solutions, count = np.array(right, float, order="C"), np.zeros(1, np.int64)
         if self.code.resolve(self.row, np.ascontiguousarray(free, float), solutions, count, place):

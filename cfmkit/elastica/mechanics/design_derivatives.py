@@ -113,16 +113,12 @@ def _by_attachments(mesh: Discretisation, z: Any, first: Any, last: Any) -> dict
     return {"origin": force, "arm": arm, "frame": np.stack([fx * x + fy * y, fy * x - fx * y], axis=-1)}
 
 
-def effort_motions(at: Equilibria, rates: FloatArray | None = None) -> FloatArray:
-    """Return w, the motion of all unknowns that the effort is the work of, (p, size).
-
-    Parameters
-    ----------
-    at : Equilibria
-        Under a drive by a motion.
-    rates : (p, n) array, optional
-        Slopes of the free unknowns along the path: they are w unless loads grow with the drive, or follow.
-    """
+def effort_motions(
+    at: Equilibria,  # under a drive by a motion
+    # (p, n): slopes of the free unknowns along the path: they are w unless loads grow with the drive, or follow
+    rates: FloatArray | None = None,
+) -> FloatArray:
+    """Return w, the motion of all unknowns that the effort is the work of, (p, size)."""
     mesh = at.mesh
     loads = [load for load in mesh.loads if load.grows or load.item.follows]
     found = np.tile(mesh.rate, (len(at.z), 1))
@@ -137,18 +133,12 @@ def effort_motions(at: Equilibria, rates: FloatArray | None = None) -> FloatArra
     return found
 
 
-def effort_slopes(at: Equilibria, designs: NetworkDesigns, rates: FloatArray | None = None) -> FloatArray:
-    """Return the derivatives of the effort by variables at points of a path, (p, k) [N or N m].
-
-    Parameters
-    ----------
-    at : Equilibria
-        Under a drive by a motion, of the designs' template.
-    designs : NetworkDesigns
-        A complex step of `COMPLEX_STEP` in each variable.
-    rates : (p, n) array, optional
-        Slopes of the free unknowns along the path, if they are known.
-    """
+def effort_slopes(
+    at: Equilibria,  # under a drive by a motion, of the designs' template
+    designs: NetworkDesigns,  # a complex step of `COMPLEX_STEP` in each variable
+    rates: FloatArray | None = None,  # (p, n): slopes of the free unknowns along the path, if they are known
+) -> FloatArray:
+    """Return the derivatives of the effort by variables at points of a path, (p, k) [N or N m]."""
     mesh, motions = at.mesh, effort_motions(at, rates)
     stepped = at.z + 1j * COMPLEX_STEP * motions
     idle = {"gap"} if mesh.elements.line.any() else {"gap", "ahead", "length"}  # the effort does not depend on these
@@ -232,10 +222,7 @@ def _held_forces(at: Equilibria, motions: FloatArray) -> FloatArray:
 def unknown_slopes(at: Equilibria, designs: NetworkDesigns, forces: FloatArray) -> FloatArray:
     """Return the derivatives of all unknowns by variables, (p, k, size), from those of the gradient (`force_slopes`).
 
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If a tangent is singular.
+    Raises LinAlgError if a tangent is singular.
     """
     mesh, chosen = at.mesh, at.mesh.free
     own = equations(mesh)

@@ -54,24 +54,13 @@ class NetworkDesigns:
 
 
 def set_up(
-    template: Discretisation,
-    origin: tuple[Network, Drive],
-    networks: Sequence[tuple[Network, Drive]],
+    template: Discretisation,  # of one of them, or of the network that they differ from
+    origin: tuple[Network, Drive],  # (Network, Drive): what the template was made of
+    networks: Sequence[tuple[Network, Drive]],  # they may hold complex steps
+    # how one is set up by itself; as the template was, with one piece a beam, unless given
     make: Callable[[Network, Drive], Discretisation] | None = None,
 ) -> NetworkDesigns:
-    """Return the arrays of networks of one topology.
-
-    Parameters
-    ----------
-    template : Discretisation
-        Of one of them, or of the network that they differ from.
-    origin : (Network, Drive)
-        What the template was made of.
-    networks : sequence of (Network, Drive)
-        They may hold complex steps.
-    make : callable, optional
-        How one is set up by itself; as the template was, with one piece a beam, unless given.
-    """
+    """Return the arrays of networks of one topology."""
     pairs = tuple(networks)
     if _all_plain(template, origin, pairs):
         return _plain(template, origin, pairs)

@@ -167,41 +167,23 @@ class Discretisation:
 
 
 def discretise(
+    # network, drive: they may hold complex steps: then the arrays do, with `scales` those of the network without them
     network: Network,
     drive: Drive,
-    degree: int = 10,
-    pieces: int = 1,
-    tension: Mapping[str, float] | None = None,
-    scales: MechanicsUnits | None = None,
-    fits: BeamFits | None = None,
+    degree: int = 10,  # of the rotation on an element, at least 2
+    pieces: int = 1,  # elements for every smooth piece of a beam, at least
+    tension: Mapping[str, float] | None = None,  # beams under a large tension N to their L sqrt(N/EI)
+    scales: MechanicsUnits | None = None,  # units; found from the beams unless given
+    fits: BeamFits | None = None,  # those of the same network, if it was set up before
+    # parameters between which the elements of each beam lie; found from degree, pieces and tension unless given
     cuts: Mapping[str, list[float]] | None = None,
+    # places at which sides of beams may touch obstacles; of one beam in ascending order
     flanks: Sequence[FlankPlace] = (),
 ) -> Discretisation:
     """Return the arrays of a network under a drive.
 
-    Parameters
-    ----------
-    network, drive : Network, Drive
-        They may hold complex steps: then the arrays do, with `scales` those of the network without them.
-    degree : int
-        Of the rotation on an element, at least 2.
-    pieces : int
-        Elements for every smooth piece of a beam, at least.
-    tension : mapping, optional
-        Beams under a large tension N to their L sqrt(N/EI).
-    scales : MechanicsUnits, optional
-        Units; found from the beams unless given.
-    fits : BeamFits, optional
-        Those of the same network, if it was set up before.
-    cuts : mapping, optional
-        Parameters between which the elements of each beam lie; found from degree, pieces and tension unless given.
-    flanks : sequence of FlankPlace
-        Places at which sides of beams may touch obstacles; of one beam in ascending order.
-
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If the driven node cannot move along the drive, or beams with offsets hang at a node that is pinned to an arm.
+    Raises InputError if the driven node cannot move along the drive, or beams with offsets hang at a node that is
+    pinned to an arm.
     """
     fits = fits or BeamFits(network)
     return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build(cuts, tuple(flanks))

@@ -25,20 +25,16 @@ if TYPE_CHECKING:
 SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
 
 
-def element_tables(fits: BeamFits, scales: MechanicsUnits, degree: int, row: Any, cuts: FloatArray) -> dict[str, Any]:
-    """Return the tables of the elements between cuts of the beams, one beam after the other.
-
-    Parameters
-    ----------
-    fits : BeamFits
-        The beams of a network.
-    scales : MechanicsUnits
-        Units of the tables.
-    degree : int
-        Of the rotation on an element.
-    row, cuts : (e,), (e, 2) arrays
-        Number of each element's beam, ascending, and the parameters of its shape between which it lies.
-    """
+def element_tables(
+    fits: BeamFits,  # the beams of a network
+    scales: MechanicsUnits,  # units of the tables
+    degree: int,  # of the rotation on an element
+    # row, cuts: (e,), (e, 2): number of each element's beam, ascending, and the parameters of its shape between which
+    # it lies
+    row: Any,
+    cuts: FloatArray,
+) -> dict[str, Any]:
+    """Return the tables of the elements between cuts of the beams, one beam after the other."""
     beams, bundle = fits.network.beams, fits.bundle
     wide = any(beam.section.wide for beam in beams.values())
     plain, together, first = [] if wide else bundle.plain, dict[str, Any](), 0
@@ -61,19 +57,18 @@ def element_tables(fits: BeamFits, scales: MechanicsUnits, degree: int, row: Any
 
 
 def plain_tables(
-    coefficients: Any, length: Any, rigidities: Any, scales: MechanicsUnits, degree: int, row: Any, cuts: FloatArray
+    # coefficients, length, rigidities: (..., b, m), (..., b), (3, ..., b): as of `Bundle`, [rad], [m], [N m2], [1/N]
+    coefficients: Any,
+    length: Any,
+    rigidities: Any,
+    # scales, degree: as of `element_tables`
+    scales: MechanicsUnits,
+    degree: int,
+    # row, cuts: (e,), (e, 2): number of each element's beam, and the parameters between which it lies
+    row: Any,
+    cuts: FloatArray,
 ) -> dict[str, Any]:
-    """Return the tables of elements of plain beams, of one network or of d: (e, q) or (d, e, q) each.
-
-    Parameters
-    ----------
-    coefficients, length, rigidities : (..., b, m), (..., b), (3, ..., b) arrays
-        As of `Bundle`, [rad], [m], [N m2], [1/N].
-    scales, degree : MechanicsUnits, int
-        As of `element_tables`.
-    row, cuts : (e,), (e, 2) arrays
-        Number of each element's beam, and the parameters between which it lies.
-    """
+    """Return the tables of elements of plain beams, of one network or of d: (e, q) or (d, e, q) each."""
     rule, force, width = basis(degree), scales.force, cuts[:, 1:] - cuts[:, :1]
     t, own, angle = cuts[:, :1] + width * rule.places, coefficients[..., row, :], 0.0
     for k in reversed(range(own.shape[-1])):

@@ -209,10 +209,7 @@ class NumpyEquations:
     def resolve(self, free: FloatArray, place: float, right: FloatArray) -> tuple[FloatArray, int]:
         """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable directions.
 
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            If the tangent is singular.
+        Raises LinAlgError if the tangent is singular.
         """
         at = self.linearise(free, place)
         return np.asarray(np.linalg.solve(at.tangent, right.T).T, float), self.count_unstable(at)

@@ -58,16 +58,11 @@ def engine() -> str:
     return "numpy" if load_compiled() is None else "C"
 
 
-def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
-    """Return the equations of a network, compiled if they can be.
-
-    Parameters
-    ----------
-    mesh : Discretisation
-        With real arrays.
-    ramp : bool
-        Whether the way is the share of what is constant instead of the drive.
-    """
+def equations(
+    mesh: Discretisation,  # with real arrays
+    ramp: bool = False,  # whether the way is the share of what is constant instead of the drive
+) -> NumpyEquations:
+    """Return the equations of a network, compiled if they can be."""
     key = equations, ramp, load_compiled() is not None
     if key not in mesh.known:
         kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}

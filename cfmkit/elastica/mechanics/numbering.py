@@ -115,21 +115,13 @@ def number(topology: Topology) -> Numbering:
 
 @lru_cache(maxsize=128)
 def find_free(
-    numbering: Numbering, held: tuple[int, ...], arms: bytes, acting: tuple[tuple[tuple[int, ...], bool, bool], ...]
+    numbering: Numbering,  # of the network
+    held: tuple[int, ...],  # unknowns that supports or the drive hold
+    arms: bytes,  # of (k,) bool: attachments with an arm
+    # attachments of springs, loads and contacts, whether they act on the place, and on the rotation
+    acting: tuple[tuple[tuple[int, ...], bool, bool], ...],
 ) -> Any:
-    """Return the unknowns that are not held and that anything acts on: a rotation that nothing resists is none.
-
-    Parameters
-    ----------
-    numbering : Numbering
-        Of the network.
-    held : tuple of int
-        Unknowns that supports or the drive hold.
-    arms : bytes
-        Of (k,) bool: attachments with an arm.
-    acting : tuple
-        Attachments of springs, loads and contacts, whether they act on the place, and on the rotation.
-    """
+    """Return the unknowns that are not held and that anything acts on: a rotation that nothing resists is none."""
     used, unknowns, places = np.zeros(numbering.size, bool), numbering.unknowns, numbering.places
     has_arm = np.frombuffer(arms, bool)
     used[unknowns[:, [0, 1, 3, 4, 5, *range(7, unknowns.shape[1])]]] = True

@@ -153,22 +153,14 @@ class Fit:
         return {}
 
 
-def fit(beam: Beam, reach: Any, known: Fit | None = None) -> Fit:
+def fit(
+    beam: Beam,  # may hold complex steps
+    reach: Any,  # may hold them too
+    known: Fit | None = None,  # the same fit without complex steps: it may know the parameters of the stations
+) -> Fit:
     """Return the beam's shape fitted to the vector `reach` between its ends, (dx, dy) [m].
 
-    Parameters
-    ----------
-    beam : Beam
-        May hold complex steps.
-    reach : (float, float)
-        May hold them too.
-    known : Fit, optional
-        The same fit without complex steps: it may know the parameters of the stations.
-
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If the ends coincide, or the shape closes on itself.
+    Raises InputError if the ends coincide, or the shape closes on itself.
     """
     dx, dy = reach
     distance = (dx * dx + dy * dy) ** 0.5

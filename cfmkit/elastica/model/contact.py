@@ -224,10 +224,7 @@ def circle(centre: Sequence[float], radius: float, hole: bool = False) -> Obstac
 def polyline(points: Sequence[Sequence[float]], fillet: float, closed: bool = False) -> ObstacleEdge:
     """Return straight sides through points [m] with rounded corners; the free side is to the left.
 
-    Raises
-    ------
-    ValueError
-        If two points are the same, the line turns back on itself, or the fillet is too large for a side.
+    Raises ValueError if two points are the same, the line turns back on itself, or the fillet is too large for a side.
     """
     corners = np.asarray(points, float)
     ring = np.vstack([corners, corners[:1]]) if closed else corners

@@ -27,10 +27,7 @@ def find_driven_node(network: Network, drive: Drive) -> tuple[str, int, float] |
     The sign is 1 or -1: a drive may lead against the direction that the support leaves free. Directions may be complex
     (derivatives are taken by complex steps); their real parts decide.
 
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If the node is moved by a link, or held where it is to move.
+    Raises InputError if the node is moved by a link, or held where it is to move.
     """
     if isinstance(drive, Loading):
         return None

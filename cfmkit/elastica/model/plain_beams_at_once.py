@@ -93,20 +93,15 @@ class Bundle:
         return Fit(self.rotation[k], self.scale[k], float(self.gap[k]), self.length[k], shape.course(chord))
 
 
-def check_fits(beams: Sequence[Beam], distance: Any, own: Any) -> None:
+def check_fits(
+    beams: Sequence[Beam],  # plain ones
+    # distance, own: (b,): between the ends of each [m], and between those of its shape, over its length [1]
+    distance: Any,
+    own: Any,
+) -> None:
     """Refuse beams without length, and shapes that return to their start.
 
-    Parameters
-    ----------
-    beams : sequence of Beam
-        Plain ones.
-    distance, own : (b,) arrays
-        Between the ends of each [m], and between those of its shape, over its length [1].
-
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If one cannot be fitted.
+    Raises InputError if one cannot be fitted.
     """
     if min(distance.real.tolist()) > 0 and min(own.real.tolist()) > 1e-9:
         return

@@ -36,16 +36,12 @@ class FittedShape:
     breaks: Any
     uniform: bool  # whether t is the fraction of the arc length
 
-    def reparametrize(self, marks: FloatArray, moved: Any) -> FittedShape:
-        """Return the course over another parameter, of which this one is a piecewise-linear function.
-
-        Parameters
-        ----------
-        marks : (n,) array
-            Ends of the linear pieces, increasing from 0 to 1: the breaks of the course returned.
-        moved : (n,) complex array
-            This course's parameters there: the marks plus imaginary steps.
-        """
+    def reparametrize(
+        self,
+        marks: FloatArray,  # (n,): ends of the linear pieces, increasing from 0 to 1: the breaks of the course returned
+        moved: Any,  # (n,) complex: this course's parameters there: the marks plus imaginary steps
+    ) -> FittedShape:
+        """Return the course over another parameter, of which this one is a piecewise-linear function."""
         steps = np.imag(moved)
         rates = 1 + 1j * np.diff(steps) / np.diff(marks)
 

@@ -69,20 +69,13 @@ def elements_of(mesh: Discretisation, beam: str) -> list[int]:
     return [number for number, name in enumerate(mesh.elements.beam) if name == beam]
 
 
-def states(net: Network, at: Equilibria, beam: str, fractions: Any) -> BeamStates:
-    """Return states at the same fractions (k,) of each element of a beam, element after element.
-
-    Parameters
-    ----------
-    net : Network
-        The model that `at` is of.
-    at : Equilibria
-        Real, or with a complex step.
-    beam : str
-        Its name.
-    fractions : (k,) array
-        Places on every element as fractions of its parameter, from 0 to 1.
-    """
+def states(
+    net: Network,  # the model that `at` is of
+    at: Equilibria,  # real, or with a complex step
+    beam: str,  # its name
+    fractions: Any,  # (k,): places on every element as fractions of its parameter, from 0 to 1
+) -> BeamStates:
+    """Return states at the same fractions (k,) of each element of a beam, element after element."""
     return states_of_elements(net, at, elements_of(at.mesh, beam), fractions)
 
 
@@ -133,18 +126,14 @@ def forces_of_designs(
     return BeamStates(*map(_join_elements, states)), np.repeat(widths, len(places), axis=1)[row]
 
 
-def states_of_designs(designs: NetworkDesigns, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
-    """Return states with their derivatives: dual arrays (p, m k), (m k) of those that do not change along the path.
-
-    Parameters
-    ----------
-    designs : NetworkDesigns
-        A complex step in each variable.
-    at : Equilibria
-        Of `dual_arrays`, with dual unknowns.
-    elements, fractions : (m,), (k,) arrays
-        As of `states_of_elements`.
-    """
+def states_of_designs(
+    designs: NetworkDesigns,  # a complex step in each variable
+    at: Equilibria,  # of `dual_arrays`, with dual unknowns
+    # elements, fractions: (m,), (k,): as of `states_of_elements`
+    elements: Sequence[int],
+    fractions: Any,
+) -> BeamStates:
+    """Return states with their derivatives: dual arrays (p, m k), (m k) of those that do not change along the path."""
     places, numbers = np.asarray(fractions, float), list(elements)
     by_element = _states(at, numbers, places, _rest_of_designs(designs, at.mesh, numbers, places))
     return BeamStates(*map(_join_elements, by_element))

@@ -72,32 +72,17 @@ class BetweenLoads(BetweenPoints):
 
 
 def interpolate_loads(
-    path: EquilibriumPath,
-    node: str,
-    along: float | None,
-    unit: float = 1.0,
-    axial: bool = True,
-    allowed: float | None = None,
+    path: EquilibriumPath,  # under loads
+    node: str,  # whose motion it is over
+    along: float | None,  # direction of the motion [rad]; None: its rotation
+    unit: float = 1.0,  # what the load is multiplied by: parts side by side
+    axial: bool = True,  # whether the stress has its axial part
+    allowed: float | None = None,  # stress [Pa]; where it is passed is solved for
 ) -> BetweenLoads | None:
     """Return a path under loads at every place of a node's motion.
 
     None if the motion turns back, where a link with an arm moves the node, where points are too few, or miss the
     tolerance.
-
-    Parameters
-    ----------
-    path : EquilibriumPath
-        Under loads.
-    node : str
-        Whose motion it is over.
-    along : float or None
-        Direction of the motion [rad]; None: its rotation.
-    unit : float
-        What the load is multiplied by: parts side by side.
-    axial : bool
-        Whether the stress has its axial part.
-    allowed : float or None
-        Stress [Pa]; where it is passed is solved for.
     """
     mesh = path.mesh
     if len(path) < MIN_PATH_POINTS or not np.all(path.accurate) or (along is not None and node not in mesh.bodies):

@@ -51,21 +51,12 @@ PLACE_RTOL = 1e-12  # share of the drive's range within which a place is that of
 
 
 def interpolate_path(
-    path: EquilibriumPath, unit: float = 1.0, axial: bool = True, allowed: float | None = None
+    path: EquilibriumPath,  # under a displacement or a rotation
+    unit: float = 1.0,  # what the effort is multiplied by: parts side by side
+    axial: bool = True,  # whether the stress has its axial part
+    allowed: float | None = None,  # stress [Pa]; where it is passed is solved for
 ) -> BetweenPoints | None:
-    """Return a path at every place of its drive; None of one that turns back, is too short, or misses its tolerance.
-
-    Parameters
-    ----------
-    path : EquilibriumPath
-        Under a displacement or a rotation.
-    unit : float
-        What the effort is multiplied by: parts side by side.
-    axial : bool
-        Whether the stress has its axial part.
-    allowed : float or None
-        Stress [Pa]; where it is passed is solved for.
-    """
+    """Return a path at every place of its drive; None of one that turns back, is too short, or misses its tolerance."""
     if isinstance(path.load_case, Loading) or len(path) < MIN_PATH_POINTS or not np.all(path.accurate):
         return None
     steps = np.diff(path.at.drive)

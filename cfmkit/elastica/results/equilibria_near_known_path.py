@@ -32,6 +32,8 @@ def solve_near_known_path(
 ) -> EquilibriumPath:
     """Return the equilibria of `network` nearest to those of a path, one for each point of the drive.
 
+    Raises InputError if the two networks are not of one kind, or the numbers of points differ.
+
     Parameters
     ----------
     path : EquilibriumPath
@@ -48,11 +50,6 @@ def solve_near_known_path(
     -------
     EquilibriumPath
         The points found, on the elements of the known path. LOST, with the first place, if any is missing.
-
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If the two networks are not of one kind, or the numbers of points differ.
     """
     arrays, known = discretise_alike(path.mesh, network, drive), path.at_requested
     if not np.array_equal(arrays.free, path.mesh.free) or len(known) != len(drive.points):
@@ -91,20 +88,13 @@ def solve_near_known_path(
     )
 
 
-def drive_slope(path: EquilibriumPath, indices: Any = None) -> FloatArray:
+def drive_slope(
+    path: EquilibriumPath,  # under a displacement or rotation of a node
+    indices: Any = None,  # points; all those requested by default
+) -> FloatArray:
     """Return the derivative of the effort by the drive at points of a path [N/m, or N m/rad].
 
-    Parameters
-    ----------
-    path : EquilibriumPath
-        Under a displacement or rotation of a node.
-    indices : sequence of int, optional
-        Points; all those requested by default.
-
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If loads drive, or a point is not an equilibrium.
+    Raises InputError if loads drive, or a point is not an equilibrium.
     """
     if isinstance(path.load_case, Loading):
         raise InputError("the slope of the effort needs a displacement or a rotation as the drive")

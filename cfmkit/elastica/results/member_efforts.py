@@ -40,18 +40,14 @@ def stiffest(mesh: Discretisation) -> float:
     return float(np.where(stretch > 0.0, 1.0 / np.where(stretch > 0.0, stretch, 1.0), bent).max())
 
 
-def effort_error(path: EquilibriumPath, tolerance: float) -> float:
+def effort_error(
+    path: EquilibriumPath,  # with points
+    tolerance: float,  # that its accurate points reach, relative to the largest force [1]
+) -> float:
     """Return the numerical error of a path's effort [N or N m] under a drive by a motion.
 
     That is the estimated error of the forces, and what rounding makes of them: `ROUND_OFF` of the largest force in the
     network, and `FORCE_ROUNDING`.
-
-    Parameters
-    ----------
-    path : EquilibriumPath
-        With points.
-    tolerance : float
-        That its accurate points reach, relative to the largest force [1].
     """
     scales = path.mesh.scales
     error = max(min(path.error, tolerance), ROUND_OFF) * largest_force(path.at) + FORCE_ROUNDING * stiffest(path.mesh)
@@ -59,19 +55,12 @@ def effort_error(path: EquilibriumPath, tolerance: float) -> float:
 
 
 def largest_member_efforts(
-    path: EquilibriumPath, points: Any, motion: Callable[[EquilibriumPath], FloatArray]
+    path: EquilibriumPath,  # the equilibria
+    points: Any,  # (k,) int: indices of points
+    # returns the motion of the drive at the points of a path, (k,) [m or rad]
+    motion: Callable[[EquilibriumPath], FloatArray],
 ) -> FloatArray:
-    """Return the largest effort of one beam or spring at points of a path, (k,) [N or N m].
-
-    Parameters
-    ----------
-    path : EquilibriumPath
-        The equilibria.
-    points : (k,) int array
-        Indices of points.
-    motion : callable
-        Returns the motion of the drive at the points of a path, (k,) [m or rad].
-    """
+    """Return the largest effort of one beam or spring at points of a path, (k,) [N or N m]."""
     here = path.take(points)
     free, drive = _ways(here)
     ahead, behind = (

@@ -33,18 +33,14 @@ NEIGHBOUR_SHARE = 0.95  # share of the largest stress at these from which on the
 STENCIL_REACH = 4  # points on either side that a cubic, or the next one, may go through
 
 
-def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve, bound: float = 0.0) -> tuple[Knots, ...]:
-    """Return places and stresses of each beam, with extremes that may be the largest of all.
-
-    Parameters
-    ----------
-    t, rows : (n,), (b, n) arrays
-        Places of points, increasing, and the stress of each of b beams there [Pa].
-    solve : callable
-        From places (m,) to stresses (b, m) and whether they were found, (m,).
-    bound : float
-        Beams that are stressed less at all points are left as they are [Pa].
-    """
+def solve_extremes(
+    # t, rows: (n,), (b, n): places of points, increasing, and the stress of each of b beams there [Pa]
+    t: FloatArray,
+    rows: FloatArray,
+    solve: Solve,  # from places (m,) to stresses (b, m) and whether they were found, (m,)
+    bound: float = 0.0,  # beams that are stressed less at all points are left as they are [Pa]
+) -> tuple[Knots, ...]:
+    """Return places and stresses of each beam, with extremes that may be the largest of all."""
     return solve_all_extremes([(t, rows, bound)], lambda places: [solve(places[0])])[0]
 
 
@@ -78,21 +74,15 @@ def solve_all_extremes(
     return [tuple(knots) for knots in knots_by_curve]
 
 
-def largest_inside(x: FloatArray, stresses: Callable[[Any], FloatArray], solve: Solve, window: FloatArray) -> float:
+def largest_inside(
+    x: FloatArray,  # (n,): places of the points, increasing
+    stresses: Callable[[Any], FloatArray],  # from numbers of points to the stress of each of b beams there, (b, m) [Pa]
+    solve: Solve,  # as of `solve_extremes`
+    window: FloatArray,  # (2,): minus infinity is returned if no point and no extreme between two is inside
+) -> float:
     """Return the largest stress of all beams at and between points of a smooth path inside of a window [Pa].
 
     The stress is computed at few points first; then at all of those near which it may be the largest.
-
-    Parameters
-    ----------
-    x : (n,) array
-        Places of the points, increasing.
-    stresses : callable
-        From numbers of points to the stress of each of b beams there, (b, m) [Pa].
-    solve : callable
-        As of `solve_extremes`.
-    window : (2,) array
-        Minus infinity is returned if no point and no extreme between two is inside.
     """
     few = choose_few_points(x, *window)
     known_stresses = stresses(few)

@@ -202,18 +202,17 @@ def largest_stresses_of_designs(
     return np.asarray(extremes_of_designs(networks, meshes, at, row, _signs(axial)).max(axis=-1))
 
 
-def stress_at(net: Network, at: Equilibria, beam: str, element: Any, fraction: Any, axial: bool) -> Any:
-    """Return the stress on both sides of a beam at places of its own for every point, (p, 2, n).
-
-    Parameters
-    ----------
-    net, at, beam : Network, Equilibria, str
-        As of `states`; with complex steps, too.
-    element, fraction : (p, 2, n) arrays
-        As of `SideExtremes`.
-    axial : bool
-        Whether the stress has its axial part.
-    """
+def stress_at(
+    # net, at, beam: as of `states`; with complex steps, too
+    net: Network,
+    at: Equilibria,
+    beam: str,
+    # element, fraction: (p, 2, n): as of `SideExtremes`
+    element: Any,
+    fraction: Any,
+    axial: bool,  # whether the stress has its axial part
+) -> Any:
+    """Return the stress on both sides of a beam at places of its own for every point, (p, 2, n)."""
     fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
     found = np.zeros(np.shape(fraction), at.z.dtype)
     sides = np.array([1.0, -1.0])[:, None]

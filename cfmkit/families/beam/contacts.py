@@ -47,10 +47,7 @@ MOST_NAMED = 6
 def refuse_overlap_at_rest(assembly: Assembly) -> None:
     """Refuse beams that lie in an obstacle, in the pad of a node or in another beam before any load.
 
-    Raises
-    ------
-    cfmkit.errors.InputError
-        With the beam, what it lies in, the depth and the place.
+    Raises InputError with the beam, what it lies in, the depth and the place.
     """
     network = assembly.network
     sides = [contact for contact in network.contacts if isinstance(contact, BeamSide)]

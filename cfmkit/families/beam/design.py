@@ -67,16 +67,11 @@ TRAVEL_STEP = 1e-5
 """Travel that follows from the stress is rounded down to whole hundredths of a millimetre [m]."""
 
 
-def rescale(spec: BeamSpec, wanted: Rescale) -> Design:
-    """Return the specification with the changes made and the force wanted reached, or why it cannot be.
-
-    Parameters
-    ----------
-    spec : BeamSpec
-        Driven by a displacement, without springs and loads.
-    wanted : Rescale
-        What is to change.
-    """
+def rescale(
+    spec: BeamSpec,  # driven by a displacement, without springs and loads
+    wanted: Rescale,  # what is to change
+) -> Design:
+    """Return the specification with the changes made and the force wanted reached, or why it cannot be."""
     wanted = wanted.model_copy(update={"free": wanted.choose_dimension(sheet_of(spec.mechanism.part))})
     changed = changed_spec(spec, wanted)
     found = _validity(spec, wanted)

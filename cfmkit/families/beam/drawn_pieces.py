@@ -236,18 +236,12 @@ def mitre_direction(ends: Sequence[BeamEnd]) -> float | None:
     return math.atan2(along[0], -along[1]) if np.hypot(*along) > CONTINUATION_ANGLE else None
 
 
-def section_at_bend(ends: Sequence[BeamEnd], direction: float, fillet: float) -> FloatArray:
-    """Return the line through a node from edge to edge (2, 2) [m], where beams leave it to both sides or to one.
-
-    Parameters
-    ----------
-    ends : sequence of BeamEnd
-        Beams of one side, or of both.
-    direction : float
-        Of the line: that of the mirror axis, or half way between two beams [rad].
-    fillet : float
-        Radius of the inside corner [m].
-    """
+def section_at_bend(
+    ends: Sequence[BeamEnd],  # beams of one side, or of both
+    direction: float,  # of the line: that of the mirror axis, or half way between two beams [rad]
+    fillet: float,  # radius of the inside corner [m]
+) -> FloatArray:
+    """Return the line through a node from edge to edge (2, 2) [m], where beams leave it to both sides or to one."""
     line = np.array([math.cos(direction), math.sin(direction)])
     reach = [0.0, 0.0]
     for end in ends:

@@ -36,19 +36,14 @@ _SMOOTH_KEYS = re.compile(
 """Values of which every number of the network is a smooth function that takes complex ones."""
 
 
-def sample_poses(spec: BeamSpec, places: FloatArray, paths: Sequence[str] = ()) -> Sampled | None:
-    """Return force and stress at places, each beam's own stress; None if the path does not reach them all.
-
-    Parameters
-    ----------
-    spec : BeamSpec
-        Driven by a displacement, not solved as a solid.
-    places : (p,) array
-        Displacements, increasing, all to one side of rest [m].
-    paths : sequence of str, optional
-        Of values by which slopes are wanted; of nodes, shapes, sections, moduli and springs they are known, others are
-        left out, and all of them where the tangent is singular at a place.
-    """
+def sample_poses(
+    spec: BeamSpec,  # driven by a displacement, not solved as a solid
+    places: FloatArray,  # (p,): displacements, increasing, all to one side of rest [m]
+    # of values by which slopes are wanted; of nodes, shapes, sections, moduli and springs they are known, others are
+    # left out, and all of them where the tangent is singular at a place
+    paths: Sequence[str] = (),
+) -> Sampled | None:
+    """Return force and stress at places, each beam's own stress; None if the path does not reach them all."""
     followed = _follow_path(spec, places)
     if followed is None:
         return None

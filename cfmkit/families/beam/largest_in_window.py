@@ -40,18 +40,13 @@ WINDOW_SLACK = 1e-9
 """Share of the range of motion by which the ends of a window, where they were looked for, may be beside it."""
 
 
-def largest(solution: Solution, observe: Callable[[Path], FloatArray], window: tuple[float, float]) -> float | None:
-    """Return the largest of some values along a path, where its motion is in a window; None if there is none.
-
-    Parameters
-    ----------
-    solution : Solution
-        A solved mechanism.
-    observe : callable
-        From equilibria to rows of values that are smooth along the path, (rows, points); NaN where there is none.
-    window : (float, float)
-        [m or rad].
-    """
+def largest(
+    solution: Solution,  # a solved mechanism
+    # from equilibria to rows of values that are smooth along the path, (rows, points); NaN where there is none
+    observe: Callable[[Path], FloatArray],
+    window: tuple[float, float],  # [m or rad]
+) -> float | None:
+    """Return the largest of some values along a path, where its motion is in a window; None if there is none."""
     path, law, winding = solution.path, solution.model_between_points, solution.winding
     points = replace(solution, keep=np.arange(len(path)), ends=())
     rows, reached = observe(path), points.motion

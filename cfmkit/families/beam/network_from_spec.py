@@ -334,20 +334,13 @@ def _own_chord(network: Network, beam: Beam) -> complex:
 _PITCH_MARGIN = 1.15  # of the pitch that is chosen, for what joins the stages
 
 
-def stack_stages(network: Network, driven: str, count: int, pitch: float | None = None) -> tuple[Network, str]:
-    """Return `count` equal stages in series, and the moving part of the last.
-
-    Parameters
-    ----------
-    network : Network
-        One stage, of beams and links; all supports but that of `driven` are clamped.
-    driven : str
-        Its moving part.
-    count : int
-        Number of stages; those after the first have names with ``.2``, ``.3``, ...
-    pitch : float, optional
-        Distance of the stages along the way of the moving part [m].
-    """
+def stack_stages(
+    network: Network,  # one stage, of beams and links; all supports but that of `driven` are clamped
+    driven: str,  # its moving part
+    count: int,  # number of stages; those after the first have names with ``.2``, ``.3``,
+    pitch: float | None = None,  # distance of the stages along the way of the moving part [m]
+) -> tuple[Network, str]:
+    """Return `count` equal stages in series, and the moving part of the last."""
     nodes, beams, links = dict(network.nodes), dict(network.beams), list(network.links)
     dx, dy = _step(network, driven, pitch)
     for stage in range(2, count + 1):

@@ -90,16 +90,11 @@ class HeldPlace:
     padded: bool = False  # whether its shapes are pads
 
 
-def regions(spec: BeamSpec, tolerance: float | None = None) -> tuple[HeldPlace, ...]:
-    """Return where the part of `drawing` is held, driven or loaded: pads from the root plane on, the holes of eyes.
-
-    Parameters
-    ----------
-    spec : BeamSpec
-        Whose part is drawn.
-    tolerance : float, optional
-        As for `drawing` [m].
-    """
+def regions(
+    spec: BeamSpec,  # whose part is drawn
+    tolerance: float | None = None,  # as for `drawing` [m]
+) -> tuple[HeldPlace, ...]:
+    """Return where the part of `drawing` is held, driven or loaded: pads from the root plane on, the holes of eyes."""
     assembly = assemble(spec)
     tolerance = tolerance or fine_tolerance(assembly)
     beams = strips_of(assembly, tolerance)

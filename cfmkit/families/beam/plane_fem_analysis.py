@@ -225,10 +225,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
 def _solve_part(spec: BeamSpec, run: Run) -> tuple[Assembly, AdaptiveSolution]:
     """Return the network that a part is drawn from and the part, moved far enough where a load drives it.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the part cannot be meshed.
+    Raises GeometryError if the part cannot be meshed.
     """
     if driven_by_load(spec):
         spec = moved_far_enough(spec, part_of, run.progress)

@@ -31,18 +31,14 @@ def columns_of(name: str, read: Read, endings: Mapping[str, str]) -> LazyColumns
     return {f"{name}_{end}": partial(column, k, dimension) for k, (end, dimension) in enumerate(endings.items())}
 
 
-def output_columns(outputs: Outputs, motion: Read, reaction: Read) -> LazyColumns:
-    """Return the columns of the nodes that are named, each as what computes it.
-
-    Parameters
-    ----------
-    outputs : Outputs
-    motion : callable
-        From a node to its x, y [m] and rotation [rad] at the points of the curve, (n, 3).
-    reaction : callable
-        From a node to the force x, y [N] and the moment [N m] that hold it, of support and of a drive by a motion, for
-        one copy, (n, 3).
-    """
+def output_columns(
+    outputs: Outputs,
+    motion: Read,  # from a node to its x, y [m] and rotation [rad] at the points of the curve, (n, 3)
+    # from a node to the force x, y [N] and the moment [N m] that hold it, of support and of a drive by a motion, for
+    # one copy, (n, 3)
+    reaction: Read,
+) -> LazyColumns:
+    """Return the columns of the nodes that are named, each as what computes it."""
     columns: LazyColumns = {}
     for name in outputs.nodes:
         columns |= columns_of(name, motion, MOTION_DIMENSIONS)

@@ -129,10 +129,7 @@ def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: floa
     It is cut where its shape has a corner and where its thickness has a kink or a step. Lines between the points of
     a piece are no farther than `tolerance` [m] from its edges and its centre line.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If more points would be needed for that than a drawing can have.
+    Raises GeometryError if more points would be needed for that than a drawing can have.
     """
     beam, fit = network.beams[name], fits[name]
     start = network.nodes[beam.start]
@@ -189,22 +186,15 @@ class BeamGap:
 
 
 def smallest_gap(
+    # centre lines (n, 2) [m] by beam; those of a mirrored half have the same name with a prime
     lines: Mapping[str, FloatArray],
-    halves: Mapping[str, float],
+    halves: Mapping[str, float],  # half thickness by beam [m]
+    # pairs of beams whose contact is solved for: they count only where they overlap all the same
     may_touch: Collection[frozenset[str]] = (),
 ) -> BeamGap | None:
     """Return the smallest gap of two beams; near an end that they have in common there is none.
 
     Pairs whose boxes are farther apart than that are not looked at.
-
-    Parameters
-    ----------
-    lines : mapping
-        Centre lines (n, 2) [m] by beam; those of a mirrored half have the same name with a prime.
-    halves : mapping
-        Half thickness by beam [m].
-    may_touch : collection of frozenset, optional
-        Pairs of beams whose contact is solved for: they count only where they overlap all the same.
     """
     pairs = list(_pairs(lines))
     best: BeamGap | None = None

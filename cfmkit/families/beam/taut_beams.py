@@ -74,17 +74,12 @@ def _apart(path: Path, one: str, other: str, point: int) -> float:
     return math.hypot(*(places[1] - places[0]))
 
 
-def ways_to_supports(network: Network, node: str, lengths: Mapping[str, float]) -> dict[str, float]:
-    """Return the shortest way along beams and links from a node to every node that is held in place [m].
-
-    Parameters
-    ----------
-    network : Network
-    node : str
-        Where the ways begin; it is none of those that are held.
-    lengths : mapping
-        From the name of a beam to its length [m].
-    """
+def ways_to_supports(
+    network: Network,
+    node: str,  # where the ways begin; it is none of those that are held
+    lengths: Mapping[str, float],  # from the name of a beam to its length [m]
+) -> dict[str, float]:
+    """Return the shortest way along beams and links from a node to every node that is held in place [m]."""
     ways = [(beam.start, beam.end, lengths[name]) for name, beam in network.beams.items()]
     ways += [(link.master, link.node, distance(network, link.master, link.node)) for link in network.links]
     reached = {node: 0.0}

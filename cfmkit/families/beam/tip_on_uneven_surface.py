@@ -73,10 +73,7 @@ class SurfaceCourse(ShortRepr):
 def course_of(surface: Surface) -> SurfaceCourse:
     """Return heights and slopes of the surface of an analysis.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If the file cannot be used.
+    Raises DataError if the file cannot be used.
     """
     given = surface.profile
     return _of_file(given) if given.kind == "file" else _of_formula(given)

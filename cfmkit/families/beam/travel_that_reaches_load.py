@@ -47,23 +47,13 @@ def moved_by(spec: BeamSpec, travel: float) -> BeamSpec:
 
 def moved_far_enough(
     spec: BeamSpec,
-    part: Callable[[BeamSpec, Assembly], Part],
+    part: Callable[[BeamSpec, Assembly], Part],  # returns the part of a mechanism whose node is moved
+    # is given the share that is done, and what is being done
     report: Callable[[float, str], None] = lambda _share, _text: None,
 ) -> BeamSpec:
     """Return a mechanism that a load drives with its node moved until a coarse mesh of the part carries the load.
 
-    Parameters
-    ----------
-    spec : BeamSpec
-    part : callable
-        Returns the part of a mechanism whose node is moved.
-    report : callable
-        Is given the share that is done, and what is being done.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the part cannot be meshed.
+    Raises GeometryError if the part cannot be meshed.
     """
     from cfmkit.solid.path_up_to_load import travel_for
 

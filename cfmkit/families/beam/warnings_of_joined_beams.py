@@ -30,25 +30,12 @@ MAX_NAMED_PAIRS = 4
 
 def joined_unasked(
     assembly: Assembly,
-    beams: dict[str, list[BeamStrip]],
-    blocks: Sequence[DrawnBlock],
-    contours: Sequence[Contour],
-    fillet: float,
+    beams: dict[str, list[BeamStrip]],  # the described half
+    blocks: Sequence[DrawnBlock],  # pads, eyes and bars of the described half, and bars that join the halves
+    contours: Sequence[Contour],  # the outline
+    fillet: float,  # its inside corners [m]
 ) -> Iterator[Finding]:
-    """Yield a warning that names what the outline joins although the network has it apart.
-
-    Parameters
-    ----------
-    assembly : Assembly
-    beams : dict of lists of BeamStrip
-        The described half.
-    blocks : sequence of DrawnBlock
-        Pads, eyes and bars of the described half, and bars that join the halves.
-    contours : sequence of Contour
-        The outline.
-    fillet : float
-        Its inside corners [m].
-    """
+    """Yield a warning that names what the outline joins although the network has it apart."""
     strips = [_draw_strip(assembly, name, found) for name, found in beams.items()]
     blocks = [*blocks]
     if (axis := mirror_axis(assembly)) is not None:

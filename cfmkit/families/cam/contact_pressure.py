@@ -30,18 +30,12 @@ YIELD_PRESSURE = 1.67
 """Pressure at which a line contact first yields, over the yield strength [J, eq. 6.4]."""
 
 
-def pressure(force: FloatArray, curvature: FloatArray, contact: Contact) -> FloatArray:
-    """Return the Hertzian pressure p0 of a line contact [Pa].
-
-    Parameters
-    ----------
-    force : array
-        Contact force [N].
-    curvature : array
-        Sum of the curvatures of roller and cam, 1/R [1/m].
-    contact : Contact
-        Width and material.
-    """
+def pressure(
+    force: FloatArray,  # contact force [N]
+    curvature: FloatArray,  # sum of the curvatures of roller and cam, 1/R [1/m]
+    contact: Contact,  # width and material
+) -> FloatArray:
+    """Return the Hertzian pressure p0 of a line contact [Pa]."""
     return pressure_between(force, curvature, contact.material, contact.width)
 
 

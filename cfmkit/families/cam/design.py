@@ -369,21 +369,15 @@ def _in_the_way(reported: str) -> str:
     return ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"
 
 
-def two_way_gap(law: SlopeLaw, target: CamDesign, loads: Loads, friction: float) -> float:
+def two_way_gap(
+    law: SlopeLaw,  # what the cam is cut for
+    target: CamDesign,  # the stroke
+    loads: Loads,  # springs, weights, and what rubs beside the rollers
+    friction: float,  # rolling friction
+) -> float:
     """Return the largest |F/F0 - 1| of both directions over the stroke, the first fiftieth left out.
 
     Infinite if friction holds the roller somewhere.
-
-    Parameters
-    ----------
-    law : SlopeLaw
-        What the cam is cut for.
-    target : CamDesign
-        The stroke.
-    loads : Loads
-        Springs, weights, and what rubs beside the rollers.
-    friction : float
-        Rolling friction.
     """
     path, end = reach(law, target.stroke)
     x = np.linspace(law.rest_half_width, end, 801)

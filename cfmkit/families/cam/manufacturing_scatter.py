@@ -69,20 +69,13 @@ class DrawnError:
         return np.asarray((along, 1.0 - at.curvature * beside, np.zeros_like(along))[derivative])
 
 
-def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray, seed: int) -> ForceBand:
-    """Return the forces of cams that are cut with errors.
-
-    Parameters
-    ----------
-    assembly : Assembly
-        The design and the loads.
-    tolerance : Manufacturing
-        Standard deviations of the errors.
-    travel : (n,) array
-        Where the force is wanted [m].
-    seed : int
-        Of the generator: the same seed draws the same cams.
-    """
+def force_band(
+    assembly: Assembly,  # the design and the loads
+    tolerance: Manufacturing,  # standard deviations of the errors
+    travel: FloatArray,  # (n,): where the force is wanted [m]
+    seed: int,  # of the generator: the same seed draws the same cams
+) -> ForceBand:
+    """Return the forces of cams that are cut with errors."""
     generator = np.random.default_rng(seed)
     flank = DesignFlank(assembly.profile, 1.0)
     arc = arc_lengths(flank)

@@ -86,10 +86,7 @@ WIDTH_EXPLAINS = 0.6
 def analyze_built(spec: CamSpec) -> Result:
     """Return the loop of a cam whose flanks were measured.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If the file with the points cannot be used.
+    Raises DataError if the file with the points cannot be used.
     """
     try:
         assembly = assemble(spec)
@@ -413,20 +410,13 @@ class BuiltTrack:
         return np.interp(slider, self.slider, self.x), slope
 
 
-def built_flank(design: DesignFlank, points: FloatArray, errors: FloatArray, noise: float) -> BuiltFlank:
-    """Return a flank from registered points.
-
-    Parameters
-    ----------
-    design : DesignFlank
-        The right flank.
-    points : (n,) array
-        Path coordinates of the points' feet [m], in any order; those at one place are averaged.
-    errors : (n,) array
-        Their distances from the design along its normal [m].
-    noise : float
-        Standard deviation of the measurement [m].
-    """
+def built_flank(
+    design: DesignFlank,  # the right flank
+    points: FloatArray,  # (n,): path coordinates of the points' feet [m], in any order; those at one place are averaged
+    errors: FloatArray,  # (n,): their distances from the design along its normal [m]
+    noise: float,  # standard deviation of the measurement [m]
+) -> BuiltFlank:
+    """Return a flank from registered points."""
     arc = arc_lengths(design)
     along = np.interp(points, *arc)
     places, inverse, counts = np.unique(np.round(along, 9), return_inverse=True, return_counts=True)
@@ -434,16 +424,13 @@ def built_flank(design: DesignFlank, points: FloatArray, errors: FloatArray, noi
     return BuiltFlank(design, fit_smoothing_spline(places, mean, noise), arc)
 
 
-def built_track(flank: BuiltFlank, roller_radius: float, brace_length: float) -> BuiltTrack:
-    """Return the track of a roller's centre on a built flank.
-
-    Parameters
-    ----------
-    flank : BuiltFlank
-        Mirrored to the right.
-    roller_radius, brace_length : float
-        Of the parts built in [m].
-    """
+def built_track(
+    flank: BuiltFlank,  # mirrored to the right
+    # roller_radius, brace_length: of the parts built in [m]
+    roller_radius: float,
+    brace_length: float,
+) -> BuiltTrack:
+    """Return the track of a roller's centre on a built flank."""
     low, high = flank.ends
     places = np.linspace(low, high, max(int((high - low) / PLACE_STEP), 50) + 1)
     base = flank.design.frame(np.interp(places, flank.arc[1], flank.arc[0]))

@@ -37,16 +37,11 @@ _DIFFERENCE_STEP = 1e-6
 """Of friction, and of the rest half width [m], for derivatives."""
 
 
-def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
-    """Return what explains a measured loop of a mechanism at rest, by name; nothing for a motion.
-
-    Parameters
-    ----------
-    result : Result
-        With its state.
-    loop : MeasuredLoop
-        Inside what the model covers.
-    """
+def attribute(
+    result: Result,  # with its state
+    loop: MeasuredLoop,  # inside what the model covers
+) -> Mapping[str, Quantity]:
+    """Return what explains a measured loop of a mechanism at rest, by name; nothing for a motion."""
     state = result.state
     if not isinstance(state, MeasuredCam | Solution):
         return {}

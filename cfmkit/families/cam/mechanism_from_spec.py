@@ -162,10 +162,7 @@ def loads_of(spec: CamSpec, stiffness: float, rest: float) -> Loads:
 def assemble(spec: CamSpec) -> Assembly:
     """Return the mechanism put together.
 
-    Raises
-    ------
-    CannotBuild
-        If it cannot exist; the finding says why.
+    Raises CannotBuild if it cannot exist; the finding says why.
     """
     spec = resolve(spec)
     mechanism, law, method = spec.mechanism, slope_law(spec), spec.analysis.path_method
@@ -189,10 +186,7 @@ def assemble(spec: CamSpec) -> Assembly:
 def assemble_sides(spec: CamSpec) -> tuple[Assembly, Assembly]:
     """Return the right and the left side put together; one and the same where nothing differs on the left.
 
-    Raises
-    ------
-    CannotBuild
-        If one of them cannot exist; the finding says why.
+    Raises CannotBuild if one of them cannot exist; the finding says why.
     """
     right = assemble(spec)
     return right, assemble(left_side(right.spec)) if spec.mechanism.left else right
@@ -207,20 +201,14 @@ def displacement_origin(assembly: Assembly) -> float:
     return assembly.track.start - below
 
 
-def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
+def check_start(
+    law: SlopeLaw,  # the slope of the path
+    # radius and brace length of each roller: the one built in, the one the cam is cut for [m]
+    *rollers: tuple[float, float],
+) -> None:
     """Raise if there is no mechanism to begin with, whatever the force constant.
 
-    Parameters
-    ----------
-    law : SlopeLaw
-        The slope of the path.
-    rollers : (float, float)
-        Radius and brace length of each roller: the one built in, the one the cam is cut for [m].
-
-    Raises
-    ------
-    CannotBuild
-        If the braces do not reach, the rollers have no room, or the path does not rise.
+    Raises CannotBuild if the braces do not reach, the rollers have no room, or the path does not rise.
     """
     x0, shortest = law.rest_half_width, np.minimum(rollers[0][1], rollers[-1][1])
     if fails(x0 >= shortest * (1 - 1e-6)):
@@ -291,10 +279,7 @@ def turns_vertical(law: SlopeLaw, end: float) -> bool:
 def cut_profile(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
     """Return the flank for a roller along a path up to x = `end` [m].
 
-    Raises
-    ------
-    CannotBuild
-        If nothing of it is left, or a part that the roller needs is missing beyond the start.
+    Raises CannotBuild if nothing of it is left, or a part that the roller needs is missing beyond the start.
     """
     try:
         profile = cut_cam(path, roller_radius, end)
@@ -374,16 +359,13 @@ def cam_start_height(profile: CamProfile) -> float:
     return profile.flank(profile.path.law.rest_half_width)[1]
 
 
-def room_between(x: tuple[FloatArray, FloatArray], y: tuple[FloatArray, FloatArray], radii: float) -> FloatArray:
-    """Return the gap between the right and the left roller, negative where they overlap [m].
-
-    Parameters
-    ----------
-    x, y : pair of (n,) array
-        Axis of the right roller, and of the left one as seen in a mirror [m].
-    radii : float
-        Sum of both radii [m].
-    """
+def room_between(
+    # x, y: pair of (n,): axis of the right roller, and of the left one as seen in a mirror [m]
+    x: tuple[FloatArray, FloatArray],
+    y: tuple[FloatArray, FloatArray],
+    radii: float,  # sum of both radii [m]
+) -> FloatArray:
+    """Return the gap between the right and the left roller, negative where they overlap [m]."""
     return np.asarray(np.hypot(x[0] + x[1], y[0] - y[1]) - radii)
 
 
@@ -405,16 +387,11 @@ def flanks_cross(x: float) -> Finding:
     )
 
 
-def flanks_crossing(profile: CamProfile, offset: float = 0.0) -> Finding | None:
-    """Return what to say where the flanks meet or cross, so that there is no plate between them.
-
-    Parameters
-    ----------
-    profile : CamProfile
-        The cam as cut.
-    offset : float
-        Material left on it beyond the profile [m].
-    """
+def flanks_crossing(
+    profile: CamProfile,  # the cam as cut
+    offset: float = 0.0,  # material left on it beyond the profile [m]
+) -> Finding | None:
+    """Return what to say where the flanks meet or cross, so that there is no plate between them."""
     x = profile.offset_points(profile.start, offset - profile.roller_radius)[0]
     return flanks_cross(x) if fails(x <= 0) else None
 
@@ -424,10 +401,7 @@ def check_first_pose(assembly: Assembly) -> None:
 
     The rollers of a symmetric mechanism move apart as the slider rises: what has room at the start has it later.
 
-    Raises
-    ------
-    CannotBuild
-        The finding says what is in the way.
+    Raises CannotBuild the finding says what is in the way.
     """
     track, mechanism = assembly.track, assembly.spec.mechanism
     if crossing := flanks_crossing(track.profile, np.maximum(mechanism.profile.offset, 0.0)):
@@ -438,23 +412,15 @@ def check_first_pose(assembly: Assembly) -> None:
 
 
 def count_before_overlap(
-    travel: FloatArray, slider: FloatArray, x: tuple[FloatArray, FloatArray], mechanism: Mechanism
+    # travel, slider: (n,): travel, and position of the slider [m]
+    travel: FloatArray,
+    slider: FloatArray,
+    x: tuple[FloatArray, FloatArray],  # pair of (n,): axes of both rollers, outwards [m]
+    mechanism: Mechanism,  # whose rollers and braces they are
 ) -> tuple[int, Finding | None]:
     """Return the number of points before the rollers overlap, and what to say if they do.
 
-    Parameters
-    ----------
-    travel, slider : (n,) array
-        Travel, and position of the slider [m].
-    x : pair of (n,) array
-        Axes of both rollers, outwards [m].
-    mechanism : Mechanism
-        Whose rollers and braces they are.
-
-    Raises
-    ------
-    CannotBuild
-        If they overlap at the first point.
+    Raises CannotBuild if they overlap at the first point.
     """
     brace = mechanism.brace_length
     right, left = (slider - np.sqrt((brace - across) * (brace + across)) for across in x)
@@ -468,20 +434,15 @@ def count_before_overlap(
     return first, rollers_overlap(float(gap.min()), f"from {mm(float(travel[first]))} of travel on")
 
 
-def check_springs(elongation: FloatArray, held: FloatArray, rest_half_width: float) -> None:
+def check_springs(
+    # elongation, held: (n,): of the springs [m], and the contact force [N]
+    elongation: FloatArray,
+    held: FloatArray,
+    rest_half_width: float,  # half width at which the springs are at rest [m]
+) -> None:
     """Raise if nothing holds the rollers on the cam anywhere: springs that are slack over the whole travel.
 
-    Parameters
-    ----------
-    elongation, held : (n,) array
-        Of the springs [m], and the contact force [N].
-    rest_half_width : float
-        Half width at which the springs are at rest [m].
-
-    Raises
-    ------
-    CannotBuild
-        If no contact is pressed and no spring is stretched.
+    Raises CannotBuild if no contact is pressed and no spring is stretched.
     """
     if elongation.max() < 0 and not (held > 0).any():
         short = mm(-float(elongation.max()))

@@ -162,20 +162,13 @@ def _hardware_parts(solution: Solution) -> tuple[ListedPart, ...]:
     return tuple(hardware(solution).parts)
 
 
-def solve(assembly: Assembly, count: int = 1) -> Solution:
+def solve(
+    assembly: Assembly,  # one mechanism; or several whose numbers are columns
+    count: int = 1,  # number of mechanisms
+) -> Solution:
     """Return states and forces over the travel that the analysis asks for, as far as the track goes.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        One mechanism; or several whose numbers are columns.
-    count : int
-        Number of mechanisms.
-
-    Raises
-    ------
-    CannotBuild
-        If a stop leaves no travel.
+    Raises CannotBuild if a stop leaves no travel.
     """
     spec, track, loads = assembly.spec, assembly.track, assembly.loads
     low, end = reachable_travel(assembly)

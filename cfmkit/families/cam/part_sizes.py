@@ -32,20 +32,15 @@ BRACE_WIDTH = 0.010
 """Thickness of a brace where the plate is thicker [m]: it is pulled along, the plate is pressed on its edge."""
 
 
-def depth_of(thick: float, springs: Springs, stretch: float, half_width: float, safety: float = 1.0) -> float | None:
-    """Return the depth with springs of a known wire, else wound of steel wire [m]; None if no such spring fits.
-
-    Parameters
-    ----------
-    thick : float
-        Of the plate, and of each brace up to `BRACE_WIDTH` [m].
-    springs : Springs
-        How many of what stiffness: half of them on either side, above each other.
-    stretch, half_width : float
-        Their largest elongation, and half their length at rest [m].
-    safety : float
-        Of springs whose wire is not known, against yield.
-    """
+def depth_of(
+    thick: float,  # of the plate, and of each brace up to `BRACE_WIDTH` [m]
+    springs: Springs,  # how many of what stiffness: half of them on either side, above each other
+    # stretch, half_width: their largest elongation, and half their length at rest [m]
+    stretch: float,
+    half_width: float,
+    safety: float = 1.0,  # of springs whose wire is not known, against yield
+) -> float | None:
+    """Return the depth with springs of a known wire, else wound of steel wire [m]; None if no such spring fits."""
     outer = coil_diameter(springs, stretch, half_width, safety)
     return None if outer is None else thick + 2.0 * min(thick, BRACE_WIDTH) + min(count_of(springs), 2) * outer
 

@@ -10,16 +10,11 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec
 
 
-def free(given: CamSpec, designed: CamSpec) -> dict[str, tuple[float, float]]:
-    """Return the force constant of the cut, and the rate of the springs where the design may choose it.
-
-    Parameters
-    ----------
-    given : CamSpec
-        With the `design` block.
-    designed : CamSpec
-        What came out.
-    """
+def free(
+    given: CamSpec,  # with the `design` block
+    designed: CamSpec,  # what came out
+) -> dict[str, tuple[float, float]]:
+    """Return the force constant of the cut, and the rate of the springs where the design may choose it."""
     wanted, mechanism = given.design, designed.mechanism
     found = {"mechanism.profile.force_constant": range_about(mechanism.profile.force_constant)}
     rate = mechanism.springs.stiffness

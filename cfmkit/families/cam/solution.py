@@ -150,21 +150,13 @@ class Solution(ShortRepr):
     # --- at any travel ----------------------------------------------------------------------------------------------
 
     def evaluate_travel(
-        self, travel: FloatArray, sign: float, rows: Any = None, flank: bool = False
+        self,
+        travel: FloatArray,  # (k, m), or of any shape for one mechanism: travels of each mechanism, or of some
+        sign: float,  # 1 or -1
+        rows: Any = None,  # (k,) of int: which mechanisms; default: all
+        flank: bool = False,  # whether places are on the flank: rounding must not take the first one to the corner
     ) -> tuple[TrackStates, Forces]:
-        """Return where the rollers are, and the forces on the way up (1) or down (-1), at travels [m].
-
-        Parameters
-        ----------
-        travel : (k, m) array, or of any shape for one mechanism
-            Travels of each mechanism, or of some.
-        sign : float
-            1 or -1.
-        rows : (k,) array of int, optional
-            Which mechanisms; default: all.
-        flank : bool
-            Whether places are on the flank: rounding must not take the first one to the corner.
-        """
+        """Return where the rollers are, and the forces on the way up (1) or down (-1), at travels [m]."""
         track, loads, friction = self.assembly.track, self.assembly.loads, self.mechanism.rolling_friction
         if rows is not None:
             track, loads, friction = track.of_rows(rows), rows_of(loads, rows), rows_of(friction, rows)
@@ -429,14 +421,12 @@ _ON_CORNER = np.concatenate([np.geomspace(1e-9, 0.02, 30), np.linspace(0.0, 1.0,
 """The same on a corner, where it rises within a tenth of a millimetre."""
 
 
-def nodes(total: FloatArray, corner: FloatArray) -> FloatArray:
-    """Return travels so dense that the force hides nothing between two of them, (d, n), increasing [m].
-
-    Parameters
-    ----------
-    total, corner : (d,) array
-        Travel of each cam, and that at which its roller leaves the corner; 0 without one [m].
-    """
+def nodes(
+    # total, corner: (d,): travel of each cam, and that at which its roller leaves the corner; 0 without one [m]
+    total: FloatArray,
+    corner: FloatArray,
+) -> FloatArray:
+    """Return travels so dense that the force hides nothing between two of them, (d, n), increasing [m]."""
     if not corner.any():
         return np.asarray(total[:, None] * _SORTED_SHARES)
     on_corner = np.minimum(corner, total)[:, None] * _ON_CORNER

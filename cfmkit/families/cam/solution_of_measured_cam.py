@@ -29,18 +29,13 @@ class Sides:
         """Return the spring force on each roller [N]; springs do not push."""
         return loads.stiffness * np.maximum(self.x[0] + self.x[1] - 2.0 * rest, 0.0)
 
-    def forces(self, loads: Loads, friction: float, rest: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the force on the slider and at the right and left contact [N]; NaN where nothing moves a side.
-
-        Parameters
-        ----------
-        loads : Loads
-            Springs and weights.
-        friction : float
-            Positive on the way up, negative on the way down.
-        rest : float
-            Half width at which the springs are at rest [m].
-        """
+    def forces(
+        self,
+        loads: Loads,  # springs and weights
+        friction: float,  # positive on the way up, negative on the way down
+        rest: float,  # half width at which the springs are at rest [m]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the force on the slider and at the right and left contact [N]; NaN where nothing moves a side."""
         pull, contacts = np.full_like(self.x[0], loads.slider_weight), []
         spring, weight = self.spring(loads, rest), loads.roller_weight
         for x, slope in zip(self.x, self.slope, strict=True):

@@ -221,20 +221,18 @@ def safe_divide(load: FloatArray, lever: FloatArray) -> FloatArray:
     return np.where(moves | (load == 0), force, np.nan)
 
 
-def dead_point_limit(slope: Real, bend: Real, parts: tuple[float, float, float], friction: float) -> Real:
+def dead_point_limit(
+    # slope, bend: float or (n,): first and second derivative of the roller's track there [1, 1/m]
+    slope: Real,
+    bend: Real,
+    # half width at which the springs are at rest [m], length of the brace [m], stiffness of all springs [N/m]
+    parts: tuple[float, float, float],
+    friction: float,  # rolling friction mu: positive on the way up, negative on the way down
+) -> Real:
     """Return the limit of 0/0, the ratio of the derivatives [N].
 
     At the first point of an ideal profile the springs carry nothing and the slider has
     no leverage on the roller; the force has a limit there, which is the constant force.
-
-    Parameters
-    ----------
-    slope, bend : float or (n,) array
-        First and second derivative of the roller's track there [1, 1/m].
-    parts : (float, float, float)
-        Half width at which the springs are at rest [m], length of the brace [m], stiffness of all springs [N/m].
-    friction : float
-        Rolling friction mu: positive on the way up, negative on the way down.
     """
     x, brace, stiffness = parts
     across = (brace - x) * (brace + x)
@@ -260,20 +258,15 @@ def normal_turn(losses: Losses, rolling: Any) -> Any:
     return (rolling + kappa * np.sqrt(1.0 + rolling**2 - kappa**2)) / (1.0 - kappa**2)
 
 
-def leverage(x: FloatArray, slope: FloatArray, brace_length: Any, losses: Losses, friction: Any) -> FloatArray:
-    """Return the slider's lever on a roller with all friction: no force moves it where this is not positive.
-
-    Parameters
-    ----------
-    x, slope : (n,) array
-        Of the roller's track [m, 1].
-    brace_length : float
-        [m].
-    losses : Losses
-        What rubs.
-    friction : float
-        Rolling friction: positive on the way up, negative on the way down.
-    """
+def leverage(
+    # x, slope: (n,): of the roller's track [m, 1]
+    x: FloatArray,
+    slope: FloatArray,
+    brace_length: Any,  # [m]
+    losses: Losses,  # what rubs
+    friction: Any,  # rolling friction: positive on the way up, negative on the way down
+) -> FloatArray:
+    """Return the slider's lever on a roller with all friction: no force moves it where this is not positive."""
     way = -1.0 if np.any(friction < 0) else 1.0
     turn = way * normal_turn(losses, np.abs(friction))
     tangent = brace_tangent(x, brace_length)
@@ -359,26 +352,17 @@ def _friction_power(
 
 
 def jams(
-    track: Track, friction: Any, states: TrackStates | None = None, losses: Losses | None = None, count: int = 1
+    track: Track,  # of one mechanism or of all, or tracks side by side
+    friction: Any,  # float or (count, 1): rolling friction
+    states: TrackStates | None = None,  # of each, (n,) or (count, n)
+    losses: Losses | None = None,  # all friction
+    count: int = 1,  # number of mechanisms
 ) -> list[tuple[Interval, ...]]:
     """Return the intervals of the slider's travel in which no force moves it up, of each of some mechanisms [m].
 
     There the lever of the slider on a roller, f - mu - tan(alpha) (1 + mu f), is not positive. It is looked at in the
     `states` that are given, if force is known to be missing in one of them; else where a stretch of the track begins or
     ends without it. With `losses` it is `leverage`.
-
-    Parameters
-    ----------
-    track : Track
-        Of one mechanism or of all, or tracks side by side.
-    friction : float or (count, 1) array
-        Rolling friction.
-    states : TrackStates, optional
-        Of each, (n,) or (count, n).
-    losses : Losses, optional
-        All friction.
-    count : int
-        Number of mechanisms.
     """
     before, found = np.zeros(count, dtype=bool), [list[float]() for _ in range(count)]
     for number, part in enumerate(track.stretches()):

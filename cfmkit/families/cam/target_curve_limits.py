@@ -88,10 +88,7 @@ def target_shape(design: CamDesign, slider_weight: float) -> ThroughPoints | Non
 def with_curve(law: SlopeLaw, shape: ThroughPoints, stroke: Any) -> CurveSlopeLaw:
     """Return the law for a force that follows a curve of shares over travel [m], up to a stroke [m].
 
-    Raises
-    ------
-    CannotBuild
-        If there is no such path: the finding says why.
+    Raises CannotBuild if there is no such path: the finding says why.
     """
     if fails(stroke > shape.places[-1] * (1 + 1e-6)):
         raise CannotBuild(

@@ -36,10 +36,7 @@ def with_catalogue_springs(made: Candidate) -> Candidate:
 def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     """Return a linkage for a force with springs of the generic series, and with the thinnest links that bear them.
 
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If no springs of the series that fit hold the force, or no links bear them.
+    Raises SolutionError if no springs of the series that fit hold the force, or no links bear them.
     """
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.design import design
@@ -65,10 +62,7 @@ def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
 def _catalogue_springs(spec: SliderCrankSpec, request: Request, sheet: float) -> list[CatalogueSpring]:
     """Return the springs of the generic series that fit beside links of a sheet [m], half of the room on either side.
 
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If there are none.
+    Raises SolutionError if there are none.
     """
     link = linkage_of(spec.mechanism)
     deep, widest = 0.5 * depth_of_springs(request, sheet), min(link.crank, link.coupler)

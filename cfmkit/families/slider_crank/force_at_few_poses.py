@@ -22,18 +22,12 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
-def sample_poses(spec: SliderCrankSpec, places: FloatArray, paths: Sequence[str] = ()) -> Sampled | None:
-    """Return force and stress at travels; None of springs, and where the chain has no equilibrium at one of them.
-
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        With flexures or a strip.
-    places : (p,) array
-        Increasing travels [m].
-    paths : sequence of str, optional
-        Of values by which slopes are wanted; none are known.
-    """
+def sample_poses(
+    spec: SliderCrankSpec,  # with flexures or a strip
+    places: FloatArray,  # (p,): increasing travels [m]
+    paths: Sequence[str] = (),  # of values by which slopes are wanted; none are known
+) -> Sampled | None:
+    """Return force and stress at travels; None of springs, and where the chain has no equilibrium at one of them."""
     if spec.fidelity in ("prb", "solid") or spec.analysis.side is not None or places[0] < 0:
         return None
     if places[-1] > spec.mechanism.end_stops.rigid_ends[1]:

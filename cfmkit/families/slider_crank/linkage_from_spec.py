@@ -48,10 +48,7 @@ def coupler_length(mechanism: Mechanism) -> float:
 def linkage_of(mechanism: Mechanism) -> Linkage:
     """Return the linkage of a mechanism.
 
-    Raises
-    ------
-    CannotBuild
-        If crank and coupler do not reach the slider's path.
+    Raises CannotBuild if crank and coupler do not reach the slider's path.
     """
     branch = 1 if mechanism.branch == "right" else -1
     linkage = Linkage(mechanism.crank_length, coupler_length(mechanism), mechanism.offset, branch)
@@ -70,10 +67,7 @@ def linkage_of(mechanism: Mechanism) -> Linkage:
 def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
     """Return the crank angle with all springs relaxed [rad].
 
-    Raises
-    ------
-    CannotBuild
-        If the linkage does not reach it.
+    Raises CannotBuild if the linkage does not reach it.
     """
     given = mechanism.unloaded_angle
     angle = given if given is not None else linkage.stretched_angle + (mechanism.unloaded_offset or 0.0)

@@ -13,17 +13,13 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
-def free(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[float, float]]:
+def free(
+    given: SliderCrankSpec,  # with the `design` block
+    designed: SliderCrankSpec,  # what came out
+) -> dict[str, tuple[float, float]]:
     """Return the values that a redesign may vary, with ranges: thicknesses and width of a strip, or spring rates.
 
     The width of a strip from a sheet stays.
-
-    Parameters
-    ----------
-    given : SliderCrankSpec
-        With the `design` block.
-    designed : SliderCrankSpec
-        What came out.
     """
     wanted, beam = given.design.beam if given.design else None, designed.mechanism.beam
     if wanted is None or beam is None:

@@ -241,10 +241,7 @@ def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     The window is as long as is required. The thinnest links that bear the springs' loads are taken: thicker ones leave
     less depth for the springs.
 
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If no springs that fit come near it, or no links bear them.
+    Raises SolutionError if no springs that fit come near it, or no links bear them.
     """
     sprung, reason, least = None, "", 0.0
     materials = request.materials or ({"name": "steel-s235"},)
@@ -372,10 +369,7 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
     other, and no deeper than the longer side of the envelope, or than what the links and those on their other side
     leave of its depth.
 
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If there is no such spring for a joint.
+    Raises SolutionError if there is no such spring for a joint.
     """
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.springs.model import analyze

@@ -52,22 +52,16 @@ class UnitCurves(ShortRepr):
     bend: FloatArray | None = None  # (4, ..., n), (q q')''; None if it was not requested
 
 
-def curves_along_crank(linkage: Linkage, unloaded: float, angle: FloatArray, bend: bool = False) -> UnitCurves:
+def curves_along_crank(
+    linkage: Linkage,  # must be assemblable
+    unloaded: float,  # crank angle at which all springs are relaxed [rad]
+    angle: FloatArray,  # (n,): crank angles [rad], any number of turns
+    bend: bool = False,  # whether the second derivative of the effort is wanted, too
+) -> UnitCurves:
     """Return the unit curves over the crank angle: effort is a torque at the crank [LH, eq. 10].
 
     Differences from the unloaded position are formed without cancellation. NaN where the
     linkage does not reach; infinite where the coupler stands across the slider's path.
-
-    Parameters
-    ----------
-    linkage : Linkage
-        Must be assemblable.
-    unloaded : float
-        Crank angle at which all springs are relaxed [rad].
-    angle : (n,) array
-        Crank angles [rad], any number of turns.
-    bend : bool
-        Whether the second derivative of the effort is wanted, too.
     """
     r1, r2 = linkage.crank, linkage.coupler
     angle = np.asarray(angle, dtype=np.float64)
@@ -133,7 +127,14 @@ def _turns(linkage: Linkage, unloaded: float, angle: FloatArray) -> tuple[FloatA
     return turn, r1 * np.cos(angle) + linkage.branch * run
 
 
-def curves_along_slider(linkage: Linkage, unloaded: float, side: int, travel: FloatArray) -> UnitCurves:
+def curves_along_slider(
+    linkage: Linkage,  # must be assemblable
+    unloaded: float,  # crank angle at which all springs are relaxed [rad]
+    side: int,  # 1: the crank is beyond the stretched position (psi > 0), -1: before it
+    # (n,): from the unloaded position [m]; positive to the left on the right branch, to the right on the left one:
+    # towards the pivot from where the linkage is stretched
+    travel: FloatArray,
+) -> UnitCurves:
     """Return the unit curves over the slider's travel towards the pivot: effort is a force at the slider [B, eq. 2-7].
 
     Everything is written in the knee angle psi between crank and coupler, which the travel
@@ -141,18 +142,6 @@ def curves_along_slider(linkage: Linkage, unloaded: float, side: int, travel: Fl
     beyond the pivot's foot the same travel leads away from the pivot. Where the springs are relaxed in the
     stretched or the folded position, the effort at its 0/0 is the limit; otherwise it grows without bound towards
     both. NaN where the linkage does not reach, and as the stiffness at those positions.
-
-    Parameters
-    ----------
-    linkage : Linkage
-        Must be assemblable.
-    unloaded : float
-        Crank angle at which all springs are relaxed [rad].
-    side : int
-        1: the crank is beyond the stretched position (psi > 0), -1: before it.
-    travel : (n,) array
-        From the unloaded position [m]; positive to the left on the right branch, to the right on the left one:
-        towards the pivot from where the linkage is stretched.
     """
     return path_of(linkage, unloaded, side).units(travel)
 

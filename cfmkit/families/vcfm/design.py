@@ -127,10 +127,7 @@ def _attempt(spec: VcfmSpec) -> Design:
 def closed_form(spec: VcfmSpec, target: VcfmDesign) -> DesignSizes:
     """Return all sizes by closed forms.
 
-    Raises
-    ------
-    Infeasible
-        With the constraint that cannot be met, and the nearest value that can.
+    Raises Infeasible with the constraint that cannot be met, and the nearest value that can.
     """
     check_guide(spec)
     thickness = thickness_for(target)
@@ -252,10 +249,7 @@ def refine_sizes(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> Desi
 
     From a sheet, whose widths stay, lengths and number are corrected instead.
 
-    Raises
-    ------
-    Infeasible
-        If the exact stress stays above the allowable one.
+    Raises Infeasible if the exact stress stays above the allowable one.
     """
     if (sheet := sheet_of(spec.mechanism.part)) is not None:
         return _refined_for_sheet(spec, target, sizes, sheet)
@@ -308,10 +302,7 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
     The fit is over the middle 84 % of the linear region, without preload; the stress of the leaves is the largest from
     where the whole preload pulls them to the end of that region, that of the spring the one there under that preload.
 
-    Raises
-    ------
-    Infeasible
-        If the exact leaves cannot be followed that far.
+    Raises Infeasible if the exact leaves cannot be followed that far.
     """
     from cfmkit.families.vcfm.exact_model import ExactSampler
 
@@ -348,10 +339,7 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
 def _follow_curve(curve: TargetCurve, places: FloatArray) -> FloatArray:
     """Return the forces of a curve at places in the linear region [N].
 
-    Raises
-    ------
-    Infeasible
-        If the curve does not cover them, or is not above zero there.
+    Raises Infeasible if the curve does not cover them, or is not above zero there.
     """
     low, high = float(places[0]), float(places[-1])
     if not curve.covers(low, high):

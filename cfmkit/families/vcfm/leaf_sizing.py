@@ -78,10 +78,7 @@ def sized_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float, length: flo
 def thickness_for(target: VcfmDesign) -> float:
     """Return the thickness of leaves whose linear region is as long as the stroke [m].
 
-    Raises
-    ------
-    Infeasible
-        If the rise is too small for the stroke, or the leaf thinner than can be made.
+    Raises Infeasible if the rise is too small for the stroke, or the leaf thinner than can be made.
     """
     rise, stroke, least = target.height, target.stroke, target.min_thickness or 0.0
     free = 1.0 - (0.75 * stroke / rise) ** 2
@@ -193,10 +190,7 @@ def complete_analysis(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, f
 def leaves_for(have: int, wanted: float, sheet: float) -> int:
     """Return the number of leaves that is no smaller than one that is wanted, whole Vs more than there are.
 
-    Raises
-    ------
-    Infeasible
-        If a mechanism cannot have as many.
+    Raises Infeasible if a mechanism cannot have as many.
     """
     count = have + 2 * max(0, ceil((wanted - have) / 2.0 - 1e-9))
     if count > MOST_LEAVES:
@@ -206,24 +200,16 @@ def leaves_for(have: int, wanted: float, sheet: float) -> int:
 
 
 def leaf_of_sheet(
-    spec: VcfmSpec, target: VcfmDesign, thickness: float, shortest: float, sheet: float
+    spec: VcfmSpec,
+    target: VcfmDesign,
+    thickness: float,  # in the plane [m]
+    shortest: float,  # shortest leaf within the stress [m]
+    sheet: float,  # their width [m]
 ) -> tuple[int, LeafStrip]:
     """Return how many leaves the sheet needs, and one of them.
 
-    Parameters
-    ----------
-    spec, target : VcfmSpec, VcfmDesign
-    thickness : float
-        In the plane [m].
-    shortest : float
-        Shortest leaf within the stress [m].
-    sheet : float
-        Their width [m].
-
-    Raises
-    ------
-    Infeasible
-        If the sheet is so thin that leaves would buckle out of the plane, or that there would be too many.
+    Raises Infeasible if the sheet is so thin that leaves would buckle out of the plane, or that there would be too
+    many.
     """
     if sheet < MIN_WIDTH_RATIO * thickness:
         least = format_at_least(MIN_WIDTH_RATIO * thickness)
@@ -247,21 +233,13 @@ def leaf_of_sheet(
 
 
 def spring_leaf_of_sheet(
-    sized: Callable[[float], LeafStrip], spring_leaf: LeafStrip, least: float, sheet: float
+    # the leaf of some thickness that the stress allows, with the width that its stiffness needs
+    sized: Callable[[float], LeafStrip],
+    spring_leaf: LeafStrip,  # one of them
+    least: float,  # thinnest leaf that can be made [m]
+    sheet: float,  # [m]
 ) -> LeafStrip:
-    """Return a leaf of the spring as wide as the sheet is thick.
-
-    Parameters
-    ----------
-    sized : callable
-        The leaf of some thickness that the stress allows, with the width that its stiffness needs.
-    spring_leaf : LeafStrip
-        One of them.
-    least : float
-        Thinnest leaf that can be made [m].
-    sheet : float
-        [m]
-    """
+    """Return a leaf of the spring as wide as the sheet is thick."""
     for _ in range(MAX_ROUNDS):
         spring_leaf = sized(float(spring_leaf.thickness) * (spring_leaf.width / sheet) ** (2.0 / 3.0))
         if abs(spring_leaf.width / sheet - 1.0) < WIDTH_RTOL:
@@ -272,22 +250,14 @@ def spring_leaf_of_sheet(
     )
 
 
-def next_leaf(have: int, leaf: LeafStrip, stiffer: float, over: float, rise: float) -> tuple[int, LeafStrip]:
-    """Return how many leaves, and one, have a force `stiffer` times as large and keep the stress.
-
-    Parameters
-    ----------
-    have : int
-        Number so far.
-    leaf : LeafStrip
-        With its width, which stays.
-    stiffer : float
-        Factor of the force of all leaves.
-    over : float
-        Its stress over the allowable one.
-    rise : float
-        Of the leaf, which stays [m].
-    """
+def next_leaf(
+    have: int,  # number so far
+    leaf: LeafStrip,  # with its width, which stays
+    stiffer: float,  # factor of the force of all leaves
+    over: float,  # its stress over the allowable one
+    rise: float,  # of the leaf, which stays [m]
+) -> tuple[int, LeafStrip]:
+    """Return how many leaves, and one, have a force `stiffer` times as large and keep the stress."""
     count, length = have, float(leaf.length) * stiffer ** (-1.0 / 3.0)
     stressed = over * (leaf.length / length) ** 2
     if stressed > 1.0 + 1e-4:

@@ -236,22 +236,14 @@ def _compress_rows(travel: FloatArray, kept: NDArray[np.bool_]) -> tuple[FloatAr
 
 
 def rests_of(
-    sampler: ForceSampler, preloads: FloatArray | Sequence[float], grid: FloatArray, stops: EndStops = NO_STOPS
+    sampler: ForceSampler,  # of one mechanism, or of one for each preload
+    preloads: FloatArray | Sequence[float],  # (r,): [m]
+    grid: FloatArray,  # (n,) or (r, n): travels at which a shuttle whose spring is pulled is looked for first [m]
+    stops: EndStops = NO_STOPS,  # of the shuttle: it may rest on one
 ) -> FloatArray:
     """Return where the shuttle rests at each preload, (r,) [m]: the first place without force from the unloaded one on.
 
     NaN where there is none, or where the spring could not be followed so far.
-
-    Parameters
-    ----------
-    sampler : ForceSampler
-        Of one mechanism, or of one for each preload.
-    preloads : (r,) array
-        [m].
-    grid : (n,) or (r, n) array
-        Travels at which a shuttle whose spring is pulled is looked for first [m].
-    stops : EndStops
-        Of the shuttle: it may rest on one.
     """
     if stops:
         return _rests_on_stops(sampler, np.asarray(preloads, dtype=float), grid, stops)

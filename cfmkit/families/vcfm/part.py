@@ -205,10 +205,7 @@ def _levels(spec: VcfmSpec) -> int:
 def _check_levels(spec: VcfmSpec) -> None:
     """Refuse leaves of neighbouring levels that overlap.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        With the place where they are closest, and the spacing at which they just touch.
+    Raises GeometryError with the place where they are closest, and the spacing at which they just touch.
     """
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
     law = _leaf(spec)
@@ -226,10 +223,7 @@ def _check_levels(spec: VcfmSpec) -> None:
 def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:
     """Return the outline of shuttle, leaves and walls with the holes between them, and its lowest point [m].
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If leaves overlap.
+    Raises GeometryError if leaves overlap.
     """
     _check_levels(spec)
     sizes, law, levels = sizes_of_frame(spec), _leaf(spec), range(_levels(spec))

@@ -375,27 +375,19 @@ class _Fit:
 
 
 def with_structure(
-    spec: VcfmSpec, name: str, forces: tuple[float, float], travel: float, strength: float
+    spec: VcfmSpec,  # with a diamond and straight leaves
+    name: str,  # of `STRUCTURE_BLOCKS`
+    # the one without preload, and the largest, for whose preload the spring is sized, too [N]
+    forces: tuple[float, float],
+    # travel, strength: [m], [Pa]
+    travel: float,
+    strength: float,
 ) -> tuple[VcfmSpec, float, float]:
     """Return a designed mechanism with another structure for a force over a travel.
 
     With it come where its best window ends [m], and the stiffness of its spring there [N/m].
 
-    Parameters
-    ----------
-    spec : VcfmSpec
-        With a diamond and straight leaves.
-    name : str
-        Of `STRUCTURE_BLOCKS`.
-    forces : (float, float)
-        The one without preload, and the largest, for whose preload the spring is sized, too [N].
-    travel, strength : float
-        [m], [Pa].
-
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If no widths above zero fit, or the leaves cannot be followed that far.
+    Raises SolutionError if no widths above zero fit, or the leaves cannot be followed that far.
     """
     block, structure = STRUCTURE_BLOCKS[name]
     keys = structure.changes(getattr(spec.mechanism, block)).items()

@@ -12,17 +12,13 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
-def free(given: VcfmSpec, designed: VcfmSpec) -> dict[str, tuple[float, float]]:
+def free(
+    given: VcfmSpec,  # with the `design` block
+    designed: VcfmSpec,  # what came out
+) -> dict[str, tuple[float, float]]:
     """Return both widths, and length, angle and thickness of the leaves, within the limits of the design.
 
     From a sheet the widths stay, and length and thickness of the spring may move.
-
-    Parameters
-    ----------
-    given : VcfmSpec
-        With the `design` block.
-    designed : VcfmSpec
-        What came out.
     """
     wanted = given.design
     if wanted is None:

@@ -91,10 +91,7 @@ class Mechanism(CutLeaves, Model):
     def flexures(self) -> Positive:
         """The structure of leaves.
 
-        Raises
-        ------
-        TypeError
-            If the spring is bought: ask `springs` first.
+        Raises TypeError if the spring is bought: ask `springs` first.
         """
         if self.positive is None:
             raise TypeError("the springs of this mechanism are bought")

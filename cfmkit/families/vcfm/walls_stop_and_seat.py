@@ -67,19 +67,14 @@ class FrameSizes:
             yield from (seat, seat.mirror())
 
 
-def frame_sizes(spec: VcfmSpec, spring: tuple[float, float, float, float] | None) -> FrameSizes:
+def frame_sizes(
+    spec: VcfmSpec,
+    # smallest x and y, largest x and y of the unloaded spring [m], where it has a seat
+    spring: tuple[float, float, float, float] | None,
+) -> FrameSizes:
     """Return the sizes of what stands.
 
-    Parameters
-    ----------
-    spec : VcfmSpec
-    spring : four floats or None
-        Smallest x and y, largest x and y of the unloaded spring [m], where it has a seat.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the spring does not fit between the walls, or the shuttle comes to the seat.
+    Raises GeometryError if the spring does not fit between the walls, or the shuttle comes to the seat.
     """
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
     given = spec.mechanism.cut_part.frame or StandingFrame()

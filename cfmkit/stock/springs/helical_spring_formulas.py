@@ -115,10 +115,7 @@ class HelicalSpring:
     def yield_load(self) -> Any:
         """Return the force [N] or couple [N m] at which turns or loops yield; of an array of coils, of each.
 
-        Raises
-        ------
-        WireOutOfRange
-            If no strength is published for this diameter, or the class of the wire is not known.
+        Raises WireOutOfRange if no strength is published for this diameter, or the class of the wire is not known.
 
         Examples
         --------
@@ -216,22 +213,13 @@ class HelicalSpring:
 
 
 def buckling_deflection(
+    # free_length, coil: relaxed length, and mean diameter of the coil [m]
     free_length: float,
     coil: float,
-    seats: Seats = "fixed-fixed",
-    moduli: tuple[float, float] = (YOUNGS_MODULUS, SHEAR_MODULUS),
+    seats: Seats = "fixed-fixed",  # how its ends are held, a key of `SEAT_FACTORS`
+    moduli: tuple[float, float] = (YOUNGS_MODULUS, SHEAR_MODULUS),  # e and G of the wire [Pa]
 ) -> float:
-    """Return the deflection at which a compression spring buckles [m]; infinite if it is stable [Sh, eq. 10-10].
-
-    Parameters
-    ----------
-    free_length, coil : float
-        Relaxed length, and mean diameter of the coil [m].
-    seats : str
-        How its ends are held, a key of `SEAT_FACTORS`.
-    moduli : (float, float)
-        E and G of the wire [Pa].
-    """
+    """Return the deflection at which a compression spring buckles [m]; infinite if it is stable [Sh, eq. 10-10]."""
     young, shear = moduli
     slenderness = SEAT_FACTORS[seats] * free_length / coil
     inside = 1.0 - 2.0 * math.pi**2 * (young - shear) / (2.0 * shear + young) / slenderness**2

@@ -115,20 +115,14 @@ def shortest_torsion_spring(
 
 
 def stiffest(
-    kind: Kind, deflection: FloatArray, widest: float | FloatArray, room: float | FloatArray, safety: float = 1.0
+    kind: Kind,  # of the springs
+    deflection: FloatArray,  # (n,): how far they are stretched or turned
+    # widest, room: float or (n,): largest outer diameter, and length with the loops of one that is stretched [m]
+    widest: float | FloatArray,
+    room: float | FloatArray,
+    safety: float = 1.0,  # against yield
 ) -> FloatArray:
     """Return the largest rates of springs that can be stretched [m], or turned [rad], so far and fit: zero for none.
-
-    Parameters
-    ----------
-    kind : {"extension", "torsion"}
-        Of the springs.
-    deflection : (n,) array
-        How far they are stretched or turned.
-    widest, room : float or (n,) array
-        Largest outer diameter, and length with the loops of one that is stretched [m].
-    safety : float
-        Against yield.
 
     Examples
     --------

@@ -389,20 +389,13 @@ Catalogue = Annotated[tuple[CatalogueSpring, ...] | str, WrapValidator(_resolve_
 """The type of a key that lists springs: blocks, a CSV file beside the specification, or ``generic``."""
 
 
-def offers(catalogue: tuple[CatalogueSpring, ...] | str, *kinds: Kind) -> tuple[Offer, ...]:
+def offers(
+    catalogue: tuple[CatalogueSpring, ...] | str,  # a list, a file's name, or "generic"
+    *kinds: Kind,  # which are wanted
+) -> tuple[Offer, ...]:
     """Return the springs of some kinds on offer.
 
-    Parameters
-    ----------
-    catalogue : tuple of CatalogueSpring or str
-        A list, a file's name, or "generic".
-    *kinds : str
-        Which are wanted.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If the file cannot be read.
+    Raises DataError if the file cannot be read.
     """
     if isinstance(catalogue, DataSource):
         return tuple(item.offer for item in _from_file(catalogue) if item.kind in kinds)

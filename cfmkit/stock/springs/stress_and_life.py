@@ -113,10 +113,7 @@ class SpringInUse:
     def life(self) -> float | None:
         """Return the cycles that it lasts; None if nothing is known of it.
 
-        Raises
-        ------
-        Undefined
-            If the S-N data have no number for these stresses.
+        Raises Undefined if the S-N data have no number for these stresses.
         """
         if self.wound is None or self.fatigue is None:
             return self.stated_life

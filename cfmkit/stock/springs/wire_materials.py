@@ -105,10 +105,7 @@ class WireMaterial:
     def tensile_strength(self, wire: float) -> float:
         """Return the smallest tensile strength of a diameter [m], A / d^m [Pa].
 
-        Raises
-        ------
-        WireOutOfRange
-            If [Sh, Table 10-4] does not list the diameter, or the class.
+        Raises WireOutOfRange if [Sh, Table 10-4] does not list the diameter, or the class.
 
         Examples
         --------
@@ -118,7 +115,7 @@ class WireMaterial:
         Traceback (most recent call last):
         ...
         cfmkit.stock.springs.wire_materials.WireOutOfRange: music-wire is listed from 0.1 to 6.5 mm (Shigley, \
-Table 10-4), and the wire is 7.25 mm
+        Table 10-4), and the wire is 7.25 mm
         """
         self.check_diameter(wire)
         for one in self.strengths:

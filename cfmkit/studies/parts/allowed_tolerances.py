@@ -77,10 +77,7 @@ def limits_along_errors(
 
     `factors`, (d,): on the stated tolerances: limits are solved as far as such tolerances go.
 
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If the perfect part, or one near it, cannot be followed at a few poses.
+    Raises SolutionError if the perfect part, or one near it, cannot be followed at a few poses.
     """
     run, spec = Run(), parts.spec
     rows = requirement_rows(nominal, spec, run)

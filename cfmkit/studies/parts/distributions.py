@@ -83,10 +83,7 @@ def values_across(spreads: Sequence[ParameterSpread], unit: FloatArray) -> Float
 def correlation_matrix(count: int, groups: Iterable[tuple[Sequence[int], float]]) -> FloatArray:
     """Return the correlations of so many parameters, from groups of them and the correlation of each two of a group.
 
-    Raises
-    ------
-    Incompatible
-        If no variables can be correlated so.
+    Raises Incompatible if no variables can be correlated so.
     """
     matrix = np.eye(count)
     for members, correlation in groups:

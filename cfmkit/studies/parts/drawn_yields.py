@@ -109,10 +109,7 @@ class Yields:
 def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
     """Return the yield of an analysed design and of the specification that it began with; None without tolerances.
 
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        If a tolerance is on a value that the design does not have.
+    Raises SpecError if a tolerance is on a value that the design does not have.
     """
     block: DesignKeys | None = getattr(design.spec, "design", None) or getattr(given, "design", None)
     if not isinstance(block, DesignKeys) or (parts := Parts.of_design(design.spec, block, run.seed)) is None:

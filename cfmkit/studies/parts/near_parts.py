@@ -57,10 +57,7 @@ def near_parts(parts: Parts, middle: FloatArray, numbers: Numbers, known: FloatA
     `middle`: those of the design, (q,); `numbers`: of a part, all of them or those after the exactly known ones;
     `known`: exact derivatives of the first numbers by all errors, (k, d).
 
-    Raises
-    ------
-    Unknown
-        If a part near the design has no numbers.
+    Raises Unknown if a part near the design has no numbers.
     """
     if known is not None and len(known) == len(middle):
         return NearParts(middle, known)
@@ -101,10 +98,7 @@ def _refuse_many(parts: Parts, quick: bool = True) -> None:
 def efforts_of_parts(parts: Parts, places: FloatArray, branch: str, run: Run) -> NearParts:
     """Return the effort of parts on one branch at places (p,), by linear estimate.
 
-    Raises
-    ------
-    Unknown
-        If it would take long, or a part near the design cannot be followed.
+    Raises Unknown if it would take long, or a part near the design cannot be followed.
     """
 
     def efforts(part: Spec) -> FloatArray | None:
@@ -133,10 +127,7 @@ class ExpectedShares:
 def expected_shares(result: Result, parts: Parts, run: Run) -> ExpectedShares:
     """Return the yields of an analysed design by linear estimate.
 
-    Raises
-    ------
-    Unknown
-        If it would take long, or a part near the design has no curve.
+    Raises Unknown if it would take long, or a part near the design has no curve.
     """
     spec, places = result.spec, rr.places_of(result)
     quick = rr.quickly_sampled(spec, places)

@@ -47,10 +47,7 @@ class Parts:
     def of_block(cls, spec: Spec, block: Sensitivity, samples: int, seed: int) -> Parts:
         """Return the parts whose errors are the parameters of a block.
 
-        Raises
-        ------
-        cfmkit.errors.SpecError
-            With every fault, at ``sensitivity.parameters`` and the path.
+        Raises SpecError with every fault, at ``sensitivity.parameters`` and the path.
         """
         parameters = parameters_of(spec, block)
         paths = tuple(one.path for one in parameters)
@@ -60,10 +57,7 @@ class Parts:
     def of_design(cls, spec: Spec, design: DesignBlock, seed: int) -> Parts | None:
         """Return the parts of a specification with the tolerances of a `design` block or of its process; None if none.
 
-        Raises
-        ------
-        cfmkit.errors.SpecError
-            If a path is not in the specification, at ``design.tolerances`` and the path.
+        Raises SpecError if a path is not in the specification, at ``design.tolerances`` and the path.
         """
         stated = stated_tolerances(spec, design)
         if not stated:

@@ -189,10 +189,7 @@ class PartNumbers:
 def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
     """Return which values may move, and in which ranges [SI]: those of `design.free`, else those of the family.
 
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        If a path of `design.free` is not in the design, or its value is not in the range.
+    Raises SpecError if a path of `design.free` is not in the design, or its value is not in the range.
     """
     block = getattr(given, "design", None)
     stated = getattr(block, "free", None)
@@ -229,19 +226,14 @@ def _plain(kind: str, text: str) -> Any:
     return read_number(text) if kind == "number" else text
 
 
-def with_design_margins(stated: Spec, design: Design, run: Run) -> Design:
+def with_design_margins(
+    stated: Spec,  # with `design.tolerances` and `design.yield`
+    design: Design,  # what the family made of it; returned as it is where nothing may move or nothing is asked
+    run: Run,  # seed, progress, time budget
+) -> Design:
     """Return a design whose made parts are good as often as `design.yield` asks, moved from one that was found.
 
     Where none is, the next springs of a catalogue are tried.
-
-    Parameters
-    ----------
-    stated : Spec
-        With `design.tolerances` and `design.yield`.
-    design : Design
-        What the family made of it; returned as it is where nothing may move or nothing is asked.
-    run : Run
-        Seed, progress, time budget.
     """
     others, clock = design.next_best[:OTHER_SPRINGS], Clock.from_budgets(run.time_budget)
     good, moved = _move_design(stated, design, run, clock, not others)

@@ -43,10 +43,7 @@ class Parameter:
 def parameters_of(spec: Spec, block: Sensitivity) -> tuple[Parameter, ...]:
     """Return the parameters of a block, lists taken apart.
 
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        With every fault, at ``sensitivity.parameters`` and the path.
+    Raises SpecError with every fault, at ``sensitivity.parameters`` and the path.
     """
     found = list(faults(spec, block))
     if found:
@@ -109,10 +106,7 @@ def groups(block: Sensitivity, paths: Sequence[str]) -> tuple[tuple[tuple[int, .
 def correlations(block: Sensitivity, paths: Sequence[str]) -> FloatArray:
     """Return the matrix of correlations.
 
-    Raises
-    ------
-    Incompatible
-        If the correlations are impossible together.
+    Raises Incompatible if the correlations are impossible together.
     """
     return correlation_matrix(len(paths), groups(block, paths))
 

@@ -52,6 +52,8 @@ class Evaluator:
     def outputs(self, points: FloatArray, roles: Sequence[str] | Sequence[Sequence[str]]) -> FloatArray:
         """Return what comes of blocks of points: the metrics, then 0 or 1 for each requirement.
 
+        Raises Interrupted if the user asked to stop.
+
         Parameters
         ----------
         points : (b, s, d) array
@@ -63,11 +65,6 @@ class Evaluator:
         -------
         (b, s, m + r) array
             NaN where there is no value; whatever is not complete has none.
-
-        Raises
-        ------
-        Interrupted
-            If the user asked to stop.
         """
         count, size = points.shape[:2]
         done = sum(int(piece.blocks[-1]) for piece in self.pieces[-1:])

@@ -57,14 +57,12 @@ def steps() -> FloatArray:
     return np.asarray(FIRST_STEP * 0.5 ** np.arange(N_STEP_LEVELS), dtype=np.float64)
 
 
-def sample(nominal: FloatArray, half_widths: FloatArray) -> FloatArray:
-    """Return points, (parameters, 2, levels, parameters): one parameter a step up, then down.
-
-    Parameters
-    ----------
-    nominal, half_widths : (d,) array
-        Values of the parameters, and the scale of their steps.
-    """
+def sample(
+    # nominal, half_widths: (d,): values of the parameters, and the scale of their steps
+    nominal: FloatArray,
+    half_widths: FloatArray,
+) -> FloatArray:
+    """Return points, (parameters, 2, levels, parameters): one parameter a step up, then down."""
     count = len(nominal)
     points = np.broadcast_to(nominal, (count, 2, N_STEP_LEVELS, count)).copy()
     for k in range(count):
@@ -73,18 +71,14 @@ def sample(nominal: FloatArray, half_widths: FloatArray) -> FloatArray:
     return points
 
 
-def slope(up: FloatArray, down: FloatArray, at_nominal: float, half_width: float) -> Slope:
-    """Return the derivative of one output by one parameter.
-
-    Parameters
-    ----------
-    up, down : (levels,) array
-        The output a step above and below the nominal point; NaN where it failed.
-    at_nominal : float
-        The output there.
-    half_width : float
-        The scale of the steps.
-    """
+def slope(
+    # up, down: (levels,): the output a step above and below the nominal point; NaN where it failed
+    up: FloatArray,
+    down: FloatArray,
+    at_nominal: float,  # the output there
+    half_width: float,  # the scale of the steps
+) -> Slope:
+    """Return the derivative of one output by one parameter."""
     size = half_width * steps()
     both = ~(np.isnan(up) | np.isnan(down))
     scale = float(np.nanmax(np.abs([*up, *down, at_nominal]))) if both.any() or np.isfinite(at_nominal) else 0.0

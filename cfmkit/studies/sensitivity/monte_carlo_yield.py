@@ -32,18 +32,12 @@ TIGHTENING_FACTOR = 0.5
 Groups = tuple[tuple[int, ...], ...]
 
 
-def sample(unit: FloatArray, spreads: Sequence[ParameterSpread], groups: Groups) -> FloatArray:
-    """Return made mechanisms, (n, 1 + groups, d): as drawn, then with one group tightened each.
-
-    Parameters
-    ----------
-    unit : (n, d) array
-        Drawn, in the unit cube.
-    spreads : sequence of ParameterSpread
-        The d tolerances.
-    groups : tuple of tuple of int
-        Tolerances that are tightened together.
-    """
+def sample(
+    unit: FloatArray,  # (n, d): drawn, in the unit cube
+    spreads: Sequence[ParameterSpread],  # the d tolerances
+    groups: Groups,  # tolerances that are tightened together
+) -> FloatArray:
+    """Return made mechanisms, (n, 1 + groups, d): as drawn, then with one group tightened each."""
     drawn = values_at(spreads, unit)
     tight = values_at([one.tighten(TIGHTENING_FACTOR) for one in spreads], unit)
     blocks = [drawn]
@@ -54,14 +48,12 @@ def sample(unit: FloatArray, spreads: Sequence[ParameterSpread], groups: Groups)
     return np.stack(blocks, axis=1)
 
 
-def yield_gains(met: NDArray[np.bool_], failed: NDArray[np.bool_]) -> Index:
-    """Return how much the yield gains when each group is tightened.
-
-    Parameters
-    ----------
-    met, failed : (n, 1 + groups) array of bool
-        As drawn, then tightened. A failed sample is a bad part.
-    """
+def yield_gains(
+    # met, failed: (n, 1 + groups) of bool: as drawn, then tightened. A failed sample is a bad part
+    met: NDArray[np.bool_],
+    failed: NDArray[np.bool_],
+) -> Index:
+    """Return how much the yield gains when each group is tightened."""
     count = len(met)
     gains = []
     for group in range(1, met.shape[1]):
@@ -75,16 +67,11 @@ def yield_gains(met: NDArray[np.bool_], failed: NDArray[np.bool_]) -> Index:
     return Index(YIELD_GAIN, value, low, high)
 
 
-def variance_drops(outputs: FloatArray, seed: int) -> Analysis:
-    """Return by which share the variance of an output falls when each group is tightened.
-
-    Parameters
-    ----------
-    outputs : (n, 1 + groups) array
-        Complete: as drawn, then tightened.
-    seed : int
-        Of the bootstrap.
-    """
+def variance_drops(
+    outputs: FloatArray,  # (n, 1 + groups): complete: as drawn, then tightened
+    seed: int,  # of the bootstrap
+) -> Analysis:
+    """Return by which share the variance of an output falls when each group is tightened."""
     groups = outputs.shape[1] - 1
     if len(outputs) < 2 or varies_not(outputs[:, 0]):
         gap = np.full(groups, np.nan)

@@ -32,19 +32,16 @@ N_GRID_LEVELS = 4
 """Levels of the grid in each direction; an effect is that of a step over two thirds of the range."""
 
 
-def sample(start: int, count: int, parameters: int, seed: int) -> FloatArray:
+def sample(
+    # start, count: which trajectories; those of another start are drawn anew
+    start: int,
+    count: int,
+    parameters: int,  # dimension of the cube
+    seed: int,  # of the trajectories
+) -> FloatArray:
     """Return trajectories on a grid of the unit cube, (count, parameters + 1, parameters).
 
     From one point to the next a single coordinate changes.
-
-    Parameters
-    ----------
-    start, count : int
-        Which trajectories; those of another start are drawn anew.
-    parameters : int
-        Dimension of the cube.
-    seed : int
-        Of the trajectories.
     """
     from SALib.sample import morris
 

@@ -23,18 +23,12 @@ if TYPE_CHECKING:
 LOW_END_INDEX, HIGH_END_INDEX, SWING_INDEX, SLOPE_INDEX = "at_low_end", "at_high_end", "swing", "normalised_slope"
 
 
-def sample(nominal: FloatArray, ends: FloatArray, count: int) -> FloatArray:
-    """Return points, (parameters, count, parameters): in the k-th group the k-th parameter varies.
-
-    Parameters
-    ----------
-    nominal : (d,) array
-        Values of the parameters.
-    ends : (d, 2) array
-        Their ranges.
-    count : int
-        Points over each range, both ends included.
-    """
+def sample(
+    nominal: FloatArray,  # (d,): values of the parameters
+    ends: FloatArray,  # (d, 2): their ranges
+    count: int,  # points over each range, both ends included
+) -> FloatArray:
+    """Return points, (parameters, count, parameters): in the k-th group the k-th parameter varies."""
     points = np.broadcast_to(nominal, (len(nominal), count, len(nominal))).copy()
     for k, (low, high) in enumerate(ends):
         points[k, :, k] = np.linspace(low, high, count)

@@ -14,16 +14,11 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.setup import Setup
 
 
-def carry_out(setup: Setup, compute: Callable[[Work], Records]) -> Findings:
-    """Return what a study finds.
-
-    Parameters
-    ----------
-    setup : Setup
-        What to do.
-    compute : callable
-        From `Work` to `Records`: serial, in processes, on a cluster.
-    """
+def carry_out(
+    setup: Setup,  # what to do
+    compute: Callable[[Work], Records],  # from `Work` to `Records`: serial, in processes, on a cluster
+) -> Findings:
+    """Return what a study finds."""
     evaluator = Evaluator(setup.study, setup.parameters, compute, by_role=setup.record.by_role)
     try:
         found: Findings = setup.record.run(setup, evaluator)

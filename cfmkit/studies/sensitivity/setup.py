@@ -110,26 +110,15 @@ class Setup:
         return tuple(Bounds.from_requirement(one, metric.dimension) for one in mine)
 
 
-def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Setup:
+def prepare(
+    spec: Spec,  # with a block `sensitivity`
+    seed: int | None = None,  # takes precedence over the one of the specification
+    most: int = MOST_POINTS,  # samples that are allowed
+) -> Setup:
     """Return what a study of a specification has to do.
 
-    Parameters
-    ----------
-    spec : Spec
-        With a block `sensitivity`.
-    seed : int, optional
-        Goes before the one of the specification.
-    most : int
-        Samples that are allowed.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is nothing to vary, too much, or a metric that does not exist.
-    cfmkit.errors.SpecError
-        If a path or value is wrong.
-    cfmkit.errors.SolutionError
-        If the specification itself has no solution.
+    Raises UsageError if there is nothing to vary, too much, or a metric that does not exist; SpecError if a path or
+    value is wrong; SolutionError if the specification itself has no solution.
     """
     block = spec.sensitivity
     if block is None:

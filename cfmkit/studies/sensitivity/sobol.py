@@ -39,20 +39,17 @@ MIN_BLOCKS = 16
 """Convergence is shown from so many blocks on."""
 
 
-def sample(start: int, count: int, parameters: int, seed: int) -> FloatArray:
+def sample(
+    # start, count: which blocks
+    start: int,
+    count: int,
+    parameters: int,  # dimension of the cube
+    seed: int,  # of the scrambling
+) -> FloatArray:
     """Return blocks of points of the unit cube, (count, parameters + 2, parameters).
 
     A block is a point A, then A with one coordinate each of a point B, then B. Blocks
     are those of one scrambled sequence: drawing more leaves the first ones as they are.
-
-    Parameters
-    ----------
-    start, count : int
-        Which blocks.
-    parameters : int
-        Dimension of the cube.
-    seed : int
-        Of the scrambling.
     """
     from SALib.sample import sobol
 

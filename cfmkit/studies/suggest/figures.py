@@ -38,18 +38,12 @@ def label_proposal(number: int, proposal: Proposal) -> str:
 
 
 @apply_style
-def to_one_scale(proposals: Sequence[Proposal], request: Request, links: Sequence[str] = ()) -> Figure:
-    """Return every proposal as it is made, to one scale, in the envelope.
-
-    Parameters
-    ----------
-    proposals : sequence of Proposal
-        The first `MAX_DRAWN_PROPOSALS` are drawn.
-    request : Request
-        Its envelope is dashed.
-    links : sequence of str
-        Where each drawing leads on a page; none in a picture.
-    """
+def to_one_scale(
+    proposals: Sequence[Proposal],  # the first `MAX_DRAWN_PROPOSALS` are drawn
+    request: Request,  # its envelope is dashed
+    links: Sequence[str] = (),  # where each drawing leads on a page; none in a picture
+) -> Figure:
+    """Return every proposal as it is made, to one scale, in the envelope."""
     drawn = [_find_drawing(one) for one in proposals[:MAX_DRAWN_PROPOSALS]]
     sizes = [_envelope_in_drawing(space, request) for _, space in drawn]
     wide, high = (max(size[k] for size in sizes) * 1.08 for k in (0, 1))

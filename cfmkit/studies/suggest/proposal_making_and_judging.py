@@ -260,23 +260,13 @@ def _with_margins(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
 
 
 def redesign_for_yield(
-    near: Proposal, candidate: Candidate, request: Request, run: Run, judge: Callable[[Spec], Proposal]
+    near: Proposal,  # which misses the yield alone
+    candidate: Candidate,  # what it was made of
+    request: Request,  # with a share of good parts
+    run: Run,  # seed, and how long it may take
+    judge: Callable[[Spec], Proposal],  # analyses and judges a specification, drawn parts included
 ) -> Proposal:
-    """Return a proposal of the required yield, else the best found, with what is missing of it.
-
-    Parameters
-    ----------
-    near : Proposal
-        Which misses the yield alone.
-    candidate : Candidate
-        What it was made of.
-    request : Request
-        With a share of good parts.
-    run : Run
-        Seed, and how long it may take.
-    judge : callable
-        Analyses and judges a specification, drawn parts included.
-    """
+    """Return a proposal of the required yield, else the best found, with what is missing of it."""
     clock = Clock.from_budgets(run.time_budget)
     wanted = asked = float(request.good_parts or 0.0)
     best, spec, last, obstacle = near, near.spec, None, ""
@@ -320,33 +310,21 @@ def _seconds(clock: Clock) -> float:
 
 
 def judge_proposal(
+    # name, variant: the family, and which of its mechanisms
     name: str,
     variant: str,
-    spec: Spec,
+    spec: Spec,  # with the model that is to judge it
     request: Request,
-    seed: int = 0,
-    clock: Clock = UNLIMITED_CLOCK,
+    seed: int = 0,  # of random parts
+    clock: Clock = UNLIMITED_CLOCK,  # late, no more parts are drawn
+    # what its family's own model made of it, where another one is to judge it. Its share of good parts is kept: a solid
+    # takes too long to be solved a hundred times
     near: Proposal | None = None,
 ) -> Proposal:
     """Return a specification as a proposal: it is written with the request as its requirements, read, analysed, judged.
 
     Where a share of good parts is required, the file says in its block `sensitivity` how they are made, and parts are
     drawn of what misses nothing else.
-
-    Parameters
-    ----------
-    name, variant : str
-        The family, and which of its mechanisms.
-    spec : Spec
-        With the model that is to judge it.
-    request : Request
-    seed : int
-        Of random parts.
-    clock : Clock
-        Late, no more parts are drawn.
-    near : Proposal, optional
-        What its family's own model made of it, where another one is to judge it. Its share of good parts is kept: a
-        solid takes too long to be solved a hundred times.
     """
     record = family(name)
     called = variant.replace(" ", "-").replace(",", "")

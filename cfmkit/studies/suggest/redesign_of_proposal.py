@@ -19,16 +19,11 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 
-def block_for_redesign(spec: Spec, request: Request) -> Mapping[str, Any] | None:
-    """Return the block `design` of a proposal; None if nothing of it may change.
-
-    Parameters
-    ----------
-    spec : Spec
-        As it was designed, its block `design` included.
-    request : Request
-        Its thinnest leaf and its depth limit what moves.
-    """
+def block_for_redesign(
+    spec: Spec,  # as it was designed, its block `design` included
+    request: Request,  # its thinnest leaf and its depth limit what moves
+) -> Mapping[str, Any] | None:
+    """Return the block `design` of a proposal; None if nothing of it may change."""
     paths = section_paths(spec)
     if paths:
         free = {path: _range(path, float(spec.get_value(path)), request) for path in paths}

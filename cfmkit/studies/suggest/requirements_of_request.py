@@ -42,20 +42,12 @@ def windows_of(spec: Spec, request: Request) -> tuple[dict[str, Any], ...]:
 
 
 def list_requirements(
-    request: Request, result: Result, space: BoundingBox | None, values: Iterable[Definition]
+    request: Request,
+    result: Result,  # an analysis of the mechanism: only what it has metrics for is required
+    space: BoundingBox | None,  # the box that it stays in
+    values: Iterable[Definition],  # of the scalar results of its family
 ) -> tuple[dict[str, Any], ...]:
-    """Return the requirements that say what is required of a mechanism, over the window of its analysis.
-
-    Parameters
-    ----------
-    request : Request
-    result : Result
-        An analysis of the mechanism: only what it has metrics for is required.
-    space : BoundingBox or None
-        The box that it stays in.
-    values : iterable of Definition
-        Of the scalar results of its family.
-    """
+    """Return the requirements that say what is required of a mechanism, over the window of its analysis."""
     found = evaluate(result, None, None, values)
     return (
         *_of_effort(request),

@@ -92,20 +92,14 @@ def with_made_parts(spec: Spec, request: Request, seed: int) -> Spec:
     return spec.replace({"sensitivity": block})
 
 
-def good_parts(result: Result, request: Request, clock: Clock, draw: bool) -> GoodParts:
-    """Return what becomes of the made parts of a mechanism.
-
-    Parameters
-    ----------
-    result : Result
-        Its analysis, with the request as its requirements and the block `sensitivity` of `with_made_parts`.
-    request : Request
-        With a share of good parts.
-    clock : Clock
-        Late, no more parts are judged.
-    draw : bool
-        Whether to draw parts where the estimate of first order is good enough; else that is the answer.
-    """
+def good_parts(
+    # its analysis, with the request as its requirements and the block `sensitivity` of `with_made_parts`
+    result: Result,
+    request: Request,  # with a share of good parts
+    clock: Clock,  # late, no more parts are judged
+    draw: bool,  # whether to draw parts where the estimate of first order is good enough; else that is the answer
+) -> GoodParts:
+    """Return what becomes of the made parts of a mechanism."""
     wanted = float(request.good_parts or 0.0)
     found = assume_errors(result.spec, request.process)
     if found is None or result.spec.sensitivity is None:

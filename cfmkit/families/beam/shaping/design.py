@@ -35,18 +35,12 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-def optimise_shape(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
-    """Return a specification with optimised nodes and shapes, or why there is none.
-
-    Parameters
-    ----------
-    spec : BeamSpec
-        Driven by a displacement.
-    wanted : Optimise
-        What is to be reached, what may vary, what must hold.
-    run : Run
-        Seed, progress, time budget, processes, notes.
-    """
+def optimise_shape(
+    spec: BeamSpec,  # driven by a displacement
+    wanted: Optimise,  # what is to be reached, what may vary, what must hold
+    run: Run,  # seed, progress, time budget, processes, notes
+) -> Design:
+    """Return a specification with optimised nodes and shapes, or why there is none."""
     if spec.extent < wanted.window[1] * (1 - 1e-12):
         problem = "analysis.travel ends before design.optimise.window: let it reach the end of the window"
         return Design(None, Status.INVALID, problem)

@@ -61,20 +61,15 @@ class Explored:
     audits: Mapping[int, Audit] = field(default_factory=dict)
 
 
-def explore(task: Task, plan: StartBudget, counts: tuple[int, int], identity: str, run: Run) -> Explored:
-    """Return what all starts lead to, the best of them widened if that is the objective, as far as the time allows.
-
-    Parameters
-    ----------
-    task, plan : Task and StartBudget
-        What is shaped, and how much is tried.
-    counts : (int, int)
-        Starts, and how many of the best are widened.
-    identity : str
-        Of everything that decides the outcome of a start but its number.
-    run : Run
-        Seed, progress, processes, notes.
-    """
+def explore(
+    # task, plan: what is shaped, and how much is tried
+    task: Task,
+    plan: StartBudget,
+    counts: tuple[int, int],  # (int, int): starts, and how many of the best are widened
+    identity: str,  # of everything that decides the outcome of a start but its number
+    run: Run,  # seed, progress, processes, notes
+) -> Explored:
+    """Return what all starts lead to, the best of them widened if that is the objective, as far as the time allows."""
     starts, wide = counts
     jobs = _Jobs(task, plan, identity, run)
     begun = jobs.run_stage("starts", partial(search_start, task.started, run.seed, plan=plan), range(starts))

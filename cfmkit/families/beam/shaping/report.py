@@ -54,16 +54,14 @@ class Judged:
         return float(window[0]), float(window[1])
 
 
-def judge_design(spec: BeamSpec, task: Task, found: Found, audit: Audit | None = None) -> Judged:
-    """Return a design as its own analysis finds it: the same curve, stress and metrics as of `cfmkit analyze`.
-
-    Parameters
-    ----------
-    spec, task, found : BeamSpec, Task, Found
-        What was given, what was searched for, and what came out.
-    audit : Audit, optional
-        Of the design, where it is known already.
-    """
+def judge_design(
+    # spec, task, found: what was given, what was searched for, and what came out
+    spec: BeamSpec,
+    task: Task,
+    found: Found,
+    audit: Audit | None = None,  # of the design, where it is known already
+) -> Judged:
+    """Return a design as its own analysis finds it: the same curve, stress and metrics as of `cfmkit analyze`."""
     new = write_design(spec, task, found)
     result = analyze(new, Run())
     window = _confirmed_window(task, result, _window(spec, task, found), _requested_window(spec)[0])

@@ -214,10 +214,7 @@ class Response:
     def force_slopes(self) -> FloatArray:
         """Derivatives of the force (p, k) [N].
 
-        Raises
-        ------
-        NoAnswer
-            Where the engine has none.
+        Raises NoAnswer where the engine has none.
         """
         return self.variables.task.force_slopes(self._gradient)
 
@@ -225,10 +222,7 @@ class Response:
     def _dual(self) -> dict[str, DualArray]:
         """Coordinates and stresses at all rows of the sampling with their derivatives, (p, r).
 
-        Raises
-        ------
-        NoAnswer
-            Where the engine has none.
+        Raises NoAnswer where the engine has none.
         """
         states = self._gradient.dual_states(*self._elements)
         bending, axial = self._gradient.dual_stresses(*self._elements)

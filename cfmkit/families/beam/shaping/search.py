@@ -108,18 +108,14 @@ class Found:
         return self.violation <= VIOLATION_TOL
 
 
-def search_start(task: Task, seed: int, index: int, plan: StartBudget) -> Found | None:
-    """Return what a start leads to; None if no random network could be followed over the window.
-
-    Parameters
-    ----------
-    task : Task
-        What is shaped.
-    seed, index : int
-        Of the run and of the start: the same pair gives the same answer.
-    plan : StartBudget
-        How much is tried.
-    """
+def search_start(
+    task: Task,  # what is shaped
+    # seed, index: of the run and of the start: the same pair gives the same answer
+    seed: int,
+    index: int,
+    plan: StartBudget,  # how much is tried
+) -> Found | None:
+    """Return what a start leads to; None if no random network could be followed over the window."""
     first, rng = task.first, np.random.default_rng([seed, index])
     begun = _begin_network(first, rng, plan)
     if begun is None and first is not task:  # straight beams that cannot stretch may not be able to move at all
@@ -213,16 +209,14 @@ def flatten(task: Task, design: Found, plan: StartBudget, enough: float = -np.in
     return design
 
 
-def verify(task: Task, design: Found, plan: StartBudget, again: Callable[[Task, Found], Found]) -> Found:
-    """Return a design with objective, window and limits as they are at many poses.
-
-    Parameters
-    ----------
-    task, design, plan : Task, Found, StartBudget
-        What was searched for, and what came out; where that misses a limit it is returned as it is.
-    again : callable
-        What searches on, from a task with more poses and a design.
-    """
+def verify(
+    # task, design, plan: what was searched for, and what came out; where that misses a limit it is returned as it is
+    task: Task,
+    design: Found,
+    plan: StartBudget,
+    again: Callable[[Task, Found], Found],  # what searches on, from a task with more poses and a design
+) -> Found:
+    """Return a design with objective, window and limits as they are at many poses."""
     if not design.feasible:
         return design
     for points in (*(more for more in _FINER_POSE_COUNTS if more > task.points), None):

@@ -222,10 +222,7 @@ def multibody_history(
 
     Of `points` equally spaced times over the motion, it is known at the `first` ones where the motion ends early.
 
-    Raises
-    ------
-    CornerContact
-        If a roller runs on the corner of its cam.
+    Raises CornerContact if a roller runs on the corner of its cam.
     """
     model = NineCoordinates(machine)
     found = model.run(motion, points, scheme, first)
@@ -261,22 +258,14 @@ class MotionEnding:
     finding: Finding
 
 
-def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | None:
+def ending(
+    parts: Build,  # the mechanism and its motion
+    times: FloatArray,  # (n,): at which it is looked at [s]
+    origin: float,  # what is added to slider positions to give displacements [m]
+) -> MotionEnding | None:
     """Return where a motion becomes impossible; None if it never does.
 
-    Parameters
-    ----------
-    parts : Build
-        The mechanism and its motion.
-    times : (n,) array
-        At which it is looked at [s].
-    origin : float
-        What is added to slider positions to give displacements [m].
-
-    Raises
-    ------
-    CannotBuild
-        If the first pose is impossible already.
+    Raises CannotBuild if the first pose is impossible already.
     """
     machine, motion = parts.machine, parts.motion
     known = _margins(machine, motion.evaluate(times))

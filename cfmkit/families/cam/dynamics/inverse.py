@@ -143,17 +143,13 @@ class MotionResponse:
         return total
 
 
-def respond(machine: Machine, moment: Moment) -> MotionResponse:
-    """Return the forces of a motion.
-
-    Parameters
-    ----------
-    machine : Machine
-        The mechanism.
-    moment : Moment
-        Position, speed and acceleration of the slider; positions within ``machine.span``, and
-        speeds of one sign: rolling resistance acts against the motion, also where it begins and ends.
-    """
+def respond(
+    machine: Machine,  # the mechanism
+    # position, speed and acceleration of the slider; positions within ``machine.span``, and speeds of one sign: rolling
+    # resistance acts against the motion, also where it begins and ends
+    moment: Moment,
+) -> MotionResponse:
+    """Return the forces of a motion."""
     parts, stances = machine.constants, machine.stances(moment.position)
     at = kinematics(stances, moment.position, parts.length)
     loads = _loads(machine, parts, at, moment)

@@ -186,10 +186,7 @@ class NineCoordinates:
     def run(self, motion: Cycloid, points: int, scheme: Scheme | None = None, first: int | None = None) -> Trajectory:
         """Return the motion and its multipliers at equally spaced times, or at the `first` of them only.
 
-        Raises
-        ------
-        CornerContact
-            If a roller begins or ends on the corner of its cam.
+        Raises CornerContact if a roller begins or ends on the corner of its cam.
         """
         scheme = scheme or Scheme()
         times = motion.times(points)[:first]

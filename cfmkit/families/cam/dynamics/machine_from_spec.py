@@ -20,10 +20,7 @@ if TYPE_CHECKING:
 def build(spec: CamSpec) -> Build:
     """Return the mechanism put together.
 
-    Raises
-    ------
-    CannotBuild
-        If it cannot exist; the finding says why.
+    Raises CannotBuild if it cannot exist; the finding says why.
     """
     motion = stated_motion(spec)
     right, left = assemble_sides(spec)
@@ -37,10 +34,7 @@ def build(spec: CamSpec) -> Build:
 def stated_motion(spec: CamSpec) -> Dynamics:
     """Return the motion that the specification states.
 
-    Raises
-    ------
-    ValueError
-        If it states none; `CamSpec.fidelity` is dynamic only where it does.
+    Raises ValueError if it states none; `CamSpec.fidelity` is dynamic only where it does.
     """
     if spec.analysis.dynamics is None:
         raise ValueError("the specification states no motion")

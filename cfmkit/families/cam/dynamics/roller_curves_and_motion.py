@@ -289,10 +289,7 @@ class Side:
     def stretches(self) -> tuple[RisingStretch, ...]:
         """The parts of the curve on which the slider rises, one after the other.
 
-        Raises
-        ------
-        NoRise
-            If there is none.
+        Raises NoRise if there is none.
         """
         found: list[RisingStretch] = []
         for piece in self.pieces:

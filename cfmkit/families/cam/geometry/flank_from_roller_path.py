@@ -73,22 +73,14 @@ class WholeCamUndercut(ValueError):
     """The roller is so large that no part of the flank is left."""
 
 
-def cut_cam(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
+def cut_cam(
+    path: RollerPath,  # the roller-centre path
+    roller_radius: float,  # of the roller that the cam is cut for [m]
+    end: float,  # path coordinate at which the cam ends [m]
+) -> CamProfile:
     """Return the cam that a roller path gives, trimmed where the roller undercuts its start.
 
-    Parameters
-    ----------
-    path : RollerPath
-        The roller-centre path.
-    roller_radius : float
-        Of the roller that the cam is cut for [m].
-    end : float
-        Path coordinate at which the cam ends [m].
-
-    Raises
-    ------
-    WholeCamUndercut
-        If every point of the flank would be cut away.
+    Raises WholeCamUndercut if every point of the flank would be cut away.
     """
     profile = CamProfile(path, roller_radius, end)
     law, x0 = path.law, path.law.rest_half_width

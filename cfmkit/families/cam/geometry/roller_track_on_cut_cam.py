@@ -358,12 +358,8 @@ class Track:
 def track_of(profile: CamProfile, roller_radius: Any, brace_length: Any, offset: Any = 0.0) -> Track:
     """Return the track of one mechanism, or, where a number is a column (m, 1), tracks side by side.
 
-    Raises
-    ------
-    NoTrack
-        If the roller cannot run on the cam.
-    RowsDiffer
-        If that is so of some rows, or if they take different ways.
+    Raises NoTrack if the roller cannot run on the cam; RowsDiffer if that is so of some rows, or if they take different
+    ways.
     """
     lengths = roller_radius, brace_length, offset, profile.roller_radius, profile.end
     several = is_column(*lengths, *profile.path.law.numbers)

@@ -49,24 +49,13 @@ class FinishedStrip:
 
 
 def judge(
-    values: FloatArray,
-    found: FoundStrip,
+    values: FloatArray,  # (n,): numbers of the form
+    found: FoundStrip,  # the search that they come from
+    # ripple as a share and stress [Pa] that end the stroke, where it is what is sought
     limits: tuple[float | None, float | None],
-    pins: FloatArray,
+    pins: FloatArray,  # (3, 2): where it is kinked, as `beam_chain_from_spec.pins_of` says [m]
 ) -> FinishedStrip | None:
-    """Return the outcome of a strip; None if it has no equilibrium over its travel, or breaks its band at once.
-
-    Parameters
-    ----------
-    values : (n,) array
-        Numbers of the form.
-    found : FoundStrip
-        The search that they come from.
-    limits : (float or None, float or None)
-        Ripple as a share and stress [Pa] that end the stroke, where it is what is sought.
-    pins : (3, 2) array
-        Where it is kinked, as `beam_chain_from_spec.pins_of` says [m].
-    """
+    """Return the outcome of a strip; None if it has no equilibrium over its travel, or breaks its band at once."""
     task, form = found.task, found.form
     strip = form.strip(values, task.corners)
     chain = strip_chain(strip, task.material, pins, task.direction)

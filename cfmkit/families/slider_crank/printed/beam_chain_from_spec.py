@@ -36,10 +36,7 @@ FLEXURE_SHARE = 0.2
 def elasticity(printed: Printed) -> Elasticity:
     """Return what the part is made of.
 
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If no material is given.
+    Raises InputError if no material is given.
     """
     given = printed.material
     if given is None:
@@ -72,10 +69,7 @@ def corners(printed: Printed, beam: StripSpec | None, linkage: Linkage, unloaded
 def strip_of(printed: Printed, linkage: Linkage, unloaded: float) -> Strip:
     """Return the strip as it is printed.
 
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If 'shares' does not fit the pieces of the centre line.
+    Raises InputError if 'shares' does not fit the pieces of the centre line.
     """
     beam = printed.beam
     if beam is None:

@@ -232,10 +232,7 @@ def _one_thickness(found: FoundStrip) -> float:
 def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTask:
     """Return what the strip of a `design` block is to do, with its reserve.
 
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If the goal lacks its tolerance or its travel.
+    Raises InputError if the goal lacks its tolerance or its travel.
     """
     wanted = spec.design
     assert wanted is not None

@@ -128,18 +128,13 @@ class Chain(ShortRepr):
         distance: FloatArray = np.hypot(*(self.pins[2] - self.pins[0] + np.outer(travel, way)).T)
         return distance
 
-    def press(self, travel: FloatArray, side: int = 0, tolerance: float = 1e-7) -> Pressed:
-        """Return the equilibria at travels on one side, that of the kink unless asked otherwise.
-
-        Parameters
-        ----------
-        travel : (n,) array
-            From the unloaded position, increasing [m]; may start with 0.
-        side : int
-            1, -1, or 0 for the side of the kink (left where there is none).
-        tolerance : float
-            As in `cfmkit.elastica.Control`.
-        """
+    def press(
+        self,
+        travel: FloatArray,  # (n,): from the unloaded position, increasing [m]; may start with 0
+        side: int = 0,  # 1, -1, or 0 for the side of the kink (left where there is none)
+        tolerance: float = 1e-7,  # as in `cfmkit.elastica.Control`
+    ) -> Pressed:
+        """Return the equilibria at travels on one side, that of the kink unless asked otherwise."""
         taut = np.flatnonzero(self._reach(travel) > (1.0 + 1e-9) * self.reach)
         if len(taut):
             near = self.press(travel[: taut[0]] if taut[0] else np.zeros(1), side, tolerance)
@@ -253,16 +248,12 @@ def _beginning(path: Path, drive: Displacement) -> int:
     return int(np.flatnonzero(~found)[-1]) + 1 if not found.all() else 0
 
 
-def _from_its_limit(path: Path, missing: FloatArray) -> Path:
-    """Return a path that is followed back to the limit point that it begins with, which becomes its first point.
-
-    Parameters
-    ----------
-    path : Path
-        Without the first of the points that were requested.
-    missing : (m,) array
-        The travels that were requested before it begins [m]; those behind the limit point are found on the way.
-    """
+def _from_its_limit(
+    path: Path,  # without the first of the points that were requested
+    # (m,): the travels that were requested before it begins [m]; those behind the limit point are found on the way
+    missing: FloatArray,
+) -> Path:
+    """Return a path that is followed back to the limit point that it begins with, which becomes its first point."""
     found = _followed_back(path)
     if not found:
         return path
@@ -321,16 +312,11 @@ N_LINE_PIECES = 60
 """Straight pieces of the line that are looked at for crossings."""
 
 
-def kept_clear(pressed: Pressed, thickness: float) -> Pressed:
-    """Return the outcome up to where the chain meets its anchor, or itself.
-
-    Parameters
-    ----------
-    pressed : Pressed
-        Any outcome.
-    thickness : float
-        At the ends of the chain [m]: nearer than this the slider's end touches the anchor.
-    """
+def kept_clear(
+    pressed: Pressed,  # any outcome
+    thickness: float,  # at the ends of the chain [m]: nearer than this the slider's end touches the anchor
+) -> Pressed:
+    """Return the outcome up to where the chain meets its anchor, or itself."""
     places = pressed.path.at_requested.tolist()
     if not places:
         return pressed

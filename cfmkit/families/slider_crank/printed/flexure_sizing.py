@@ -132,10 +132,7 @@ class FixedWidth:
 def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Design:
     """Return the specification with flexures that have the springs' rates and bear the stroke.
 
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If springs, travel or strength are missing.
+    Raises InputError if springs, travel or strength are missing.
     """
     wanted = spec.design
     assert wanted is not None
@@ -235,31 +232,17 @@ def of_width(
 
 
 def correct_flexures(
-    flexures: Sequence[Flexure],
-    made_of: Elasticity,
+    flexures: Sequence[Flexure],  # of the closed forms
+    made_of: Elasticity,  # with the stress allowed
+    # (Linkage, float, int): linkage, crank angle unloaded, and the side to which the chain bends; 0: that of its kink
     built_in: tuple[Linkage, float, int],
+    # travel, force: (n,): where the force is compared, and that of the springs [m, N]
     travel: FloatArray,
     force: FloatArray,
-    exact: bool,
-    fixed: FixedWidth | None = None,
+    exact: bool,  # whether to correct; else the factors are found only
+    fixed: FixedWidth | None = None,  # how, where the width stays
 ) -> Sized | None:
-    """Return flexures whose beams have a mean force and the allowable stress; None without equilibrium.
-
-    Parameters
-    ----------
-    flexures : sequence of Flexure
-        Of the closed forms.
-    made_of : Elasticity
-        With the stress allowed.
-    built_in : (Linkage, float, int)
-        Linkage, crank angle unloaded, and the side to which the chain bends; 0: that of its kink.
-    travel, force : (n,) arrays
-        Where the force is compared, and that of the springs [m, N].
-    exact : bool
-        Whether to correct; else the factors are found only.
-    fixed : FixedWidth, optional
-        How, where the width stays.
-    """
+    """Return flexures whose beams have a mean force and the allowable stress; None without equilibrium."""
     parts, factors = tuple(flexures), (1.0, 1.0)
     limit, (linkage, unloaded, side) = made_of.allowable_stress or np.inf, built_in
     for number in range(_MAX_ROUNDS if fixed is None else 4 * _MAX_ROUNDS):

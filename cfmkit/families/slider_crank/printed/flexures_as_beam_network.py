@@ -132,20 +132,15 @@ def joints(linkage: Linkage, unloaded: float) -> FloatArray:
     return np.array([np.zeros(2), pin, slider])
 
 
-def flexure_ends(places: FloatArray, lengths: Sequence[float], before: Sequence[float]) -> FloatArray:
+def flexure_ends(
+    places: FloatArray,  # (3, 2): the joints [m]
+    # lengths, before: length of each flexure [m], and the share of it that lies before its joint
+    lengths: Sequence[float],
+    before: Sequence[float],
+) -> FloatArray:
     """Return the ends of the three flexures, (6, 2) [m]: S1 to S6 of [B, fig. 7].
 
-    Parameters
-    ----------
-    places : (3, 2) array
-        The joints [m].
-    lengths, before : sequences of three
-        Length of each flexure [m], and the share of it that lies before its joint.
-
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If two flexures are together longer than the link between their joints.
+    Raises InputError if two flexures are together longer than the link between their joints.
     """
     crank, coupler = places[1] - places[0], places[2] - places[1]
     for k, (link, name) in enumerate(((crank, "crank"), (coupler, "coupler"))):
@@ -183,16 +178,11 @@ def flexure_network(ends: FloatArray, flexures: Sequence[Flexure], material: Ela
     return Network(nodes, beams, links=(Link("crank", "crank end"), Link("coupler", "coupler end")))
 
 
-def spread(corners: FloatArray, shares: Sequence[Sequence[float]]) -> FloatArray:
-    """Return places along a polyline as fractions of its length, both ends included [B, eq. 13].
-
-    Parameters
-    ----------
-    corners : (k + 1, 2) array
-        The polyline [m].
-    shares : k sequences
-        For every straight piece, shares of its length at which a place lies.
-    """
+def spread(
+    corners: FloatArray,  # (k + 1, 2): the polyline [m]
+    shares: Sequence[Sequence[float]],  # for every straight piece, shares of its length at which a place lies
+) -> FloatArray:
+    """Return places along a polyline as fractions of its length, both ends included [B, eq. 13]."""
     lengths = np.hypot(*np.diff(corners, axis=0).T)
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
     inner = [starts[k] + share * lengths[k] for k, own in enumerate(shares) for share in own]

@@ -38,10 +38,7 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
 def _draw_leg(spec: SliderCrankSpec, leg: Leg) -> Drawing:
     """Return a leg with its inside corners rounded, its fixing holes, and the frame around it.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If a flexure or the strip, or the area of the leg, is not that of the specification.
+    Raises GeometryError if a flexure or the strip, or the area of the leg, is not that of the specification.
     """
     from cfmkit.export.union import SAGITTA_RTOL, OutlinePiece, merge_pieces
 

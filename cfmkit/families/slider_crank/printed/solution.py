@@ -114,21 +114,12 @@ class ChainCurve(ShortRepr):
 
 
 def course(
+    # force [N] and stress [Pa] at increasing travels [m]; None if one of them is not reached
     pressed: Callable[[FloatArray], tuple[FloatArray, FloatArray] | None],
-    ends: tuple[float, float],
-    first: tuple[float, float],
+    ends: tuple[float, float],  # of the curve [m]
+    first: tuple[float, float],  # force and stress where it begins
 ) -> ChainCurve | None:
-    """Return the course between two travels; None if the chain cannot be pressed to every node.
-
-    Parameters
-    ----------
-    pressed : callable
-        Force [N] and stress [Pa] at increasing travels [m]; None if one of them is not reached.
-    ends : (float, float)
-        Of the curve [m].
-    first : (float, float)
-        Force and stress where it begins.
-    """
+    """Return the course between two travels; None if the chain cannot be pressed to every node."""
     low, high = np.log(max(ends[0], FIRST_NODE_SHARE * ends[1])), np.log(ends[1])
 
     def values(places: FloatArray) -> FloatArray:

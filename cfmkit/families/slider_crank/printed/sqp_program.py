@@ -388,16 +388,11 @@ class Watched:
         return np.tensordot(self.between, tops, 1).reshape(-1, *tops.shape[2:])
 
 
-def stress_places(path: Path, spots: FloatArray) -> Watched:
-    """Return where the stress of a strip is looked at.
-
-    Parameters
-    ----------
-    path : Path
-        Its equilibria at the requested points.
-    spots : (p,) array
-        Places of these points in a variable in which the stress is smooth.
-    """
+def stress_places(
+    path: Path,  # its equilibria at the requested points
+    spots: FloatArray,  # (p,): places of these points in a variable in which the stress is smooth
+) -> Watched:
+    """Return where the stress of a strip is looked at."""
     sections, last = path.sections(STRIP_BEAM), path.at_requested[-N_STRESS_POINTS:]
     beam = path.network.beams[STRIP_BEAM]
     breaks = np.unique(np.concatenate([beam.shape.course(1.0).breaks, beam.section.stations]))

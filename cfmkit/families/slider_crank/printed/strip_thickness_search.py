@@ -29,30 +29,14 @@ VIOLATION_TOL = 5e-3
 
 
 def descend(
-    program: StripProgram,
-    start: FloatArray,
-    bounds: FloatArray,
-    steps: int = 100,
-    tolerance: float = 1e-6,
-    clock: Clock = UNLIMITED_CLOCK,
+    program: StripProgram,  # what is minimised
+    start: FloatArray,  # (n,): moved into the bounds first
+    bounds: FloatArray,  # (n, 2): smallest and largest values
+    steps: int = 100,  # at most
+    tolerance: float = 1e-6,  # change of the objective that ends the search
+    clock: Clock = UNLIMITED_CLOCK,  # when it is late, the search ends, too
 ) -> Optimum:
-    """Return where the steps from a start end.
-
-    Parameters
-    ----------
-    program : StripProgram
-        What is minimised.
-    start : (n,) array
-        Moved into the bounds first.
-    bounds : (n, 2) array
-        Smallest and largest values.
-    steps : int
-        At most.
-    tolerance : float
-        Change of the objective that ends the search.
-    clock : Clock
-        When it is late, the search ends, too.
-    """
+    """Return where the steps from a start end."""
     return minimize(
         program,
         start,

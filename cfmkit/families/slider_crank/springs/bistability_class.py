@@ -65,21 +65,17 @@ class Classified(ShortRepr):
 
 
 def classify(
-    curves: Monotone, start: FloatArray, rest: FloatArray, tolerance: FloatArray, window: Ends | None
+    curves: Monotone,  # efforts cut into monotonic pieces
+    # start, rest: (m, 1): the unloaded position, and where the effort is known to be zero whatever rounding says, NaN
+    # for nowhere
+    start: FloatArray,
+    rest: FloatArray,
+    # (m, 1): half width of a band that counts as constant: a drop of no more than twice that is zero stiffness
+    tolerance: FloatArray,
+    # pair of (m, 1): where the effort is wanted constant: if it is, the stiffness is zero even without any fall
+    window: Ends | None,
 ) -> Classified:
-    """Return the class of each curve.
-
-    Parameters
-    ----------
-    curves : Monotone
-        Efforts cut into monotonic pieces.
-    start, rest : (m, 1) array
-        The unloaded position, and where the effort is known to be zero whatever rounding says, NaN for nowhere.
-    tolerance : (m, 1) array
-        Half width of a band that counts as constant: a drop of no more than twice that is zero stiffness.
-    window : pair of (m, 1) array, optional
-        Where the effort is wanted constant: if it is, the stiffness is zero even without any fall.
-    """
+    """Return the class of each curve."""
     place, value = curves.place, curves.value
     before, after = place <= start, place >= start
     drop = np.maximum(_drop(np.where(after, value, np.nan)), _drop(np.where(before, -value, np.nan)[:, ::-1]))
@@ -148,17 +144,15 @@ N_SAMPLES, N_CLOSER_SAMPLES = 1001, 101
 """Places of the first look, and of each closer one around the highest of them."""
 
 
-def scale_factors(assembly: Assembly, low: Any, high: Any) -> Ends:
+def scale_factors(
+    assembly: Assembly,  # its rates are the springs for a factor of 1; one mechanism, or m as rows
+    # low, high: float or (m, 1): the motion that is looked at; the unloaded position is left out
+    low: Any,
+    high: Any,
+) -> Ends:
     """Return the factors k1 and k2 by which the torsion springs would have to be scaled, all alike, (m,) each.
 
     NaN where there is no torsion spring or no spring at the slider; infinite where no factor is enough.
-
-    Parameters
-    ----------
-    assembly : Assembly
-        Its rates are the springs for a factor of 1; one mechanism, or m as rows.
-    low, high : float or (m, 1) array
-        The motion that is looked at; the unloaded position is left out.
     """
     rates = assembly.rates.reshape(4, -1)
     none = ~rates[:3].any(axis=0) | (rates[3] == 0.0)

@@ -121,10 +121,7 @@ class Chosen:
 def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> Chosen:
     """Return the springs of the catalogue that hold the target best.
 
-    Raises
-    ------
-    Infeasible
-        If none can be used, or none keeps the tolerance; the message has the nearest three.
+    Raises Infeasible if none can be used, or none keeps the tolerance; the message has the nearest three.
     """
     options, refused = _options(task, window)
     if not options:

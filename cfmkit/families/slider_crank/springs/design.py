@@ -146,10 +146,7 @@ def _keep_if_audited(solved: Solved) -> Solved:
     A widest window whose springs are farther off between the places that the search looked at than its reserve allows
     is looked for again, by as much stricter.
 
-    Raises
-    ------
-    Infeasible
-        If a given window does not allow it.
+    Raises Infeasible if a given window does not allow it.
     """
     tolerance = solved.task.wanted.tolerance
     if tolerance is None or not solved.exact or solved.deviation <= tolerance * BAND_EDGE_FACTOR:
@@ -228,10 +225,7 @@ def _places(wanted: CrankDesign) -> int | None:
 def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
     """Return the best springs for given lengths, for the design's tolerance or another one.
 
-    Raises
-    ------
-    Infeasible
-        If nothing keeps the tolerance, or the window cannot be reached.
+    Raises Infeasible if nothing keeps the tolerance, or the window cannot be reached.
     """
     wanted, proven = task.wanted, True
     if wanted.window is None:

@@ -293,18 +293,12 @@ def _stretched_outside(solution: Solution) -> Sentence:
 # --- limits of springs ----------------------------------------------------------------------------------------------
 
 
-def _fault_of_bought_spring(spec: SliderCrankSpec, number: int, moved: float) -> tuple[Any, ...] | None:
-    """Return what is wrong with a bought spring over a motion, and settings that cure it; None if nothing is.
-
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        With bought springs.
-    number : int
-        Which of them.
-    moved : float
-        Size of the largest turn of its joint, of the slider its travel [rad or m].
-    """
+def _fault_of_bought_spring(
+    spec: SliderCrankSpec,  # with bought springs
+    number: int,  # which of them
+    moved: float,  # size of the largest turn of its joint, of the slider its travel [rad or m]
+) -> tuple[Any, ...] | None:
+    """Return what is wrong with a bought spring over a motion, and settings that cure it; None if nothing is."""
     spring, pins = spec.mechanism.springs.bought[number], spec.mechanism.pins
     coil, key = spring.coil, f"mechanism.springs.bought.{number}"
     if spring.kind == "compression":

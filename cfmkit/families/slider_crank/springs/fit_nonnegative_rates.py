@@ -170,18 +170,12 @@ def _enlarge_goal(goal: RateGoal, rates: FloatArray, unit: float) -> RateGoal:
     )
 
 
-def _solve_programme(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray | None:
-    """Return scaled rates, then the deviation, that minimise a cost; None if there are none.
-
-    Parameters
-    ----------
-    goal : RateGoal
-        m springs.
-    cost : (m + 1,) array
-        Of scaled rates and of the deviation.
-    worst : float or None
-        Largest deviation allowed.
-    """
+def _solve_programme(
+    goal: RateGoal,  # m springs
+    cost: FloatArray,  # (m + 1,): of scaled rates and of the deviation
+    worst: float | None,  # largest deviation allowed
+) -> FloatArray | None:
+    """Return scaled rates, then the deviation, that minimise a cost; None if there are none."""
     from scipy.optimize import linprog
 
     scales = goal.scales()
@@ -289,19 +283,14 @@ def ranges(goal: RateGoal, worst: float) -> FloatArray:
     return found
 
 
-def choose_preferred(goal: RateGoal, worst: float, rule: str) -> FloatArray | None:
-    """Return one of the rates with no deviation above `worst`: the softest, or the most even ones.
-
-    Parameters
-    ----------
-    goal : RateGoal
-        m springs, the last of them the slider's if there are four.
-    worst : float
-        Largest deviation allowed.
-    rule : {"soft-springs", "even-rates"}
-        Smallest sum of the springs' largest efforts; or the smallest difference of the largest and
-        the smallest torsion rate of those that may be used.
-    """
+def choose_preferred(
+    goal: RateGoal,  # m springs, the last of them the slider's if there are four
+    worst: float,  # largest deviation allowed
+    # smallest sum of the springs' largest efforts; or the smallest difference of the largest and the smallest torsion
+    # rate of those that may be used
+    rule: str,
+) -> FloatArray | None:
+    """Return one of the rates with no deviation above `worst`: the softest, or the most even ones."""
     count = goal.matrix.shape[1]
     if rule == "soft-springs":
         solved = _solve_programme(goal, np.append(np.ones(count), 0.0), worst)

@@ -172,22 +172,13 @@ SIZE_MARGIN = 1.001
 
 
 def links_that_bear(
-    loads: LinkLoads, sheet: float, strength: PartStrength, least: float, widest_pin: float
+    loads: LinkLoads,
+    sheet: float,  # thickness [m]
+    strength: PartStrength,  # of the material, and of its pins
+    least: float,  # thinnest wall that the process makes [m]
+    widest_pin: float,  # largest diameter of a pin: torsion springs go around it [m]
 ) -> LinkBar | None:
-    """Return the narrowest links of a sheet that bear their loads and stay straight; None if there are none.
-
-    Parameters
-    ----------
-    loads : LinkLoads
-    sheet : float
-        Thickness [m].
-    strength : PartStrength
-        Of the material, and of its pins.
-    least : float
-        Thinnest wall that the process makes [m].
-    widest_pin : float
-        Largest diameter of a pin: torsion springs go around it [m].
-    """
+    """Return the narrowest links of a sheet that bear their loads and stay straight; None if there are none."""
     pin = next((d for d in PIN_DIAMETERS if _pin_bears(d, loads, sheet, strength)), None)
     if pin is None or pin > widest_pin:
         return None

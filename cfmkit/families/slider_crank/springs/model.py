@@ -178,10 +178,7 @@ def _is_complete(solution: Solution) -> NDArray[np.bool_]:
 def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Finding, ...]]:
     """Return the solution over what the linkage reaches of the requested motion, and why that is less.
 
-    Raises
-    ------
-    CannotBuild
-        If it reaches nothing of it.
+    Raises CannotBuild if it reaches nothing of it.
     """
     asked = asked_motion(spec, assembly)
     start, stop = assembly.clip_motion(*asked)

@@ -90,10 +90,7 @@ class SpringTask:
 
         Where the force has to begin at zero, the first of the design's intervals is left out.
 
-        Raises
-        ------
-        Infeasible
-            If places even in the crank's angle are wanted, and the crank turns back.
+        Raises Infeasible if places even in the crank's angle are wanted, and the crank turns back.
         """
         low, high = window
         points, start = self.wanted.points, self.assembly.start
@@ -206,10 +203,7 @@ def with_lengths(spec: SliderCrankSpec, lengths: dict[str, float]) -> SliderCran
 def task_of(spec: SliderCrankSpec) -> SpringTask:
     """Return the design of a specification, put together for its own drive, whatever the analysis says.
 
-    Raises
-    ------
-    CannotBuild
-        If the mechanism cannot exist.
+    Raises CannotBuild if the mechanism cannot exist.
     """
     design = spec.design
     assert design is not None

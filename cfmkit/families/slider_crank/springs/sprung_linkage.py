@@ -259,10 +259,7 @@ def _with_more_at_slider(rows: FloatArray, more: Any) -> FloatArray:
 def assemble(spec: SliderCrankSpec) -> Assembly:
     """Return the slider-crank put together.
 
-    Raises
-    ------
-    CannotBuild
-        If it cannot exist as described; the finding says why.
+    Raises CannotBuild if it cannot exist as described; the finding says why.
     """
     mechanism, analysis = spec.mechanism, spec.analysis
     linkage = linkage_of(mechanism)
@@ -388,16 +385,13 @@ def turn_unloaded(assembly: Assembly, angle: float) -> tuple[Assembly, float]:
     return other, link.branch * (before - after)
 
 
-def mean_effort_per_angle(assemblies: Sequence[Assembly], low: Any, high: Any) -> FloatArray:
-    """Return by how much unit efforts rise per unloaded angle, (4, m), [N m or N, per rate and rad].
-
-    Parameters
-    ----------
-    assemblies : sequence of Assembly
-        Each of one mechanism.
-    low, high : float or (m, 1) array
-        The windows over which the means are taken [rad or m].
-    """
+def mean_effort_per_angle(
+    assemblies: Sequence[Assembly],  # each of one mechanism
+    # low, high: float or (m, 1): the windows over which the means are taken [rad or m]
+    low: Any,
+    high: Any,
+) -> FloatArray:
+    """Return by how much unit efforts rise per unloaded angle, (4, m), [N m or N, per rate and rad]."""
     places = np.linspace(np.reshape(low, -1), np.reshape(high, -1), N_WINDOW_PLACES, axis=1)
     rows = []
     for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP):

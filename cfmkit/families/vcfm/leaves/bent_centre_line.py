@@ -15,20 +15,14 @@ if TYPE_CHECKING:
 N_LINE_POINTS = 81
 
 
-def bent_leaf(strip: LeafStrip, travel: float, critical: float | None = None, free: bool = False) -> FloatArray:
-    """Return the centre line of a straight leaf bent into an S, buckled under `critical` [N] where that is given.
-
-    Parameters
-    ----------
-    strip : LeafStrip
-        The leaf.
-    travel : float
-        Of its far end towards the flat pose [m].
-    critical : float, optional
-        Load of the buckled form; None: it is not buckled.
-    free : bool
-        Whether the far end moves across as it likes, without axial force, as the corner of a diamond does.
-    """
+def bent_leaf(
+    strip: LeafStrip,  # the leaf
+    travel: float,  # of its far end towards the flat pose [m]
+    critical: float | None = None,  # load of the buckled form; None: it is not buckled
+    # whether the far end moves across as it likes, without axial force, as the corner of a diamond does
+    free: bool = False,
+) -> FloatArray:
+    """Return the centre line of a straight leaf bent into an S, buckled under `critical` [N] where that is given."""
     length, angle = float(strip.length), float(strip.angle)
     at = pose(angle, travel / length)
     stretch = (strip.thickness / length) ** 2 / 3.0

@@ -143,18 +143,12 @@ def largest_curvature(z: FloatArray) -> FloatArray:
     return np.where(z > 0.25 * np.pi**2, inside, np.abs(end_curvature(z)))
 
 
-def axial_root(shortening: Any, turn: Any, stretch: Any) -> FloatArray:
-    """Return z with stretch z + turn^2 e(z) = shortening, element by element.
-
-    Parameters
-    ----------
-    shortening : array
-        1 - l/L.
-    turn : array
-        alpha [rad].
-    stretch : array
-        (t/L)^2/3 = 4 E I/(E A L^2).
-    """
+def axial_root(
+    shortening: Any,  # 1 - l/L
+    turn: Any,  # alpha [rad]
+    stretch: Any,  # (t/L)^2/3 = 4 E I/(E A L^2)
+) -> FloatArray:
+    """Return z with stretch z + turn^2 e(z) = shortening, element by element."""
     parts = [np.asarray(item, dtype=float) for item in (shortening, np.square(turn), stretch)]
     shape = np.broadcast_shapes(*(item.shape for item in parts))
     m, bend, a = (np.broadcast_to(item, shape).ravel() for item in parts)
@@ -187,18 +181,12 @@ class Force:
         return np.abs(self.turn) * largest_curvature(self.z)
 
 
-def s_force(angle: Any, slimness: Any, travel: Any) -> Force:
-    """Return the force of a leaf in S form.
-
-    Parameters
-    ----------
-    angle : array
-        Of the unloaded leaf [rad].
-    slimness : array
-        t/L.
-    travel : array
-        d/L, positive towards the flat pose.
-    """
+def s_force(
+    angle: Any,  # of the unloaded leaf [rad]
+    slimness: Any,  # t/L
+    travel: Any,  # d/L, positive towards the flat pose
+) -> Force:
+    """Return the force of a leaf in S form."""
     at = pose(angle, travel)
     z = axial_root(at.shortening, at.turn, np.square(slimness) / 3.0)
     along = 4.0 * z * at.sine + 2.0 * at.turn * end_curvature(z) * at.cosine / at.chord

@@ -177,14 +177,11 @@ class VBeam(LeafLaw):
         buckled = bool(self.is_buckled(np.array([travel]))[0])
         return bent_leaf(self.strip, travel, float(critical_force(self.strip)) if buckled else None)
 
-    def force(self, travel: Any) -> FloatArray:
-        """Return the force of one leaf along the motion [N], on the stable branch.
-
-        Parameters
-        ----------
-        travel : array
-            Of the shuttle from the unloaded position, positive towards the flat pose [m].
-        """
+    def force(
+        self,
+        travel: Any,  # of the shuttle from the unloaded position, positive towards the flat pose [m]
+    ) -> FloatArray:
+        """Return the force of one leaf along the motion [N], on the stable branch."""
         strip, bent = self.strip, ~np.asarray(self.is_buckled(travel))
         drop = strip.rise - np.asarray(travel, dtype=float)
         force = np.array(np.broadcast_to(critical_force(strip) * (drop / np.hypot(strip.reach, drop)), bent.shape))
