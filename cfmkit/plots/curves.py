@@ -102,6 +102,8 @@ def plot_curve(
     band_names = [_draw_band(ax, band, curves[0]) for band in bands]
     ax.set_xlabel(axis_label(curves[0].motion_name, curves[0].motion_dimension))
     ax.set_ylabel(axis_label(kind, kind))
+    for curve in curves:
+        _draw_events(ax, curve)
     if look.arrows and not _all_coincide(ax, lines):
         for line in lines:
             _draw_arrow(ax, line)
@@ -120,6 +122,14 @@ def plot_curve(
             ],
         )
     return ax
+
+
+def _draw_events(ax: Axes, curve: Curve) -> None:
+    """Draw a tick where something changes on the path of a curve: its column `event` says what."""
+    if "event" in curve.extra:
+        there = curve.extra["event"].values != ""
+        at = to_border(curve.motion[there], curve.motion_dimension), to_border(curve.effort[there], curve.kind)
+        ax.plot(*at, linestyle="", marker="|", markersize=8.0, color=TEXT_GREY, zorder=3.5, gid="events")
 
 
 def _name_room(ax: Axes) -> float:

@@ -212,6 +212,26 @@ def test_obstacles_stops_and_touching_pads_are_drawn():
         assert parts <= drawn
 
 
+def test_forces_of_contacts_are_arrows_in_one_scale_and_events_are_ticks():
+    """Arrows go from the centre of the disc outwards, as long as the forces; the tick is where contact begins."""
+    result = solved("beam_gripper")
+    forces = result.curve.extra["work_tip_force"].values
+    ax = figures(result)["shapes"]().axes[0]
+    arrows = {
+        text.get_gid(): np.subtract(text.xyann, text.xy) for text in ax.texts if "force" in (text.get_gid() or "")
+    }
+    pads = {gid: artist.get_xydata()[0] for artist in ax.lines if (gid := artist.get_gid() or "").startswith("touch-0")}
+    assert len(arrows) == len(pads) == 3
+    poses = [int(gid.split("-")[2]) for gid in arrows]
+    lengths = [np.hypot(*arrow) for arrow in arrows.values()]
+    assert np.divide(lengths, lengths[-1]) == pytest.approx(forces[poses] / forces[poses[-1]])
+    for pose, arrow in zip(poses, arrows.values(), strict=True):
+        outwards = pads[f"touch-0-{pose}"] - np.array([14.0, -16.0])
+        assert -arrow / np.hypot(*arrow) == pytest.approx(outwards / np.hypot(*outwards))
+    (ticks,) = (line for line in figures(result)["curve"]().axes[0].lines if line.get_gid() == "events")
+    assert ticks.get_xdata() == pytest.approx([1e3 * result.values["first_contact"].value])
+
+
 def test_a_contact_that_a_constant_load_closes_is_reported_from_the_start():
     text = CANTILEVER.replace(
         "kind: displacement, node: tip, direction: -90 deg", "kind: force, node: tip, direction: 0 deg"

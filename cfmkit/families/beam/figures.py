@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, BeamSide, NodeOnBeam, Stop
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.export.posed_part import PosedBody
+from cfmkit.families.beam.drawn_contacts import both_halves, draw_contacts
 from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.part import BOX_TOLERANCE, bodies, made_strips, regions
 from cfmkit.families.beam.scalar_results import natural
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
-    from cfmkit.elastica.model.contact import ObstacleEdge
     from cfmkit.families.beam.plane_fem_analysis import SolidSolution
     from cfmkit.families.beam.solution import Solution
     from cfmkit.plots.label_placement import Label
@@ -124,7 +123,7 @@ def shapes(result: Result) -> Figure:
     poses = np.unique(np.linspace(0, len(solution.keep) - 1, N_DRAWN_POSES).astype(int))[1:]
     shown, made = bodies(solution, poses, centre_line=centre_line), made_strips(solution.assembly)
     drawn = {int(pose): [body.core_at(k) for body in shown] for k, pose in enumerate(poses)}
-    springs = _both(solution, spring_lines(solution.path))
+    springs = both_halves(solution, spring_lines(solution.path))
     box = _box([*made, *shown, *(PosedBody.line("spring", "free", line, 0.0) for line in springs)])
     width, height = box[2] - box[0], box[3] - box[1]
     scale = min(138.0 / width, 110.0 / height)
@@ -134,7 +133,7 @@ def shapes(result: Result) -> Figure:
     room = (17.0 + 0.5 * (138.0 - width * scale), 12.0, width * scale, height * scale)
     ax = axes_mm(figure, room)
     parts.bodies(ax, made, 0, {})
-    for number, line in enumerate(_both(solution, rigid_parts(solution.path, None))):
+    for number, line in enumerate(both_halves(solution, rigid_parts(solution.path, None))):
         parts.edge(ax, line, f"rigid-{number}", color=TEXT_GREY, linewidth=2.4, zorder=1.3, solid_capstyle="round")
     for number, line in enumerate(springs):
         ends = [(float(x), float(y)) for x, y in line]
@@ -143,7 +142,7 @@ def shapes(result: Result) -> Figure:
     motion = f"{result.curve.motion_name}:"
     color_key(ax, [(motion, TEXT_INK), *_key(solution, list(drawn))])
     _supports(solution, ax)
-    _contacts(solution, ax, box, list(drawn))
+    draw_contacts(solution, ax, max(width, height), dict(zip(drawn, _colors(len(drawn)), strict=True)))
     parts.to_scale(ax, box)
     ax.set_ylabel("y [mm]")
     place_labels(ax, [peak, *_names(solution)])
@@ -171,7 +170,7 @@ def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> 
         for number, line in enumerate(lines):
             parts.edge(ax, line, f"pose-{pose}-{number}", color=color, linewidth=1.2, zorder=2.5)
         point = int(solution.keep[pose])
-        for number, line in enumerate(_both(solution, rigid_parts(solution.path, point))):
+        for number, line in enumerate(both_halves(solution, rigid_parts(solution.path, point))):
             parts.edge(ax, line, f"rigid-{pose}-{number}", color=color, linewidth=0.7, linestyle="--", zorder=2.4)
     index = int(np.argmax(np.where(np.isfinite(solution.stress), solution.stress, -np.inf)))
     return _peak(solution, ax, index)
@@ -199,12 +198,6 @@ def _names(solution: Solution) -> list[Label]:
     return found
 
 
-def _both(solution: Solution, lines: list[FloatArray]) -> list[FloatArray]:
-    """Return lines of what is described, and those of its mirrored half."""
-    axis = mirror_axis(solution.assembly)
-    return lines if axis is None else [*lines, *(mirror_points(line, *axis) for line in lines)]
-
-
 def _box(shown: Sequence[PosedBody]) -> parts.Box:
     return parts.box_around(shown, (0.08, 0.08, 0.08, 0.08))[0]
 
@@ -224,79 +217,6 @@ def _supports(solution: Solution, ax: Axes) -> None:
                 markerfacecolor=color if support.along or color != TEXT_INK else "white", linestyle="",
                 gid=f"at-{name}",
             )  # fmt: skip
-
-
-def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, float], poses: list[int]) -> None:
-    """Draw obstacles, bars of stops at the ends of their gaps, and node and rim of each pad that touches in a pose."""
-    path, size = solution.path, max(box[2] - box[0], box[3] - box[1])
-    outlines = {contact.name: contact.outline for contact in path.network.contacts
-                if not isinstance(contact, Stop | NodeOnBeam | BeamOnBeam)}  # fmt: skip
-    for name, outline in outlines.items():
-        for number, line in enumerate(_both(solution, outline.lines(2 * size))):
-            parts.edge(ax, line, f"obstacle-{name}-{number}", color=TEXT_INK, linewidth=1.8, zorder=1.6)
-        strokes = [_hatch(outline, line, 0.02 * size) for line in outline.lines(2 * size)]
-        for number, line in enumerate(_both(solution, strokes)):
-            parts.edge(ax, line, f"hatch-{name}-{number}", color=TEXT_INK, linewidth=0.5, zorder=1.5)
-    for number, contact in enumerate(path.network.contacts):
-        if isinstance(contact, BeamSide):
-            _touching_side(solution, ax, number, poses)
-        if isinstance(contact, BeamOnObstacle | BeamOnBeam):
-            continue
-        node = path.network.nodes[contact.node]
-        if isinstance(contact, Stop) and contact.direction is not None:
-            along = np.array([np.cos(contact.direction), np.sin(contact.direction)])
-            at = np.array([float(np.real(node.x)), float(np.real(node.y))]) + contact.gap * along
-            bar = 0.03 * size * np.array([[-along[1], along[0]], [along[1], -along[0]]])
-            for image, line in enumerate(_both(solution, [at + bar])):
-                parts.edge(ax, line, f"stop-{contact.name}-{number}-{image}", color=TEXT_INK, linewidth=2.6, zorder=1.6)
-        for color, pose in zip(_colors(len(poses)), poses, strict=True):
-            point = int(solution.keep[pose])
-            if contact.turns or not path.contact_force(number)[point] > 0:
-                continue
-            x, y, _ = path.motion(contact.node)[point]
-            place = np.array([[float(np.real(node.x)) + x, float(np.real(node.y)) + y]])
-            for at_pad in () if isinstance(contact, NodeOnBeam) else _both(solution, [place]):
-                ax.plot(*parts.mm(at_pad[0]), marker="o", markersize=4.0, color=color, zorder=4.5, linestyle="",
-                        gid=f"touch-{number}-{pose}")  # fmt: skip
-            if isinstance(contact, Stop):
-                continue
-            turn = np.linspace(0.0, 2.0 * np.pi, 61)
-            rim = contact.radius * np.column_stack([np.cos(turn), np.sin(turn)])
-            for image, line in enumerate(_both(solution, [place + rim])):
-                parts.edge(ax, line, f"pad-{number}-{pose}-{image}", color=color, linewidth=0.8, zorder=4.4)
-
-
-def _hatch(outline: ObstacleEdge, line: FloatArray, length: float) -> FloatArray:
-    """Return strokes from a part of an outline into the solid, with gaps between them, (n, 2) [m]."""
-    way = np.append(0.0, np.hypot(*np.diff(line, axis=0).T).cumsum())
-    shares = np.arange(0.5 * length, way[-1], length)
-    begin = np.column_stack([np.interp(shares, way, line[:, k]) for k in (0, 1)])
-    free = outline.distance(begin).normal
-    end = begin - 0.7 * length * (free + np.column_stack([-free[:, 1], free[:, 0]]))
-    return np.stack([begin, end, np.full_like(begin, np.nan)], axis=1).reshape(-1, 2)
-
-
-def _touching_side(solution: Solution, ax: Axes, number: int, poses: list[int]) -> None:
-    """Mark where the side of a beam touches: a dot, or a thick line along what lies on an obstacle."""
-    path = solution.path
-    contact: Any = path.network.contacts[number]
-    touching = path.contact_places(number)
-    for color, pose in zip(_colors(len(poses)), poses, strict=True):
-        point = int(solution.keep[pose])
-        if np.isnan(touching[point, 0]):
-            continue
-        along = path.places(contact.beam)
-        sampled = along[point] if along.ndim > 1 else along
-        line = path.shape(contact.beam, point)
-        first, last = touching[point].tolist()
-        shares = np.linspace(first, last, 2 + 30 * int(last > first))
-        places = np.column_stack([np.interp(shares, sampled, line[:, k]) for k in (0, 1)])
-        for image, copy in enumerate(_both(solution, [places])):
-            gid = f"side-{number}-{pose}-{image}"
-            if np.ptp(shares) > 0:
-                parts.edge(ax, copy, gid, color=color, linewidth=3.0, zorder=4.4)
-            else:
-                ax.plot(*parts.mm(copy[0]), marker="o", markersize=4.0, color=color, zorder=4.5, linestyle="", gid=gid)
 
 
 def reactions(result: Result) -> Figure:
@@ -423,7 +343,7 @@ def moving(result: Result) -> Moving | None:
     def draw(ax: Axes, number: int) -> None:
         parts.bodies(ax, made, 0, {})
         parts.bodies(ax, shown, number, {"beam": LINE_BLUE})
-        for line in _both(solution, rigid_parts(solution.path, int(solution.keep[points[number]]))):
+        for line in both_halves(solution, rigid_parts(solution.path, int(solution.keep[points[number]]))):
             parts.edge(ax, line, "rigid", color=TEXT_GREY, linewidth=2.4, zorder=2.4, solid_capstyle="round")
         _supports(solution, ax)
         parts.to_scale(ax, box)
