@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import CfmError
@@ -49,10 +48,12 @@ def add_process_and_materials(spec: Spec, request: Request) -> Spec:
 
 def add_screws(record: Family, spec: Spec) -> Spec:
     """Return a part with holes for screws of usual sizes whose heads fit everywhere; without if none do."""
+    if record.outline is None:
+        return spec
     for screw in USUAL_SCREWS:
         try:
             fastened = spec.replace({"mechanism.part.screws": screw})
-            drawing = import_module(str(record.outline)).drawing(fastened)
+            drawing = record.outline(fastened)
         except CfmError:  # another kind of part, or none that can be cut
             return spec
         if not any(NO_HOLES in note for note in drawing.notes):
