@@ -80,6 +80,11 @@ class SuggestBlock(Model):
         description="share of manufactured parts that must meet all requirements, with the tolerances assumed for the "
         "process",
     )
+    overload: PositiveForce | None = Field(
+        None,
+        description="force along the travel that it has to bear at its end: a rigid end stop behind the travel carries "
+        "what is above its own force",
+    )
     prefer: tuple[Prefer, ...] = Field(
         ("size", "ripple", "parts", "stress"), description="criteria for the order of the proposals"
     )
@@ -118,6 +123,13 @@ class SuggestBlock(Model):
             low, high = self.ends
             if not self.adjustable[0] <= high or not low <= self.adjustable[1]:
                 refuse("SuggestBlock", {("adjustable",): "the force required is not in this range"})
+        if self.overload is not None:
+            if self.force is None:
+                refuse("SuggestBlock", {("overload",): "goes with 'force' only"})
+            own = max((self.ends[1], *(self.adjustable or ())))
+            if self.overload <= own:
+                texts = format_short(self.overload, "force"), format_short(own, "force")
+                refuse("SuggestBlock", {("overload",): f"{texts[0]} is not above the largest own force, {texts[1]}"})
         return self
 
     @model_validator(mode="after")
