@@ -106,7 +106,8 @@ def _remarks(proposals: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
     texts_of_many: dict[str, list[int]] = defaultdict(list)
     warned: dict[str, dict[int, str]] = defaultdict(dict)
     for number, proposal in enumerate(proposals, 1):
-        for text in (*proposal["unjudged"], *(note for note in proposal["notes"] if note.startswith("end stop"))):
+        stops = (note for note in proposal.get("notes", ()) if note.startswith("end stop"))
+        for text in (*proposal["unjudged"], *stops):
             texts_of_many[text].append(number)
         for text in proposal["warnings"]:  # a name, and often what it means for this proposal
             warned[re.split("[: ]", text, maxsplit=1)[0]][number] = text

@@ -68,6 +68,11 @@ class SuggestBlock(Model):
     adjustable: tuple[PositiveForce, PositiveForce] | None = Field(
         None, description="lowest and highest force of the adjustment"
     )
+    overload: PositiveForce | None = Field(
+        None,
+        description="force along the travel that it has to bear at its end: a rigid end stop behind the travel carries "
+        "what is above its own force",
+    )
     hysteresis: Share | None = Field(None, description="largest energy loss of a cycle, as a share of its work")
     springs: Springs | None = Field(None, description="helical springs that it may have; default: either")
     safety: SafetyFactor = Field(DEFAULT_SAFETY, description="least safety factor of stresses, against yield")
@@ -79,11 +84,6 @@ class SuggestBlock(Model):
         alias="yield",
         description="share of manufactured parts that must meet all requirements, with the tolerances assumed for the "
         "process",
-    )
-    overload: PositiveForce | None = Field(
-        None,
-        description="force along the travel that it has to bear at its end: a rigid end stop behind the travel carries "
-        "what is above its own force",
     )
     prefer: tuple[Prefer, ...] = Field(
         ("size", "ripple", "parts", "stress"), description="criteria for the order of the proposals"
