@@ -102,15 +102,16 @@ def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
 
 
 def _remarks(proposals: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
-    """Yield what was not judged and what is warned of, each once with the numbers of its proposals."""
-    unjudged: dict[str, list[int]] = defaultdict(list)
+    """Yield what was not judged, end stops, and what is warned of, each once with the numbers of its proposals."""
+    texts_of_many: dict[str, list[int]] = defaultdict(list)
     warned: dict[str, dict[int, str]] = defaultdict(dict)
     for number, proposal in enumerate(proposals, 1):
-        for text in proposal["unjudged"]:
-            unjudged[text].append(number)
+        stops = (note for note in proposal.get("notes", ()) if note.startswith("end stop"))
+        for text in (*proposal["unjudged"], *stops):
+            texts_of_many[text].append(number)
         for text in proposal["warnings"]:  # a name, and often what it means for this proposal
             warned[re.split("[: ]", text, maxsplit=1)[0]][number] = text
-    for text, numbers in unjudged.items():
+    for text, numbers in texts_of_many.items():
         yield Note(f"no. {_numbers(numbers)}", text, whole=True)
     for name, texts in warned.items():
         text = next(iter(texts.values())) if len(set(texts.values())) == 1 else name

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 FreeWay = Annotated[Length, Field(ge=0)]
 
+BEFORE_STOP = 2e-12
+"""How far before a rigid stop a motion ends that is to be complete [m]: at the stop its drive is blocked."""
+
 
 class EndStop(Model):
     """A stop of a guided part, along its motion."""

@@ -28,6 +28,10 @@ ASSUMED_STRAINS = {"plastic": (0.015, 0.04), "metal": (0.003, 0.006)}
 """Strains that designs use of a material whose strength is not stated: about those of PLA and aluminium at yield, then
 what published mechanisms of printed plastic are bent to. The stress of what comes of it is not judged."""
 
+STOP_MARGIN_SHARE = 0.03
+"""Free way behind the travel, over the travel, at which an end stop stands: so far off may it be made and not shorten
+the travel. For parts of a few millimetres that is a tenth of one, the usual tolerance of a cut length."""
+
 
 @dataclass(frozen=True)
 class Request:
@@ -54,6 +58,7 @@ class Request:
     good_parts: float | None = None  # least share of manufactured parts that meet all of it
     # by which tolerances they are made; None: those of the process that is usual for the material
     process: str | None = None
+    overload: float | None = None  # that an end stop behind the travel has to bear [N]; None: it needs no stop
     # share of what the safety factor leaves that designs by beams may use: solids have more stress, in fillets
     reserve: float = 1.0
 
@@ -64,8 +69,17 @@ class Request:
 
     @property
     def strength_used(self) -> float:
-        """The share of the strength that designs may use: made parts are thicker and stiffer than drawn."""
-        return self.reserve * (1.0 if self.good_parts is None else STRENGTH_SHARE) / self.safety
+        """The share of the strength that designs may use: made parts are thicker and stiffer than drawn.
+
+        Up to an end stop the stress rises at most about as the motion does.
+        """
+        up_to_stop = 1.0 if self.overload is None else 1.0 + STOP_MARGIN_SHARE
+        return self.reserve * (1.0 if self.good_parts is None else STRENGTH_SHARE) / (self.safety * up_to_stop)
+
+    @property
+    def stop_margin(self) -> float:
+        """Way from the end of the travel to the end stop [m]; zero if none is required."""
+        return 0.0 if self.overload is None else STOP_MARGIN_SHARE * self.travel
 
     @property
     def with_strengths(self) -> tuple[Request, ...]:

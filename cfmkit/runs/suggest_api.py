@@ -34,6 +34,7 @@ def suggest(
     min_yield: str | float | None = None,
     safety: str | float | None = None,
     springs: str | Sequence[str] | None = None,
+    overload: str | None = None,
     prefer: Sequence[str] | None = None,
 ) -> SuggestionsView:
     """Return mechanisms of every family that meet the requirements, ranked, and those not judged in full.
@@ -72,6 +73,8 @@ def suggest(
         Smallest safety factor.
     springs : str or sequence of str, optional
         Which springs may be used.
+    overload : str, optional
+        Force along the travel that a rigid end stop has to bear.
     prefer : sequence of str, optional
         What decides the order: ``size``, ``ripple``, ``parts``, ``stress``, ``depth``.
 
@@ -110,6 +113,7 @@ def suggest(
         cycles=cycles,
         safety=safety,
         springs=springs,
+        overload=overload,
         prefer=prefer,
     )
     keys |= {} if min_yield is None else {"yield": min_yield}

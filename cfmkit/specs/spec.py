@@ -217,6 +217,10 @@ class Spec(Model):
         found: str | None = getattr(getattr(self, "analysis", None), "fidelity", None)
         return found
 
+    def end_stop_changes(self, end: float) -> Mapping[str, Any]:
+        """Return what puts a rigid stop at a motion [m] and ends the analysis there; empty if it can have none."""
+        return {}
+
     @property
     def part_requirements(self) -> tuple[Requirement, ...]:
         """The requirements that a single part meets or misses: all but those on a yield."""

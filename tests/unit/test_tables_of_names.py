@@ -59,11 +59,12 @@ def test_every_key_of_a_request_is_an_option_and_reaches_families_under_its_name
     stated = {
         "force": "20 N", "travel": "10 mm", "ripple": "3 %", "envelope": "[100 mm, 90 mm, 20 mm]", "process": "laser",
         "adjustable": "[15 N, 25 N]", "hysteresis": "7 %", "springs": "custom", "safety": "1.7", "cycles": "12345",
+        "overload": "60 N",
     }  # fmt: skip
     request = read_request(None, stated).request()
     assert (request.travel, request.ripple, request.envelope) == (0.01, 0.03, (0.1, 0.09, 0.02))
     assert (request.process, request.adjustable, request.hysteresis) == ("laser", (15.0, 25.0), 0.07)
-    assert (request.springs, request.safety, request.cycles) == ("custom", 1.7, 12345)
+    assert (request.springs, request.safety, request.cycles, request.overload) == ("custom", 1.7, 12345, 60.0)
 
 
 def test_families_read_the_modulus_of_a_material_and_how_it_is_cut_in_one_place():

@@ -85,6 +85,9 @@ class RequestOptions(Common):
     made_well: Annotated[
         str | None, _key("yield", "SHARE", "Required share of manufactured parts that meet the requirements.")
     ] = None
+    overload: Annotated[
+        str | None, _key("overload", "FORCE", "Force to bear at the end of the travel, by a rigid end stop: '60 N'.")
+    ] = None
     prefer: Annotated[
         list[str] | None,
         _key("prefer", "A,B", "Ranking, most important first: size,ripple,parts,stress,depth. Repeatable."),

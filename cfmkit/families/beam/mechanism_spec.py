@@ -9,10 +9,18 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.families.beam.contact_spec import ObstacleSpec, PartContact, StopSpec, contact_faults, list_names
+from cfmkit.families.beam.contact_spec import (
+    MotionStop,
+    ObstacleSpec,
+    PartContact,
+    StopSpec,
+    contact_faults,
+    list_names,
+)
 from cfmkit.families.beam.network_elements_spec import (
     HELD_MOTIONS,
     Copies,
+    DisplacementDrive,
     DriveSpec,
     LinkSpec,
     LoadsDrive,
@@ -255,6 +263,21 @@ class Mechanism(RoundedCorners, Model):
     def has_contacts(self) -> bool:
         """True if any contact is stated."""
         return bool(self.stops or self.obstacles or self.contacts)
+
+    def ends_before_stops(self, travel: float | None) -> bool:
+        """Return True if a motion of the driven node [m] surely ends before each stop: all are on it, along the drive.
+
+        True without stops.
+        """
+        drive = self.drive
+        return all(
+            isinstance(drive, DisplacementDrive)
+            and travel is not None
+            and isinstance(stop, MotionStop)
+            and (stop.node, stop.direction) == (drive.node, drive.direction)
+            and (stop.gaps[1] or 0.0) > travel
+            for stop in self.stops.values()
+        )
 
     @property
     def thinnest(self) -> float:

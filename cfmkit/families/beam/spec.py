@@ -10,9 +10,9 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.beam.contact_spec import contacts_of
 from cfmkit.families.beam.mechanism_spec import Mechanism
-from cfmkit.families.beam.network_elements_spec import BeamMaterial, Drive, LoadsDrive, MaterialField
+from cfmkit.families.beam.network_elements_spec import BeamMaterial, DisplacementDrive, Drive, LoadsDrive, MaterialField
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
-from cfmkit.families.end_stops_spec import contact_requirement_faults
+from cfmkit.families.end_stops_spec import BEFORE_STOP, contact_requirement_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.formula_of_x import formula
@@ -331,6 +331,14 @@ class BeamSpec(Spec):
         """Abscissa of the curve: the displacement or the angle of the driven node."""
         return "angle" if self.mechanism.drive.turns else "length"
 
+    def end_stop_changes(self, end: float) -> Mapping[str, Any]:
+        """Return what puts a rigid stop at a motion of the driven node [m], just behind the end; not in stages."""
+        drive, copies = self.mechanism.drive, self.mechanism.copies
+        if not isinstance(drive, DisplacementDrive) or (copies is not None and copies.layers > 1):
+            return {}
+        stop = {"node": drive.node, "direction": drive.direction, "gap": end}
+        return {"mechanism.stops": {"end": stop}, "analysis.travel": end - BEFORE_STOP}
+
     @property
     def extent(self) -> float:
         """End of the drive: the travel [m or rad], the force [N] or the moment [N m]."""
@@ -418,7 +426,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
             "with constant loads the force is not proportional to the width",
         ),
         ("analysis.loads_first", mechanism.loads and not analysis.loads_first, "constant loads act from the start"),
-        ("mechanism.stops", mechanism.stops, "contact is not modelled"),
+        ("mechanism.stops", not mechanism.ends_before_stops(analysis.travel), "contact is not modelled"),
         ("mechanism.obstacles", mechanism.obstacles, "contact is not modelled"),
         ("mechanism.contacts", mechanism.contacts, "contact is not modelled"),
         ("mechanism.springs", mechanism.springs, "only the part that is cut is meshed, and springs are not part of it"),

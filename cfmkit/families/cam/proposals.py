@@ -144,8 +144,12 @@ def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
 
 
 def spare_stroke(request: Request) -> float:
-    """Return how much longer than the travel a contour is cut [m]: half of made parts end before their own stroke."""
-    return 0.0 if request.good_parts is None else SPARE_SHARE * request.travel + SPARE_LENGTH
+    """Return how much longer than the travel a contour is cut [m].
+
+    Half of made parts end before their own stroke; behind an end stop there is as much of it as before.
+    """
+    spare = 0.0 if request.good_parts is None else SPARE_SHARE * request.travel + SPARE_LENGTH
+    return spare + 2.0 * request.stop_margin
 
 
 def _spread(found: dict[str, Any], fitting: Any) -> list[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import pi, radians
 from typing import Annotated, Any, Literal, Self
 
@@ -454,6 +455,11 @@ class CamSpec(Spec):
     def fidelity(self) -> Literal["quasi-static", "dynamic"]:
         """The model that the analysis uses."""
         return self.analysis.fidelity or ("dynamic" if self.analysis.dynamics else "quasi-static")
+
+    def end_stop_changes(self, end: float) -> Mapping[str, Any]:
+        """Return what stops the slider at a travel [m], where its curve ends."""
+        lower = 0.0 if self.mechanism.stops is None else self.mechanism.stops.lower
+        return {"mechanism.stops": {"lower": lower, "upper": end}}
 
     @property
     def gravity(self) -> bool:

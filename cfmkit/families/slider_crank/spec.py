@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from cfmkit.families.end_stops_spec import stop_faults
+from cfmkit.families.end_stops_spec import BEFORE_STOP, stop_faults
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
 from cfmkit.families.slider_crank.springs.spec import Limits, Links, SpringDesign, Springs
 from cfmkit.metrics.fatigue_and_relaxation import Durability
@@ -186,12 +186,21 @@ class SliderCrankSpec(Spec):
     @model_validator(mode="after")
     def _stops_are_of_a_part_that_is_pressed(self) -> Self:
         faults = dict(stop_faults(self.mechanism.stops, self.requirements))
-        if self.mechanism.stops and self.fidelity in ("prb", "solid"):
+        end = self.analysis.travel[1] if self.analysis.travel else math.inf
+        solid = self.fidelity == "solid" and end < self.mechanism.end_stops.free_end
+        if self.mechanism.stops and self.fidelity in ("prb", "solid") and not solid:
             faults["mechanism", "stops"] = (
-                f"stops are known of flexures and strips: 'analysis.fidelity' of lumped or beam, not {self.fidelity}"
+                "stops are known of flexures and strips: 'analysis.fidelity' of lumped or beam, or of solid with an "
+                f"'analysis.travel' that ends before them, not {self.fidelity}"
             )
         refuse("Spec", faults)
         return self
+
+    def end_stop_changes(self, end: float) -> Mapping[str, Any]:
+        """Return what puts a rigid stop at a motion of the slider [m], just behind the end; none with springs."""
+        if self.built_as == "springs":
+            return {}
+        return {"mechanism.stops": {"end": {"gap": end}}, "analysis.travel": (0.0, end - BEFORE_STOP)}
 
     @model_validator(mode="after")
     def _a_mirrored_pair_is_on_one_slider(self) -> Self:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from pydantic import ValidationError
 
-MOST_LISTED = 15
+MOST_LISTED = 16
 MOST_EXPLAINED = 500
 _OLD_BOOLS = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
 

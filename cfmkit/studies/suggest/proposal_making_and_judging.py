@@ -23,6 +23,7 @@ from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump, read_document
+from cfmkit.studies.suggest.end_stop_of_proposal import add_end_stop, note_end_stop, remove_end_stop
 from cfmkit.studies.suggest.material_and_fastening_of_proposal import add_process_and_materials, add_screws
 from cfmkit.studies.suggest.misses_in_words import (
     disqualifying,
@@ -229,7 +230,7 @@ def by_own_model(proposal: Proposal) -> Spec:
 
 def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
     """Return a proposal corrected and judged by the finest model of its family; the last of those that miss least."""
-    spec, best, correct = near.spec, None, job.candidate.correct
+    spec, best, correct = remove_end_stop(near.spec, job.request), None, job.candidate.correct
     for _ in range(MAX_CORRECTIONS if correct else 1):
         if clock.late():
             break
@@ -241,7 +242,7 @@ def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
             best = found
         if found.passes or not found.text:
             break
-        spec = by_own_model(found)
+        spec = remove_end_stop(by_own_model(found), job.request)
     return Proposal(job.family, near.variant, message=OUT_OF_TIME) if best is None else best
 
 
@@ -330,6 +331,7 @@ def judge_proposal(
     called = variant.replace(" ", "-").replace(",", "")
     # read back from its text: what is judged is what stands in the file
     spec = add_process_and_materials(spec, request) if near is None else add_screws(record, spec)
+    spec = add_end_stop(spec, request)
     plain = spec_of(name, dump(spec.replace({"design": None, "name": called})))
     begun = time.perf_counter()
     result = record.analyze(spec_of(name, dump(plain.replace({"requirements": windows_of(plain, request)}))), Run())
@@ -377,7 +379,8 @@ def judge_proposal(
     return Proposal(
         name, variant, text,
         missed=tuple(text for _, text in misses), fails=tuple(topic for topic, _ in misses), numbers=numbers,
-        notes=tuple(_notes(space, result)), movable=movable, unjudged=tuple(list_unjudged(request, result)),
+        notes=(*note_end_stop(request, result), *_notes(space, result)),
+        movable=movable, unjudged=tuple(list_unjudged(request, result)),
         model=model_of(name, written), pending=pending, warnings=tuple(warnings.values()), seconds=seconds,
         own=near.model if near else "",
     )  # fmt: skip

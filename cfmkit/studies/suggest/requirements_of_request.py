@@ -88,7 +88,8 @@ def stressed_motion(request: Request, spec: Spec) -> tuple[str, str]:
     window: Any = spec.get_value("analysis.window")
     if request.good_parts is None or window is None or request.kind == "torque":
         return "0 %", "100 %"
-    return format_short(0.5 * float(window[0]), "length", 12), format_short(float(window[1]), "length", 12)
+    end = "100 %" if request.overload is not None else format_short(float(window[1]), "length", 12)
+    return format_short(0.5 * float(window[0]), "length", 12), end  # an end stop is where it is for all parts
 
 
 def _share(value: float) -> str:

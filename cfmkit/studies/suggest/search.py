@@ -28,6 +28,7 @@ from cfmkit.specs.yamlio import dump
 from cfmkit.store.content_hashes_and_versions import code_stamp, stable_hash
 from cfmkit.studies.pool import give_up_at
 from cfmkit.studies.serial_and_cluster_executors import Lost, lost_to, surviving
+from cfmkit.studies.suggest.end_stop_of_proposal import NO_END_STOP
 from cfmkit.studies.suggest.proposal_making_and_judging import (
     ENDED_EARLY,
     OUT_OF_TIME,
@@ -366,8 +367,11 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
         for candidate in offer.candidates:
             if None not in (candidate.springs, request.springs) and candidate.springs != request.springs:
                 continue
+            if request.overload is not None and not candidate.spec.end_stop_changes(1.0):
+                continue
             candidates.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
     reason = f"it needs {OTHER_SPRINGS[request.springs]} springs" if offer.candidates and request.springs else ""
+    reason = NO_END_STOP if offer.candidates and request.overload is not None else reason
     likely_first = tuple(sorted(candidates.values(), key=lambda candidate: candidate.doubtful))
     return FamilyOffer(likely_first, offer.reason if candidates else offer.reason or reason)
 

@@ -68,6 +68,11 @@ class SuggestBlock(Model):
     adjustable: tuple[PositiveForce, PositiveForce] | None = Field(
         None, description="lowest and highest force of the adjustment"
     )
+    overload: PositiveForce | None = Field(
+        None,
+        description="force along the travel that it has to bear at its end: a rigid end stop behind the travel carries "
+        "what is above its own force",
+    )
     hysteresis: Share | None = Field(None, description="largest energy loss of a cycle, as a share of its work")
     springs: Springs | None = Field(None, description="helical springs that it may have; default: either")
     safety: SafetyFactor = Field(DEFAULT_SAFETY, description="least safety factor of stresses, against yield")
@@ -118,6 +123,13 @@ class SuggestBlock(Model):
             low, high = self.ends
             if not self.adjustable[0] <= high or not low <= self.adjustable[1]:
                 refuse("SuggestBlock", {("adjustable",): "the force required is not in this range"})
+        if self.overload is not None:
+            if self.force is None:
+                refuse("SuggestBlock", {("overload",): "goes with 'force' only"})
+            own = max((self.ends[1], *(self.adjustable or ())))
+            if self.overload <= own:
+                texts = format_short(self.overload, "force"), format_short(own, "force")
+                refuse("SuggestBlock", {("overload",): f"{texts[0]} is not above the largest own force, {texts[1]}"})
         return self
 
     @model_validator(mode="after")
