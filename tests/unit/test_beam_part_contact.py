@@ -124,7 +124,7 @@ def test_two_beams_have_one_force_and_a_place_on_each():
     assert said.endswith("between 'end' and 'upper'")
     assert "beams_touch" not in {warning.name for warning in pair.warnings}
     drawn = {artist.get_gid() for artist in figures(pair)["shapes"]().axes[0].get_children()}
-    assert {"pad-3-16-0", "force-3-16-0"} <= drawn
+    assert {"pad-5-16-0", "force-5-16-0"} <= drawn
 
 
 @pytest.mark.parametrize(

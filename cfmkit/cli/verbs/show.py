@@ -51,7 +51,7 @@ class ShowOptions(Common):
 def run(options: ShowOptions, terminal: Terminal) -> Document:
     """Explain a family with every key; list units, metrics, materials, stock or papers; or explain one word."""
     from cfmkit.cli.show_by_meaning import explain_by_meaning
-    from cfmkit.cli.show_topics import explain, list_skipped_families
+    from cfmkit.cli.show_topics import explain, list_skipped_families, names
 
     if options.figure is not None:
         return _copy_drawing(options.topic, options.figure)
@@ -59,7 +59,8 @@ def run(options: ShowOptions, terminal: Terminal) -> Document:
         answer = explain(options.topic)
     except UsageError:
         _refer_to_help(options.topic)
-        if (by_meaning := explain_by_meaning(options.topic or "")) is None:
+        topic = options.topic or ""
+        if topic.lower() in names() or (by_meaning := explain_by_meaning(topic)) is None:
             raise
         answer = by_meaning
     if options.topic and set(answer.data) == {"terms"}:

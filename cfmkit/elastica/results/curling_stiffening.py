@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.section import curl_hindered, curling
 from cfmkit.elastica.results.beam_states import elements_of, forces_of_elements
@@ -26,8 +26,8 @@ _COMPLEX_STEP = 1e-30
 """Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
 
 
-@dataclass(frozen=True)
-class HinderedCurling:
+@dataclass(frozen=True, repr=False)
+class HinderedCurling(ShortRepr):
     """Share by which beams that are wide, but solved as narrow ones, are too soft."""
 
     share: FloatArray  # (n,) of the strain energy of bending of all beams, at every point [1]
