@@ -421,7 +421,7 @@ TOPIC_KINDS: Mapping[str, TopicKind] = {
         lambda record: {record["name"], re.sub(r"-[0-9]{4}$", "", record["name"])},
     ),
 }
-"""What is known by name, by its heading."""
+"""Kinds of names that `show` explains, by the heading of each on a page."""
 
 TOPIC_HEADINGS: Mapping[str, tuple[str, Callable[[], Document]]] = {
     "units": ("the units that a spec may use, and those that files are written in", units_page),

@@ -20,7 +20,7 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 FreeWay = Annotated[Length, Field(ge=0)]
 
 BEFORE_STOP = 2e-12
-"""How far before a rigid stop a motion ends that is to be complete [m]: at the stop its drive is blocked."""
+"""Distance from a rigid stop at which a complete motion ends [m]: at the stop its drive is blocked."""
 
 
 class EndStop(Model):

@@ -43,12 +43,12 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
     mesh, names = path.mesh, list(path.network.beams)
     places = basis(mesh.degree).places
     energies, lost = (np.zeros((len(names), len(path))) for _ in range(2))
-    whole = forces_of_elements(path.network, path.at, range(len(mesh.elements.beam)), places)
+    all_states = forces_of_elements(path.network, path.at, range(len(mesh.elements.beam)), places)
     for number, name in enumerate(names):
         section, fitted = path.network.beams[name].section, mesh.fits[name]
         for element in elements_of(mesh, name):
             own = slice(element * len(places), (element + 1) * len(places))
-            moment, thickness = whole.moment[..., own], whole.thickness[..., own]
+            moment, thickness = all_states.moment[..., own], all_states.thickness[..., own]
             left, right = mesh.elements.cuts[element]
             t, inside = left + (right - left) * places, 0.5 * (left + right)
             rest = (
