@@ -89,6 +89,11 @@ class Request:
         made = [replace(self, materials=blocks) for blocks in levels] or [self]
         return tuple(made if made[0] != made[-1] else made[:1])
 
+    def allows(self, candidate: Candidate) -> bool:
+        """Return whether a candidate has springs of the kind that is required, and a stop where one is."""
+        is_of_kind = None in (candidate.springs, self.springs) or candidate.springs == self.springs
+        return is_of_kind and (self.overload is None or bool(candidate.spec.end_stop_changes(1.0)))
+
     def stated_material(self, block: MaterialBlock) -> MaterialBlock:
         """Return the material of a candidate as the request states it: without a strength that was only assumed."""
         return next((stated for stated in self.materials if block in _with_strengths(stated)), block)

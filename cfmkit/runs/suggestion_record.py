@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import ExitCode
 from cfmkit.specs.units import to_border
 from cfmkit.studies.serial_and_cluster_executors import BUG_PREFIX
-from cfmkit.studies.suggest.relaxed_requests import RELAXATION_FACTORS
+from cfmkit.studies.suggest.relaxed_requests import LAST_FACTOR
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -123,9 +123,7 @@ def message(found: Suggestions) -> str:
     if found.late:
         return "the time budget ended the search before a mechanism met the requirements; increase it (--time-budget)"
     if found.remote:
-        return (
-            f"no mechanism meets the requirements, nor with one of them relaxed up to {RELAXATION_FACTORS[-1]:g} times"
-        )
+        return f"no mechanism meets the requirements, nor with one of them relaxed up to {LAST_FACTOR:g} times"
     return "no mechanism meets the requirements"
 
 

@@ -25,13 +25,14 @@ if TYPE_CHECKING:
     Relaxed = tuple[Request, str]
     Relaxation = Callable[[Request, float], Relaxed | None]
 
-RELAXATION_FACTORS = (1.15, 2.2, 6.0)
-"""Factors at which a request is relaxed for a family: a mechanism six times as large is no alternative any more."""
+RELAXATION_FACTORS, LAST_FACTOR = (1.15, 2.2), 6.0
+"""Factors at which a request is relaxed for a family. The last is looked at first: most of what nothing helps ends
+there, and a mechanism six times as large is no alternative any more."""
 
 N_HALVINGS = 3
 """Of the last step, on a logarithmic scale: what is left is less than what the laws leave out."""
 
-FURTHER_FACTORS = (1.03, 1.15, 1.5, 2.2)
+FURTHER_FACTORS = (1.03, 1.15, 1.5, 2.2, 3.6)
 """Beyond the first candidates: laws leave out pads, margins, and what stretches."""
 
 MAX_RIPPLE = 0.5
@@ -58,13 +59,18 @@ def edges(request: Request, names: Sequence[str], seed: int, clock: Clock) -> It
     relaxations = _relaxations(request)
     near = [name for name in names if not clock.late() and _offer(request, name, seed)]
     yield from (Edge(name, key, 1.0) for name in near for key in relaxations)
-    left = [(name, key) for name in names if name not in near for key in relaxations]
+    pairs = [(name, key) for name in names if name not in near for key in relaxations]
+    left = [
+        (name, key)
+        for name, key in pairs
+        if not clock.late() and _offers(request, name, relaxations[key], LAST_FACTOR, seed)
+    ]
     below = 1.0
-    for factor in RELAXATION_FACTORS:
+    for factor in (*RELAXATION_FACTORS, LAST_FACTOR):
         for name, key in tuple(left):
             if clock.late():
                 return
-            if _offers(request, name, relaxations[key], factor, seed):
+            if factor == LAST_FACTOR or _offers(request, name, relaxations[key], factor, seed):
                 left.remove((name, key))
                 yield Edge(name, key, _bisect(request, name, relaxations[key], (below, factor), seed))
         below = factor
@@ -87,26 +93,34 @@ def _bisect(request: Request, name: str, relaxation: Relaxation, ends: tuple[flo
 
 
 def confirm(request: Request, seed: int, clock: Clock, edge: Edge) -> str | None:
-    """Return the value of a key with which a family's first candidate is good; None if none is."""
+    """Return the value of a key with which a family's first candidate is good; None if none is.
+
+    A little more of it is tried first, then the most: what that does not help, nothing between does.
+    """
     relaxation = _relaxations(request)[edge.key]
-    tried: set[str] = set()
-    for more in FURTHER_FACTORS:
-        factor = edge.factor * more
-        relaxed = relaxation(request, factor) if factor <= RELAXATION_FACTORS[-1] else None
+
+    def find_value(factor: float, sides_apart: bool = True) -> str | None:
+        relaxed = None if clock.late() else relaxation(request, factor)
         if relaxed is None:
             return None
         # the sides that were just enough by the laws may be too little: then all of them
-        larger = relaxation is _larger
-        choices = [_only_needed(request, (edge.family, seed), relaxed), relaxed] if larger else [relaxed]
-        for asked, reported in choices:
-            candidates = () if reported in tried else _offer(asked, edge.family, seed)
-            tried.add(reported)
-            if clock.late():
-                return None
-            job = ProposalJob(edge.family, candidates[0], asked, seed, clock.deadline) if candidates else None
-            if job is not None and make_proposal(job).passes:
+        apart = sides_apart and relaxation is _larger
+        choices = [_only_needed(request, (edge.family, seed), relaxed), relaxed] if apart else [relaxed]
+        for asked, reported in choices[:1] if choices[0] == choices[-1] else choices:
+            candidates = _offer(asked, edge.family, seed)
+            if (
+                candidates
+                and make_proposal(ProposalJob(edge.family, candidates[0], asked, seed, clock.deadline)).passes
+            ):
                 return reported
-    return None
+        return None
+
+    factors = [edge.factor * more for more in FURTHER_FACTORS if edge.factor * more < LAST_FACTOR]
+    if factors and (value := find_value(factors[0])) is not None:
+        return value
+    if (most := find_value(LAST_FACTOR, sides_apart=False)) is None:
+        return None
+    return next((value for factor in factors[1:] if (value := find_value(factor)) is not None), most)
 
 
 def _relaxations(request: Request) -> dict[str, Relaxation]:
@@ -129,7 +143,7 @@ def _offer(request: Request, name: str, seed: int) -> Sequence[Candidate]:
     if not propose:
         return ()
     asked = request.with_strengths[-1]
-    candidates = propose(asked, Run(seed)).candidates
+    candidates = [candidate for candidate in propose(asked, Run(seed)).candidates if request.allows(candidate)]
     return sorted(candidates, key=lambda candidate: candidate.doubtful)
 
 

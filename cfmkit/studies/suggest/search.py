@@ -117,7 +117,7 @@ class Suggestions:
     reused: int = 0  # candidates that were found in the journal
     bugs: tuple[str, ...] = ()  # the traceback of each family or candidate that a bug ended
     unjudged: tuple[Proposal, ...] = ()  # those that miss nothing of what was judged, but not all was, the best first
-    remote: bool = False  # whether it would not help either to relax one requirement up to `RELAXATION_FACTORS[-1]`
+    remote: bool = False  # whether it would not help either to relax one requirement up to `LAST_FACTOR`
 
     @property
     def listed(self) -> tuple[Proposal, ...]:
@@ -365,11 +365,8 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
     for requested, reserve in product(request.with_strengths, reserves):
         offer = record.propose(replace(requested, reserve=reserve), run)
         for candidate in offer.candidates:
-            if None not in (candidate.springs, request.springs) and candidate.springs != request.springs:
-                continue
-            if request.overload is not None and not candidate.spec.end_stop_changes(1.0):
-                continue
-            candidates.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
+            if request.allows(candidate):
+                candidates.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
     reason = f"it needs {OTHER_SPRINGS[request.springs]} springs" if offer.candidates and request.springs else ""
     reason = NO_END_STOP if offer.candidates and request.overload is not None else reason
     likely_first = tuple(sorted(candidates.values(), key=lambda candidate: candidate.doubtful))
