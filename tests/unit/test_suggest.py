@@ -144,6 +144,7 @@ def test_a_material_named_again_is_one_more_and_replaces_none():
 def test_a_room_and_a_time_may_be_written_short():
     assert parse_envelope("80x60x6mm") == "[80 mm, 60 mm, 6 mm]"
     assert parse_envelope("8cm x 60 mm") == "[8 cm, 60 mm]"
+    assert parse_envelope("8e1x6E1mm") == "[8e1 mm, 6E1 mm]"
     with pytest.raises(UsageError, match="100x100x20 has no unit; write 100x100x20mm"):
         parse_envelope("100x100x20")
     assert seconds("90s") == 90.0
