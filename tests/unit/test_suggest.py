@@ -40,7 +40,7 @@ from cfmkit.studies.suggest.proposal_making_and_judging import (
     ProposalJob,
     make_proposal,
 )
-from cfmkit.studies.suggest.relaxed_requests import confirm, edges
+from cfmkit.studies.suggest.relaxed_requests import Edge, confirm, edges
 from cfmkit.studies.suggest.search import FIGURE_SECONDS, RESERVE_OF_FEW, _Times, order_proposals, suggest
 
 REQUESTS = Path(__file__).parents[1] / "requests"
@@ -532,6 +532,17 @@ def test_the_nearest_request_gets_a_proposal_when_it_is_asked():
         assert any(make_proposal(job).passes for job in jobs), key
 
 
+def test_the_nearest_request_is_met_with_the_springs_that_are_allowed():
+    """With custom springs 435 N would do."""
+    keys = {"travel": "300 mm", "ripple": "5 %", "envelope": "[900 mm, 1100 mm, 300 mm]", "springs": "catalogue"}
+    asked = request(force="500 N", **keys)
+    value = confirm(asked, 0, UNLIMITED_CLOCK, Edge("cam", "force", 1.0))
+    assert value is not None
+    again = request(force=value, **keys)
+    candidates = search.offer_of(family("cam"), again, Run()).candidates
+    assert any(make_proposal(ProposalJob("cam", one, again, 0)).passes for one in candidates)
+
+
 def test_two_relaxed_keys_are_named_after_one_analysis_each(monkeypatch):
     made = []
 
@@ -574,7 +585,10 @@ def test_a_request_that_nothing_comes_near_says_so(monkeypatch):
     monkeypatch.setattr(search, "edges", lambda *_: iter(()))
     found = suggest(request(envelope="[26 mm, 20 mm, 12 mm]"), Run())
     assert found.remote
-    assert message(found) == "no mechanism meets the requirements, nor with one of them relaxed up to 6 times"
+    assert (
+        message(found)
+        == "no mechanism meets the requirements, and none was found with one of them relaxed up to 6 times"
+    )
 
 
 def test_a_family_whose_candidates_all_miss_is_relaxed_by_a_little_first(monkeypatch):
