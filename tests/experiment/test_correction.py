@@ -164,6 +164,16 @@ def test_springs_and_friction_of_a_cam_stay_and_its_profile_changes():
         assert found.corrected.get_value(path) == hidden.drawn.get_value(path)
 
 
+def test_links_are_found_beyond_the_offset_at_which_the_force_jumps():
+    """With the crank and the offset shorter by 1.5 % the force is smooth; between there and the drawing it is not."""
+    springs = {"mechanism.springs.pivot": 0.974, "mechanism.springs.slider_pin": 0.969}
+    pins = "mechanism.pins={diameter: 3 mm, friction: 0.02}"
+    friction = {"mechanism.pins.friction": 0.1}
+    hidden = Hidden("slider_crank_bought", springs, friction=friction, seen_at_rest=True, changes=(pins,))
+    found = cfmkit.correct(hidden.drawn, hidden.recording(), tare="start")
+    assert is_close(found, found.aim.mean([curve_of(hidden.made_of(found.corrected))]))
+
+
 def test_a_part_stays_in_the_envelope_that_is_required():
     """Widths alone would make it 15.2 mm deep."""
     hidden = Hidden("make_finger", {MODULUS: 0.85}, changes=("requirements.0={metric: envelope_z, max: 13.5 mm}",))
