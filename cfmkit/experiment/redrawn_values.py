@@ -222,7 +222,18 @@ class Redesign:
                 best = min(self._solve_for(list(free), best), best, key=self._cost)
                 if self._cost(best) <= CLOSE_DEPARTURE:
                     break
+        if self._cost(best) > CLOSE_DEPARTURE and not any(stages):
+            best = min(self._solve_for(list(range(len(kinds))), self._scaled_links()), best, key=self._cost)
         return min(self._solve_for(stages[0], best), best, key=self._cost) if stages[0] else best
+
+    def _scaled_links(self) -> FloatArray:
+        """Return the places of joints, scaled so that springs at them have the force, (n,) [SI].
+
+        It goes with one over all lengths; where a link is stretched it jumps, and a search from the start ends there.
+        """
+        low, high = self._ends
+        curves = analyze_part(self.explanations[0].part_of(self.drawn)).curves
+        return np.clip(self.start * self.aim.mean(curves) / self.aim.mean_effort, low, high)
 
     def _compensate(self) -> FloatArray:
         """Return the values of leaves that are drawn thinner by as much as they are made thicker, (n,) [SI].

@@ -123,7 +123,10 @@ def message(found: Suggestions) -> str:
     if found.late:
         return "the time budget ended the search before a mechanism met the requirements; increase it (--time-budget)"
     if found.remote:
-        return f"no mechanism meets the requirements, nor with one of them relaxed up to {LAST_FACTOR:g} times"
+        return (
+            "no mechanism meets the requirements, and none was found with one of them relaxed up to "
+            f"{LAST_FACTOR:g} times"
+        )
     return "no mechanism meets the requirements"
 
 

@@ -164,6 +164,16 @@ def test_springs_and_friction_of_a_cam_stay_and_its_profile_changes():
         assert found.corrected.get_value(path) == hidden.drawn.get_value(path)
 
 
+def test_links_are_found_beyond_the_offset_at_which_the_force_jumps():
+    """With the crank and the offset shorter by 1.5 % the force is smooth; between there and the drawing it is not."""
+    springs = {"mechanism.springs.pivot": 0.974, "mechanism.springs.slider_pin": 0.969}
+    pins = "mechanism.pins={diameter: 3 mm, friction: 0.02}"
+    friction = {"mechanism.pins.friction": 0.1}
+    hidden = Hidden("slider_crank_bought", springs, friction=friction, seen_at_rest=True, changes=(pins,))
+    found = cfmkit.correct(hidden.drawn, hidden.recording(), tare="start")
+    assert is_close(found, found.aim.mean([curve_of(hidden.made_of(found.corrected))]))
+
+
 def test_a_part_stays_in_the_envelope_that_is_required():
     """Widths alone would make it 15.2 mm deep."""
     hidden = Hidden("make_finger", {MODULUS: 0.85}, changes=("requirements.0={metric: envelope_z, max: 13.5 mm}",))
@@ -188,6 +198,16 @@ def test_a_recording_of_another_force_is_refused():
     recording = hidden.recording()
     with pytest.raises(DataError, match="a recording of another part"):
         cfmkit.correct(hidden.drawn, Recording("strong", recording.motion, 30.0 * recording.effort))
+
+
+def test_a_zero_that_is_larger_than_the_force_is_no_zero():
+    """The force of these springs is constant: 8 times as much of it looks like a zero of 7 times the force."""
+    drawn = Hidden("slider_crank_bought").drawn
+    curve, noise = curve_of(drawn), np.random.default_rng(3)
+    motion, effort = (np.concatenate([values, values[::-1]]) for values in (curve.motion, 8.0 * curve.effort))
+    strong = Recording("strong", motion, effort + noise.normal(0.0, 0.03, len(motion)))
+    with pytest.raises(DataError, match=r"without load the sensor would show .* another part"):
+        cfmkit.correct(drawn, strong)
 
 
 def test_a_thickness_that_the_process_cannot_make_is_refused_with_the_nearest_force():
