@@ -90,6 +90,18 @@ def why_not_made(process: str, material: str | None, youngs_modulus: float) -> s
     return f"{name} is not made by {process}, but by {', '.join(others)}{' or ' if others else ''}{last}"
 
 
+def finest_process(material: str | None, youngs_modulus: float) -> ProcessAccuracy:
+    """Return the process with the thinnest wall of those that make parts of a material.
+
+    Examples
+    --------
+    >>> finest_process("titanium-6al-4v", 114e9).name, finest_process("pla", 3e9).name
+    ('wire-edm', 'fdm')
+    """
+    made_by = (PROCESSES_BY_NAME[name] for name in _processes_of(material, youngs_modulus))
+    return min(made_by, key=lambda process: process.least_feature)
+
+
 def _processes_of(material: str | None, youngs_modulus: float) -> tuple[str, ...]:
     """Return by which processes parts of a material are made."""
     if youngs_modulus > MIN_METAL_MODULUS:

@@ -107,7 +107,7 @@ def with_whole_strands(original: Spec, outcome: Design, finish: Callable[[Spec],
     if outcome.spec is None or getattr(part, "stock", None) is None or accuracy_of(original).name != "fdm":
         return outcome
     nozzle = accuracy_of(original).least_feature
-    leaves = {path: size for path, size in outcome.spec.leaves() if _is_leaf(path, size)}
+    leaves = {path: size for path, size in outcome.spec.leaves() if is_leaf(path, size)}
     if not leaves or all(is_whole(size, nozzle) for size in leaves.values()):
         return outcome
     neighbours = [{path: _whole(size, nozzle, rank) for path, size in leaves.items()} for rank in (0, 1)]
@@ -141,7 +141,7 @@ def _levers(original: Spec, leaves: Mapping[str, float], changes: Mapping[str, f
     return {"mechanism.safety_factor": thinner * float(original.get_value("mechanism").safety_factor)}
 
 
-def _is_leaf(path: str, size: Any) -> bool:
+def is_leaf(path: str, size: Any) -> bool:
     """Return True for the thickness of a leaf [m], not for the deviation of it that a process has."""
     leaf = path.startswith("mechanism.") and path.endswith(".thickness") and ".process." not in path
     return leaf and isinstance(size, float)

@@ -109,3 +109,14 @@ def test_a_window_is_as_long_as_a_travel_that_has_more_digits_than_the_process_h
     assert high - low == pytest.approx(2.001, abs=1e-9)
     again = judge_proposal("vcfm", "2 Vs", proposal.spec, asked)  # what is rounded stays as it is
     assert dump(again.spec) == proposal.text.replace(proposal.spec.name, again.spec.name)
+
+
+def test_leaves_that_are_thinner_than_any_process_makes_are_named():
+    asked = request(force="12 mN", travel="100 um", envelope="[12 mm, 9 mm, 0.5 mm]", material="titanium-6al-4v")
+    candidate = offer_of(family("vcfm"), asked, Run()).candidates[0]
+    notes = make_proposal(ProposalJob("vcfm", candidate, asked, 0)).notes
+    (note,) = [note for note in notes if note.startswith("leaves of ")]
+    assert note.endswith("mm are thinner than 0.2 mm, the least assumed of wire-edm: state --process")
+    thick = propose_first("vcfm")[1]
+    assert cfmkit.loads(thick.text).mechanism.bistable.thickness > 0.0004
+    assert not any(note.startswith("leaves of ") for note in thick.notes)

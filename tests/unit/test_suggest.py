@@ -801,14 +801,6 @@ def test_of_a_list_of_materials_the_one_that_is_wrong_is_told(material, words):
     assert str(problem).startswith("--material: " + words)
 
 
-def test_nearest_values_are_those_of_the_springs_that_are_required():
-    keys = {"force": "500 N", "travel": "300 mm", "ripple": "5 %", "envelope": "[900 mm, 1100 mm, 300 mm]"}
-    asked = request(**keys, material="steel-s235", springs="catalogue")
-    offered_springs = {candidate.springs for candidate in relaxed_requests._offer(asked, "cam", 0)}
-    assert offered_springs == {"catalogue"}
-    assert {candidate.springs for candidate in propose("cam", asked).candidates} == {"catalogue", "custom"}
-
-
 def test_what_only_the_largest_factor_helps_is_named_with_it(monkeypatch):
     monkeypatch.setattr(relaxed_requests, "_offer", lambda relaxed, *_: ("a candidate",))
     monkeypatch.setattr(relaxed_requests, "ProposalJob", lambda _name, _candidate, asked, *_: asked)

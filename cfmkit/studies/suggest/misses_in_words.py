@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.metrics import evaluate
 from cfmkit.specs.units import format_short
+from cfmkit.stock.processes import finest_process
+from cfmkit.studies.stock_and_digits import is_leaf
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -13,6 +15,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import BoundingBox
     from cfmkit.families.suggestion_request import Request
     from cfmkit.results import Result
+    from cfmkit.specs.spec import Spec
 
 LENGTH_RTOL = 1e-9
 """On lengths that are compared: what writing a number down does to its last digit."""
@@ -104,6 +107,18 @@ def _apart(one: float, other: float) -> tuple[str, str]:
         if texts[0] != texts[1]:
             break
     return texts
+
+
+def too_thin(spec: Spec) -> Iterator[str]:
+    """Yield whether a leaf is thinner than all processes that make its material are assumed to make, in a sentence."""
+    material: Any = getattr(spec.get_value("mechanism"), "material", None)
+    leaves = [size for path, size in spec.leaves() if is_leaf(path, size)]
+    if material is None or not leaves:
+        return
+    process, thin = finest_process(material.name, material.modulus), min(leaves)
+    if thin < process.least_feature * (1.0 - LENGTH_RTOL):
+        sizes = [format_short(size, "length", 3) for size in (thin, process.least_feature)]
+        yield f"leaves of {sizes[0]} are thinner than {sizes[1]}, the least assumed of {process.name}: state --process"
 
 
 def too_short(request: Request, result: Result) -> Iterator[str]:

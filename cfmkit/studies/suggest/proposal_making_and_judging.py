@@ -34,6 +34,7 @@ from cfmkit.studies.suggest.misses_in_words import (
     raised_out,
     sides_outside,
     too_short,
+    too_thin,
     topic_of,
 )
 from cfmkit.studies.suggest.redesign_of_proposal import block_for_redesign
@@ -382,7 +383,7 @@ def judge_proposal(
     return Proposal(
         name, variant, text,
         missed=tuple(text for _, text in misses), fails=tuple(topic for topic, _ in misses), numbers=numbers,
-        notes=(*note_end_stop(request, result), *_notes(space, result)),
+        notes=(*note_end_stop(request, result), *too_thin(written), *_notes(space, result)),
         movable=movable, unjudged=tuple(list_unjudged(request, result)),
         model=model_of(name, written), pending=pending, warnings=tuple(warnings.values()), seconds=seconds,
         own=near.model if near else "",
