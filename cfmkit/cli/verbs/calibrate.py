@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.documents.document import Document
     from cfmkit.documents.run_outcome import Report
-    from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.families.run_control import Run
     from cfmkit.specs.spec import Spec
@@ -78,38 +77,9 @@ def compute(options: CalibrateOptions, source: MeasuredCurves, spec: Spec, run: 
     """Return the report on the fitted mechanism."""
     from cfmkit.experiment.parameters_to_fit import split_bounds
     from cfmkit.numerics.least_squares import LOSS_NAMES
+    from cfmkit.runs.comparisons import report_on_calibration
     from cfmkit.runs.measure_and_calibrate_api import calibrate
 
     loss = next(name for name in LOSS_NAMES if name == options.loss)
     bounds = split_bounds(options.bounds or ())
-    return report(calibrate(spec, source, options.fit, bounds=bounds, loss=loss), source)
-
-
-def report(calibration: Calibration, source: MeasuredCurves) -> Report:
-    """Return the report on a finished calibration."""
-    from dataclasses import replace
-
-    from cfmkit import api
-    from cfmkit.documents.run_outcome import Supplement, report_on
-    from cfmkit.experiment import measurement_and_calibration_outputs as add
-    from cfmkit.tables import to_csv
-
-    found, after, name = report_on(calibration.result), calibration.after, calibration.spec.name
-    files = {
-        "calibrated.yaml": lambda: api.dumps(calibration.spec).encode(),
-        "parameters.csv": lambda: to_csv(add.parameters_table(calibration)),
-        "residuals.csv": lambda: to_csv(add.residuals_table(calibration)),
-        **add.comparison_files(source),
-    }
-    return replace(
-        found,
-        metrics=dict(found.metrics) | after.metrics() | after.loss(),
-        supplement=Supplement(
-            add.comparison_data(after, source) | add.calibration_data(calibration),
-            files,
-            (*add.comparison_lines(after, source), *add.calibration_lines(calibration, source.recording)),
-            (*add.comparison_warnings(after, source), *calibration.warnings),
-            shortfall=add.shortfall(after),
-            figures=add.comparison_figures(after, name, calibration.before),
-        ),
-    )
+    return report_on_calibration(calibrate(spec, source, options.fit, bounds=bounds, loss=loss), source)
