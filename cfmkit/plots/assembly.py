@@ -73,16 +73,18 @@ def assembly_figure(
     low, high = points.min(axis=0), points.max(axis=0)
     width = print_width(SHEET_SIZE[0])
     top = HEADING_ROOM if has_titles() else PLAIN_ROOM
+    subject = "assembly, numbers as in parts.csv"
     if width >= MIN_WIDTH_BESIDE:
         room = (width - LIST_WIDTH, SHEET_SIZE[1] - HEADING_ROOM - BOTTOM_ROOM)
         figure = new_figure(width, room[1] + top + BOTTOM_ROOM)
         list_box = (room[0], BOTTOM_ROOM, LIST_WIDTH, room[1])
     else:
+        subject = "assembly"  # no more stands beside a name of usual length
         scale = (width - 2.0 * EDGE_MARGIN) / (high[0] - low[0])
         room = (width, min(scale * (high[1] - low[1]) + 2.0 * EDGE_MARGIN, MAX_HEIGHT_SHARE * width))
         list_box = (0.0, BOTTOM_ROOM, width, _list_height(parts, width))
         figure = new_figure(width, room[1] + list_box[3] + top + BOTTOM_ROOM)
-    write_heading(figure, Heading(title, "assembly, numbers as in parts.csv"))
+    write_heading(figure, Heading(title, subject))
     ax = _blank_axes(figure, (0.0, size_mm(figure)[1] - top - room[1], *room))
     _frame(ax, low, high)
     made = {part.body for part in parts if part.source == "make"}

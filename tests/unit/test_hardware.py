@@ -106,11 +106,12 @@ def test_a_stated_pin_that_is_too_thin_is_named_with_one_that_is_not():
 
 
 def test_numbers_of_the_assembly_are_those_of_the_list():
-    for name, of in (("cam_friction", cam_hardware), ("slider_crank_bought", None)):
+    for name, of in (("cam", cam_hardware), ("cam_friction", cam_hardware), ("slider_crank_bought", None)):
         result = cfmkit.analyze(cfmkit.load(f"configs/{name}.yaml"))
         found = of(result.state) if of else crank_hardware(result.spec, result.state)
         drawn = {body.name for body in found.drawn}
         assert {part.body for part in found.parts if part.body} <= drawn
+        assert all(part.body for part in found.parts if part.place == "in the rollers" and part.standard)
         figure = cfmkit.figures(result)["assembly"]()
         shown = {text.get_gid(): text.get_text() for ax in figure.axes for text in ax.texts if text.get_gid()}
         wanted = {f"item-{k}": str(k) for k, part in enumerate(found.parts, start=1) if part.body}
@@ -169,6 +170,7 @@ def test_in_one_column_the_parts_list_stands_below_an_assembly_as_wide_as_the_pa
     picture, listed = (ax.get_position() for ax in figure.axes)
     width, height = size_mm(figure)
     assert width == pytest.approx(84.0)
+    assert figure.texts[0].get_text() == f"{result.spec.name}: assembly"  # no name of usual length is cut
     assert picture.width == pytest.approx(1.0)
     assert picture.y0 == pytest.approx(listed.y1)
     assert (picture.height + listed.height) * height > height - 17.0  # heading and margins

@@ -39,7 +39,7 @@ CAM_FINDINGS = {
     "undercut_total": "the roller is so large that no part of the flank remains",
     "corner_pressure": "on the sharp corner the contact pressure is unbounded",
     "overstressed": "the contact pressure exceeds the one at which the material first yields below the surface",
-    "up_jam": "the mechanism self-locks: no force moves the slider up",
+    "up_jam": "the mechanism self-locks over a ten-thousandth of its travel or more: no force moves the slider up",
     "dead_point": "the slider cannot move the roller at the start: forces other than the springs' diverge",
     "spring_slack": "the springs are slack (shorter than their rest length) and carry no force",
     "spring_overstretched": "the springs are stretched beyond their limit",
@@ -215,7 +215,22 @@ def _jam(number: int) -> FindingRule[Solution]:
         low, high = (mm(end) for end in solution.jams[number])
         return f"self-locks on the way up from {low} to {high}"
 
-    return FindingRule("up_jam", lambda one: np.array([len(jams) > number for jams in one.all_jams]), message, short)
+    def is_felt(solution: Solution) -> NDArray[np.bool_]:
+        low, high = np.array([jams[number] if len(jams) > number else (0.0, 0.0) for jams in solution.all_jams]).T[
+            ..., None
+        ]
+        leaves_gap = ((low < solution.travel) & (solution.travel < high)).any(axis=-1)
+        return leaves_gap | (high - low > MIN_JAM_SHARE * solution.travel[..., -1:])[..., 0]
+
+    return FindingRule("up_jam", is_felt, message, short)
+
+
+MIN_JAM_SHARE = 1e-4
+"""Part of the travel over which a mechanism may self-lock without a warning if no point of the curve is in it.
+
+No slider is stopped or measured more finely (wire EDM places holes within 0.005 mm). With friction every cam that starts
+without leverage self-locks, over nanometres.
+"""
 
 
 def _is_sunk(solution: Solution) -> Any:

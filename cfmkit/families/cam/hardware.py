@@ -120,7 +120,7 @@ def hardware(solution: Solution) -> Hardware:
     if holes:
         parts = (*parts, screw_part("plate to its base", len(holes), screw, thick, "screw"))
     standing = tuple(_standing(solution, rod.bush, rod.diameter, holes, screw))
-    drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft)))
+    drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft), bearing))
     return Hardware(with_faults(parts, faults), standing, drawn, pin, in_sentences(faults))
 
 
@@ -238,12 +238,12 @@ def _parts(
         name = stated.name or (bearing.name if bearing and stated.kind == "ball" else "")
         size = mm(bearing.bore, bearing.outer, bearing.width) if bearing else f"bore {mm(stated.bore)}"
         data = f"{stated.kind} bearing, bore {length_in_words(stated.bore)}{rated}"
-        yield ListedPart("in the rollers", name, count, data, "buy", size, "DIN 625-1" if bearing else "")
+        standard, body = ("DIN 625-1", "bearing") if bearing else ("", "")
+        yield ListedPart("in the rollers", name, count, data, "buy", size, standard, body)
     elif bearing is not None:
         size = mm(bearing.bore, bearing.outer, bearing.width)
-        yield ListedPart(
-            "in the rollers", bearing.name, count, "ball bearing, its life not judged", "buy", size, "DIN 625-1"
-        )
+        data = "ball bearing, its life not judged"
+        yield ListedPart("in the rollers", bearing.name, count, data, "buy", size, "DIN 625-1", "bearing")
     springs = mechanism.springs
     wound = springs.wound
     size = f"wire {mm(wound.wire)}, coil {mm(wound.coil)}, {wound.turns:g} turns" if wound else ""
@@ -260,7 +260,7 @@ def _standing(solution: Solution, bush: float, diameter: float, holes: list[Arc]
 
 
 def _drawn_bodies(
-    solution: Solution, standing: tuple[PosedBody, ...], sizes: tuple[float, float, float]
+    solution: Solution, standing: tuple[PosedBody, ...], sizes: tuple[float, float, float], bearing: Bearing | None
 ) -> Iterator[PosedBody]:
     """Yield all parts as the assembly shows them, the lowest first: for braces, slider pin and shafts their widths."""
     width, pin, shaft = sizes
@@ -272,6 +272,8 @@ def _drawn_bodies(
     yield PosedBody.line("spring", "free", np.stack([rollers, rollers * mirror], axis=1), 0.35 * width)
     for side in (np.ones(2), mirror):
         yield PosedBody.line("roller", "contact", (rollers * side)[:, None], radius)
+        if bearing is not None:
+            yield PosedBody.line("bearing", "free", (rollers * side)[:, None], 0.5 * bearing.outer)
         ends: FloatArray = np.stack([rollers * side, pins], axis=1)
         yield PosedBody.line("brace", "free", ends, 0.5 * width, round=True)
         yield PosedBody.line("shaft", "free", (rollers * side)[:, None], 0.5 * shaft)
