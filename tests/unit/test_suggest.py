@@ -453,7 +453,7 @@ def test_the_reason_is_that_of_a_shape_that_travels_so_far():
     offer = propose("beam", asked)
     assert not offer.candidates
     assert offer.reason.startswith("the beams would be ")
-    assert offer.reason.endswith(" mm wide")
+    assert offer.reason.endswith(" mm wide, at most 24.75 mm fit")
 
 
 def test_a_request_beyond_energy_gets_nothing_and_ends_with_4():

@@ -228,8 +228,8 @@ def _jam(number: int) -> FindingRule[Solution]:
 MIN_JAM_SHARE = 1e-4
 """Part of the travel over which a mechanism may self-lock without a warning if no point of the curve is in it.
 
-No slider is stopped or measured more finely (wire EDM places holes within 0.005 mm). With friction every cam that starts
-without leverage self-locks, over nanometres.
+No slider is stopped or measured more finely (wire EDM places holes within 0.005 mm). With friction every cam that
+starts without leverage self-locks, over nanometres.
 """
 
 
