@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from cfmkit.cli.output_folder import folder_of
+from cfmkit.cli.options import folder_of
 from cfmkit.documents.document import BAD_TONE, Document, Note, Written
 from cfmkit.documents.run_document import RunCommand, complaints_of, data_of, document_of
 from cfmkit.runs.run import RunTask, carry_out

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.cli.output_folder import folder_of
+from cfmkit.cli.options import folder_of
 from cfmkit.documents.document import Written
 from cfmkit.errors import UsageError
 

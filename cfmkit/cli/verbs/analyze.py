@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import (
-    Animate,
+    REPORT_FLAG,
     ComputeOptions,
     MeasurementOptions,
-    Overlay,
-    WithReport,
+    RunPictures,
     data_record,
     flag,
     given_measurement_options,
@@ -30,19 +29,12 @@ HELP_EXAMPLE = "cfmkit analyze cam.yaml --set mechanism.rolling_friction=0.004 -
 
 
 @dataclass(frozen=True, kw_only=True)
-class AnalyzeOptions(ComputeOptions, MeasurementOptions):
+class AnalyzeOptions(ComputeOptions, MeasurementOptions, RunPictures):
     """Arguments and options."""
 
-    report: WithReport = False
-    animate: Animate = None
-    overlay: Overlay = None
-    data: Annotated[
-        str | None,
-        option("--data", metavar="FILE.csv", text="Measured curve to overlay; reports the errors of the model."),
-    ] = None
-    compare_fidelity: Annotated[
-        bool, flag("--compare-fidelity", text="Overlay the curves of all models and report their differences.")
-    ] = False
+    report: bool = REPORT_FLAG()
+    data: str | None = option("FILE.csv", "Measured curve to overlay; reports the errors of the model.")
+    compare_fidelity: bool = flag("Overlay the curves of all models and report their differences.")
 
 
 def run(options: AnalyzeOptions, terminal: Terminal) -> Document:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import (
+    REPORT_FLAG,
     ComputeOptions,
     MeasurementOptions,
-    WithReport,
     argument,
     data_record,
     given_measurement_options,
@@ -34,26 +34,17 @@ HELP_EXAMPLE = "cfmkit calibrate cam.yaml loop.csv --fit mechanism.rolling_frict
 class CalibrateOptions(ComputeOptions, MeasurementOptions):
     """Arguments and options."""
 
-    data: Annotated[str, argument("DATA.csv", "The measured curve, as for `measure`.")]
-    fit: Annotated[
-        str,
-        option(
-            "--fit",
-            metavar="A.B,C.D",
-            text="Numbers of the spec to fit, e.g. mechanism.rolling_friction; separate several with commas.",
-        ),
-    ]
-    bounds: Annotated[
-        list[str] | None,
-        option("--bounds", metavar="A.B=LOW:HIGH", text="Bounds of a fitted value, with units. Repeatable."),
-    ] = None
-    loss: Annotated[
-        str,
-        option(
-            "--loss", metavar="NAME", shown=True, text="Loss function of the residuals: linear, soft_l1, huber, cauchy."
-        ),
-    ] = "soft_l1"
-    report: WithReport = False
+    data: str = argument("DATA.csv", "The measured curve, as for `measure`.")
+    fit: str = option(
+        "A.B,C.D",
+        "Numbers of the spec to fit, e.g. mechanism.rolling_friction; separate several with commas.",
+        default=MISSING,
+    )
+    bounds: list[str] | None = option("A.B=LOW:HIGH", "Bounds of a fitted value, with units. Repeatable.")
+    loss: str = option(
+        "NAME", "Loss function of the residuals: linear, soft_l1, huber, cauchy.", shown=True, default="soft_l1"
+    )
+    report: bool = REPORT_FLAG()
 
 
 def run(options: CalibrateOptions, terminal: Terminal) -> Document:

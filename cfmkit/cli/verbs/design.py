@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cfmkit.cli.options import Animate, ComputeOptions, Fresh, Jobs, Overlay, WithReport, option, seconds
+from cfmkit.cli.options import FRESH_FLAG, JOBS_OPTION, REPORT_FLAG, ComputeOptions, RunPictures, option, seconds
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -21,18 +21,13 @@ HELP_EXAMPLE = "cfmkit design cam.yaml --set design.force='80 N'"
 
 
 @dataclass(frozen=True, kw_only=True)
-class DesignOptions(ComputeOptions):
+class DesignOptions(ComputeOptions, RunPictures):
     """Arguments and options."""
 
-    report: WithReport = False
-    animate: Animate = None
-    overlay: Overlay = None
-    jobs: Jobs = None
-    fresh: Fresh = False
-    time_budget: Annotated[
-        str | None,
-        option("--time-budget", metavar="TIME", text="Time after which a search ends with the best found: 60s, 10min."),
-    ] = None
+    report: bool = REPORT_FLAG()
+    jobs: int | None = JOBS_OPTION()
+    fresh: bool = FRESH_FLAG()
+    time_budget: str | None = option("TIME", "Time after which a search ends with the best found: 60s, 10min.")
 
 
 def run(options: DesignOptions, terminal: Terminal) -> Document:

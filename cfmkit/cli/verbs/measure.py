@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cfmkit.cli.options import FigureChoice, MeasurementOptions, NoLock, Quiet, argument, data_record, flag, option
+from cfmkit.cli.options import (
+    NO_LOCK_FLAG,
+    QUIET_FLAG,
+    FigureChoice,
+    MeasurementOptions,
+    argument,
+    data_record,
+    flag,
+    option,
+)
 from cfmkit.documents.document import Written
 from cfmkit.errors import ExitCode
 
@@ -21,46 +30,31 @@ HELP_EXAMPLE = "cfmkit measure loop.csv --window '40 mm:210 mm'"
 class MeasureOptions(MeasurementOptions, FigureChoice):
     """Arguments and options."""
 
-    data: Annotated[str, argument("DATA.csv", "Columns with displacement and force, optionally time.")]
-    out: Annotated[
-        str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/DATA-measure/.")
-    ] = None
-    window: Annotated[
-        str | None,
-        option(
-            "--window",
-            metavar="FROM:TO",
-            text="Window to evaluate, e.g. '40 mm:210 mm'; default: the travel that every branch covers.",
-        ),
-    ] = None
-    filter: Annotated[
-        str | None,
-        option(
-            "--filter",
-            metavar="CUT-OFF",
-            text="Low-pass per branch: '2 Hz', '0.24 1/mm, order 3', '2 Hz, corrected', 'none'; "
-            "default: 60 cycles over the travel, order 6 per pass.",
-        ),
-    ] = None
-    target: Annotated[str | None, option("--target", metavar="FORCE", text="Target force or torque.")] = None
-    one_branch: Annotated[bool, flag("--one-branch", text="Accept a recording without a return stroke.")] = False
-    as_recorded: Annotated[bool, flag("--as-recorded", text="Keep spikes and the points next to reversals.")] = False
-    max_hole: Annotated[
-        str | None,
-        option(
-            "--max-hole",
-            metavar="SHARE",
-            text="Part of the window that may be missing in one piece, e.g. '5 %'; default: 2 %. With a larger hole "
-            "numbers have no value.",
-        ),
-    ] = None
-    quiet: Quiet = False
-    no_lock: NoLock = False
+    data: str = argument("DATA.csv", "Columns with displacement and force, optionally time.")
+    out: str | None = option("DIR", "Output folder; default: cfm-out/DATA-measure/.", "-o", "--out")
+    window: str | None = option(
+        "FROM:TO", "Window to evaluate, e.g. '40 mm:210 mm'; default: the travel that every branch covers."
+    )
+    filter: str | None = option(
+        "CUT-OFF",
+        "Low-pass per branch: '2 Hz', '0.24 1/mm, order 3', '2 Hz, corrected', 'none'; "
+        "default: 60 cycles over the travel, order 6 per pass.",
+    )
+    target: str | None = option("FORCE", "Target force or torque.")
+    one_branch: bool = flag("Accept a recording without a return stroke.")
+    as_recorded: bool = flag("Keep spikes and the points next to reversals.")
+    max_hole: str | None = option(
+        "SHARE",
+        "Part of the window that may be missing in one piece, e.g. '5 %'; default: 2 %. With a larger hole "
+        "numbers have no value.",
+    )
+    quiet: bool = QUIET_FLAG()
+    no_lock: bool = NO_LOCK_FLAG()
 
 
 def run(options: MeasureOptions, terminal: Terminal) -> Document:
     """Measure a recorded force curve: branches, filter, metrics raw and filtered, hysteresis, repeatability."""
-    from cfmkit.cli.output_folder import folder_of
+    from cfmkit.cli.options import folder_of
     from cfmkit.documents.recording_document import document_of
     from cfmkit.experiment.measurement_and_calibration_outputs import data_of, files
     from cfmkit.runs.measure_and_calibrate_api import MeasurementSettings, measure_each

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, flag, option
@@ -26,19 +26,13 @@ HELP_EXAMPLE = "cfmkit new cam -o mine.yaml"
 class NewOptions(Common):
     """Arguments and options."""
 
-    family: Annotated[
-        str, argument("FAMILY", "A family of mechanisms; `cfmkit show` lists them.", shell_completion.families)
-    ]
-    out: Annotated[
-        str | None,
-        option("-o", "--out", metavar="FILE", text="File to write, - prints it; default: FAMILY.yaml."),
-    ] = None
-    schema: Annotated[
-        bool,
-        flag(
-            "--schema/--no-schema", text="Also write the JSON schema, and the line through which editors will find it."
-        ),
-    ] = True
+    family: str = argument("FAMILY", "A family of mechanisms; `cfmkit show` lists them.", shell_completion.families)
+    out: str | None = option("FILE", "File to write, - prints it; default: FAMILY.yaml.", "-o", "--out")
+    schema: bool = flag(
+        "Also write the JSON schema, and the line through which editors will find it.",
+        "--schema/--no-schema",
+        default=True,
+    )
 
 
 def run(options: NewOptions, terminal: Terminal) -> Document:

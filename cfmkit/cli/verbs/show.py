@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, option
@@ -29,23 +29,16 @@ HELP_EXAMPLE = "cfmkit show cam --figure"
 class ShowOptions(Common):
     """Arguments and options."""
 
-    topic: Annotated[
-        str | None,
-        argument(
-            "WORD",
-            "What to explain: a family, units, metrics, materials, stock, references, anything by its name: "
-            "brace_length, pla, MPa, or a word by its meaning: creep, BOM; default: list all.",
-            shell_completion.topics,
-        ),
-    ] = None
-    figure: Annotated[
-        str | None,
-        option(
-            "--figure",
-            metavar="[FILE]",
-            text="Write a drawing of a family with its dimensions named: .png, .svg or .pdf; default: FAMILY.png.",
-        ),
-    ] = None
+    topic: str | None = argument(
+        "WORD",
+        "What to explain: a family, units, metrics, materials, stock, references, anything by its name: "
+        "brace_length, pla, MPa, or a word by its meaning: creep, BOM; default: list all.",
+        shell_completion.topics,
+        default=None,
+    )
+    figure: str | None = option(
+        "[FILE]", "Write a drawing of a family with its dimensions named: .png, .svg or .pdf; default: FAMILY.png."
+    )
 
 
 def run(options: ShowOptions, terminal: Terminal) -> Document:
