@@ -28,7 +28,7 @@ def check_complementarity(path):
         assert np.minimum(gap, force).max() < 1e-8
 
 
-def check_work(net, node, begin, end):
+def assert_work_is_energy(net, node, begin, end):
     """Check that the work of a drive downwards between two places, without an event, is the change of the energy."""
     shares, weights = np.polynomial.legendre.leggauss(12)
     drives = np.concatenate([[begin], begin + (end - begin) * (shares + 1) / 2, [end]])

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contact_layouts import among_discs
-from contact_paths import check_work
+from contact_paths import assert_work_is_energy
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -342,4 +342,4 @@ TAPERED = leaf(side("pin", circle((0.6, -0.275), 0.2)), section=soft(20, STRETCH
 )  # fmt: skip
 def test_the_work_of_the_drive_is_the_energy_of_a_leaf_that_shears_or_stretches(net, node, begin, end):
     """Nothing works at the contact, wherever it slides: so the tangent there is the right one."""
-    check_work(net, node, begin, end)
+    assert_work_is_energy(net, node, begin, end)

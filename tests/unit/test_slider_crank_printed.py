@@ -28,7 +28,7 @@ import cfmkit
 from cfmkit import api
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
-from cfmkit.families.slider_crank.printed import strip_thickness_search
+from cfmkit.families.slider_crank.printed import equilibrium_path, strip_thickness_search
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.flexure_sizing import rotations, size_flexure
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
@@ -218,6 +218,20 @@ def test_a_chain_that_goes_over_to_the_other_side_has_a_curve_up_to_there() -> N
     assert "between 6 and 7 mm" in found.message
     np.testing.assert_allclose(found.travel, travel[:7])
     np.testing.assert_allclose(found.force, chain.press(travel).force[:7])
+
+
+def test_a_chain_that_loses_its_stability_says_from_where_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A real chain, but for counts of unstable directions beyond 6 mm that stand for a path that went on there."""
+    trace = equilibrium_path._trace
+
+    def lose_stability(*arguments: Any) -> Any:
+        path = trace(*arguments)
+        return replace(path, unstable=np.where(path.drive > 6.5 * MM, 1, path.unstable))
+
+    monkeypatch.setattr(equilibrium_path, "_trace", lose_stability)
+    found = lumped_chain().press(np.linspace(0.0, 10.0, 11) * MM)
+    assert found.ending is PressingEnd.UNSTABLE
+    assert found.message == "unstable from 7 mm on"
 
 
 CROSSING = """

@@ -346,6 +346,11 @@ def test_links_are_as_narrow_as_their_loads_allow():
     assert links_that_bear(acting, 2e-3, strength, 0.4e-3, 0.5e-3) is None
 
 
+def test_the_thinnest_pins_of_links_are_those_of_1_mm():
+    link = links_that_bear(loads(pin=0.1), 2e-3, PartStrength("x", 2e9, 40e6, 235e6, assumed=False), 0.4e-3, 3e-3)
+    assert link.hole == 1e-3
+
+
 LINKAGE = {
     "force": "12 N", "travel": "8 mm", "ripple": "5 %", "envelope": "[90 mm, 70 mm, 10 mm]", "material": "steel-s235",
 }  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from functional_paths import beam_stress
-from study_rows import compare_rows_with_runs
+from study_rows import assert_rows_equal_runs
 from vcfm_support import CONFIGS, MM, analyzed, leaf, table_i
 
 import cfmkit
@@ -261,7 +261,7 @@ def test_rows_have_the_numbers_and_warnings_of_their_points(model, window, prelo
     plan = sample_axes(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 64))
     study = Study(spec, plan.paths, metrics_of(spec, names))
     assert are_solved_together(study, plan)
-    rows = compare_rows_with_runs(study, plan, step=4)
+    rows = assert_rows_equal_runs(study, plan, step=4)
     if ranges is WIDE:
         assert sum(mask.any() for mask in rows.warned.values()) > (2 if model == "truss" else 5)
 
