@@ -63,10 +63,7 @@ _COIL_PLACES = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at
 def analyze(spec: BeamSpec, _run: Run) -> Result:
     """Return the force-displacement path of a beam mechanism, with everything that is wrong with it.
 
-    Returns
-    -------
-    Result
-        PARTIAL if the path ends before what was asked, NO_EQUILIBRIUM if there is none under the constant loads.
+    PARTIAL if the path ends before what was asked, NO_EQUILIBRIUM if there is none under the constant loads.
     """
     solution, resolved = solve(spec), resolve(spec)
     if len(solution.keep) < 2:

@@ -34,19 +34,9 @@ if TYPE_CHECKING:
 
 
 def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
-    """Return the part, its centre lines, and the point table of every beam.
+    """Return the part, its centre lines, and the point table of every beam; `FINE` is the default tolerance.
 
-    Parameters
-    ----------
-    spec : BeamSpec
-        What to draw.
-    tolerance : float, optional
-        Largest distance of the contour from the exact edges [m]; default: `FINE`.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the outline of a beam, or its area, is not that of the specification.
+    Raises `GeometryError` if the outline of a beam, or its area, is not that of the specification.
     """
     from cfmkit.export.union import merge_pieces
 

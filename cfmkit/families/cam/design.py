@@ -69,19 +69,9 @@ class Choice:
 
 @refusals_answered
 def design(spec: CamSpec, run: Run) -> Design:
-    """Return a complete specification whose cam meets the targets of the `design` block.
+    """Return a complete specification whose cam meets the targets of the `design` block, in closed form.
 
-    Parameters
-    ----------
-    spec : CamSpec
-        With a `design` block.
-    run : Run
-        Not needed here: the choice is in closed form.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE, with the reason and the nearest feasible values, if there is none.
+    INFEASIBLE, with the reason and the nearest feasible values, if there is none.
     """
     target = spec.design
     if target is None:

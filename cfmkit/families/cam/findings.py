@@ -352,9 +352,7 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     return (
         FindingRule("undercut", _is_undercut, _undercut, _undercut_in_short),
         FindingRule(
-            "corner_pressure",
-            lambda one: one.mechanism.contact is not None and _is_undercut(one),
-            _corner_pressure,
+            "corner_pressure", lambda one: one.mechanism.contact is not None and _is_undercut(one), _corner_pressure
         ),
         *map(_jam, range(number)),
         FindingRule("dead_point", _is_dead, _dead_point),

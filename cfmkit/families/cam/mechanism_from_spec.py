@@ -144,11 +144,7 @@ def losses_of(mechanism: Mechanism) -> Losses | None:
     if not agree(np.not_equal(bearing, 0.0)) and not agree(np.not_equal(pin, 0.0)) and not guide.there:
         return None
     return Losses(
-        rolling=mechanism.rolling_friction,
-        roller_radius=mechanism.roller_radius,
-        bearing=bearing,
-        pin=pin,
-        guide=guide,
+        rolling=mechanism.rolling_friction, roller_radius=mechanism.roller_radius, bearing=bearing, pin=pin, guide=guide
     )
 
 

@@ -78,17 +78,7 @@ MAX_ROUNDS = 8
 def design(spec: VcfmSpec, run: Run) -> Design:
     """Return a complete specification that meets the targets of the `design` block.
 
-    Parameters
-    ----------
-    spec : VcfmSpec
-        With a `design` block and an allowable stress.
-    run : Run
-        Not needed here: nothing is random.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE, with the reason and the nearest feasible values, if there is none.
+    INFEASIBLE, with the reason and the nearest feasible values, if there is none.
     """
     found = _attempt(spec)
     nearest, last = dict(found.nearest_feasible), found

@@ -114,7 +114,7 @@ def stress(result: Result) -> Figure:
     nominal, most = solution.first, max(solution.pushes, key=lambda push: push.preload)
     over = most.travel
     series = [
-        Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", LINE_BLUE, prefer=0.5),
+        Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", LINE_BLUE, prefer=0.5)
     ]
     bought = solution.spec.mechanism.springs is not None  # whose wire is of another material, with another limit
     if not bought:

@@ -99,19 +99,7 @@ class SolidPath:
 
 
 class SolidSampler(ExactSampler):
-    """Samples of leaves and spring as solids, over what an analysis needs.
-
-    Parameters
-    ----------
-    spec : VcfmSpec
-        What is analysed.
-    end : float
-        How far the shuttle goes [m].
-    back : float
-        How far it is pulled back at most, positive [m].
-    run : Run
-        Its progress is reported.
-    """
+    """Samples of leaves and spring as solids, over what an analysis needs; the progress of `run` is reported."""
 
     def __init__(self, spec: VcfmSpec, end: float, back: float, run: Run) -> None:
         """Mesh and follow leaf and spring."""

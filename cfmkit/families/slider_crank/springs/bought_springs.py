@@ -47,21 +47,10 @@ BOUND_RTOL = 1e-9
 
 
 def best_sets(goal: RateGoal, offered: Sequence[FloatArray], count: int = 1) -> list[tuple[float, FloatArray]]:
-    """Return the sets with the smallest largest deviation, the best first.
+    """Return the sets with the smallest largest deviation, the best first: deviation, and rates (m,) of m joints.
 
-    Parameters
-    ----------
-    goal : RateGoal
-        Over m joints.
-    offered : sequence of m arrays
-        Rates that each joint may have, increasing; zero among them where it may have no spring.
-    count : int
-        How many sets.
-
-    Returns
-    -------
-    list of (float, (m,) array)
-        The deviation and the rates; empty if no set keeps what the goal requires beside the deviation.
+    `offered`: rates that each joint may have, increasing; zero among them where it may have no spring. Empty if no set
+    keeps what the goal requires beside the deviation.
     """
     if any(not len(rates) for rates in offered):
         return []

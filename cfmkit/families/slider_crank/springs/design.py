@@ -70,17 +70,7 @@ GRID_SIZES = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
 def design(spec: SliderCrankSpec, run: Run) -> Design:
     """Return a complete specification with the springs, and the lengths left free, that meet the `design` block best.
 
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        With a `design` block.
-    run : Run
-        Only its progress is used: the search is deterministic.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE, with the reason and what would be feasible, if nothing keeps the tolerance.
+    INFEASIBLE, with the reason and what would be feasible, if nothing keeps the tolerance.
     """
     wanted = spec.design
     if wanted is None:

@@ -192,7 +192,7 @@ def describe_springs(solved: Solved) -> tuple[Finding, ...]:
         found.append(
             finding(
                 "spring_at_bound", f"{' and '.join(at_cap)} limits the design: a larger value would give a better one"
-            ),
+            )
         )
     return tuple(found)
 
