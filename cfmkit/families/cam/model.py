@@ -154,8 +154,8 @@ def solve(
     spec, track, loads = assembly.spec, assembly.track, assembly.loads
     low, end = reachable_travel(assembly)
     if fails(end <= low):
-        raise CannotBuild(
-            finding("end_stop", f"the lower stop at {mm(low)} leaves no travel ('mechanism.stops.lower')")
+        raise finding.cannot_build(
+            "end_stop", f"the lower stop at {mm(low)} leaves no travel ('mechanism.stops.lower')"
         )
     travel = np.linspace(low, end, spec.analysis.points, axis=-1)
     travel = travel if travel.ndim == 1 else travel[:, 0]
