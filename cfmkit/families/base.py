@@ -298,11 +298,6 @@ class Family:
         return read_papers(self.bibtex)
 
     @property
-    def leading(self) -> tuple[str, ...]:
-        """Values that pages show first: the headline, and how far a curve is from the one that was to be followed."""
-        return (*self.outputs.headline, "deviation_from_curve")
-
-    @property
     def phrase(self) -> str:
         """The mechanism with its article: ``a cam mechanism``."""
         return f"{article(self.name)} {self.name} mechanism"

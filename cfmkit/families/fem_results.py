@@ -1,12 +1,18 @@
 """Results of a part that is solved as a solid: scalar results, and the stress in each fillet.
 
 Scalar results are errors of the mesh and the stress concentration; `fillets.csv` has a row for each fillet.
+
+As handbooks do it for shoulders, the nominal stress of a fillet is that of the beam's section where the fillet ends
+on the beam: bending and axial stress at the edge on which it ends. Here the beams are in large deflection, at the
+displacement at which the solid's stress in the fillet is largest. Of two sections, on two beams, the more stressed one
+counts.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,9 +21,14 @@ from cfmkit.results import Quantity
 from cfmkit.tables import Table, TableColumn, border_column
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Displacement, Network, Path, Rotation
+    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.results.beam_states import BeamSections as Sections
     from cfmkit.solid.stress_along_fillets import FilletArc
 
 
@@ -53,7 +64,7 @@ FEM_DEFINITIONS = {
         "the beams' largest",
     ),
 }
-"""Name -> dimension and definition; computed by `solid.adaptive_solution` and `nominal_stress_beside_fillets`."""
+"""Name -> dimension and definition; computed by `solid.adaptive_solution` and `nominal_stresses`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +76,7 @@ class FilletRow:
     stress: float  # largest in the window, tension positive [Pa]
     motion: float  # where it occurs [m or rad]
     preload: float | None = None  # at which it occurs [m], of springs that are preloaded
-    # stress of beams at the end of the fillet there [Pa], see `nominal_stress_beside_fillets`; NaN where there is none
+    # stress of beams at the end of the fillet there [Pa], see `nominal_stresses`; NaN where there is none
     nominal: float = math.nan
 
     @property
@@ -111,3 +122,160 @@ def fillet_table(rows: Sequence[FilletRow], motion: tuple[str, str] = ("displace
         border_column("stress_concentration", np.array([row.concentration for row in rows]), "factor"),
     ]
     return Table(tuple(columns))
+
+
+MIN_STRESS_SHARE = 0.1
+"""Nominal stresses below this part of the beams' largest at the same displacement are none: solid and beams differ by
+some hundredths of the largest for other reasons, which would make a third of such a ratio."""
+
+N_PATH_STEPS = 40
+"""Of the beams' path beside the requested displacements: as dense as curves are."""
+
+STEP_RTOL = 1e-6
+"""Steps nearer to a requested displacement than this part of the largest are left out."""
+
+PATH_TOLERANCE = 1e-6
+"""Of the beams' path: far below what a mesh is off, and slender leaves reach it where they are pulled straight."""
+
+CHORD_TOLERANCE = 0.02
+"""How far a fillet may end from the edge of its beam, in thicknesses: what lines between the places of a curved beam
+are off."""
+
+
+def nominal_stresses(
+    rows: Sequence[FilletRow],
+    travel: FloatArray,
+    images: Callable[[FloatArray], Iterable[Path]],
+    placed: Callable[[FloatArray], FloatArray],
+) -> FloatArray:
+    """Return the nominal stress of some fillets, (n,) [Pa], tension positive.
+
+    Parameters
+    ----------
+    rows : sequence of FilletRow
+        The fillets with the solid's stress.
+    travel : (n,) array
+        Where the drive of the beams is then [m or rad].
+    images : callable
+        From travels of one sign to the paths of the beams through them: two where beams may bend to either side.
+    placed : callable
+        From points of the drawing (m, 2) to the network that was solved; a mirrored half may give twice as many [m].
+
+    Returns
+    -------
+    (n,) array
+        NaN where no beam carries the fillet, the beams have no path, or the stress is negligible. Of two paths that
+        one counts whose stresses have the solid's signs.
+    """
+    found = np.full(len(rows), np.nan)
+    for sense in (1.0, -1.0):
+        own = np.flatnonzero(sense * travel > 0.0).tolist()
+        solid = np.array([rows[k].stress for k in own])
+        reported = [
+            np.array([beams.evaluate_stress(placed(rows[k].arc.ends), float(travel[k])) for k in own])
+            for beams in (map(SolvedBeams, images(travel[own])) if len(own) else ())
+        ]
+        if reported:
+            found[own] = max(reported, key=lambda stress: float(np.nansum(stress * solid)))
+    return found
+
+
+def both_images(
+    network: Network, drive: Callable[[FloatArray], Displacement | Rotation], travel: FloatArray
+) -> Iterator[Path]:
+    """Yield the stable path of beams through travels of one sign [m or rad], and its mirror image if it bifurcates."""
+    from cfmkit.elastica import Control, trace
+
+    points = drive(with_steps(travel))
+    path = trace(network, points, Control(tolerance=PATH_TOLERANCE))
+    yield path
+    if any(event.kind == "bifurcation" for event in path.events):
+        yield trace(network, points, Control(tolerance=PATH_TOLERANCE, sign=-1))
+
+
+def with_steps(travel: FloatArray) -> FloatArray:
+    """Return some travels of one sign, each once, with steps between them and rest, in the order from rest on."""
+    end = float(travel[np.abs(travel).argmax()])
+    wanted = np.unique(travel / end)
+    wanted = wanted[np.diff(wanted, prepend=-1.0) > STEP_RTOL]
+    steps = np.arange(1, N_PATH_STEPS + 1) / N_PATH_STEPS
+    apart = np.abs(steps[:, None] - wanted).min(axis=1) > STEP_RTOL
+    return np.asarray(end * np.sort(np.concatenate([wanted, steps[apart]])))
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedBeams:
+    """Beams at the points of a path, whose stress is wanted at places on their edges."""
+
+    path: Path
+
+    @cached_property
+    def axes(self) -> Mapping[str, FloatArray]:
+        """Centre lines before any load, (k, 2) each [m]."""
+        path = self.path
+        return {name: path.shape(name, 0) - path.line_motion(name)[0] for name in path.network.beams}
+
+    @cached_property
+    def sections(self) -> Mapping[str, Sections]:
+        """Stresses at the places of the centre lines, at all points."""
+        return {name: self.path.sections(name) for name in self.path.network.beams}
+
+    @cached_property
+    def largest(self) -> FloatArray:
+        """Largest stress of all beams at each point (n,) [Pa]."""
+        return self.path.peak_stress().value
+
+    def evaluate_stress(self, edge: FloatArray, travel: float) -> float:
+        """Return the stress at points on edges of beams (m, 2) [m], of largest size [Pa]; NaN where it is negligible.
+
+        At a travel of the drive [m or rad]; NaN where the path does not come to it, or no beam is at the points.
+        """
+        point = self._point(travel)
+        if point is None:
+            return float("nan")
+        stresses = [
+            stress
+            for name, beam in self.path.network.beams.items()
+            for place in edge
+            if (stress := self._evaluate_edge_stress(name, beam, place, point)) is not None
+        ]
+        worst = max(stresses, key=abs, default=0.0)
+        return worst if abs(worst) > MIN_STRESS_SHARE * float(self.largest[point]) else float("nan")
+
+    def _point(self, travel: float) -> int | None:
+        """Return the point of the path at a travel; None if there is none that is accurate."""
+        known = self.path.at_requested
+        off = np.abs(self.path.drive[known] - travel)
+        if not len(known) or off.min() > STEP_RTOL * float(np.abs(self.path.drive).max()):
+            return None
+        point = int(known[off.argmin()])
+        return point if self.path.accurate[point] else None
+
+    def _evaluate_edge_stress(self, name: str, beam: Beam, place: FloatArray, point: int) -> float | None:
+        """Return the stress of a beam at a place on its edge (2,) [m]; None if it is not on it."""
+        axis, found = self.axes[name], self.sections[name]
+        k, share, off = _foot(axis, place)
+        way = (axis[k + 1] - axis[k]) / np.hypot(*(axis[k + 1] - axis[k]))
+        along, aside = float(off @ way), float(way[0] * off[1] - way[1] * off[0])
+        middle = 0.5 * float(found.place[point, k] + found.place[point, k + 1])
+        at = found.place[point, k] + share * (found.place[point, k + 1] - found.place[point, k])
+        thickness = float(np.real(beam.section.thickness_at(at, middle)))
+        allowed = CHORD_TOLERANCE * thickness
+        if abs(along) > allowed or abs(abs(aside) - 0.5 * thickness) > allowed:
+            return None
+        bending, axial = (
+            float(values[point, k] + share * (values[point, k + 1] - values[point, k]))
+            for values in (found.bending_stress, found.axial_stress)
+        )
+        return axial - float(np.sign(aside)) * bending
+
+
+def _foot(axis: FloatArray, place: FloatArray) -> tuple[int, float, FloatArray]:
+    """Return the chord of a line (k, 2) nearest to a place, the share of it there, and the way from it to the place."""
+    start, chord = axis[:-1], np.diff(axis, axis=0)
+    square = (chord**2).sum(axis=1)
+    some: NDArray[np.bool_] = square > 0.0  # places where a beam's pieces meet are there twice
+    share = np.where(some, ((place - start) * chord).sum(axis=1) / np.where(some, square, 1.0), 0.0).clip(0.0, 1.0)
+    off = place - start - share[:, None] * chord
+    nearest = int(np.where(some, np.hypot(*off.T), np.inf).argmin())
+    return nearest, float(share[nearest]), off[nearest]

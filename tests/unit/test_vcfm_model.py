@@ -24,8 +24,7 @@ from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw
 from cfmkit.families.vcfm.leaves.laws_in_rows import stack_laws
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.s_form import POLE_LOAD, axial_root, compliance, end_curvature, pose
-from cfmkit.families.vcfm.leaves.truss import TrussLeaf
-from cfmkit.families.vcfm.leaves.v_beam import VBeam
+from cfmkit.families.vcfm.leaves.v_beam import TrussLeaf, VBeam
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness

@@ -37,15 +37,7 @@ if TYPE_CHECKING:
 
 
 def design(spec: BeamSpec, run: Run) -> Design:
-    """Return a complete specification that does what the `design` block asks for, or why there is none.
-
-    Parameters
-    ----------
-    spec : BeamSpec
-        With a `design` block.
-    run : Run
-        Seed, progress and time budget.
-    """
+    """Return a complete specification that does what the `design` block asks for, or why there is none."""
     if spec.design is not None and spec.design.rescale is not None:
         return rescale(spec, spec.design.rescale)
     if spec.design is not None and spec.design.optimise is not None:

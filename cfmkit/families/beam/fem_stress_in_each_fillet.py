@@ -15,8 +15,7 @@ from cfmkit.families.beam.drawn_pieces import both_halves
 from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.part import POINT_TOLERANCE_FACTOR, strips_of
 from cfmkit.families.beam.strips_and_gaps import mirror_points
-from cfmkit.families.fem_results import FilletRow, with_nominal
-from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
+from cfmkit.families.fem_results import FilletRow, both_images, nominal_stresses, with_nominal
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

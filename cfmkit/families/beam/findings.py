@@ -272,9 +272,8 @@ def _thick_beam(name: str) -> FindingRule[Solution]:
     def sentence(solution: Solution) -> Sentence:
         length, thickness = (format_short(size, "length") for size in sizes(solution))
         return (
-            f"beam {name} is {length} long and {thickness} thick: below {SLENDERNESS_LIMIT:g} times the "
-            f"thickness beam theory is "
-            "inaccurate",
+            f"beam {name} is {length} long and {thickness} thick: below {SLENDERNESS_LIMIT:g} times the thickness beam "
+            "theory is inaccurate",
         )
 
     def short(solution: Solution) -> str:

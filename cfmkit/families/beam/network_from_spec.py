@@ -46,11 +46,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import LoadOn
     from cfmkit.elastica.vibration import NetworkMasses
     from cfmkit.families.beam.mechanism_spec import Mechanism
-    from cfmkit.families.beam.network_elements_spec import (
-        MemberSpec,
-        NodeSpec,
-        Thickness,
-    )
+    from cfmkit.families.beam.network_elements_spec import MemberSpec, NodeSpec, Thickness
     from cfmkit.families.beam.spec import BeamSpec
 
 

@@ -31,13 +31,7 @@ from cfmkit.families.beam.drawn_pieces import (
     pads_behind,
     section_at_bend,
 )
-from cfmkit.families.beam.network_from_spec import (
-    assemble,
-    is_on_axis,
-    mirror_axis,
-    moving_nodes,
-    thickest_of,
-)
+from cfmkit.families.beam.network_from_spec import assemble, is_on_axis, mirror_axis, moving_nodes, thickest_of
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points, strips
 from cfmkit.families.run_control import Run
 
@@ -248,21 +242,12 @@ def as_made(assembly: Assembly) -> Iterator[PosedBody]:
 
 def bodies(
     solution: Solution,
-    points: NDArray[Any],
-    places: Sequence[HeldPlace] = (),
+    points: NDArray[Any],  # (p,) of int
+    places: Sequence[HeldPlace] = (),  # whose pads are returned, as they move
+    # from a path, a beam and a point of the path to its line (n, 2) [m]
     centre_line: Callable[[Path, str, int], FloatArray] = Path.shape,
 ) -> tuple[PosedBody, ...]:
-    """Return beams and pads, those of a mirrored half included, at points of the curve.
-
-    Parameters
-    ----------
-    solution : Solution
-    points : (p,) array of int
-    places : sequence of HeldPlace
-        Whose pads are returned, as they move.
-    centre_line : callable
-        From a path, a beam and a point of the path to its line (n, 2) [m].
-    """
+    """Return beams and pads, those of a mirrored half included, at points of the curve."""
     assembly, path = solution.assembly, solution.path
     at = [int(solution.keep[point]) for point in points]
     beams = []

@@ -20,13 +20,7 @@ from cfmkit.export.fixing_holes import remove_screws
 from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
 from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
 from cfmkit.families.beam.finding_names import finding
-from cfmkit.families.beam.network_from_spec import (
-    assemble,
-    constant_load,
-    is_on_axis,
-    mirror_axis,
-    resolve,
-)
+from cfmkit.families.beam.network_from_spec import assemble, constant_load, is_on_axis, mirror_axis, resolve
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
 from cfmkit.families.beam.outline import drawing
 from cfmkit.families.beam.part import drawn_fillet, regions, standing_frame

@@ -11,14 +11,7 @@ import numpy as np
 from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.clearance import nearest_pairs
 from cfmkit.families.cam.hardware import hardware
-from cfmkit.families.cam.part import (
-    moment,
-    pivoting,
-    pose,
-    scene,
-    start_curve,
-    swallowtail,
-)
+from cfmkit.families.cam.part import moment, pivoting, pose, scene, start_curve, swallowtail
 from cfmkit.families.cam.part_sizes import count_of
 from cfmkit.numerics.holes_in_samples import holes_between
 from cfmkit.plots import parts

@@ -14,7 +14,7 @@ from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stres
 from cfmkit.families.cam.largest_next_to_samples import largest_of_each
 from cfmkit.families.cam.scalar_results import errors_used, half_extent, largest, pressure_of, root_mean_square
 from cfmkit.families.cam.statics import spring_force
-from cfmkit.families.findings import finder, format_at_least, mm, mpa, newton
+from cfmkit.families.findings import Finder, format_at_least, mm, mpa, newton
 from cfmkit.families.rows import FindingRule
 from cfmkit.numerics.robust_statistics import neighbour_noise
 
@@ -68,7 +68,7 @@ CAM_FINDINGS = {
     "no_spring_fits": "no spring of the catalogue meets the limits",
 }
 
-finding = finder(CAM_FINDINGS)
+finding = Finder(CAM_FINDINGS)
 """Return a finding of this family; the name must be one that `CAM_FINDINGS` explains."""
 
 
@@ -367,9 +367,7 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     return (
         FindingRule("undercut", _is_undercut, _undercut, _undercut_in_short),
         FindingRule(
-            "corner_pressure",
-            lambda one: one.mechanism.contact is not None and _is_undercut(one),
-            _corner_pressure,
+            "corner_pressure", lambda one: one.mechanism.contact is not None and _is_undercut(one), _corner_pressure
         ),
         *map(_jam, range(number)),
         FindingRule("dead_point", _is_dead, _dead_point),

@@ -26,12 +26,7 @@ from cfmkit.families.cam.clearance import smallest, touching
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, left_out, rules_of
 from cfmkit.families.cam.hardware import hardware
-from cfmkit.families.cam.mechanism_from_spec import (
-    assemble,
-    check_first_pose,
-    check_springs,
-    displacement_origin,
-)
+from cfmkit.families.cam.mechanism_from_spec import assemble, check_first_pose, check_springs, displacement_origin
 from cfmkit.families.cam.scalar_results import SCALAR_QUANTITIES, contact_pressure, curve_cut_for
 from cfmkit.families.cam.solution import DenseLoop, Solution
 from cfmkit.families.cam.statics import forces
@@ -59,23 +54,9 @@ UNEQUAL_SIDES_MESSAGE = (
 def analyze(spec: CamSpec, run: Run) -> Result:
     """Return the force-displacement loop of a cam that is moved slowly, with everything that is wrong with it.
 
-    Parameters
-    ----------
-    spec : CamSpec
-        The mechanism; what is left out is derived.
-    run : Run
-        Its seed, for the parts that are drawn for `analysis.manufacturing`.
-
-    Returns
-    -------
-    Result
-        Branches ``load`` (up) and ``unload`` (down). NO_EQUILIBRIUM if the mechanism cannot
-        be built, PARTIAL if the curve ends before the requested travel.
-
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        If the two sides differ and nobody has said that the symmetric model will do.
+    Branches ``load`` (up) and ``unload`` (down); the seed of the run draws the parts of `analysis.manufacturing`.
+    NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if the curve ends before the requested travel. Raises
+    `SpecError` if the two sides differ and nobody has said that the symmetric model will do.
     """
     if spec.mechanism.profile.file is not None:
         from cfmkit.families.cam.measured_cam_analysis import analyze_built
@@ -173,8 +154,8 @@ def solve(
     spec, track, loads = assembly.spec, assembly.track, assembly.loads
     low, end = reachable_travel(assembly)
     if fails(end <= low):
-        raise CannotBuild(
-            finding("end_stop", f"the lower stop at {mm(low)} leaves no travel ('mechanism.stops.lower')")
+        raise finding.cannot_build(
+            "end_stop", f"the lower stop at {mm(low)} leaves no travel ('mechanism.stops.lower')"
         )
     travel = np.linspace(low, end, spec.analysis.points, axis=-1)
     travel = travel if travel.ndim == 1 else travel[:, 0]

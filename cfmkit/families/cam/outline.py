@@ -48,10 +48,7 @@ TAB_CLEARANCE = 0.25
 def drawing(spec: CamSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     """Return the plate, the roller paths and their point tables of a cam specification.
 
-    Raises
-    ------
-    cfmkit.families.no_mechanism.CannotBuild
-        If there is no cam to draw.
+    Raises `CannotBuild` if there is no cam to draw.
     """
     sides = assemble_sides(spec)
     profiles = sides[0].profile, sides[1].profile

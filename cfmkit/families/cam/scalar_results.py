@@ -155,10 +155,7 @@ SCALAR_DEFINITIONS = {
     "roller_speed_max": ("angular_velocity", "largest speed at which a roller turns"),
     "slider_speed_max": ("velocity", "largest speed of the slider"),
     "slider_acceleration_max": ("acceleration", "largest acceleration of the slider"),
-    "dead_weight_peak": (
-        "ratio",
-        "largest acceleration over g: relative increase of the force of a dead weight",
-    ),
+    "dead_weight_peak": ("ratio", "largest acceleration over g: relative increase of the force of a dead weight"),
     "moving_mass_max": ("mass", "largest mass that, fixed to the slider, would have the same kinetic energy"),
     "force_peak_over_static": ("ratio", "largest F/F_0 - 1 of a motion, F_0 the static force at the same position"),
     "force_dip_under_static": ("ratio", "largest 1 - F/F_0 of a motion; above 1 the force changes sign"),

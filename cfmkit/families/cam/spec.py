@@ -26,7 +26,6 @@ from cfmkit.stock.material_and_part_spec import (
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringSafety
 from cfmkit.stock.stock_series import StockSize, System, stock_faults
 
-Positive = Field(gt=0)
 NonNegativeInertia = Annotated[Inertia, Field(ge=0)]
 SmallAngle = Annotated[Angle, Field(ge=-radians(45), le=radians(45))]
 
@@ -352,8 +351,7 @@ class Dynamics(Model):
         "path-start", description="where heights are zero: at the first point of the roller path, or of the cam"
     )
     method: Literal["inverse", "multibody"] = Field(
-        "inverse",
-        description="inverse dynamics with closed kinematics, or nine coordinates with Lagrange multipliers",
+        "inverse", description="inverse dynamics with closed kinematics, or nine coordinates with Lagrange multipliers"
     )
 
     @property

@@ -11,7 +11,6 @@ import math
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import deg, mm
-from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import Linkage
 
@@ -34,13 +33,11 @@ def coupler_length(mechanism: Mechanism) -> float:
         return mechanism.coupler_length
     reach = math.hypot(mechanism.stretched_position or 0.0, mechanism.offset)
     if reach <= mechanism.crank_length:
-        raise CannotBuild(
-            finding(
-                "not_assemblable",
-                f"pivot and slider pin are {mm(reach)} apart when stretched, and the crank alone is "
-                f"{mm(mechanism.crank_length)}: no length is left for the coupler; make "
-                "'mechanism.crank_length' shorter, or 'mechanism.stretched_position' longer",
-            )
+        raise finding.cannot_build(
+            "not_assemblable",
+            f"pivot and slider pin are {mm(reach)} apart when stretched, and the crank alone is "
+            f"{mm(mechanism.crank_length)}: no length is left for the coupler; make "
+            "'mechanism.crank_length' shorter, or 'mechanism.stretched_position' longer",
         )
     return reach - mechanism.crank_length
 
@@ -53,13 +50,11 @@ def linkage_of(mechanism: Mechanism) -> Linkage:
     branch = 1 if mechanism.branch == "right" else -1
     linkage = Linkage(mechanism.crank_length, coupler_length(mechanism), mechanism.offset, branch)
     if not linkage.assemblable:
-        raise CannotBuild(
-            finding(
-                "not_assemblable",
-                f"crank and coupler together are {mm(linkage.crank + linkage.coupler)}, but the slider's path passes "
-                f"the pivot at {mm(abs(linkage.offset))}; make the links longer or the "
-                "offset smaller: 'mechanism.coupler_length' or 'mechanism.offset'",
-            )
+        raise finding.cannot_build(
+            "not_assemblable",
+            f"crank and coupler together are {mm(linkage.crank + linkage.coupler)}, but the slider's path passes "
+            f"the pivot at {mm(abs(linkage.offset))}; make the links longer or the "
+            "offset smaller: 'mechanism.coupler_length' or 'mechanism.offset'",
         )
     return linkage
 
@@ -73,12 +68,10 @@ def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
     angle = given if given is not None else linkage.stretched_angle + (mechanism.unloaded_offset or 0.0)
     if not linkage.reaches(angle):
         low, high = linkage.arc(linkage.stretched_angle)
-        raise CannotBuild(
-            finding(
-                "not_assemblable",
-                f"with the crank at {deg(angle)} the coupler of {mm(linkage.coupler)} does not reach the slider's "
-                f"path; 'mechanism.unloaded_angle' must be between {deg(low)} and {deg(high)}",
-            )
+        raise finding.cannot_build(
+            "not_assemblable",
+            f"with the crank at {deg(angle)} the coupler of {mm(linkage.coupler)} does not reach the slider's "
+            f"path; 'mechanism.unloaded_angle' must be between {deg(low)} and {deg(high)}",
         )
     return angle
 

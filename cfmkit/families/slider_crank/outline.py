@@ -23,10 +23,7 @@ if TYPE_CHECKING:
 def drawing(spec: SliderCrankSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     """Return the outlines of one leg as the fidelity has it: of straight edges and arcs, exact.
 
-    Raises
-    ------
-    cfmkit.families.no_mechanism.CannotBuild
-        If it cannot be assembled.
+    Raises `CannotBuild` if it cannot be assembled.
     """
     made = (draw_links if spec.built_as == "springs" else draw_part)(resolve(spec))
     legs = spec.mechanism.legs

@@ -230,7 +230,3 @@ class SpringSamples(ShortRepr):
 
     force: FloatArray
     stress: FloatArray
-
-
-def _parts(samples: Any) -> tuple[Any, ...]:
-    return tuple(vars(samples).values())

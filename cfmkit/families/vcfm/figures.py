@@ -11,10 +11,10 @@ import numpy as np
 from cfmkit.curves import Curve
 from cfmkit.export.posed_part import box
 from cfmkit.families.fem_results import number_fillets
-from cfmkit.families.vcfm.fem_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, rest_shift
 from cfmkit.families.vcfm.model import rests_of
 from cfmkit.families.vcfm.part import bodies
+from cfmkit.families.vcfm.plane_fem_analysis import fillets
 from cfmkit.metrics.longest_interval_in_band import flat_window
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
@@ -114,7 +114,7 @@ def stress(result: Result) -> Figure:
     nominal, most = solution.first, max(solution.pushes, key=lambda push: push.preload)
     over = most.travel
     series = [
-        Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", LINE_BLUE, prefer=0.5),
+        Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", LINE_BLUE, prefer=0.5)
     ]
     bought = solution.spec.mechanism.springs is not None  # whose wire is of another material, with another limit
     if not bought:

@@ -278,14 +278,7 @@ def _points(path: Path, places: FloatArray) -> PathPoints:
 def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevPanels, PathPoints, bool]:
     """Return the force as panels that have converged, all points traced for them, and whether these keep their branch.
 
-    Parameters
-    ----------
-    route : Route
-        What is traced.
-    first : First
-        The path that bifurcations are known from.
-    number : int
-        Panels of a piece at first.
+    `first`: the path that bifurcations are known from; `number`: panels of a piece at first.
     """
     points, sense = first.points, np.sign(first.edges[-1])
     ends, count = sense * np.array(first.edges), N_CORNER_PANELS if route.control.get("imperfection") else number

@@ -111,18 +111,7 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
 
     Of springs that fit those come first that need no guide against buckling, and of these the one whose rise, or
     preload, comes nearest to the largest that is allowed; if neither is limited, the one with the shortest leaves.
-
-    Parameters
-    ----------
-    spec : VcfmSpec
-        With springs that are bought, or a catalogue of them.
-    target : VcfmDesign
-        Its design block.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE where no spring fits: the message has the nearest three and what they miss.
+    INFEASIBLE where no spring fits: the message has the nearest three and what they miss.
     """
     try:
         check_guide(spec)

@@ -54,10 +54,7 @@ MAX_SAMPLES = 60_000
 def analyze(spec: VcfmSpec, _run: Run) -> Result:
     """Return the force-displacement curves of a mechanism by closed forms, with everything that is wrong with it.
 
-    Returns
-    -------
-    Result
-        One curve per preload, the nominal one first. PARTIAL if the spring closes within the travel.
+    One curve per preload, the nominal one first. PARTIAL if the spring closes within the travel.
     """
     made = parts(spec)
     return result_of(solve(spec, made, LawSampler(made)))

@@ -47,10 +47,7 @@ COSINE_TOLERANCE_RATIO = 2e-4
 def drawing(spec: VcfmSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     """Return the leaves with shuttle and walls and the spring, and a table of the leaves' centre line.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If leaves overlap, or if a leaf, or the area of the part, is not that of the specification.
+    Raises `GeometryError` if leaves overlap, or if a leaf, or the area of the part, is not that of the specification.
     """
     sizes = sizes_of_frame(spec)
     places, heights, _ = leaf_law(spec.mechanism.bistable, spec.mechanism.material).centre_line

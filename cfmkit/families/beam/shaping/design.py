@@ -229,9 +229,8 @@ def _report_search(task: Task, design: Judged, result: Explored) -> str:
     if task.objective == "paper":
         reached = f"F(a)/F(b) - 1 = {best.objective:.3f}"
     return (
-        f"{reached}; {len(feasible)} of {len(result.found)} starts meet all limits{refuted} "
-        f"({total} traces{reused}{left}); "
-        f"the last minimisation {best.ending}"
+        f"{reached}; {len(feasible)} of {len(result.found)} starts meet all limits{refuted} ({total} "
+        f"traces{reused}{left}); the last minimisation {best.ending}"
     )
 
 

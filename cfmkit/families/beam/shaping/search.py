@@ -138,11 +138,6 @@ def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found 
 
     It begins halfway between rest and the requested window. What is flat over that seldom is the flattest over the
     requested one: order by order a start ends in another family of shapes. None if nothing could be followed.
-
-    Parameters
-    ----------
-    task, seed, index, plan : Task, int, int, StartBudget
-        As of `search_start`.
     """
     task = replace(task, orders=task.orders[-1:], points=_N_WINDOW_POSES)
     first, far = task.first, _FAR_START * task.window[0]

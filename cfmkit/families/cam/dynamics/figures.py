@@ -34,13 +34,7 @@ SIDE_RTOL = 1e-9
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:
-    """Return what draws each picture of a motion, by file stem.
-
-    Parameters
-    ----------
-    result : Result
-        Of the dynamic model; its `state` is the `MotionSolution`.
-    """
+    """Return what draws each picture of a motion, by file stem."""
     makers = (motion, motion_force, motion_contact, motion_rollers)
     return {maker.__name__: partial(maker, result) for maker in makers}
 

@@ -50,19 +50,8 @@ if TYPE_CHECKING:
 def analyze(spec: CamSpec, run: Run) -> Result:
     """Return the force that the motion in ``analysis.dynamics`` needs, and everything that is wrong with it.
 
-    Parameters
-    ----------
-    spec : CamSpec
-        With a motion and masses.
-    run : Run
-        Not needed here: there is nothing to search.
-
-    Returns
-    -------
-    Result
-        Branch ``load`` for a motion upwards, ``unload`` downwards. PARTIAL if the motion leaves
-        the profile, or becomes impossible (a roller lifts off); NO_EQUILIBRIUM if the mechanism
-        cannot exist, or the motion lies outside it.
+    Branch ``load`` for a motion upwards, ``unload`` downwards. PARTIAL if the motion leaves the profile, or becomes
+    impossible (a roller lifts off); NO_EQUILIBRIUM if the mechanism cannot exist, or the motion lies outside it.
     """
     try:
         parts = build(spec)

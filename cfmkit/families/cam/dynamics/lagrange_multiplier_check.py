@@ -171,13 +171,7 @@ class Trajectory:
 
 
 class NineCoordinates:
-    """The mechanism as five moving bodies on two flanks.
-
-    Parameters
-    ----------
-    machine : Machine
-        Its friction is not used.
-    """
+    """The mechanism as five moving bodies on two flanks, without friction."""
 
     def __init__(self, machine: Machine) -> None:
         """Describe each flank as a line x(y)."""

@@ -81,17 +81,7 @@ motion, and what grows without end by corrections is no dimension."""
 def design(spec: SliderCrankSpec, run: Run) -> Design:
     """Return a specification with the strip, or the flexures, that the `design` block asks for.
 
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        With `design.beam` or `design.flexures`.
-    run : Run
-        Seed of the random starts, and progress.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE, with the reason and the nearest, where the targets contradict the ranges.
+    INFEASIBLE, with the reason and the nearest, where the targets contradict the ranges.
     """
     wanted = spec.design
     if wanted is None or wanted.drive != "force" or (wanted.force is None and wanted.beam is None):
@@ -211,7 +201,7 @@ def _not_pressed(found: FoundStrip) -> Design:
 def _search_of(found: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
     """Return what only the search knows."""
     numbers: dict[str, tuple[float | None, str, str]] = {
-        "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed"),
+        "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed")
     }
     if _has_uniform_strip(found):
         text = "longest travel that a strip of one thickness reaches within the band and the stress"

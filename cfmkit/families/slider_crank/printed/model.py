@@ -62,16 +62,7 @@ _ENDING_NAMES = {
 def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     """Return the force of a printed slider-crank over its slider's travel, with everything that is wrong with it.
 
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        With `mechanism.flexures` or `mechanism.beam`.
-
-    Returns
-    -------
-    Result
-        One branch, ``load``. PARTIAL if equilibrium ends within the travel, NO_EQUILIBRIUM if
-        nothing was found that is on the requested branch.
+    PARTIAL if equilibrium ends within the travel, NO_EQUILIBRIUM if nothing was found that is on the requested branch.
     """
     try:
         spec = resolve(spec)

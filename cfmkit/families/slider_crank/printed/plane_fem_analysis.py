@@ -1,7 +1,8 @@
 """A printed slider-crank as it is drawn, as a planar solid: flexures with their fillets, links that bend, or a strip.
 
 The pad at the ground is held and that at the slider moved from their faces on; widths are those of the flexures where
-they are. Poses stand close where the travel begins: a nearly straight chain yields within a thousandth of it.
+they are. Poses stand close where the travel begins: a nearly straight chain yields within a thousandth of it. Nominal
+stresses of fillets are those of the flexures between rigid links, or of the strip.
 
 Assumes: plane stress. No contact, no plasticity.
 """
@@ -17,15 +18,22 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError, InputError
-from cfmkit.families.fem_results import fillet_table, largest_concentration
+from cfmkit.families.fem_results import (
+    PATH_TOLERANCE,
+    FilletRow,
+    fillet_table,
+    largest_concentration,
+    nominal_stresses,
+    with_nominal,
+    with_steps,
+)
 from cfmkit.families.findings import bracket, sharp_inside
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction
-from cfmkit.families.slider_crank.printed.fem_stress_in_each_fillet import fillets
 from cfmkit.families.slider_crank.printed.findings import left_out_friction
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, kink
 from cfmkit.families.slider_crank.printed.model import as_run, chain_of
 from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS
@@ -39,13 +47,13 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
-    from cfmkit.families.fem_results import FilletRow
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Finding
     from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart, MeshError
     from cfmkit.solid.meshed_part import MeshSolution, Part
+
 
 POSE_EXPONENT = 3.0
 """Poses stand at (k/n) to this power of the travel, and where the stiffness leaps."""
@@ -277,3 +285,29 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         )
     if reported := left_out_friction(solution.spec):
         yield finding("friction_left_out", reported)
+
+
+def fillets(
+    spec: SliderCrankSpec, chain: Chain, solved: MeshSolution, window: tuple[float, float]
+) -> tuple[FilletRow, ...]:
+    """Return the fillets of a leg with their largest stress in a window [m], named by pad or flexure.
+
+    chain: the leg as beams, unloaded.
+    """
+    from cfmkit.solid.stress_along_fillets import stressed_fillets
+
+    pads = {place.name: place.shapes for place in solved.part.places}
+    rows = []
+    for one in stressed_fillets(solved, spec.mechanism.fillet):
+        nearest = FLEXURE_BEAMS[int(np.hypot(*(chain.pins - one.arc.middle).T).argmin())]
+        names = [] if spec.piece == "beam" else [nearest]
+        names += one.arc.find_touched(pads) or ([] if names else ["strip"])
+        if (found := one.largest(*window)) is not None:
+            rows.append(FilletRow(": ".join(names), one.arc, *found))
+    stresses = nominal_stresses(
+        rows,
+        np.array([row.motion for row in rows]),
+        lambda travel: [chain.press(with_steps(travel), tolerance=PATH_TOLERANCE).path],
+        lambda points: points,
+    )
+    return with_nominal(rows, stresses)

@@ -223,34 +223,14 @@ def search(
     task: StripTask,
     form: Form,
     ranges: Ranges,
-    starts: int,
+    starts: int,  # how many, the uniform strip included
     run: Run,
-    identity: str = "",
-    clock: Clock = UNLIMITED_CLOCK,
+    identity: str = "",  # of everything that decides the outcome of a start but its number
+    clock: Clock = UNLIMITED_CLOCK,  # when it is late, no more is tried
 ) -> FoundStrip | Design:
     """Return the best strip found, from the uniform one coarse to fine, and from random ones where asked.
 
-    Parameters
-    ----------
-    task : StripTask
-        What the strip is to do.
-    form : Form
-        How it is described.
-    ranges : Ranges
-        Of its numbers.
-    starts : int
-        How many, the uniform strip included.
-    run : Run
-        Seed of the random ones, progress, processes, notes.
-    identity : str
-        Of everything that decides the outcome of a start but its number.
-    clock : Clock
-        When it is late, no more is tried.
-
-    Returns
-    -------
-    FoundStrip or Design
-        Why there is none, where no start was completed.
+    A `Design` says why there is none, where no start was completed.
     """
 
     def tell(records: Mapping[int, Any]) -> None:

@@ -70,17 +70,7 @@ GRID_SIZES = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
 def design(spec: SliderCrankSpec, run: Run) -> Design:
     """Return a complete specification with the springs, and the lengths left free, that meet the `design` block best.
 
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        With a `design` block.
-    run : Run
-        Only its progress is used: the search is deterministic.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE, with the reason and what would be feasible, if nothing keeps the tolerance.
+    INFEASIBLE, with the reason and what would be feasible, if nothing keeps the tolerance.
     """
     wanted = spec.design
     if wanted is None:
@@ -181,7 +171,7 @@ def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tup
     if not math.isfinite(found.value):
         names = " or ".join(f"'design.{name}'" for name in axes)
         text = f"no lengths in the ranges given reach the window within the limits of the joints; widen {names}"
-        raise Infeasible(finding("infeasible_targets", text))
+        raise finding.infeasible("infeasible_targets", text)
     place = even_best(spec, tuple(axes), found) if wanted.slack else found.place
     return solve(task_of(with_lengths(spec, dict(zip(axes, place, strict=True))))), found
 
@@ -240,7 +230,7 @@ def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
     if goal is None:
         text = "in the window the force or torque is unbounded: it contains a dead point or the stretched position"
         text += f"; change 'design.{task.assembly.motion_name}'"
-        raise Infeasible(finding("infeasible_targets", text))
+        raise finding.infeasible("infeasible_targets", text)
     if wanted.catalogue:
         picked = choose(task, goal, window)
         if picked.deviation > MAX_DEVIATION and wanted.tolerance is None:

@@ -364,14 +364,10 @@ FINDING_RULES: tuple[Rule, ...] = (
     FindingRule("same_position_twice", _rests_again, _again),
     FindingRule("stretched_start", _starts_stretched, _column),
     FindingRule(
-        "two_positions",
-        lambda solution: _starts_stretched(solution) & (solution.spec.analysis.side is None),
-        _sides,
+        "two_positions", lambda solution: _starts_stretched(solution) & (solution.spec.analysis.side is None), _sides
     ),
     FindingRule(
-        "force_unbounded",
-        lambda solution: _is_nearly_stretched(solution) & np.isnan(solution.rest[:, 0]),
-        _far_side,
+        "force_unbounded", lambda solution: _is_nearly_stretched(solution) & np.isnan(solution.rest[:, 0]), _far_side
     ),
     FindingRule(
         "run_in",

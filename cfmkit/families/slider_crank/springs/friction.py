@@ -39,21 +39,9 @@ class FrictionBranch:
 
 
 def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch:
-    """Return the efforts with friction.
+    """Return efforts, forces inside and friction's share at crank angles [rad] or slider travels [m], (n,) or (m, n).
 
-    Parameters
-    ----------
-    assembly : Assembly
-        With its springs' rates and its `rubbing`.
-    motion : (n,) array, or (m, n) of m mechanisms
-        Crank angles [rad] or slider travels [m].
-    way : float
-        1 while the motion grows, -1 on the way back.
-
-    Returns
-    -------
-    FrictionBranch
-        Efforts, forces inside, and what friction takes.
+    `way`: 1 while the motion grows, -1 on the way back.
     """
     units, link = assembly.units(motion), assembly.linkage
     angle, beta = units.angle, coupler_angle(link, units)

@@ -25,14 +25,7 @@ import numpy as np
 
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.sprung_linkage import coupler_angle
-from cfmkit.stock.joint_strength import (
-    SHEAR_SHARE,
-    bearing_pressure,
-    euler_load,
-    link_stress,
-    pin_bending,
-    shear_out,
-)
+from cfmkit.stock.joint_strength import SHEAR_SHARE, bearing_pressure, euler_load, link_stress, pin_bending, shear_out
 from cfmkit.stock.stock_series import ALL_SERIES
 
 if TYPE_CHECKING:

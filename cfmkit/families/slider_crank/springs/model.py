@@ -70,11 +70,7 @@ ROW_COLUMNS = columns_of_absent_values(OF_PARTS | OF_STOPS) | dict(SCALAR_QUANTI
 def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     """Return the torque or force curve of a slider-crank, with everything that is wrong with it.
 
-    Returns
-    -------
-    Result
-        One branch, ``load``; with friction ``unload``, too. NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if
-        the linkage does not reach all of the requested motion.
+    NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if the linkage does not reach all of the requested motion.
     """
     try:
         spec = resolve(spec)
@@ -287,12 +283,7 @@ def _describe_locked(solution: Solution) -> str:
 def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str, float]]:
     """Return derivatives [SI] of metrics over the window of the analysis by the rates of springs of one leg.
 
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        The nominal mechanism.
-    paths : sequence of str
-        Those that are no rate of a spring are left out.
+    Paths that are no rate of a spring are left out.
     """
     if spec.fidelity != "prb" or spec.mechanism.pins or spec.mechanism.guide:
         return {}

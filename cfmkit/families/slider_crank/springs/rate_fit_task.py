@@ -142,7 +142,7 @@ class SpringTask:
         added = sum(branch(rubbed, places, one).effort - free for one in ways) / len(ways)
         if not np.isfinite(added).all():
             text = "friction holds the mechanism within the window: the line of force runs through its pins"
-            raise Infeasible(finding("self_locks", f"{text}; use thinner pins ('mechanism.pins'), or another window"))
+            raise finding.infeasible("self_locks", f"{text}; use thinner pins ('mechanism.pins'), or another window")
         return np.asarray(added / self.wanted.size)
 
     def _lower(self) -> FloatArray | None:

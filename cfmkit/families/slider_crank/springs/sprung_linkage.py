@@ -26,13 +26,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.families.guide_friction import FRICTIONLESS_GUIDE, GuideFriction
 from cfmkit.families.rows import stack
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
-from cfmkit.families.slider_crank.unit_springs import (
-    SliderPath,
-    UnitCurves,
-    crank_efforts,
-    curves_along_crank,
-    path_of,
-)
+from cfmkit.families.slider_crank.unit_springs import SliderPath, UnitCurves, crank_efforts, curves_along_crank, path_of
 from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
@@ -323,22 +317,10 @@ def reference_motion(spec: SliderCrankSpec, assembly: Assembly) -> float:
 
 
 def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the force along the coupler and that of the slider on its guide.
+    """Return the tension in the coupler, and the force on the guide across the slider's path (positive upwards) [N].
 
-    Parameters
-    ----------
-    assembly : Assembly
-        The mechanism; rates of all legs.
-    units : UnitCurves
-        Along the motion, n places.
-    drive : (n,) array
-        Force that drives the slider towards the pivot [N]; zero where a torque drives the crank.
-
-    Returns
-    -------
-    coupler, guide : (n,) array
-        Tension in the coupler, and force on the guide across the slider's path (positive
-        upwards) [N]; for the rates and the drive given, so of all legs together or of one.
+    `drive`: force that drives the slider towards the pivot, (n,) [N]; zero where a torque drives the crank. Both are
+    (n,), for the rates and the drive given, so of all legs together or of one.
     """
     link, turn, rates = assembly.linkage, units.turn, assembly.rates_over(units.turn)
     beta = coupler_angle(link, units)

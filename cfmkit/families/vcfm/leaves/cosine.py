@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaves.bent_centre_line import N_LINE_POINTS, line_between
 from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, ProposedStructure
-from cfmkit.families.vcfm.leaves.s_form import BUCKLING_LOAD, POLE_LOAD
+from cfmkit.families.vcfm.leaves.s_form import BUCKLING_LOAD, N_LINE_POINTS, POLE_LOAD, line_between
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import percent
-from cfmkit.families.vcfm.leaves.bent_centre_line import N_LINE_POINTS, line_between
 from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, ProposedStructure
+from cfmkit.families.vcfm.leaves.s_form import N_LINE_POINTS, line_between
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

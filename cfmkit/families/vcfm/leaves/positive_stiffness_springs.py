@@ -24,9 +24,8 @@ import numpy as np
 
 from cfmkit.errors import GeometryError
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.leaves.bent_centre_line import bent_leaf
 from cfmkit.families.vcfm.leaves.kinds import LeafSpring, ProposedStructure, SpringChain, SpringKind
-from cfmkit.families.vcfm.leaves.s_form import s_force
+from cfmkit.families.vcfm.leaves.s_form import bent_leaf, s_force
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
