@@ -220,7 +220,8 @@ def _jam(number: int) -> FindingRule[Solution]:
             ..., None
         ]
         leaves_gap = ((low < solution.travel) & (solution.travel < high)).any(axis=-1)
-        return leaves_gap | (high - low > MIN_JAM_SHARE * solution.travel[..., -1:])[..., 0]
+        felt: NDArray[np.bool_] = leaves_gap | (high - low > MIN_JAM_SHARE * solution.travel[..., -1:])[..., 0]
+        return felt
 
     return FindingRule("up_jam", is_felt, message, short)
 

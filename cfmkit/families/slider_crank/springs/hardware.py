@@ -1,7 +1,8 @@
 """Links, pins, guide, ground and screws of a slider-crank with springs, dimensioned for the loads of its motion.
 
-Links are as they are drawn; their pins, the guide's rod and the screws of the ground bear what they take. Crank and
-coupler lie a sheet apart, and so do the crank and the ground that carries its pivot.
+Links are as they are drawn; their pins, the guide's rods and the screws of the ground bear what they take. Ground,
+crank and coupler lie on each other; the slider lies below the coupler and may be thicker than a link. Heads of screws
+stand beside what moves; where there is no place for them, they are sunk into the ground.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from cfmkit.families.findings import mm as length_in_words
 from cfmkit.families.findings import newton
 from cfmkit.families.hardware import (
     DEFAULT_MATERIAL,
+    GuideRods,
     Hardware,
     PartStrength,
     guide_part,
-    guide_rod,
+    guide_rods,
     in_sentences,
     mm,
     pin_for,
@@ -50,6 +52,9 @@ N_LOADS = 201
 N_SCREWS = 4
 """Of the ground."""
 
+GROUND_SCREWS = "ground to its base"
+"""Place of these screws."""
+
 
 LEAST_GROUND = 4.0
 """Least width of the ground, in heads of its screws: two of them, each a head from the edge."""
@@ -72,21 +77,27 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
         cure = f"use at least {length_in_words(least)} ('mechanism.pins.diameter')" if bears else "use thicker links"
         faults["joints"] = f"too weak for {newton(load)} in links of {length_in_words(sheet)}: {cure}"
     across, force, travel, rod_at = _guide_loads(spec, solution)
-    rod = guide_rod(across, force, travel, 2.0 * eye, mechanism.guide, system, strength)
+    rods = guide_rods(across, force, travel, 2.0 * eye, pin, mechanism.guide, system, strength)
     screw = screw_for(load * legs, sheet, N_SCREWS, strength)
-    ends = rod_at + np.array([[-0.5 * rod.bush, 0.0], [0.5 * rod.bush, 0.0]])
-    low, high = np.minimum(ends.min(axis=0), 0.0) - eye, np.maximum(ends.max(axis=0), 0.0) + eye
+    ends = rod_at + np.array([[-0.5 * rods.bush, 0.0], [0.5 * rods.bush, 0.0]])
+    margin = np.array([eye, max(eye, 0.5 * rods.slider_width)])
+    low, high = np.minimum(ends.min(axis=0) - margin, -eye), np.maximum(ends.max(axis=0) + margin, eye)
     spare = 0.5 * np.maximum(LEAST_GROUND * screw.head - (high - low), 0.0)
     low, high = low - spare, high + spare
     ground, moving = rectangle(*low, *high), tuple(_drawn_bodies(spec, solution, eye, pin))
-    places = screw_positions(ground, moving, screw.head)
+    places, reached = screw_positions(ground, moving, screw.head)
+    if not reached and sheet < screw.countersunk_height:
+        faults[GROUND_SCREWS] = (
+            f"below what moves, and a ground of {length_in_words(sheet)} is too thin for countersunk heads: use links "
+            f"of {length_in_words(screw.countersunk_height)} ('mechanism.part.sheet')"
+        )
     bodies = (
         PosedBody.polygon("ground", "held", ground),
-        PosedBody.line("guide", "held", ends, 0.5 * rod.diameter),
+        *rods.bodies(ends),
         *(PosedBody.line("screw", "held", at[None], 0.5 * screw.diameter) for at in places),
     )
     parts = (
-        *_parts(spec, solution, strength, (sheet, 2.0 * eye, pin), load),
+        *_parts(spec, solution, strength, (sheet, 2.0 * eye, pin), load, rods),
         ListedPart(
             "carries pivot and guide",
             "ground",
@@ -97,10 +108,13 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
             "",
             "ground",
         ),
-        guide_part(rod, 1, mechanism.guide is None),
-        screw_part("ground to its base, countersunk", len(places), screw, sheet, "screw"),
+        guide_part(rods, 1, mechanism.guide is None),
+        screw_part(GROUND_SCREWS, len(places), screw, sheet, "screw", countersunk=not reached),
     )
-    return Hardware(with_faults(parts, faults), bodies, (*bodies, *moving), pin, in_sentences(faults))
+    rubbing = {"pins": {"diameter": pin}, "guide": {}}
+    heads, thicker = screw.head_height if reached else 0.0, max(rods.slider_thickness - sheet, 0.0)
+    drawn = (*bodies, *moving)
+    return Hardware(with_faults(parts, faults), bodies, drawn, rubbing, in_sentences(faults), heads, thicker)
 
 
 def _drawn_bodies(spec: SliderCrankSpec, solution: Solution, eye: float, pin: float) -> Iterator[PosedBody]:
@@ -160,11 +174,17 @@ def _tallest_spring(spec: SliderCrankSpec, solution: Solution) -> float:
 
 
 def _parts(
-    spec: SliderCrankSpec, solution: Solution, strength: PartStrength, sizes: tuple[float, float, float], load: float
+    spec: SliderCrankSpec,
+    solution: Solution,
+    strength: PartStrength,
+    sizes: tuple[float, float, float],
+    load: float,
+    rods: GuideRods,
 ) -> Iterator[ListedPart]:
     """Yield links, slider, pins and springs."""
     mechanism, legs, link = spec.mechanism, spec.mechanism.sets, solution.assembly.linkage
     sheet, width, pin = sizes
+    thick = max(sheet, rods.slider_thickness)
     for name, length in (("crank", link.crank), ("coupler", link.coupler)):
         holes = f"{mm(float(length))} between holes of {hole_with_fit(pin, 8)}"
         data = f"{_describe_strength(strength)}; {holes}; geometry/slider-crank.dxf"
@@ -173,13 +193,13 @@ def _parts(
         "on its guide",
         "slider",
         1,
-        f"with a hole of {hole_with_fit(pin, 8)}",
+        f"with a hole of {hole_with_fit(pin, 8)} between those of its guide",
         "make",
-        mm(width, width, sheet),
+        mm(width, max(width, rods.slider_width), thick),
         "",
         "slider",
     )
-    long = 2.0 * sheet + _tallest_spring(spec, solution)
+    long = sheet + thick + _tallest_spring(spec, solution)
     yield pin_part("joints", 3 * legs, pin, long, load, "joint")
     for entry in mechanism.springs.bought:
         value = getattr(mechanism.springs, entry.at)
