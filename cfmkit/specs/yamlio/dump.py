@@ -13,7 +13,7 @@ from cfmkit.errors import QuantityError
 from cfmkit.specs.units.quantities import decimal_text
 from cfmkit.specs.units.strict_decimal_number import odd_character
 from cfmkit.specs.yamlio.allowed_at_path import Slot
-from cfmkit.specs.yamlio.scalars import read_plain
+from cfmkit.specs.yamlio.tree_builder import read_plain
 
 LINE_WIDTH = 100
 _PLAIN_PATTERN = re.compile(r"[\w.+(/][^:#\[\]{},\"'&*!|>%@`\\=?-]*(?:[-%=?'*](?! )[^:#\[\]{},\"&!|>@`\\]*)*")
