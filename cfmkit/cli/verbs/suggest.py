@@ -6,7 +6,7 @@ import re
 import shlex
 import time
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import (
     FRESH_FLAG,
@@ -41,10 +41,6 @@ but what was found is written."""
 
 WRITING_SHARE = 0.1
 """Share of the time budget that is kept for files."""
-
-
-def _key(name: str, metavar: str, text: str) -> Any:
-    return option(f"--{name}", metavar=metavar, text=text)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,21 +20,11 @@ _PLAIN_PATTERN = re.compile(r"[\w.+(/][^:#\[\]{},\"'&*!|>%@`\\=?-]*(?:[-%=?'*](?
 _OLD_WORDS = re.compile("(?i)(y|yes|n|no|on|off|=|<<|-|[-+]?[0-9]{1,4}-[0-9]{1,2}-[0-9]{1,2}.*)")
 
 
-def dump(spec: BaseModel, complete: bool = False) -> str:
-    """Return a specification as YAML, with units, keys in the model's order.
-
-    Parameters
-    ----------
-    spec : BaseModel
-        What to write.
-    complete : bool
-        Write every default too, not only what was set.
-
-    Returns
-    -------
-    str
-        Text that `read_document` and `bind` turn into an equal specification.
-    """
+def dump(
+    spec: BaseModel,  # what to write
+    complete: bool = False,  # write every default too, not only what was set
+) -> str:
+    """Return a specification as YAML that `read_document` and `bind` turn into an equal one; keys as in the model."""
     content = _content(spec, spec.model_dump(mode="json"), (), complete)
     # Lists of blocks, such as the requirements, read best at the end.
     ordered = dict(sorted(content.items(), key=lambda item: _holds_blocks(item[1])))
