@@ -329,7 +329,7 @@ class Spec(Model):
         Laws that are assumed of a named material are none of the specification's.
         """
         everything = self.model_dump(exclude_none=True, exclude={"sweep", "sensitivity"})
-        yield from stated_leaves(everything, self.model_dump(exclude_unset=True))
+        yield from _stated_leaves(everything, self.model_dump(exclude_unset=True))
 
 
 def readable_requirement(entry: Any) -> Requirement | None:
@@ -406,7 +406,7 @@ def _contains(data: Any, parts: list[str]) -> bool:
     return True
 
 
-def stated_leaves(everything: Mapping[str, Any], stated: Mapping[str, Any]) -> Iterator[tuple[str, float | int]]:
+def _stated_leaves(everything: Mapping[str, Any], stated: Mapping[str, Any]) -> Iterator[tuple[str, float | int]]:
     """Yield every numeric leaf as (dotted path, value), but for those of laws that a material has by its name alone."""
     for path, value in _leaves(everything, ""):
         law = ASSUMED_LAW.match(path)
