@@ -208,7 +208,8 @@ def _fault_of_fields(record: Any, above: str) -> str:
     for entry in fields(record):
         value, name = getattr(record, entry.name), f"{above}{entry.name}"
         if not _is_of_kind(value, str(entry.type)):
-            return f"the field {name!r} of its record must be of the type {entry.type}"
+            empty = ", and not empty" if isinstance(value, Mapping) and not value else ""
+            return f"the field {name!r} of its record must be of the type {entry.type}{empty}"
         if is_dataclass(value) and not isinstance(value, type) and (fault := _fault_of_fields(value, f"{name}.")):
             return fault
     return ""

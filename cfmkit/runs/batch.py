@@ -16,7 +16,7 @@ from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, li
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.runs import batch_output_files
 from cfmkit.runs.batch_reference import BatchReference
-from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, run_analysis, run_design, spec_of
+from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, read, run_analysis, run_design
 from cfmkit.runs.run import carry_out as carry_out_run
 from cfmkit.studies.batch_sources_and_outcomes import SKIPPED_MESSAGE, Entry
 from cfmkit.studies.engine import NullMonitor
@@ -74,14 +74,14 @@ class BatchWork:
     def refusal(self, job: BatchJob) -> Entry | None:
         """Return what is wrong with a specification; None if it is valid."""
         try:
-            spec_of(replace(self.common, spec=job.spec))
+            read(replace(self.common, spec=job.spec))
         except CfmError as error:
             return _failed_entry(Entry(job.spec, job.folder), error)
         return None
 
     def _run_entry(self, entry: Entry) -> Entry:
         wanted = replace(self.common, spec=entry.spec, out=os.path.join(self.common.out, entry.folder))
-        spec = spec_of(wanted)
+        spec = read(wanted)[1]
         verb = _verb(self.verb or _natural(spec), self.fresh)
         name = " ".join(spec.name.split())
         known = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec, entry.spec))
@@ -114,8 +114,8 @@ def _data_of(spec: Spec, file: str) -> tuple[tuple[str, str | None], ...]:
 def _verb(name: str, fresh: bool) -> Verb:
     if name == "design":
         # One process: the specifications of the batch share the cores already.
-        return Verb("design", "designed and analysed", run_design, running=partial(long_run, 1, fresh))
-    return Verb("analyze", "analysed", run_analysis)
+        return Verb("design", run_design, running=partial(long_run, 1, fresh))
+    return Verb("analyze", run_analysis)
 
 
 def _entry_of(entry: Entry, outcome: FinishedRun) -> Entry:

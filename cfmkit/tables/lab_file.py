@@ -302,8 +302,8 @@ def _shape(lines: list[str], filled: list[int], name: str) -> RowPattern:
     if not count:
         _refuse_groups(sample, name)
         raise DataError(
-            f"{name}: there is no block of lines with at least two numbers, separated by semicolon, tab, comma, bar or "
-            "spaces"
+            f"{name}: there are no lines below each other with at least two numbers each, separated by semicolon, tab, "
+            "comma, bar or spaces"
         )
     rows = [cells for line in sample if _is_data(cells := dialect.cells(line), dialect)]
     if count < 0.5 * len(sample) or not all(map(dialect.is_number, dialect.cells(sample[0]))):

@@ -10,7 +10,7 @@ import cfmkit
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.metrics import window_of
-from cfmkit.runs.read_suggest_file import read_request
+from cfmkit.runs.suggest_api import read_request
 from cfmkit.studies.suggest import search
 from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, make_proposal
 

@@ -24,7 +24,7 @@ from cfmkit.families.slider_crank.proposals import PUSHED_PROPORTIONS, _strip, l
 from cfmkit.families.slider_crank.sprung_linkage_proposals import _turning, add_custom_springs
 from cfmkit.families.suggestion_request import FamilyOffer
 from cfmkit.results import Status
-from cfmkit.runs.read_suggest_file import read_request
+from cfmkit.runs.suggest_api import read_request
 from cfmkit.runs.suggestion_record import exit_code, message
 from cfmkit.specs.units import TravelShare
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength

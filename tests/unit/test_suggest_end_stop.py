@@ -16,7 +16,7 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.families.suggestion_request import STOP_MARGIN_SHARE
-from cfmkit.runs.read_suggest_file import read_request
+from cfmkit.runs.suggest_api import read_request
 from cfmkit.runs.suggestion_record import as_json, exit_code
 from cfmkit.studies.suggest.end_stop_of_proposal import NO_END_STOP
 from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, make_proposal

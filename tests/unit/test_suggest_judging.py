@@ -20,7 +20,7 @@ from cfmkit.families.hardware import PartStrength
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, links_that_bear
 from cfmkit.runs.part_on_paper import assumed_tolerances
-from cfmkit.runs.read_suggest_file import read_request
+from cfmkit.runs.suggest_api import read_request
 from cfmkit.runs.suggestion_files import table
 from cfmkit.runs.suggestion_record import as_json, exit_code
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength

@@ -55,5 +55,5 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Document:
         from cfmkit.runs.comparisons import analyze_by_each_model
 
         work = partial(analyze_by_each_model, work)
-    verb = Verb("analyze", "analysed", work, inputs, words=words)
+    verb = Verb("analyze", work, inputs, words=words)
     return execute(verb, options, terminal, options.report)

@@ -24,12 +24,11 @@ from cfmkit.cli.options import (
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from cfmkit.cli.output import Terminal
     from cfmkit.documents.document import Document
     from cfmkit.runs.batch import BatchResult
-    from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 
 HELP_POSITION = 26
@@ -113,7 +112,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
         document,
         data=dict(found.summary)
         | written.data
-        | {"junit": options.junit, "reused": _count_reused(found.entries)}
+        | {"junit": options.junit, "reused": sum(one.reused for one in found.entries)}
         | ({"accepted": found.accepted} if found.accepted else {}),
         notes=(*document.notes, *named),
         complaints=(
@@ -166,7 +165,3 @@ def _complaints(found: BatchResult, options: BatchOptions, terminal: Terminal) -
     if found.exit_code is ExitCode.INTERRUPTED:
         left = sum(one.skipped for one in found.entries)
         yield f"interrupted  {left} of {len(found.entries)} specs were not run; {go_on(options.fresh)}"
-
-
-def _count_reused(entries: Sequence[Entry]) -> int:
-    return sum(one.reused for one in entries)

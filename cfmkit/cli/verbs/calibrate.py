@@ -60,7 +60,7 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Document:
     bounds = [("--bounds", text) for text in options.bounds or ()]
     loss = [] if options.loss == CalibrateOptions.loss else [("--loss", options.loss)]
     words = (options.data, "--fit", options.fit, *chain(*bounds, *loss, *given_measurement_options(options)))
-    verb = Verb("calibrate", "calibrated", partial(compute, options, source), data_record(options.data), words=words)
+    verb = Verb("calibrate", partial(compute, options, source), data_record(options.data), words=words)
     return execute(verb, options, terminal, options.report)
 
 

@@ -52,5 +52,5 @@ def run(options: CorrectOptions, terminal: Terminal) -> Document:
     fit = [] if options.fit is None else ["--fit", options.fit]
     words = (options.data, *fit, *chain(*given_measurement_options(options)))
     compute = partial(report_on_corrected, source, options.fit, options.tare is not None)
-    verb = Verb("correct", "corrected", compute, data_record(options.data), words=words)
+    verb = Verb("correct", compute, data_record(options.data), words=words)
     return execute(verb, options, terminal, options.report)

@@ -85,15 +85,7 @@ def template(name: str) -> str:
 
 
 def complete_template(text: str, known: Iterable[Key]) -> str:
-    """Return a template in which every optional key of a block stands, those that it left out as comments at its end.
-
-    Parameters
-    ----------
-    text : str
-        The template.
-    known : iterable of Key
-        Of the specification.
-    """
+    """Return a template with every optional key of its blocks, those that it left out as comments at their ends."""
     for key in known:
         block, _, name = key.path.partition(".")
         is_missing = block.isidentifier() and name.isidentifier() and f"{name}:" not in text

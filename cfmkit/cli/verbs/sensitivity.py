@@ -53,13 +53,13 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
     """
     from cfmkit.cli.run_study_in_folder import open_study
     from cfmkit.documents.sensitivity_document import document_of
-    from cfmkit.runs.run import placing, read
+    from cfmkit.runs.run import RunTask, placing, read
     from cfmkit.studies.sensitivity.output import outputs
     from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
     from cfmkit.studies.sensitivity.setup import prepare
 
     start = time.perf_counter()
-    document, spec = read(options)
+    document, spec = read(RunTask(options.spec, "", options.changes, options.fidelity))
     with placing(document, [f"sensitivity.{key}" for key in changes_of(options)]):
         setup = prepare(changed_by(options, spec), options.seed, options.max_points)
     with open_study("sensitivity", options, terminal, start) as study:

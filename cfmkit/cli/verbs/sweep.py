@@ -52,11 +52,11 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
     """
     from cfmkit.cli.run_study_in_folder import open_study
     from cfmkit.documents import sweep_document
-    from cfmkit.runs.run import placing, read
+    from cfmkit.runs.run import RunTask, placing, read
     from cfmkit.studies.sweep_request_and_files import outputs, prepare, summary_of, writes_curves
 
     start = time.perf_counter()
-    document, spec = read(options)
+    document, spec = read(RunTask(options.spec, "", options.changes, options.fidelity))
     asked = request(options)
     with placing(document):
         work = prepare(spec, asked)

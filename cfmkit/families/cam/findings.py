@@ -216,12 +216,11 @@ def _jam(number: int) -> FindingRule[Solution]:
         return f"self-locks on the way up from {low} to {high}"
 
     def is_felt(solution: Solution) -> NDArray[np.bool_]:
-        low, high = np.array([jams[number] if len(jams) > number else (0.0, 0.0) for jams in solution.all_jams]).T[
-            ..., None
-        ]
-        leaves_gap = ((low < solution.travel) & (solution.travel < high)).any(axis=-1)
-        felt: NDArray[np.bool_] = leaves_gap | (high - low > MIN_JAM_SHARE * solution.travel[..., -1:])[..., 0]
-        return felt
+        ends = np.array([jams[number] if len(jams) > number else (0.0, 0.0) for jams in solution.all_jams])
+        low, high = ends.T[..., None]
+        leaves_gap = ((low < solution.travel) & (solution.travel < high)).any(axis=-1, keepdims=True)
+        is_long: NDArray[np.bool_] = high - low > MIN_JAM_SHARE * solution.travel[..., -1:]
+        return np.asarray(leaves_gap | is_long, bool)[..., 0]
 
     return FindingRule("up_jam", is_felt, message, short)
 
