@@ -11,6 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import deg, mm
+from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import Linkage
 
@@ -23,8 +24,8 @@ def resolve(spec: SliderCrankSpec) -> SliderCrankSpec:
     mechanism = spec.mechanism
     if mechanism.stretched_position is None:
         return spec
-    written = {"coupler_length": coupler_length(mechanism), "stretched_position": None}
-    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=written)})
+    written = {"mechanism.coupler_length": coupler_length(mechanism), "mechanism.stretched_position": None}
+    return with_values(spec, written)
 
 
 def coupler_length(mechanism: Mechanism) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.arrays import LazySequence, ShortRepr, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import NO_STOPS
-from cfmkit.families.rows import SolvedRows, findings_of_one, valid, values_of_one
+from cfmkit.families.rows import SolvedRows, findings_of_one, valid, values_of_one, with_values
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, LeafSamples, Rows
 from cfmkit.families.vcfm.findings import FINDING_RULES, closed_spring, finding, is_closed
@@ -75,7 +75,7 @@ def result_of(solution: Solution) -> Result:
     curves = tuple(_curve(push, stops, bool(push.force[0] > solution.effort_error[0])) for push in solution.pushes)
     (low, high), dense = (float(end[0]) for end in solution.linear), DenseCurve(solution)
     return Result(
-        spec=_as_run(spec),
+        spec=with_values(spec, {"analysis.travel": spec.travel}),
         status=Status.PARTIAL if short else Status.COMPLETE,
         message=reason if short else "",
         curves=curves,
@@ -317,12 +317,6 @@ def rest_of(sampler: ForceSampler, preload: float, grid: FloatArray) -> float | 
     """Return `rests_of` for one preload [m]; None if the shuttle does not rest."""
     rest = float(rests_of(sampler, [preload], grid)[0])
     return None if np.isnan(rest) else rest
-
-
-def _as_run(spec: VcfmSpec) -> VcfmSpec:
-    """Return the spec with the defaults of the analysis made explicit."""
-    analysis = spec.analysis.model_copy(update={"travel": spec.travel})
-    return spec.model_copy(update={"analysis": analysis})
 
 
 def _curve(push: Push, stops: EndStops, pressed: bool) -> Curve:

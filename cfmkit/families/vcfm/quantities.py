@@ -9,14 +9,15 @@ import numpy as np
 from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
 from cfmkit.families.findings import newton
-from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values
+from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values, quantity_of_each
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.solution import Solution
+    from cfmkit.results import Quantity
 
 
 def _of_mesh(name: str) -> Callable[[Solution], float]:
@@ -129,19 +130,9 @@ def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
     return used
 
 
-def _of_wire(name: str) -> ScalarQuantity[Solution]:
-    """Return the largest stress in the wire of bought springs, or their shortest life."""
-
-    def read(solution: Solution) -> FloatArray:
-        found = [wire_quantities(_in_use(solution, number)).get(name) for number in range(len(solution))]
-        return np.array([np.nan if one is None or one.value is None else one.value for one in found])
-
-    return ScalarQuantity(
-        *WIRE_DEFINITIONS[name],
-        read,
-        lambda solution: wire_quantities(_in_use(solution, 0))[name].reason,
-        lambda solution: name in wire_quantities(_in_use(solution, 0)),
-    )
+def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
+    """Yield the largest stress in the wire of bought springs, and their shortest life, of each mechanism."""
+    return (wire_quantities(_in_use(solution, number)) for number in range(len(solution)))
 
 
 SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
@@ -265,7 +256,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         _spring_deflection_max,
         applies=_is_bought,
     ),
-    **{name: _of_wire(name) for name in WIRE_DEFINITIONS},
+    **{name: quantity_of_each(name, about, _wires) for name, about in WIRE_DEFINITIONS.items()},
 }
 """Every scalar result of the family, in the order in which they are shown."""
 

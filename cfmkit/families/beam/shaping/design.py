@@ -23,6 +23,7 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScat
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task import BENDING_ONLY, STRESS_MARGIN, Coordinate, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.rows import with_values
 from cfmkit.results import Design, Finding, Status
 from cfmkit.specs.units import format_short
 
@@ -82,8 +83,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
     mechanism = spec.mechanism
     layers = mechanism.copies.layers if mechanism.copies else 1
     if layers > 1 and mechanism.copies:
-        single_layer = mechanism.copies.model_copy(update={"layers": 1})
-        spec = spec.model_copy(update={"mechanism": mechanism.model_copy(update={"copies": single_layer})})
+        spec = with_values(spec, {"mechanism.copies.layers": 1})
     assembly = assemble(spec)
     bends = assemble(spec.replace({"analysis.fidelity": BENDING_ONLY})).network
     curve = spec.design.target.curve() if spec.design is not None and spec.design.target is not None else None

@@ -22,6 +22,7 @@ from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.no_mechanism import CannotBuild, no_design
+from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge
@@ -383,8 +384,7 @@ def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: flo
 def _analyse_strip(spec: SliderCrankSpec, task: StripTask, text: str, run: Run) -> Design:
     """Return a uniform strip as a design, if its analysis keeps the stress, too."""
     window, limits = (task.start, task.stroke), _limits(spec)
-    quick = {"points": min(spec.analysis.points, MAX_ANALYSIS_POINTS)}
-    plain = spec.model_copy(update={"analysis": spec.analysis.model_copy(update=quick)})
+    plain = with_values(spec, {"analysis.points": min(spec.analysis.points, MAX_ANALYSIS_POINTS)})
     reported = _report(plain, window, run)
     return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _not_kept(reported, window, limits)
 
@@ -403,14 +403,11 @@ def _part(spec: SliderCrankSpec, changes: dict[str, object]) -> StripSpec:
 
 
 def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, float]) -> SliderCrankSpec:
-    analysis = spec.analysis.model_copy(
-        update={"travel": (0.0, window[1]), "window": window, "fidelity": None, "drive": "force"}
-    )
-    mechanism = spec.mechanism.model_copy(update={"beam": part})
+    analysis = {"travel": (0.0, window[1]), "window": window, "fidelity": None, "drive": "force"}
+    changes = {"mechanism.beam": part, **{f"analysis.{name}": value for name, value in analysis.items()}}
     if spec.design is not None and spec.design.target is not None:
-        target = spec.design.target.written_out(spec.design.force)
-        spec = spec.model_copy(update={"design": spec.design.model_copy(update={"target": target, "force": None})})
-    return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
+        changes |= {"design.target": spec.design.target.written_out(spec.design.force), "design.force": None}
+    return with_values(spec, changes)
 
 
 def _write_strip(spec: SliderCrankSpec, judged: FinishedStrip, wanted: StripDesign) -> SliderCrankSpec:

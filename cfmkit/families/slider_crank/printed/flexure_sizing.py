@@ -21,6 +21,7 @@ from cfmkit.designing.reported_values_of_finished_design import search_values
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import no_design
+from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import side_of
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
@@ -290,10 +291,9 @@ def _write_flexures(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: flo
         for one in parts
     ]
     flexures = Flexures(pivot=blocks[0], crank_pin=blocks[1], slider_pin=blocks[2])
-    mechanism = spec.mechanism.model_copy(update={"flexures": flexures})
-    changes = {"travel": (0.0, stroke), "fidelity": None if mechanism.beam is None else "lumped", "drive": "force"}
-    analysis = spec.analysis.model_copy(update=changes)
-    return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
+    fidelity = None if spec.mechanism.beam is None else "lumped"
+    analysis = {"analysis.travel": (0.0, stroke), "analysis.fidelity": fidelity, "analysis.drive": "force"}
+    return with_values(spec, {"mechanism.flexures": flexures, **analysis})
 
 
 def _message(found: Sized, exact: bool) -> str:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design, refusals_answered
+from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation, next_sets
@@ -262,9 +263,7 @@ def _write_springs(solved: Solved) -> SliderCrankSpec:
     mechanism = spec.mechanism.model_copy(update={"springs": springs})
     if wanted.target is not None:
         reported = wanted.target.written_out(wanted.torque or wanted.force)
-        spec = spec.model_copy(
-            update={"design": wanted.model_copy(update={"target": reported, "torque": None, "force": None})}
-        )
+        spec = with_values(spec, {"design.target": reported, "design.torque": None, "design.force": None})
     if any(getattr(wanted, name) is not None for name in ("crank_length", "offset")):
         mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
     assembly = solved.task.assembly

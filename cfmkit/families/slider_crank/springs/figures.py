@@ -11,9 +11,9 @@ import numpy as np
 
 from cfmkit.families.slider_crank.springs.bistability_class import NEGATIVE_CLASS
 from cfmkit.families.slider_crank.springs.hardware import hardware
+from cfmkit.families.slider_crank.springs.hardware import joints as joints_at
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.part import bodies
-from cfmkit.families.slider_crank.springs.part import joints as joints_at
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.plots import parts
 from cfmkit.plots.assembly import assembly_figure
