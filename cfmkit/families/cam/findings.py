@@ -72,8 +72,7 @@ finding = Finder(CAM_FINDINGS)
 """Return a finding of this family; the name must be one that `CAM_FINDINGS` explains."""
 
 
-LIMIT_RTOL = 1e-9
-"""A value that exceeds its limit by this share is on it: conversions of units and sums leave less."""
+LIMIT_RTOL = 1e-9  # a value that exceeds its limit by this share is on it: conversions of units and sums leave less
 
 LENGTH_TOL = 1e-12
 """Springs shorter than at rest by less [m] are at rest: rounding of half widths of decimetres is smaller."""
@@ -366,8 +365,7 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     )
 
 
-TOO_NOISY = 2.0
-"""Points are noisier than stated if their neighbours say so by this factor."""
+TOO_NOISY = 2.0  # points are noisier than stated if their neighbours say so by this factor
 
 
 def findings_of_built(built: MeasuredCam) -> list[Finding]:

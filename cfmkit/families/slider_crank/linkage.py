@@ -19,8 +19,7 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-STRETCHED_ANGLE_TOL = 1e-12
-"""An unloaded position so near to the stretched one [rad] is the stretched one."""
+STRETCHED_ANGLE_TOL = 1e-12  # an unloaded position so near to the stretched one [rad] is the stretched one
 
 
 @dataclass(frozen=True)

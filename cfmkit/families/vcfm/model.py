@@ -47,8 +47,7 @@ MOST_BACK = 20
 """The way from the rest position to the unloaded position has at most so many times the points of the travel: a travel
 of some nanometres would take them by the billion."""
 
-MAX_SAMPLES = 60_000
-"""Samples that are worked on together: few enough to stay in a processor's cache."""
+MAX_SAMPLES = 60_000  # samples that are worked on together: few enough to stay in a processor's cache
 
 
 def analyze(spec: VcfmSpec, _run: Run) -> Result:

@@ -39,12 +39,10 @@ if TYPE_CHECKING:
 N_POSES = 9
 """Travels of each preload that a box counts: rigid parts move linearly, leaves bulge less than a wall is thick."""
 
-N_WINDINGS = 8
-"""Turns of a bought spring as they are drawn."""
+N_WINDINGS = 8  # turns of a bought spring as they are drawn
 
 Point = tuple[float, float]
-Item = Point | Arc | Smooth
-"""A corner, or an edge that is not straight."""
+Item = Point | Arc | Smooth  # a corner, or an edge that is not straight
 
 
 # --- over the motion --------------------------------------------------------------------------------------------

@@ -36,8 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-MOST_PRELOAD = 100.0
-"""Lengths of a leaf that a preload may be: every spring closes, or tears, long before."""
+MOST_PRELOAD = 100.0  # lengths of a leaf that a preload may be: every spring closes, or tears, long before
 
 
 class Frame(Model):

@@ -257,11 +257,8 @@ def _warnings(task: Task, design: Judged, result: Explored) -> tuple[Finding, ..
     return tuple(out)
 
 
-MAX_NEAR_DESIGNS = 3
-"""Designs that are looked at, the ones that miss the limits least."""
-
-AT_BOUND = 1e-4
-"""A variable so near to its bound, in units of the size and in rad, is held by it."""
+MAX_NEAR_DESIGNS = 3  # designs that are looked at, the ones that miss the limits least
+AT_BOUND = 1e-4  # a variable so near to its bound, in units of the size and in rad, is held by it
 
 
 @dataclass(frozen=True)

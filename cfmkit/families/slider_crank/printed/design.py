@@ -68,11 +68,8 @@ MAX_NAMED_LIMITS = 4
 FORM_DECIMALS, LENGTH_DECIMALS = 6, 9
 """Of the numbers of a form, mostly millimetres, and of lengths in metres: both nanometres."""
 
-DEFAULT_THICKNESS = (0.5e-3, 2e-3)
-"""Range where none is given [m]: what printing makes."""
-
-DEFAULT_WIDTH = (5e-3, 8e-3)
-"""Range where none is given [m], as of the strip of [B, Table 3]."""
+DEFAULT_THICKNESS = (0.5e-3, 2e-3)  # range where none is given [m]: what printing makes
+DEFAULT_WIDTH = (5e-3, 8e-3)  # range where none is given [m], as of the strip of [B, Table 3]
 
 THICKER_BY = 3.0
 """Times the thickest strip beyond which no thickness from the stress is stated: rubber may bear any curvature of the

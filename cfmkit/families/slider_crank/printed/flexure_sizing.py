@@ -92,8 +92,7 @@ def rotations(linkage: Linkage, unloaded: float, travel: FloatArray, side: int =
     return curves_along_slider(linkage, unloaded, bent, np.asarray(travel)).turn[:3]
 
 
-_MAX_ROUNDS = 8
-"""`configs/slider_crank_lumped.yaml` needs four; a fixed width may take four times as many."""
+_MAX_ROUNDS = 8  # `configs/slider_crank_lumped.yaml` needs four; a fixed width may take four times as many
 
 _N_POINTS = 40
 
@@ -276,8 +275,7 @@ FACTOR_PHRASES = (
 )
 """What is said of the factors of force and stress."""
 
-PER_METRE = 1e8
-"""Thicknesses are whole parts of it, rounded down: the stress is that of the written one."""
+PER_METRE = 1e8  # thicknesses are whole parts of it, rounded down: the stress is that of the written one
 
 
 def _write_flexures(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: float) -> SliderCrankSpec:

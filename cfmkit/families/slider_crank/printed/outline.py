@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
-N_SWEPT_POSES = 25
-"""Poses at which what moves must be clear of the frame."""
+N_SWEPT_POSES = 25  # poses at which what moves must be clear of the frame
 
 
 def drawing(spec: SliderCrankSpec) -> Drawing:

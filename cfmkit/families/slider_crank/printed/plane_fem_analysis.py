@@ -61,10 +61,8 @@ if TYPE_CHECKING:
     from cfmkit.solid.meshed_part import MeshSolution, Part
 
 
-POSE_EXPONENT = 3.0
-"""Poses stand at (k/n) to this power of the travel, and where the stiffness leaps."""
-LINK_ELEMENT_RATIO = 4.0
-"""Sides of elements in links, in those of flexures: links are stiff, and hardly bend."""
+POSE_EXPONENT = 3.0  # poses stand at (k/n) to this power of the travel, and where the stiffness leaps
+LINK_ELEMENT_RATIO = 4.0  # sides of elements in links, in those of flexures: links are stiff, and hardly bend
 NOT_COMPUTED_TEXT = "the model of the part as a solid does not compute it"
 
 

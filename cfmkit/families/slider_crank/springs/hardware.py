@@ -46,15 +46,9 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.springs.solution import Solution
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
-N_LOADS = 201
-"""Places of the motion at which loads are computed."""
-
-N_SCREWS = 4
-"""Of the ground."""
-
-
-LEAST_GROUND = 4.0
-"""Least width of the ground, in heads of its screws: two of them, each a head from the edge."""
+N_LOADS = 201  # places of the motion at which loads are computed
+N_SCREWS = 4  # of the ground
+LEAST_GROUND = 4.0  # least width of the ground, in heads of its screws: two of them, each a head from the edge
 
 
 def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:

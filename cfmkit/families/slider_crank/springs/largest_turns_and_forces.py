@@ -25,11 +25,8 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
 
-GRID_SIZES, TURN_NODES = 129, 385
-"""Places of the grid for less and for more than a quarter turn."""
-
-Ends = tuple["FloatArray", "FloatArray"]
-"""Largest and smallest values."""
+GRID_SIZES, TURN_NODES = 129, 385  # places of the grid for less and for more than a quarter turn
+Ends = tuple["FloatArray", "FloatArray"]  # largest and smallest values
 
 
 def is_wide(assembly: Assembly, low: Any, high: Any) -> bool:

@@ -26,8 +26,7 @@ stated."""
 PIN_IN_COIL = 0.8
 """Diameter of a pin that is not stated over the inside of the relaxed spring around it: wound up that is narrower."""
 
-EYE_OF_HOLE = 2.0
-"""Least radius of an eye in those of its hole: a wall as thick as the hole's radius."""
+EYE_OF_HOLE = 2.0  # least radius of an eye in those of its hole: a wall as thick as the hole's radius
 
 
 def pin_within(largest: float) -> float:

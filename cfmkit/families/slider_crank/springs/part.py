@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
-N_SHEETS = 3
-"""Sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's path."""
+N_SHEETS = 3  # sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's path
 
 
 def part_over_motion(result: Result) -> PosedPart:
