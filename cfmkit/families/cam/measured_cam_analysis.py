@@ -46,8 +46,7 @@ from cfmkit.families.cam.scalar_results import (
     pressure_of,
     values_of_built,
 )
-from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides
-from cfmkit.families.cam.window_of_measured_cam import large_holes, requested_travel
+from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides, large_holes, requested_travel
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between

@@ -43,10 +43,10 @@ from cfmkit.stock.springs.stress_and_life import SpringInUse
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
     from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
+    from cfmkit.families.vcfm.surroundings_spec import BoughtSprings
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
 RETURN_TRAVEL_RATIO = 1.5
@@ -153,7 +153,7 @@ def _with_next(spec: VcfmSpec, target: VcfmDesign, choice: LeavesAroundSprings) 
 
 def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings, Offer | None]]:
     """Yield springs in their numbers, with their places in the catalogue; without one those of the mechanism."""
-    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
+    from cfmkit.families.vcfm.surroundings_spec import BoughtSprings
 
     stated = spec.mechanism.springs
     if not target.catalogue:

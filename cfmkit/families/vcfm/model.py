@@ -22,9 +22,8 @@ from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, L
 from cfmkit.families.vcfm.findings import FINDING_RULES, closed_spring, finding, is_closed
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
 from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of, stack_laws
-from cfmkit.families.vcfm.quantities import ROW_COLUMNS, SCALAR_QUANTITIES
+from cfmkit.families.vcfm.quantities import ROW_COLUMNS, SCALAR_QUANTITIES, adjustability, readings
 from cfmkit.families.vcfm.solution import Solution, target_of
-from cfmkit.families.vcfm.tables_of_preloads_and_readings import adjustability, readings
 from cfmkit.numerics.where_condition_ends import last_places
 from cfmkit.results import ROUND_OFF, Result, Status
 from cfmkit.stock.parts_list import parts_tables

@@ -1,12 +1,10 @@
-"""From a cam specification to a machine that can be moved, with the springs between the axes of its rollers."""
+"""From a cam specification to a machine that can be moved."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
+from cfmkit.families.cam.dynamics.axis_springs import AxisSprings
 from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, NoRise, Side, SideParts, pieces_of
 from cfmkit.families.cam.dynamics.solution import Build
 from cfmkit.families.cam.findings import finding
@@ -16,34 +14,6 @@ from cfmkit.families.cam.statics import STANDARD_GRAVITY
 if TYPE_CHECKING:
     from cfmkit.families.cam.assembly import Assembly
     from cfmkit.families.cam.spec import CamSpec, Dynamics, Errors, LeftMasses, Masses, Mechanism
-
-
-@dataclass(frozen=True)
-class AxisSprings:
-    """All springs together."""
-
-    stiffness: float  # [N/m]
-    rest_length: float  # distance of the axes at which they would pull no more [m]
-    tension_stretch: float = 0.0  # how much farther apart the axes are when springs with initial tension open [m]
-
-    @classmethod
-    def from_mechanism(cls, mechanism: Mechanism) -> AxisSprings:
-        """Return the springs of a mechanism."""
-        springs = mechanism.springs
-        return cls(springs.total, 2.0 * mechanism.springs_rest, springs.tension_stretch)
-
-    def pull(self, distance: Any) -> Any:
-        """Return the force [N] with which they pull axes together that are so far apart [m]; they do not push."""
-        return self.stiffness * np.maximum(distance - self.rest_length, 0.0)
-
-    def elongation(self, distance: Any) -> Any:
-        """Return by how much they are longer than closed [m]."""
-        return distance - self.rest_length - self.tension_stretch
-
-    def energy(self, distance: Any) -> Any:
-        """Return their energy [J]."""
-        stretch = np.maximum(self.elongation(distance) + self.tension_stretch, 0.0)
-        return self.stiffness * stretch**2 / 2.0
 
 
 def build(spec: CamSpec) -> Build:

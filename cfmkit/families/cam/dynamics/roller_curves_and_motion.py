@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.machine_from_spec import AxisSprings
+    from cfmkit.families.cam.dynamics.axis_springs import AxisSprings
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.geometry.roller_track_on_cut_cam import Track
 

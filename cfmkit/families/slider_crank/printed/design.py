@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.no_mechanism import CannotBuild, no_design
 from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, elasticity, pins_of, travel_direction
 from cfmkit.families.slider_crank.printed.flexure_sizing import design_flexures
@@ -401,7 +401,10 @@ def _part(spec: SliderCrankSpec, changes: dict[str, object]) -> StripSpec:
 
 def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, float]) -> SliderCrankSpec:
     analysis = {"travel": (0.0, window[1]), "window": window, "fidelity": None, "drive": "force"}
-    changes = {"mechanism.beam": part, **{f"analysis.{name}": value for name, value in analysis.items()}}
+    changes: dict[str, Any] = {
+        "mechanism.beam": part,
+        **{f"analysis.{name}": value for name, value in analysis.items()},
+    }
     if spec.design is not None and spec.design.target is not None:
         changes |= {"design.target": spec.design.target.written_out(spec.design.force), "design.force": None}
     return with_values(spec, changes)

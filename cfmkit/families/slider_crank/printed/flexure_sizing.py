@@ -23,7 +23,7 @@ from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import no_design
 from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import side_of
+from cfmkit.families.slider_crank.linkage import side_of
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
     FLEXURE_SHARE,
     chain_of_flexures,

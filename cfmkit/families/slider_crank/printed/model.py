@@ -19,7 +19,7 @@ from cfmkit.errors import InputError
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.rows import findings_of_one, values_of_one, with_values
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, side_of, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, resolve, side_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
     elasticity,
     lumped_chain,

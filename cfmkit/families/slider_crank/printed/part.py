@@ -16,7 +16,7 @@ from cfmkit.export.beam_sections import BeamSection
 from cfmkit.export.contours import Contour, Line, polygon
 from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.posed_part import PosedBody, PosedPart
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, flexures_of, strip_of, travel_direction
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, STRIP_BEAM
 

@@ -36,7 +36,7 @@ from cfmkit.families.fem_results import (
 from cfmkit.families.findings import sharp_inside
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction
 from cfmkit.families.slider_crank.printed.findings import left_out_friction
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, kink

@@ -22,7 +22,7 @@ import numpy as np
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design, refusals_answered
 from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import resolve
+from cfmkit.families.slider_crank.linkage import resolve
 from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation, next_sets
 from cfmkit.families.slider_crank.springs.design_outcome import (
     Solved,

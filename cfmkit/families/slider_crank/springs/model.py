@@ -34,7 +34,7 @@ from cfmkit.families.rows import (
     with_values,
 )
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import resolve
+from cfmkit.families.slider_crank.linkage import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.springs.findings import rules_of
 from cfmkit.families.slider_crank.springs.hardware import hardware

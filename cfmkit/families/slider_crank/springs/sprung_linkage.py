@@ -25,7 +25,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.guide_friction import FRICTIONLESS_GUIDE, GuideFriction
 from cfmkit.families.rows import stack
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, side_of, unloaded_angle
 from cfmkit.families.slider_crank.unit_springs import SliderPath, UnitCurves, crank_efforts, curves_along_crank, path_of
 from cfmkit.specs.units import window_places
 
