@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, worst
-from cfmkit.families.cam.largest_next_to_samples import largest_of_each
 from cfmkit.families.cam.scalar_results import errors_used, half_extent, largest, pressure_of, root_mean_square
 from cfmkit.families.cam.statics import spring_force
 from cfmkit.families.findings import Finder, format_at_least, mm, mpa, newton
+from cfmkit.families.largest_next_to_samples import largest_of_each
 from cfmkit.families.rows import FindingRule
 from cfmkit.numerics.robust_statistics import neighbour_noise
 

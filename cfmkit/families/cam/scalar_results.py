@@ -11,10 +11,10 @@ import numpy as np
 from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.contact_pressure import flank_pressure
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.cam.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.families.cam.solution_of_measured_cam import large_holes, profile_coverage, requested_travel, window_mask
 from cfmkit.families.cam.statics import Losses, normal_turn
+from cfmkit.families.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values, quantity_of_each, row_of
 from cfmkit.results import Quantity
 from cfmkit.specs.evaluable_target_curve import TargetCurve

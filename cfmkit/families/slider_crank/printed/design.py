@@ -21,7 +21,7 @@ from cfmkit.designing.reported_values_of_finished_design import measure_metrics,
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, mpa, newton, percent
-from cfmkit.families.no_mechanism import CannotBuild, no_design
+from cfmkit.families.no_mechanism import no_design, refusals_answered
 from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
@@ -76,6 +76,7 @@ THICKER_BY = 3.0
 motion, and what grows without end by corrections is no dimension."""
 
 
+@refusals_answered
 def design(spec: SliderCrankSpec, run: Run) -> Design:
     """Return a specification with the strip, or the flexures, that the `design` block asks for.
 
@@ -91,8 +92,6 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         if wanted.beam is None:
             return design_flexures(spec, linkage, unloaded)
         return _strip(spec, linkage, unloaded, run)
-    except CannotBuild as problem:
-        return no_design(problem.finding)
     except InputError as problem:
         return Design(None, Status.INVALID, str(problem))
 
