@@ -13,11 +13,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from cfmkit.results import Quantity
+from cfmkit.arrays import read_only
+from cfmkit.curves import Column
+from cfmkit.families.findings import bracket
+from cfmkit.families.rows import with_values
+from cfmkit.results import Quantity, Result, Status
 from cfmkit.tables import Table, TableColumn, border_column
 
 if TYPE_CHECKING:
@@ -29,7 +33,16 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Displacement, Network, Path, Rotation
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.results.beam_states import BeamSections as Sections
+    from cfmkit.errors import GeometryError
+    from cfmkit.families.findings import Finder
+    from cfmkit.results import Finding
+    from cfmkit.solid.adaptive_solution import MeshError
+    from cfmkit.solid.meshed_part import MeshSolution
+    from cfmkit.solid.path_following import PosePath
     from cfmkit.solid.stress_along_fillets import FilletArc
+    from cfmkit.specs.spec import Spec
+
+S = TypeVar("S", bound="Spec")
 
 
 FEM_DEFINITIONS = {
@@ -85,6 +98,60 @@ class FilletRow:
         return abs(self.stress / self.nominal)
 
 
+def remove_frame(spec: S, frame: Sequence[FloatArray], pads: Sequence[FloatArray]) -> S:
+    """Return what bends of a part: without the frame around it, which stands, and the holes in that."""
+    from cfmkit.export.ground_frame import find_outside
+
+    holes = spec.mechanism.part.holes  # type: ignore[attr-defined]
+    kept = find_outside([hole.at for hole in holes], frame, pads)
+    left = tuple(hole for hole, keep in zip(holes, kept, strict=True) if keep)
+    return with_values(spec, {"mechanism.part.frame.ground": None, "mechanism.part.holes": left})
+
+
+def without_repeats(travels: FloatArray, end: float) -> FloatArray:
+    """Return travels in increasing order, without those that are the one before but for rounding."""
+    found = np.unique(travels)
+    return np.delete(found, np.flatnonzero(np.diff(found) < 1e-9 * abs(end)) + 1)
+
+
+def not_meshed(spec: Spec, error: GeometryError) -> Result:
+    """Return the result of a part that has no mesh."""
+    return Result(spec, Status.NO_EQUILIBRIUM, f"the part cannot be meshed: {error}; check mechanism.part")
+
+
+def stress_between_poses(solved: MeshSolution, motion: FloatArray) -> FloatArray:
+    """Return the largest stress along a free edge [Pa]; between poses by cubics that stay between their values."""
+    from scipy.interpolate import PchipInterpolator
+
+    rising = np.argsort(solved.course.travel)
+    cubics = PchipInterpolator(solved.course.travel[rising], solved.peaks[0][rising])
+    return read_only(np.maximum(cubics(motion), 0.0))  # at rest rounding may be below
+
+
+def stable_between_poses(course: PosePath, motion: FloatArray) -> NDArray[np.bool_]:
+    """Return whether the last pose up to each point of a curve is stable."""
+    before = np.searchsorted(np.abs(course.travel), np.abs(motion) * (1 + 1e-12)) - 1
+    return np.array([pose.unstable == 0 for pose in course.poses])[np.clip(before, 0, None)]
+
+
+def columns_of_solid(course: PosePath, motion: FloatArray, stress: FloatArray, extent: float) -> dict[str, Column]:
+    """Return the columns of largest stress, and of which points are poses that were solved."""
+    solved = np.isclose(motion[:, None], course.solved_travel, rtol=0, atol=1e-9 * abs(extent)).any(axis=1)
+    words = read_only(np.where(solved, "yes", "between"), np.str_)
+    return {"max_stress": Column(stress, "stress"), "solved": Column(words, "text")}
+
+
+def findings_of_mesh(
+    finding: Finder, error: MeshError, sections: Iterable[tuple[float, float]], poisson: float, wide_beams: bool
+) -> Iterator[Finding]:
+    """Yield which errors of a mesh are too large, and which parts, of a width and a thickness [m], are too wide."""
+    for name, reported in error.too_large():
+        yield finding(name, reported)
+    for width, thickness in sections:
+        if reported := bracket(width, thickness, poisson, wide_beams):
+            yield finding("wide_beam", reported)
+
+
 def with_nominal(rows: Sequence[FilletRow], stresses: FloatArray) -> tuple[FilletRow, ...]:
     """Return rows with their nominal stresses (n,) [Pa]."""
     return tuple(replace(row, nominal=float(stress)) for row, stress in zip(rows, stresses, strict=True))
@@ -128,11 +195,8 @@ MIN_STRESS_SHARE = 0.1
 """Nominal stresses below this part of the beams' largest at the same displacement are none: solid and beams differ by
 some hundredths of the largest for other reasons, which would make a third of such a ratio."""
 
-N_PATH_STEPS = 40
-"""Of the beams' path beside the requested displacements: as dense as curves are."""
-
-STEP_RTOL = 1e-6
-"""Steps nearer to a requested displacement than this part of the largest are left out."""
+N_PATH_STEPS = 40  # of the beams' path beside the requested displacements: as dense as curves are
+STEP_RTOL = 1e-6  # steps nearer to a requested displacement than this part of the largest are left out
 
 PATH_TOLERANCE = 1e-6
 """Of the beams' path: far below what a mesh is off, and slender leaves reach it where they are pulled straight."""

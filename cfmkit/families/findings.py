@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 
-TOO_SOFT = 0.01
-"""Share of the energy of bending above which wide beams that are solved as narrow ones are reported."""
+TOO_SOFT = 0.01  # share of the energy of bending above which wide beams that are solved as narrow ones are reported
 
 
 MIN_PLANE_STRESS_RATIO = 3.0

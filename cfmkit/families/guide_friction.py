@@ -81,5 +81,4 @@ class GuideFriction:
         return force
 
 
-FRICTIONLESS_GUIDE = GuideFriction()
-"""A guide that takes nothing."""
+FRICTIONLESS_GUIDE = GuideFriction()  # a guide that takes nothing

@@ -29,11 +29,8 @@ if TYPE_CHECKING:
     from cfmkit.stock.material_and_part_spec import Guide, MaterialSpec
     from cfmkit.stock.stock_series import Screw, System
 
-DEFAULT_MATERIAL = "steel-s235"
-"""Of links and plates that state none."""
-
-DEFAULT_SAFETY = 1.5
-"""Against yield, where `safety_factor` is not above 1."""
+DEFAULT_MATERIAL = "steel-s235"  # of links and plates that state none
+DEFAULT_SAFETY = 1.5  # against yield, where `safety_factor` is not above 1
 
 SAFETY_METRICS = ("safety_factor", "link_safety_factor", "spring_safety_factor")
 """Metrics of strength: what a requirement asks of them is asked of pins, shafts and screws, too."""
@@ -44,21 +41,11 @@ PIN_STRENGTH = 235e6
 PIN_MODULUS = 210e9
 """Young's modulus of pins and rods [Pa]: EN 1993-1-1, sec. 3.2.6."""
 
-SIDE_SHARE = 0.1
-"""Load across a guide over the largest force on its slider, at least: assumed."""
-
-SAG_SHARE = 1e-3
-"""Sag of a guide's rod over its span, at most: assumed."""
-
-LEAST_WALL = 0.25
-"""Wall beside a hole over its diameter, at least."""
-
-
-CUT_LENGTH = 1e-3
-"""How much longer than what it joins a pin may be [m]; it is cut where it is longer."""
-
-LEAST_SCREW = 3e-3
-"""Thinnest screw of a plate or a ground [m]: thinner ones are hard to handle."""
+SIDE_SHARE = 0.1  # load across a guide over the largest force on its slider, at least: assumed
+SAG_SHARE = 1e-3  # sag of a guide's rod over its span, at most: assumed
+LEAST_WALL = 0.25  # wall beside a hole over its diameter, at least
+LEAST_SCREW = 3e-3  # thinnest screw of a plate or a ground [m]: thinner ones are hard to handle
+CUT_LENGTH = 1e-3  # how much longer than what it joins a pin may be [m]; it is cut where it is longer
 
 
 @dataclass(frozen=True)

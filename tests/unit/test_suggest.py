@@ -19,7 +19,7 @@ from cfmkit.families import family
 from cfmkit.families.beam.proposals import kept_shapes
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.linkage import linkage_of
 from cfmkit.families.slider_crank.proposals import PUSHED_PROPORTIONS, _strip, largest_printed
 from cfmkit.families.slider_crank.sprung_linkage_proposals import _turning, add_custom_springs
 from cfmkit.families.suggestion_request import FamilyOffer

@@ -28,8 +28,7 @@ from cfmkit.families.vcfm.leaves.v_beam import TrussLeaf, VBeam
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
-from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES
-from cfmkit.families.vcfm.tables_of_preloads_and_readings import spread
+from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES, spread
 from cfmkit.metrics import evaluate
 from cfmkit.metrics.longest_interval_in_band import _levels, _reach, flat_window
 from cfmkit.metrics.metrics_of_rows import metric_of_branches

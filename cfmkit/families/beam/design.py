@@ -55,8 +55,7 @@ MAX_ROUNDS = 12
 """Of corrections, of which `configs/beam_rescaled.yaml` needs two; of travels, each a quarter longer: the last is 14.6
 times the first."""
 
-TRAVEL_STEP = 1e-5
-"""Travel that follows from the stress is rounded down to whole hundredths of a millimetre [m]."""
+TRAVEL_STEP = 1e-5  # travel that follows from the stress is rounded down to whole hundredths of a millimetre [m]
 
 
 def rescale(

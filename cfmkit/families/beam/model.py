@@ -31,11 +31,10 @@ from cfmkit.families.beam.contacts import contact_columns, contact_values, refus
 from cfmkit.families.beam.findings import findings_of
 from cfmkit.families.beam.network_elements_spec import LoadsDrive
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
-from cfmkit.families.beam.path_ending import ending_of, in_units
+from cfmkit.families.beam.path_ending import distance, ending_of, in_units, ways_to_supports
 from cfmkit.families.beam.requested_node_columns import END_FORCES, columns_of, output_columns
 from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, natural, target_of
 from cfmkit.families.beam.solution import Solution
-from cfmkit.families.beam.taut_beams import distance, ways_to_supports
 from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, follow_surface, values_along
 from cfmkit.families.rows import values_of_one
 from cfmkit.numerics.one_blas_thread import one_blas_thread

@@ -182,8 +182,7 @@ def _table(name: str, found: list[BeamStrip]) -> Curve2D:
     return Curve2D(name, columns)
 
 
-MAX_NAMED_PAIRS = 4
-"""Pairs that one line names."""
+MAX_NAMED_PAIRS = 4  # pairs that one line names
 
 
 def joined_unasked(

@@ -355,8 +355,7 @@ def _cam_with_corner(solution: Solution, ax: Axes, view: Scene) -> FloatArray:
     return flank[:1]
 
 
-N_HEIGHTS = 400
-"""Heights at which the errors of measured flanks are drawn."""
+N_HEIGHTS = 400  # heights at which the errors of measured flanks are drawn
 
 
 def built_figures(result: Result) -> dict[str, Callable[[], Figure]]:

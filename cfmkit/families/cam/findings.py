@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, worst
-from cfmkit.families.cam.largest_next_to_samples import largest_of_each
 from cfmkit.families.cam.scalar_results import errors_used, half_extent, largest, pressure_of, root_mean_square
 from cfmkit.families.cam.statics import spring_force
 from cfmkit.families.findings import Finder, format_at_least, mm, mpa, newton
+from cfmkit.families.largest_next_to_samples import largest_of_each
 from cfmkit.families.rows import FindingRule
 from cfmkit.numerics.robust_statistics import neighbour_noise
 
@@ -72,8 +72,7 @@ finding = Finder(CAM_FINDINGS)
 """Return a finding of this family; the name must be one that `CAM_FINDINGS` explains."""
 
 
-LIMIT_RTOL = 1e-9
-"""A value that exceeds its limit by this share is on it: conversions of units and sums leave less."""
+LIMIT_RTOL = 1e-9  # a value that exceeds its limit by this share is on it: conversions of units and sums leave less
 
 LENGTH_TOL = 1e-12
 """Springs shorter than at rest by less [m] are at rest: rounding of half widths of decimetres is smaller."""
@@ -381,8 +380,7 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     )
 
 
-TOO_NOISY = 2.0
-"""Points are noisier than stated if their neighbours say so by this factor."""
+TOO_NOISY = 2.0  # points are noisier than stated if their neighbours say so by this factor
 
 
 def findings_of_built(built: MeasuredCam) -> list[Finding]:

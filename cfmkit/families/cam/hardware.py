@@ -59,8 +59,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.spec import Mechanism
     from cfmkit.stock.stock_series import Bearing, Screw, System
 
-BEARING_IN_ROLLER = 0.9
-"""Outside diameter of a bearing over that of the roller around it, at most."""
+BEARING_IN_ROLLER = 0.9  # outside diameter of a bearing over that of the roller around it, at most
 
 SHAFT_IN_ROLLER = 0.7
 """Diameter of a plain shaft over that of the roller around it, and of the pin over the slider's side, at most."""

@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     """The right flank and the left one, each as it would be on the right."""
 
 N_OUTLINE_POINTS = 1201
-TAB_CLEARANCE = 0.25
-"""Space left between the tab and a roller, in roller radii."""
+TAB_CLEARANCE = 0.25  # space left between the tab and a roller, in roller radii
 
 
 def drawing(spec: CamSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:

@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.springs_spec import Springs
 
-PLATE_THICKNESS = 0.008
-"""Thickness of the plate where no `contact.width` says it [m]: that of the contact's example."""
+PLATE_THICKNESS = 0.008  # thickness of the plate where no `contact.width` says it [m]: that of the contact's example
 
 
 def roller_path(solution: Solution) -> FloatArray:

@@ -18,8 +18,8 @@ from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
 from cfmkit.families.cam.geometry.path import RollerPath
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, TrackStates
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
-from cfmkit.families.cam.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.cam.statics import Forces, forces, jams
+from cfmkit.families.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.rows import is_column, row_of, rows_of
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.results import ROUND_OFF

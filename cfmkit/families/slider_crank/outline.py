@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc, Line, Smooth, polygons
 from cfmkit.families.deferred_imports import deferred_imports
-from cfmkit.families.slider_crank.linkage_from_spec import resolve
+from cfmkit.families.slider_crank.linkage import resolve
 
 with deferred_imports():
     from cfmkit.families.slider_crank.printed.outline import drawing as draw_part

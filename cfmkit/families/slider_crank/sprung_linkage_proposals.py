@@ -22,8 +22,7 @@ from cfmkit.families.slider_crank.flattest_springs_that_fit import (
     flattest_springs,
     largest_effort,
 )
-from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.linkage import Linkage, linkage_of
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.link_strength import least_sheet, link_loads, links_that_bear

@@ -71,8 +71,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-MAX_ROUNDS = 8
-"""Most limits that are met one after the other until the nearest feasible values meet all of them."""
+MAX_ROUNDS = 8  # most limits that are met one after the other until the nearest feasible values meet all of them
 
 
 def design(spec: VcfmSpec, run: Run) -> Design:

@@ -49,14 +49,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 TRAVEL_SCALE = Scale("displacement", "length")
-N_WINDOW_PLACES = 241
-"""Places that are tried as the start of a window."""
-
-ELEMENT_COLOURS = {"leaf": LINE_BLUE, "spring": SPRING_OCHRE}
-"""Colours of the bodies that bend."""
-
-N_PRELOADS = 41
-"""Preloads for which the figure of the adjustability is computed."""
+N_WINDOW_PLACES = 241  # places that are tried as the start of a window
+ELEMENT_COLOURS = {"leaf": LINE_BLUE, "spring": SPRING_OCHRE}  # colours of the bodies that bend
+N_PRELOADS = 41  # preloads for which the figure of the adjustability is computed
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:

@@ -49,8 +49,7 @@ if TYPE_CHECKING:
     Sentence = tuple[Any, ...]
 
 
-TRACED_MODELS = ("exact", "solid")
-"""Models that follow leaves along their branches."""
+TRACED_MODELS = ("exact", "solid")  # models that follow leaves along their branches
 
 VCFM_FINDINGS = {
     "no_negative_stiffness": "the leaves are too thick for their rise: no negative stiffness anywhere",
@@ -88,17 +87,13 @@ VCFM_FINDINGS = {
 finding = Finder(VCFM_FINDINGS)
 """Return a finding of this family; the name must be one that `VCFM_FINDINGS` explains."""
 
-MAX_WAVINESS_RATIO = 0.02
-"""Waviness over thickness from which on the flatness suffers."""
+MAX_WAVINESS_RATIO = 0.02  # waviness over thickness from which on the flatness suffers
 
 TURNING_LOAD_RATIO = POLE_LOAD / (4.0 * np.pi**2)
 """Load at which a leaf buckles whose shuttle can turn, over that with a shuttle that cannot; each in E I/L^2."""
 
-STIFFNESS_RTOL = 0.01
-"""Stiffnesses that differ by less than this share cancel."""
-
-EXACT_FORM = 2e-4
-"""Share of a stress that counts for nothing: designs are fitted to 1e-4."""
+STIFFNESS_RTOL = 0.01  # stiffnesses that differ by less than this share cancel
+EXACT_FORM = 2e-4  # share of a stress that counts for nothing: designs are fitted to 1e-4
 
 
 def _slenderness(solution: Solution) -> FloatArray:

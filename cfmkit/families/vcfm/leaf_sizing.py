@@ -30,26 +30,17 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
 
 
-MIN_WIDTH_RATIO = 2.0
-"""Least width of a leaf over its thickness: narrower ones buckle out of the plane."""
-
-SNAPPING_RISE_RATIO = 3.2
-"""Rise over thickness below which leaves that buckle may do so with a jump."""
-
-FITTED_REGION_SHARE = 0.84
-"""Part of the linear region over which the widths are fitted to the force."""
-
-N_RESCALES = 4
-"""Two do for the shipped mechanisms."""
+MIN_WIDTH_RATIO = 2.0  # least width of a leaf over its thickness: narrower ones buckle out of the plane
+SNAPPING_RISE_RATIO = 3.2  # rise over thickness below which leaves that buckle may do so with a jump
+FITTED_REGION_SHARE = 0.84  # part of the linear region over which the widths are fitted to the force
+N_RESCALES = 4  # two do for the shipped mechanisms
 
 MAX_ROUNDS = 40
 """Of iterations that end after five, since forces and stresses are powers of the sizes within a few per cent."""
-WIDTH_RTOL = 1e-6
-"""Share of the width by which it may be off when sizes are found."""
+WIDTH_RTOL = 1e-6  # share of the width by which it may be off when sizes are found
 MAX_PASSES, FORCE_RTOL = 12, 1e-5
 """Of the exact model for a sheet, and how far its force may then be off: five passes are usual."""
-MOST_LEAVES = 1000
-"""As `mechanism.bistable.half_beams` allows."""
+MOST_LEAVES = 1000  # as `mechanism.bistable.half_beams` allows
 
 
 def check_guide(spec: VcfmSpec) -> None:

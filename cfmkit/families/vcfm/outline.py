@@ -37,11 +37,8 @@ if TYPE_CHECKING:
 
     from cfmkit.families.vcfm.spec import VcfmSpec
 
-PART_GAP = 0.01
-"""Between the two parts of the drawing [m]."""
-
-COSINE_TOLERANCE_RATIO = 2e-4
-"""How far files may be from cosine arches, in thicknesses of the thinnest leaf."""
+PART_GAP = 0.01  # between the two parts of the drawing [m]
+COSINE_TOLERANCE_RATIO = 2e-4  # how far files may be from cosine arches, in thicknesses of the thinnest leaf
 
 
 def drawing(spec: VcfmSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:

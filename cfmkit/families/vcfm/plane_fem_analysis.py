@@ -22,11 +22,14 @@ from cfmkit.families.fem_results import (
     FilletRow,
     both_images,
     fillet_table,
+    findings_of_mesh,
     largest_concentration,
     nominal_stresses,
+    not_meshed,
     with_nominal,
+    without_repeats,
 )
-from cfmkit.families.findings import bracket, sharp_inside
+from cfmkit.families.findings import sharp_inside
 from cfmkit.families.vcfm.exact_model import DOWN_ANGLE, ExactSampler, leaf_network, problem_of, spring_chain
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts, strip_of
@@ -201,8 +204,7 @@ def _stops(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ())
     count = max(5, spec.analysis.solid.poses // fewer)
     shares = np.linspace(0.0, 1.0, count) ** POSE_EXPONENT
     more = [place / end for place in places if 0.0 < place / end < 1.0]
-    found = np.unique(np.concatenate([shares, more]))
-    return tuple((end * np.delete(found, np.flatnonzero(np.diff(found) < 1e-9) + 1)).tolist())
+    return tuple((end * without_repeats(np.concatenate([shares, more]), 1.0)).tolist())
 
 
 def _pull_back(spec: VcfmSpec, pushed: AdaptiveSolution, end: float, report: Callable[[float], None]) -> SolidPath:
@@ -231,8 +233,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         outlines(drawing(spec))  # what cannot be cut is not solved: fillets too large make mountains of elements
         sampler = SolidSampler(spec, spec.travel, back, run)
     except GeometryError as error:
-        message = f"the part cannot be meshed: {error}; check mechanism.part"
-        return Result(spec, Status.NO_EQUILIBRIUM, message)
+        return not_meshed(spec, error)
     except SolutionError as error:
         return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}")
     found = result_of(solution := solve(spec, made, sampler))
@@ -249,14 +250,9 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
     if reported := sharp_inside(spec.mechanism.fillet, sharp_corners(spec)):
         yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
-    for name, reported in sampler.mesh_error.too_large():
-        yield finding(name, reported)
     about = spec.mechanism
-    for part in (about.bistable, about.positive):
-        if part is None:
-            continue
-        if reported := bracket(part.width, part.thickness, about.material.poisson, about.wide_beams):
-            yield finding("wide_beam", reported)
+    sections = [(part.width, part.thickness) for part in (about.bistable, about.positive) if part is not None]
+    yield from findings_of_mesh(finding, sampler.mesh_error, sections, about.material.poisson, about.wide_beams)
 
 
 def fillets(solution: Solution) -> tuple[tuple[FilletRow, ...], tuple[FilletRow, ...]]:

@@ -35,12 +35,8 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.task import Task
 
 
-VIOLATION_TOL = 1e-4
-"""A limit missed by less than this share holds."""
-
-COORDINATE_DECIMALS, COEFFICIENT_DECIMALS = 7, 6
-"""Decimals of designed coordinates [m] and coefficients [rad]."""
-
+VIOLATION_TOL = 1e-4  # a limit missed by less than this share holds
+COORDINATE_DECIMALS, COEFFICIENT_DECIMALS = 7, 6  # decimals of designed coordinates [m] and coefficients [rad]
 _MAX_WIDENINGS = 3  # minimisations, each from the last
 _MIN_WINDOW_GAIN = 2e-3  # of the end of the window: a gain that is not worth another one
 _REPAIRABLE_VIOLATION = 2e-3  # a limit missed by less is repaired afterwards

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 
 
 TIME_SCALE = Scale("time", "time")
-SIDE_RTOL = 1e-9
-"""Sides whose values differ by less than this fraction of the largest are drawn as one line."""
+SIDE_RTOL = 1e-9  # sides whose values differ by less than this fraction of the largest are drawn as one line
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:

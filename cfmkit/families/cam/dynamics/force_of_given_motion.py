@@ -232,8 +232,7 @@ def multibody_history(
     )
 
 
-N_BISECTIONS = 60
-"""They leave 1e-18 of a step in time: less than rounding."""
+N_BISECTIONS = 60  # they leave 1e-18 of a step in time: less than rounding
 
 CONTACT_FORCE_RTOL = 1e-9
 """A contact force below zero by this part of the largest is rounding: springs at rest press with nothing."""

@@ -38,11 +38,8 @@ if TYPE_CHECKING:
     from cfmkit.stock.material_and_part_spec import Pins
 
 
-N_BOUND_PLACES = 41
-"""Places of the window that bounds are taken from; sets themselves are judged at all places."""
-
-BOUND_RTOL = 1e-9
-"""Bounds are wider by this share: rounding must not leave a set out."""
+N_BOUND_PLACES = 41  # places of the window that bounds are taken from; sets themselves are judged at all places
+BOUND_RTOL = 1e-9  # bounds are wider by this share: rounding must not leave a set out
 
 
 def best_sets(goal: RateGoal, offered: Sequence[FloatArray], count: int = 1) -> list[tuple[float, FloatArray]]:

@@ -35,11 +35,8 @@ if TYPE_CHECKING:
     Rule = FindingRule[Solution]
 
 
-RUN_IN = 0.02
-"""An unloaded position nearer than this to the stretched one [rad] is meant to be stretched, nearly."""
-
-ON_LIMIT = 1 + 1e-9
-"""A deflection that is beyond its limit by less than this share is on it."""
+RUN_IN = 0.02  # an unloaded position nearer than this to the stretched one [rad] is meant to be stretched, nearly
+ON_LIMIT = 1 + 1e-9  # a deflection that is beyond its limit by less than this share is on it
 
 
 def place(solution: Solution, motion: float) -> str:

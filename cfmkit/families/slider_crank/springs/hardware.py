@@ -42,22 +42,16 @@ from cfmkit.stock.stock_series import hole_with_fit, series_of
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.link_strength import LinkLoads
     from cfmkit.families.slider_crank.springs.solution import Solution
+    from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
-N_LOADS = 201
-"""Places of the motion at which loads are computed."""
-
-N_SCREWS = 4
-"""Of the ground."""
-
-GROUND_SCREWS = "ground to its base"
-"""Place of these screws."""
-
-
-LEAST_GROUND = 4.0
-"""Least width of the ground, in heads of its screws: two of them, each a head from the edge."""
+N_LOADS = 201  # places of the motion at which loads are computed
+N_SCREWS = 4  # of the ground
+GROUND_SCREWS = "ground to its base"  # place of these screws
+LEAST_GROUND = 4.0  # least width of the ground, in heads of its screws: two of them, each a head from the edge
 
 
 def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
@@ -119,24 +113,23 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
 
 def _drawn_bodies(spec: SliderCrankSpec, solution: Solution, eye: float, pin: float) -> Iterator[PosedBody]:
     """Yield links, slider, springs and pins as the assembly shows them, the lowest first."""
-    rates, joints = solution.assembly.rates, _joints(solution)
+    rates, pins = solution.assembly.rates, joints(solution, solution.unit_spring_curves)
     for name, k in (("crank", 0), ("coupler", 1)):
-        yield PosedBody.line(name, "free", np.stack(joints[k : k + 2], axis=1), eye, round=True)
+        yield PosedBody.line(name, "free", np.stack(pins[k : k + 2], axis=1), eye, round=True)
     corners = eye * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    yield PosedBody.polygon("slider", "driven", joints[2][:, None] + corners)
-    for joint, name, rate in zip(joints, JOINT_NAMES, rates[:3], strict=False):
+    yield PosedBody.polygon("slider", "driven", pins[2][:, None] + corners)
+    for joint, name, rate in zip(pins, JOINT_NAMES, rates[:3], strict=False):
         if np.any(rate > 0.0):
             coils = [0.5 * coil.outer_diameter for coil in spec.mechanism.springs.coils_at(name)]
             yield PosedBody.line(f"spring-{name}", "free", joint[:, None], max(coils, default=0.8 * eye))
         yield PosedBody.line("joint", "free", joint[:, None], 0.5 * pin)
 
 
-def _joints(solution: Solution) -> list[Any]:
+def joints(solution: Solution, units: UnitCurves) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return pivot, crank pin and slider pin in all poses, (p, 2) each [m]."""
-    link, angle = solution.assembly.linkage, np.atleast_2d(solution.unit_spring_curves.angle)[0]
-    slid = np.atleast_2d(solution.unit_spring_curves.position)[0]
-    crank = link.crank * np.column_stack([np.cos(angle), np.sin(angle)])
-    return [np.zeros_like(crank), crank, np.column_stack([slid, np.full(slid.size, link.offset)])]
+    link, angle, slid = solution.assembly.linkage, np.atleast_2d(units.angle)[0], np.atleast_2d(units.position)[0]
+    pin = link.crank * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.zeros_like(pin), pin, np.column_stack([slid, np.full(slid.size, link.offset)])
 
 
 def _sheet(loads: LinkLoads, width: float, hole: float, strength: PartStrength, system: Any) -> float:

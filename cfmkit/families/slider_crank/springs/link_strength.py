@@ -154,14 +154,12 @@ PIN_DIAMETERS = tuple(
 )
 """Pins of links [m]: the diameters of ISO 2338 from 1 mm on."""
 
-LARGEST_TURN_SHARE = 0.01
-"""Turn of a link over that of its spring up to which links count as rigid."""
+LARGEST_TURN_SHARE = 0.01  # turn of a link over that of its spring up to which links count as rigid
 
 WIDEST_SHARE = 0.5
 """Largest width of a link over the length of the shorter one: wider ones are plates, and bend as plates do."""
 
-SIZE_MARGIN = 1.001
-"""Sizes are larger by this share than just enough."""
+SIZE_MARGIN = 1.001  # sizes are larger by this share than just enough
 
 
 def links_that_bear(

@@ -25,9 +25,16 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import SolvedRows, columns_of_absent_values, drop_numbers, findings_of_one, values_of_one
+from cfmkit.families.rows import (
+    SolvedRows,
+    columns_of_absent_values,
+    drop_numbers,
+    findings_of_one,
+    values_of_one,
+    with_values,
+)
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import resolve
+from cfmkit.families.slider_crank.linkage import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.springs.findings import rules_of
 from cfmkit.families.slider_crank.springs.hardware import hardware
@@ -234,8 +241,8 @@ def find_unbounded(poles: Sequence[tuple[float, float]]) -> Finding:
 
 def _as_run(spec: SliderCrankSpec, assembly: Assembly) -> SliderCrankSpec:
     """Return the spec with the defaults of the analysis made explicit."""
-    written = {assembly.motion_name: asked_motion(spec, assembly), "fidelity": "prb"}
-    return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=written)})
+    written = {f"analysis.{assembly.motion_name}": asked_motion(spec, assembly), "analysis.fidelity": "prb"}
+    return with_values(spec, written)
 
 
 def _curve(solution: Solution) -> Curve:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.export.posed_part import PosedBody, PosedPart
-from cfmkit.families.slider_crank.springs.hardware import hardware
+from cfmkit.families.slider_crank.springs.hardware import hardware, joints
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
-N_SHEETS = 3
-"""Sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's path."""
+N_SHEETS = 3  # sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's path
 
 
 def part_over_motion(result: Result) -> PosedPart:
@@ -59,13 +58,6 @@ def bodies(spec: SliderCrankSpec, solution: Solution, units: UnitCurves) -> Iter
     for pin, names in zip(pins, (("pivot",), ("crank_pin",), ("slider_pin", "slider")), strict=True):
         sizes = [0.5 * coil.outer_diameter for name in names for coil in spec.mechanism.springs.coils_at(name)]
         yield PosedBody.line("spring", "free", pin[:, None], max([half, *sizes]))
-
-
-def joints(solution: Solution, units: UnitCurves) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return pivot, crank pin and slider pin in all poses, (p, 2) each [m]."""
-    link, angle, slid = solution.assembly.linkage, np.atleast_2d(units.angle)[0], np.atleast_2d(units.position)[0]
-    pin = link.crank * np.column_stack([np.cos(angle), np.sin(angle)])
-    return np.zeros_like(pin), pin, np.column_stack([slid, np.full(slid.size, link.offset)])
 
 
 def _depth(spec: SliderCrankSpec, rates: FloatArray, turns: FloatArray, joining: Hardware) -> tuple[float | None, str]:

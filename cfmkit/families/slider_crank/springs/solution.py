@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import Several, ShortRepr
+from cfmkit.families.largest_next_to_samples import finite_samples
 from cfmkit.families.rows import rows_of, stack
 from cfmkit.families.slider_crank.springs.bistability_class import (
     CLASS_NAMES,
@@ -32,7 +33,7 @@ from cfmkit.families.slider_crank.springs.bistability_class import (
     signs,
 )
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
-from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes, finite_samples
+from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.sprung_linkage import reactions, reference_motion, window_of
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples

@@ -25,7 +25,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.guide_friction import FRICTIONLESS_GUIDE, GuideFriction
 from cfmkit.families.rows import stack
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, side_of, unloaded_angle
 from cfmkit.families.slider_crank.unit_springs import SliderPath, UnitCurves, crank_efforts, curves_along_crank, path_of
 from cfmkit.specs.units import window_places
 
@@ -40,8 +40,7 @@ if TYPE_CHECKING:
 
 FULL_TURN = 2.0 * math.pi
 
-SHORT_OF_END = 1e-3
-"""Share of an arc that a motion stays away from its ends, where efforts are unbounded."""
+SHORT_OF_END = 1e-3  # share of an arc that a motion stays away from its ends, where efforts are unbounded
 
 MIN_END_SHARE = 1e-6
 """Nearer to such an end, as a share of the way to it, the last digits of the motion decide the effort's."""
@@ -349,8 +348,7 @@ def coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
 DIFFERENCE_STEP = 1e-5
 """Of the angle [rad]: the effort is a quadratic of q at most, so that central differences are off by rounding alone."""
 
-N_WINDOW_PLACES = 201
-"""Of the window, over which the change of the effort is averaged."""
+N_WINDOW_PLACES = 201  # of the window, over which the change of the effort is averaged
 
 
 def turn_unloaded(assembly: Assembly, angle: float) -> tuple[Assembly, float]:

@@ -35,11 +35,8 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.leaves.kinds import Edge, Edges
 
 
-BLOCK_HEIGHT_RATIO = 0.75
-"""Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
-
-FILLET_MARGIN = 1.02
-"""Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
+BLOCK_HEIGHT_RATIO = 0.75  # half height of rigid blocks beyond the middle of a leaf, in its thicknesses
+FILLET_MARGIN = 1.02  # height of rigid blocks beyond a leaf's edge, in what a fillet there takes
 
 
 def leaf_compliance(strip: LeafStrip) -> Any:

@@ -29,17 +29,10 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
 
-POLE_LOAD = 20.190728556426629
-"""z at which tan q = q: the S form can carry no more."""
-
-BUCKLING_LOAD = np.pi**2
-"""z of the buckling form 1 - cos(2 pi s/L), P = 4 pi^2 E I/L^2."""
-
-MAX_SERIES_LOAD = 0.35
-"""Below this |z| the closed forms cancel and the series is used."""
-
-NEWTON_STEPS = 60
-"""At most so many to find z."""
+POLE_LOAD = 20.190728556426629  # z at which tan q = q: the S form can carry no more
+BUCKLING_LOAD = np.pi**2  # z of the buckling form 1 - cos(2 pi s/L), P = 4 pi^2 E I/L^2
+MAX_SERIES_LOAD = 0.35  # below this |z| the closed forms cancel and the series is used
+NEWTON_STEPS = 60  # at most so many to find z
 
 _STIFFNESS_SERIES = np.array(
     [

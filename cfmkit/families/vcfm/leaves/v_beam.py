@@ -72,11 +72,8 @@ class TrussLeaf(LeafLaw):
         return line
 
 
-NEGATIVE_ABOVE = 1.4246
-"""Rise over thickness above which a V-beam has a negative stiffness anywhere."""
-
-LINEAR_ABOVE = np.pi
-"""Rise over thickness above which it buckles, and so has a linear negative stiffness."""
+NEGATIVE_ABOVE = 1.4246  # rise over thickness above which a V-beam has a negative stiffness anywhere
+LINEAR_ABOVE = np.pi  # rise over thickness above which it buckles, and so has a linear negative stiffness
 
 FLAT_BUCKLED_ABOVE = 2.0 * np.pi / 3.0**0.5
 """Rise over thickness above which it is still buckled when flat, so that its force is zero there."""
