@@ -239,7 +239,7 @@ def explain(
         raise SolutionError("the recording determines neither modulus nor thickness nor friction of this part")
     explanations = _rank_explanations(fits, before, assume_errors(curves.spec))
     best = explanations[0]
-    _check_best(best, before, source)
+    _check_best(best, before, source, float(np.median(np.abs(result.curve.effort[np.isfinite(result.curve.effort)]))))
     return tuple(_irreducible([item for item in explanations if item.criterion <= best.criterion + STRONG_EVIDENCE]))
 
 
@@ -396,11 +396,19 @@ def _irreducible(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
             yield explanation
 
 
-def _check_best(best: Explanation, before: Comparison, source: MeasuredCurves) -> None:
-    """Raise if even the best explanation says that another part was measured."""
+def _check_best(best: Explanation, before: Comparison, source: MeasuredCurves, own: float) -> None:
+    """Raise if even the best explanation says that another part was measured; `own` is the part's usual force."""
     calibration, name = best.calibration, source.recording.name
     bounds = calibration.fit.at_bound
+    zero = f"{DATA_PREFIX}{next(iter(ZERO_OFFSETS[before.curve.kind]))}"
     for k, item in enumerate(calibration.parameters):
+        value = abs(float(calibration.fit.values[k]))
+        if item.path == zero and value > own:
+            shown, usual = (format_short(one, before.curve.kind, 3) for one in (value, own))
+            raise DataError(
+                f"{name}: without load the sensor would show {shown}, more than the {usual} of the part: a recording "
+                "of another part? If it does, state it with --tare"
+            )
         if bounds[k] and item in best.errors and not item.path.endswith("friction"):
             low, high = (_number(item, end) for end in (item.low, item.high))
             raise DataError(

@@ -19,10 +19,11 @@ from cfmkit.experiment.errors_of_made_part import is_thickness
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE_METRICS
 from cfmkit.metrics import check, values_of_family
-from cfmkit.specs.units import format_short
+from cfmkit.specs.units import format_short, from_border, to_border
 from cfmkit.stock.material_and_part_spec import sheet_of
-from cfmkit.studies.parts.assumed_errors import assume_errors
+from cfmkit.studies.parts.assumed_errors import accuracy_of, assume_errors
 from cfmkit.studies.parts.redesign import free_of
+from cfmkit.studies.stock_and_digits import decimals_of
 from cfmkit.studies.variable_paths import leaf
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ OTHER_RELUCTANCE = 1e-2
 """The same of any other value."""
 
 N_DIGITS = 5
-"""Digits of a corrected value: a leaf of 0.25 mm to 10 nm, a millionth of its force."""
+"""Digits of a corrected value that is no length or angle."""
 
 CLOSE_DEPARTURE = 2e-3
 """Root mean square departure from the aim, over its level, with which no more values are changed."""
@@ -198,10 +199,10 @@ class Redesign:
         return self.drawn.replace(dict(zip(self.limits, x.tolist(), strict=True)))
 
     def solve(self) -> FloatArray:
-        """Return the values, with the digits that are written, (n,) [SI].
+        """Return the values, with the digits that the process can hold, (n,) [SI].
 
         Widths change alone if that is enough: neither shape nor stress change with them. Then thicknesses change, too,
-        then all.
+        then all. At last widths make up for the rounding of the others.
 
         Raises SolutionError if nothing may change.
         """
@@ -221,7 +222,7 @@ class Redesign:
                 best = min(self._solve_for(list(free), best), best, key=self._cost)
                 if self._cost(best) <= CLOSE_DEPARTURE:
                     break
-        return best
+        return min(self._solve_for(stages[0], best), best, key=self._cost) if stages[0] else best
 
     def _compensate(self) -> FloatArray:
         """Return the values of leaves that are drawn thinner by as much as they are made thicker, (n,) [SI].
@@ -238,9 +239,16 @@ class Redesign:
         return self._round(np.array(x))
 
     def _round(self, x: FloatArray) -> FloatArray:
-        """Return values with the digits that are written, within their limits, (n,) [SI]."""
+        """Return values with the digits that the process can hold, within their limits, (n,) [SI]."""
         low, high = self._ends
-        digits = np.array([float(f"{value:.{N_DIGITS}g}") for value in x])
+        decimals = decimals_of(accuracy_of(self.drawn))
+        dimensions = [dimension_of(self.drawn, path) for path in self.limits]
+        digits = [
+            from_border(round(to_border(value, dimension), decimals), dimension)
+            if dimension in ("length", "angle")
+            else float(f"{value:.{N_DIGITS}g}")
+            for value, dimension in zip(x.tolist(), dimensions, strict=True)
+        ]
         return np.where(np.isclose(x, self.start), self.start, np.clip(digits, low, high))
 
     def _solve_for(self, free: list[int], start: FloatArray) -> FloatArray:

@@ -19,7 +19,16 @@ if TYPE_CHECKING:
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 FreeWay = Annotated[Length, Field(ge=0)]
 
-BEFORE_STOP = 2e-12  # distance from a rigid stop at which a complete motion ends [m]: at the stop its drive is blocked
+BEFORE_STOP = 1e-6  # distance from a rigid stop at which a complete motion ends [m]: at the stop its drive is blocked
+
+
+def travel_up_to_stop(end: float) -> float:
+    """Return how far a drive goes that a rigid stop at an end does not block [m], in whole nanometres.
+
+    >>> travel_up_to_stop(0.005457)
+    0.005456
+    """
+    return round(end - BEFORE_STOP, 9)
 
 
 class EndStop(Model):

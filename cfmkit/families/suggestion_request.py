@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
+from cfmkit.families.end_stops_spec import BEFORE_STOP
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.processes import MIN_METAL_MODULUS
 
@@ -79,7 +80,7 @@ class Request:
     @property
     def stop_margin(self) -> float:
         """Way from the end of the travel to the end stop [m]; zero if none is required."""
-        return 0.0 if self.overload is None else STOP_MARGIN_SHARE * self.travel
+        return 0.0 if self.overload is None else max(round(STOP_MARGIN_SHARE * self.travel, 6), 2.0 * BEFORE_STOP)
 
     @property
     def with_strengths(self) -> tuple[Request, ...]:

@@ -124,7 +124,8 @@ def message(found: Suggestions) -> str:
         return "the time budget ended the search before a mechanism met the requirements; increase it (--time-budget)"
     if found.remote:
         return (
-            f"no mechanism meets the requirements, nor with one of them relaxed up to {RELAXATION_FACTORS[-1]:g} times"
+            "no mechanism meets the requirements, and none was found with one of them relaxed up to "
+            f"{RELAXATION_FACTORS[-1]:g} times"
         )
     return "no mechanism meets the requirements"
 

@@ -25,7 +25,7 @@ from cfmkit.stock.stock_series import series_of
 from cfmkit.studies.parts.assumed_errors import accuracy_of, process_of_part
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from cfmkit.families.run_control import Run
     from cfmkit.results import Result
@@ -45,8 +45,8 @@ MOST_CHANGE = 0.05
 FINER_DIGITS = 4
 """Decimals by which the digits are refined where a rounded design misses a requirement that it met: to a nanometre."""
 
-NOT_CHOSEN = ("wound", "bought")
-"""Blocks of what is bought: its sizes are its maker's."""
+NOT_CHOSEN = ("wound", "bought", "catalogue", "free", "tolerances", "material")
+"""Blocks whose sizes are those of a maker, or limits that are stated."""
 
 
 def with_stock_sheet(original: Spec, outcome: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
@@ -208,13 +208,13 @@ def with_digits_of_process(original: Spec, outcome: Design, finish: Callable[[Sp
     if outcome.spec is None or not _is_part_to_make(outcome.spec):
         return outcome
     stated, written = (
-        dict(_texts(spec.model_dump(mode="json", exclude_unset=True))) for spec in (original, outcome.spec)
+        dict(lengths_and_angles(spec.model_dump(mode="json", exclude_unset=True))) for spec in (original, outcome.spec)
     )
     kept = {*stated.values(), written.get("mechanism.part.sheet")}  # a profile made for stated links has their lengths
     chosen = {path: text for path, text in written.items() if text not in kept}
     decimals, before = decimals_of(accuracy_of(outcome.spec)), None
     for refined in range(FINER_DIGITS):
-        rounded = {path: _in_digits(text, decimals + refined) for path, text in chosen.items()}
+        rounded = {path: in_digits(text, decimals + refined) for path, text in chosen.items()}
         changes = {path: text for path, text in rounded.items() if text != chosen[path]}
         if not changes:
             return outcome
@@ -247,24 +247,24 @@ def _has_chosen_rates(original: Spec, designed: Spec) -> bool:
     return any(springs[0].get(path) != springs[1][path] for path in paths)
 
 
-def _texts(value: Any, path: str = "") -> Iterator[tuple[str, str]]:
-    """Yield every length and angle of the mechanism as (dotted path, text as written)."""
+def lengths_and_angles(value: Any, blocks: Sequence[str] = ("mechanism",), path: str = "") -> Iterator[tuple[str, str]]:
+    """Yield every length and angle of some blocks of a written specification as (dotted path, text as written)."""
     if isinstance(value, dict):
         for key, item in value.items():
             inside = f"{path}.{key}" if path else str(key)
-            if inside.split(".")[0] == "mechanism" and key not in NOT_CHOSEN:
-                yield from _texts(item, inside)
+            if inside.split(".")[0] in blocks and key not in NOT_CHOSEN:
+                yield from lengths_and_angles(item, blocks, inside)
     elif isinstance(value, list):
         for number, item in enumerate(value):
-            yield from _texts(item, f"{path}.{number}")
+            yield from lengths_and_angles(item, blocks, f"{path}.{number}")
     elif isinstance(value, str) and value.endswith((" mm", " deg")):
         yield path, value
 
 
-def _in_digits(text: str, decimals: int) -> str:
+def in_digits(text: str, decimals: int) -> str:
     """Return a length or an angle with so many decimals: 0.001 deg move the end of 57 mm by 0.001 mm.
 
-    >>> _in_digits("44.4195213186294 mm", 3), _in_digits("6.3793702084428034 deg", 3), _in_digits("6 mm", 3)
+    >>> in_digits("44.4195213186294 mm", 3), in_digits("6.3793702084428034 deg", 3), in_digits("6 mm", 3)
     ('44.42 mm', '6.379 deg', '6 mm')
     """
     number, unit = text.split()

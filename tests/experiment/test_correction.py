@@ -190,6 +190,16 @@ def test_a_recording_of_another_force_is_refused():
         cfmkit.correct(hidden.drawn, Recording("strong", recording.motion, 30.0 * recording.effort))
 
 
+def test_a_zero_that_is_larger_than_the_force_is_no_zero():
+    """The force of these springs is constant: 8 times as much of it looks like a zero of 7 times the force."""
+    drawn = Hidden("slider_crank_bought").drawn
+    curve, noise = curve_of(drawn), np.random.default_rng(3)
+    motion, effort = (np.concatenate([values, values[::-1]]) for values in (curve.motion, 8.0 * curve.effort))
+    strong = Recording("strong", motion, effort + noise.normal(0.0, 0.03, len(motion)))
+    with pytest.raises(DataError, match=r"without load the sensor would show .* another part"):
+        cfmkit.correct(drawn, strong)
+
+
 def test_a_thickness_that_the_process_cannot_make_is_refused_with_the_nearest_force():
     """The width is that of the sheet: a stiffer material needs beams thinner than 0.98 mm, the least that is made."""
     changes = ("mechanism.part.sheet=10 mm", "mechanism.part.process.least_feature=0.98 mm")

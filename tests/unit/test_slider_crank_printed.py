@@ -738,3 +738,10 @@ def test_rubber_that_bears_any_curvature_has_no_thickness_from_the_stress(streng
     design = family("slider-crank").design.make(strip, Run())
     assert design.status is Status.INFEASIBLE
     assert "far thicker than 'design.beam.thickness', 0.5 mm to 2 mm" in design.message
+
+
+def test_flexures_of_almost_no_force_are_refused() -> None:
+    rates = ", ".join(f"{joint}: 1e-9 N*mm/rad" for joint in ("pivot", "crank_pin", "slider_pin"))
+    found = api.design(spec("lumped", f"mechanism.springs={{{rates}}}"))
+    assert found.spec is None
+    assert "stress and force allow flexures of" in found.message

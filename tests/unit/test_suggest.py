@@ -40,7 +40,7 @@ from cfmkit.studies.suggest.proposal_making_and_judging import (
     ProposalJob,
     make_proposal,
 )
-from cfmkit.studies.suggest.relaxed_requests import confirm, edges
+from cfmkit.studies.suggest.relaxed_requests import Edge, confirm, edges
 from cfmkit.studies.suggest.search import FIGURE_SECONDS, RESERVE_OF_FEW, _Times, order_proposals, suggest
 
 REQUESTS = Path(__file__).parents[1] / "requests"
@@ -144,6 +144,7 @@ def test_a_material_named_again_is_one_more_and_replaces_none():
 def test_a_room_and_a_time_may_be_written_short():
     assert parse_envelope("80x60x6mm") == "[80 mm, 60 mm, 6 mm]"
     assert parse_envelope("8cm x 60 mm") == "[8 cm, 60 mm]"
+    assert parse_envelope("8e1x6E1mm") == "[8e1 mm, 6E1 mm]"
     with pytest.raises(UsageError, match="100x100x20 has no unit; write 100x100x20mm"):
         parse_envelope("100x100x20")
     assert seconds("90s") == 90.0
@@ -531,6 +532,17 @@ def test_the_nearest_request_gets_a_proposal_when_it_is_asked():
         assert any(make_proposal(job).passes for job in jobs), key
 
 
+def test_the_nearest_request_is_met_with_the_springs_that_are_allowed():
+    """With custom springs 435 N would do."""
+    keys = {"travel": "300 mm", "ripple": "5 %", "envelope": "[900 mm, 1100 mm, 300 mm]", "springs": "catalogue"}
+    asked = request(force="500 N", **keys)
+    value = confirm(asked, 0, UNLIMITED_CLOCK, Edge("cam", "force", 1.0))
+    assert value is not None
+    again = request(force=value, **keys)
+    candidates = search.offer_of(family("cam"), again, Run()).candidates
+    assert any(make_proposal(ProposalJob("cam", one, again, 0)).passes for one in candidates)
+
+
 def test_two_relaxed_keys_are_named_after_one_analysis_each(monkeypatch):
     made = []
 
@@ -573,7 +585,10 @@ def test_a_request_that_nothing_comes_near_says_so(monkeypatch):
     monkeypatch.setattr(search, "edges", lambda *_: iter(()))
     found = suggest(request(envelope="[26 mm, 20 mm, 12 mm]"), Run())
     assert found.remote
-    assert message(found) == "no mechanism meets the requirements, nor with one of them relaxed up to 6 times"
+    assert (
+        message(found)
+        == "no mechanism meets the requirements, and none was found with one of them relaxed up to 6 times"
+    )
 
 
 def test_a_family_whose_candidates_all_miss_is_relaxed_by_a_little_first(monkeypatch):

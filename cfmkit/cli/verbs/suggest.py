@@ -196,13 +196,16 @@ def parse_envelope(text: str) -> str:
 
     Examples
     --------
-    >>> parse_envelope("80x60x6mm"), parse_envelope("80 mm x 6 cm")
-    ('[80 mm, 60 mm, 6 mm]', '[80 mm, 6 cm]')
+    >>> parse_envelope("80x60x6mm"), parse_envelope("80 mm x 6 cm"), parse_envelope("8e1 x 60mm")
+    ('[80 mm, 60 mm, 6 mm]', '[80 mm, 6 cm]', '[8e1 mm, 60 mm]')
     """
     if text.strip().startswith("["):
         return text
-    sides = [side.strip() for side in re.split(r"(?<=[\d. a-z])x(?=[\d. ])", text.strip())]
-    if not (unit := re.sub(r"^[\d.eE+-]*\s*", "", sides[-1])):
+    sides = [
+        re.sub(r"^([+-]?[\d.,]*(?:[eE][+-]?\d+)?)\s*", r"\1 ", side.strip()).partition(" ")
+        for side in re.split(r"(?<=[\d. a-z])x(?=[\d. ])", text.strip())
+    ]
+    unit = sides[-1][2]
+    if not unit:
         raise UsageError(f"--envelope: {text.strip()} has no unit; write {text.strip()}mm")
-    full = [side if re.search(r"[a-zA-Z]", side) else f"{side} {unit}" for side in sides]
-    return "[" + ", ".join(re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", side) for side in full) + "]"
+    return "[" + ", ".join(f"{number} {own or unit}" for number, _, own in sides) + "]"

@@ -48,6 +48,9 @@ SHAPE_FILES = ("lan-2010", "lan-flat", "lan-wide", "lan-tall", "arch", "end-effe
 RELATIVE_SIZES = (1.0, 0.96, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
 """Sizes that are tried, over the largest that fits the envelope with the pads scaled, too, which they are not."""
 
+ROUNDED_BOX = 1.0 - 2e-4
+"""Share of the envelope that the largest takes: its lengths are rounded."""
+
 BENDING_STRESS_SHARE = 0.95
 """Share of the allowable stress by bending alone: what stretching adds is judged afterwards."""
 
@@ -127,7 +130,8 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     found: list[Candidate] = []
     missed: list[tuple[float, str]] = []
     for kept in kept_shapes():
-        largest = min(request.envelope[0] / kept.envelope.across, request.envelope[1] / kept.envelope.along)
+        sides = request.envelope[0] / kept.envelope.across, request.envelope[1] / kept.envelope.along
+        largest = ROUNDED_BOX * min(sides)
         for share in RELATIVE_SIZES:
             for block, ratio in product(request.materials or ({"name": "pom"},), MAX_THICKNESS_RATIOS):
                 candidate = _rescale_shape(request, kept, share * largest, dict(block), ratio)

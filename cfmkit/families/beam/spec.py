@@ -12,7 +12,7 @@ from cfmkit.families.beam.contact_spec import contacts_of
 from cfmkit.families.beam.mechanism_spec import Mechanism
 from cfmkit.families.beam.network_elements_spec import BeamMaterial, DisplacementDrive, Drive, LoadsDrive, MaterialField
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
-from cfmkit.families.end_stops_spec import BEFORE_STOP, contact_requirement_faults
+from cfmkit.families.end_stops_spec import contact_requirement_faults, travel_up_to_stop
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.formula_of_x import formula
@@ -337,7 +337,7 @@ class BeamSpec(Spec):
         if not isinstance(drive, DisplacementDrive) or (copies is not None and copies.layers > 1):
             return {}
         stop = {"node": drive.node, "direction": drive.direction, "gap": end}
-        return {"mechanism.stops": {"end": stop}, "analysis.travel": end - BEFORE_STOP}
+        return {"mechanism.stops": {"end": stop}, "analysis.travel": travel_up_to_stop(end)}
 
     @property
     def extent(self) -> float:

@@ -300,6 +300,9 @@ def widen_plate(spec: CamSpec, request: Request) -> CamSpec:
 
     if count_of(spec.mechanism.springs) % 2:
         raise SolutionError("an odd number of springs of the catalogue would pull on one side of the plate")
+    springs = spec.mechanism.springs
+    if springs.wound is not None:  # the rate is that of the wire
+        spec = spec.replace({"mechanism.springs": springs.model_dump(exclude_unset=True, exclude={"stiffness"})})
     result = analyze(spec.replace({"analysis.window": None}), Run())  # all of the travel counts
     factor = evaluate(result, ["safety_factor"])["safety_factor"].value
     if factor is None or factor >= request.safety or spec.mechanism.contact is None:

@@ -52,8 +52,12 @@ def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
         designed = design(spec.replace(changes), Run())
         if not isinstance(designed.spec, SliderCrankSpec):
             raise SolutionError(designed.message)
+        # the rates are those of the wires
+        chosen = designed.spec.replace(
+            {"design": None, "mechanism.springs": {"bought": designed.spec.mechanism.springs.bought}}
+        )
         for block in request.materials or ({"name": "steel-s235"},):
-            linked = with_links(designed.spec.replace({"design": None}), request, block)
+            linked = with_links(chosen, request, block)
             if linked is not None:
                 return linked
     raise SolutionError("links neither bear the loads of the springs nor stay straight under them")

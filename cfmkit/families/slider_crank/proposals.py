@@ -453,7 +453,9 @@ def part(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.printed.model import analyze
 
-    made = spec.replace({"design": None, "requirements": (), "mechanism.safety_factor": 1.0})
+    # the rates for which flexures were sized are not theirs
+    rates: dict[str, Any] = {"mechanism.springs": {}} if spec.mechanism.flexures else {}
+    made = spec.replace({"design": None, "requirements": (), "mechanism.safety_factor": 1.0, **rates})
     result = analyze(made, Run())
     if not result.curves:
         return made

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from cfmkit.families.end_stops_spec import BEFORE_STOP, stop_faults
+from cfmkit.families.end_stops_spec import stop_faults, travel_up_to_stop
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
 from cfmkit.families.slider_crank.springs.spec import Limits, Links, SpringDesign, Springs
 from cfmkit.metrics.fatigue_and_relaxation import Durability
@@ -200,7 +200,7 @@ class SliderCrankSpec(Spec):
         """Return what puts a rigid stop at a motion of the slider [m], just behind the end; none with springs."""
         if self.built_as == "springs":
             return {}
-        return {"mechanism.stops": {"end": {"gap": end}}, "analysis.travel": (0.0, end - BEFORE_STOP)}
+        return {"mechanism.stops": {"end": {"gap": end}}, "analysis.travel": (0.0, travel_up_to_stop(end))}
 
     @model_validator(mode="after")
     def _a_mirrored_pair_is_on_one_slider(self) -> Self:

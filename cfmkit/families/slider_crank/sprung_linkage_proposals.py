@@ -43,6 +43,7 @@ from cfmkit.stock.springs.made_to_measure import (
     torsion_spring,
 )
 from cfmkit.stock.springs.offer_type_and_generic_series import largest_load
+from cfmkit.stock.stock_series import series_of
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.flattest_springs_that_fit import HeldEffort
@@ -240,10 +241,16 @@ def _pushing(spec: SliderCrankSpec, request: Request, sheet: float | None = None
 def sheets_of_links(request: Request) -> tuple[float, ...]:
     """Return of which sheets links may be that have springs at their pins, the thinnest first [m].
 
-    Shares of the depth required; where depth does not matter, shares of the envelope's shorter side.
+    Shares of the depth required; where depth does not matter, shares of the envelope's shorter side. Of a material
+    with a series of sheets that begins below the first share all of the series up to the last.
     """
     deep = 0.5 * min(request.envelope[:2]) if request.depth is None else request.depth
-    return tuple(dict.fromkeys(max(share * deep, request.thinnest) for share in LINK_SHARES))
+    shares = [max(float(f"{share * deep:.2g}"), request.thinnest) for share in LINK_SHARES]
+    materials = request.materials or ({"name": "steel-s235"},)
+    named = (series_of("sheet", "metric", block.get("name")) for block in materials)
+    sold = [size for series in named if series is not None for size in series.sizes if size >= request.thinnest]
+    first = max((size for size in sold if size <= shares[0]), default=None)
+    return tuple(dict.fromkeys(shares if first is None else (size for size in sold if first <= size <= shares[-1])))
 
 
 def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:

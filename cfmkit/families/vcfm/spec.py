@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.end_stops import EndStops
-from cfmkit.families.end_stops_spec import BEFORE_STOP, EndStop, stop_faults
+from cfmkit.families.end_stops_spec import EndStop, stop_faults, travel_up_to_stop
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS, Bistable, Positive
 from cfmkit.families.vcfm.surroundings_spec import BoughtSprings, CutLeaves, VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
@@ -396,7 +396,7 @@ class VcfmSpec(Spec):
 
     def end_stop_changes(self, end: float) -> Mapping[str, Any]:
         """Return what puts a rigid stop at a motion of the shuttle [m] and ends the analysis just before it."""
-        return {"mechanism.stops": {"end": {"gap": end}}, "analysis.travel": end - BEFORE_STOP}
+        return {"mechanism.stops": {"end": {"gap": end}}, "analysis.travel": travel_up_to_stop(end)}
 
     @property
     def travel(self) -> float:

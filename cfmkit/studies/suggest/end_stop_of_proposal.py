@@ -27,7 +27,7 @@ def add_end_stop(spec: Spec, request: Request) -> Spec:
     window: Any = spec.get_value("analysis.window")
     if request.overload is None or window is None:
         return spec
-    changes = spec.end_stop_changes(float(window[1]) + request.stop_margin)
+    changes = spec.end_stop_changes(round(float(window[1]) + request.stop_margin, 9))
     if not changes:
         raise SolutionError(NO_END_STOP)
     return spec.replace(changes)

@@ -23,6 +23,9 @@ from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump, read_document
+from cfmkit.studies.parts.assumed_errors import accuracy_of
+from cfmkit.studies.stock_and_digits import decimals_of
+from cfmkit.studies.suggest.digits_of_proposal import round_to_process
 from cfmkit.studies.suggest.end_stop_of_proposal import add_end_stop, note_end_stop, remove_end_stop
 from cfmkit.studies.suggest.material_and_fastening_of_proposal import add_process_and_materials, add_screws
 from cfmkit.studies.suggest.misses_in_words import (
@@ -334,7 +337,7 @@ def judge_proposal(
     called = variant.replace(" ", "-").replace(",", "")
     # read back from its text: what is judged is what stands in the file
     spec = add_process_and_materials(spec, request) if near is None else add_screws(record, spec)
-    spec = add_end_stop(spec, request)
+    spec = add_end_stop(round_to_process(spec, request, decimals_of(accuracy_of(spec))), request)
     plain = spec_of(name, dump(spec.replace({"design": None, "name": called})))
     begun = time.perf_counter()
     result = record.analyze(spec_of(name, dump(plain.replace({"requirements": windows_of(plain, request)}))), Run())

@@ -37,13 +37,14 @@ def block_for_redesign(
 
 def _range(path: str, value: float, request: Request) -> tuple[str, str]:
     """Return between which lengths a width or a thickness may move, its own value included."""
-    low, high = value / MOST_CHANGE, value * MOST_CHANGE
+    low, high = ends = value / MOST_CHANGE, value * MOST_CHANGE
     if path.endswith("width") and request.depth is not None:
         high = max(value, min(high, request.depth))
     if "thickness" in path:
         low = min(value, max(low, request.thinnest))
-    # rounded outwards: a value at its limit stays in its range
-    return format_short(0.999 * low, "length", 4), format_short(1.001 * high, "length", 4)
+    # a limit that is the value, the depth or the thinnest leaf is written in full
+    written = [format_short(end, "length", 3 if end in ends else 12) for end in (low, high)]
+    return written[0], written[1]
 
 
 def _of_own_springs(spec: Spec, request: Request) -> Mapping[str, Any] | None:

@@ -31,7 +31,7 @@ RELAXATION_FACTORS = (1.15, 2.2, 6.0)
 N_HALVINGS = 3
 """Of the last step, on a logarithmic scale: what is left is less than what the laws leave out."""
 
-FURTHER_FACTORS = (1.03, 1.15, 1.5, 2.2)
+FURTHER_FACTORS = (1.03, 1.15, 1.5, 2.2, 3.6, 6.0)
 """Beyond the first candidates: laws leave out pads, margins, and what stretches."""
 
 MAX_RIPPLE = 0.5
@@ -91,8 +91,7 @@ def confirm(request: Request, seed: int, clock: Clock, edge: Edge) -> str | None
     relaxation = _relaxations(request)[edge.key]
     tried: set[str] = set()
     for more in FURTHER_FACTORS:
-        factor = edge.factor * more
-        relaxed = relaxation(request, factor) if factor <= RELAXATION_FACTORS[-1] else None
+        relaxed = relaxation(request, min(edge.factor * more, RELAXATION_FACTORS[-1]))
         if relaxed is None:
             return None
         # the sides that were just enough by the laws may be too little: then all of them
@@ -129,8 +128,15 @@ def _offer(request: Request, name: str, seed: int) -> Sequence[Candidate]:
     if not propose:
         return ()
     asked = request.with_strengths[-1]
-    candidates = propose(asked, Run(seed)).candidates
+    candidates = [candidate for candidate in propose(asked, Run(seed)).candidates if is_allowed(request, candidate)]
     return sorted(candidates, key=lambda candidate: candidate.doubtful)
+
+
+def is_allowed(request: Request, candidate: Candidate) -> bool:
+    """Return True if a candidate has springs of the required kind, and an end stop where an overload needs one."""
+    if None not in (candidate.springs, request.springs) and candidate.springs != request.springs:
+        return False
+    return request.overload is None or bool(candidate.spec.end_stop_changes(1.0))
 
 
 def _only_needed(request: Request, asked: tuple[str, int], relaxed: Relaxed) -> Relaxed:

@@ -36,7 +36,7 @@ from cfmkit.studies.suggest.proposal_making_and_judging import (
     ProposalJob,
     make_proposal,
 )
-from cfmkit.studies.suggest.relaxed_requests import MAX_NAMED_KEYS, confirm, edges
+from cfmkit.studies.suggest.relaxed_requests import MAX_NAMED_KEYS, confirm, edges, is_allowed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -365,9 +365,7 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
     for requested, reserve in product(request.with_strengths, reserves):
         offer = record.propose(replace(requested, reserve=reserve), run)
         for candidate in offer.candidates:
-            if None not in (candidate.springs, request.springs) and candidate.springs != request.springs:
-                continue
-            if request.overload is not None and not candidate.spec.end_stop_changes(1.0):
+            if not is_allowed(request, candidate):
                 continue
             candidates.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
     reason = f"it needs {OTHER_SPRINGS[request.springs]} springs" if offer.candidates and request.springs else ""

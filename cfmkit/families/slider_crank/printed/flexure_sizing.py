@@ -179,8 +179,8 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
             f"flexures of {mm(max(lengths))} from a sheet of {mm(sheet)} have {found.over:.4g} times the stress allowed"
         )
         return no_design(finding("target_unreachable", text), {"design.flexures.length": longer})
-    if (thinnest := min(one.thickness for one in found.flexures)) < 1.0 / PER_METRE:
-        text = f"the stress allows flexures of {mm(thinnest)} at most: less travel, or a stronger material"
+    if (thinnest := min(min(one.thickness, one.width) for one in found.flexures)) < 1.0 / PER_METRE:
+        text = f"stress and force allow flexures of {mm(thinnest)} at most: less travel, or a stronger material"
         return no_design(finding("target_unreachable", text))
     factors: dict[str, tuple[float | None, str, str]] = {
         "closed_form_force": (found.force_factor, "factor", f"force {FACTOR_PHRASES[0]}"),
