@@ -133,13 +133,14 @@ class SpringTask:
 
     def _evaluate_friction(self, places: FloatArray) -> FloatArray | float:
         """Return what friction adds to the effort with the springs of the last round, over the target."""
-        way = self.wanted.branch
-        if self.rates is None or way is None or not self.assembly.rubbing.there:
+        wanted = self.wanted.branch
+        if self.rates is None or wanted is None or not self.assembly.rubbing.there:
             return 0.0
         rubbed = replace(self.assembly, rates=self.rates * self.spec.mechanism.sets)
-        ways = {"load": (1.0,), "unload": (-1.0,), "mean": (1.0, -1.0)}[way]
-        free = rubbed.rates @ rubbed.units(places).effort
-        added = sum(branch(rubbed, places, one).effort - free for one in ways) / len(ways)
+        ways = {"load": (1.0,), "unload": (-1.0,), "mean": (1.0, -1.0)}[wanted]
+        units = rubbed.units(places)
+        free = rubbed.rates @ units.effort
+        added = sum(branch(rubbed, units, way).effort - free for way in ways) / len(ways)
         if not np.isfinite(added).all():
             text = "friction holds the mechanism within the window: the line of force runs through its pins"
             raise Infeasible(finding("self_locks", f"{text}; use thinner pins ('mechanism.pins'), or another window"))
