@@ -108,7 +108,7 @@ class SpringTask:
     def _travels(self, angle: FloatArray, last: float) -> FloatArray:
         """Return the travels at crank angles, of the two that each allows: those that lead up to a last one."""
         link = self.assembly.linkage
-        start, own = float(link.slider_position(np.asarray(self.assembly.unloaded))), link.slider_position(angle)
+        start, own = link.place(self.assembly.unloaded), link.slider_position(angle)
         away: FloatArray = link.branch * (start - own)
         other: FloatArray = link.branch * (start - (2.0 * link.crank * np.cos(angle) - own))
         return away if abs(away[-1] - last) <= abs(other[-1] - last) else other
