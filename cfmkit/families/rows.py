@@ -116,6 +116,11 @@ def is_column(*values: Any) -> bool:
     return any(np.ndim(value) > 0 for value in values)
 
 
+def plain_if_equal(value: Any) -> Any:
+    """Return a number as it is, and a column of equal numbers as one of them."""
+    return value.flat[0] if np.ndim(value) and (value == value.flat[0]).all() else value
+
+
 def refuse_columns(*values: Any) -> None:
     """Raise `RowsDiffer` if one of some numbers is a column: what follows is computed for one mechanism alone."""
     if is_column(*values):
@@ -132,6 +137,27 @@ def root_between(function: Callable[[Any], Any], low: Any, high: Any) -> Any:
     roots = bracketed_roots(function, low, high)
     fails(np.isnan(roots))
     return roots
+
+
+class PlacesKept(Generic[T]):
+    """A function of places of all rows that keeps its last two results.
+
+    What is wanted on the way up is asked for again on the way down, at other places in between.
+    """
+
+    def __init__(self, function: Callable[[FloatArray], T]) -> None:
+        """Keep nothing yet."""
+        self._function = function
+        self._kept: list[tuple[FloatArray, T]] = []
+
+    def __call__(self, places: FloatArray) -> T:
+        """Return the result at places."""
+        for known, result in self._kept:
+            if known is places or (known.shape == places.shape and (known == places).all()):
+                return result
+        result = self._function(places)
+        self._kept = [(places, result), *self._kept[:1]]
+        return result
 
 
 def row_of(item: T, row: int) -> T:

@@ -24,7 +24,7 @@ from cfmkit.families.cam.assembly import TRAVEL_RTOL
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
-from cfmkit.families.cam.geometry.slope_law import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.mechanism_from_spec import (
     assemble_sides,
@@ -362,7 +362,8 @@ def two_way_gap(
     path, end = reach(law, target.stroke)
     x = np.linspace(law.rest_half_width, end, 801)
     x = x[path.travel(x) >= 0.02 * target.stroke]
-    states = TrackStates(x, np.zeros_like(x), *law.slopes(x), np.zeros(len(x), dtype=bool), x)
+    tangent, on_flank = brace_tangent(x, loads.brace_length), np.zeros(len(x), dtype=bool)
+    states = TrackStates(x, np.zeros_like(x), law.slope(x), tangent, on_flank, x, partial(law.slope_derivative, x))
     ways = np.stack([forces(states, loads, way * friction, way).slider for way in (1.0, -1.0)])
     if not np.isfinite(ways).all():
         return float("inf")

@@ -32,7 +32,7 @@ from cfmkit.families.cam.solution import DenseLoop, Solution
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import fails, findings_of_one, values_of_one
+from cfmkit.families.rows import fails, findings_of_one, plain_if_equal, values_of_one
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import parts_tables
 
@@ -44,6 +44,9 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
     from cfmkit.stock.parts_list import ListedPart
+
+STROKE_RTOL = 1e-13
+"""Rounding of the travel to the end of a flank that is cut for a stroke: mechanisms side by side have one travel."""
 
 UNEQUAL_SIDES_MESSAGE = (
     "the quasi-static model is symmetric and would give the force of two right sides: add 'analysis.dynamics' with a "
@@ -168,10 +171,12 @@ def solve(
 def reachable_travel(assembly: Assembly) -> tuple[Any, Any]:
     """Return where the travel begins, and as far as it goes: to what is asked, the end of the track, or a stop [m]."""
     spec, track = assembly.spec, assembly.track
-    available = track.end - track.start
+    stroke, available = spec.mechanism.profile.stroke, track.end - track.start
+    assert stroke is not None  # of a resolved spec
+    available = np.where(np.abs(available - stroke) <= STROKE_RTOL * stroke, stroke, available)
     low, high = travel_between_stops(spec)
     asked = available if spec.analysis.travel is None else spec.analysis.travel
-    return low, np.minimum(np.minimum(asked, available), high)
+    return low, plain_if_equal(np.minimum(np.minimum(asked, available), high)[()])
 
 
 def travel_between_stops(spec: CamSpec) -> tuple[Any, Any]:

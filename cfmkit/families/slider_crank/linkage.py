@@ -82,7 +82,7 @@ class Linkage:
         if abs(self.offset) > abs(short):
             return -far, far
         near = math.sqrt((short - self.offset) * (short + self.offset))
-        return (near, far) if self.branch * float(self.slider_position(np.asarray(angle))) >= 0.0 else (-far, -near)
+        return (near, far) if self.branch * self.place(angle) >= 0.0 else (-far, -near)
 
     def room(self, angle: float) -> tuple[float, float]:
         """Return how far the slider is from the ends of its `way` at a crank angle [m], from the low and the high one.
@@ -90,7 +90,7 @@ class Linkage:
         Next to an end the difference of two places has no digits left; the knee angle psi has: x_s^2 - x^2 is
         4 r1 r2 sin^2(psi/2), and x^2 exceeds that of the folded position by 4 r1 r2 cos^2(psi/2).
         """
-        place, half = self.branch * float(self.slider_position(np.asarray(angle))), 0.5 * self.knee(angle)
+        place, half = self.branch * self.place(angle), 0.5 * self.knee(angle)
         square, far = 4.0 * self.crank * self.coupler, self.stretched_position
 
         def measure_distance(end: float) -> float:
@@ -137,6 +137,10 @@ class Linkage:
         position: FloatArray = self.crank * np.cos(angle) + self.branch * self._run(lift)
         return position
 
+    def place(self, angle: float) -> float:
+        """Return `slider_position` at one crank angle [m]; NaN where the linkage does not reach."""
+        return self.crank * math.cos(angle) + self.branch * self._lift_and_run(angle)[1]
+
     def knee(self, angle: float) -> float:
         """Return the angle from the coupler's direction to the crank's [rad]: 0 where stretched, pi where folded."""
         if abs(math.remainder(angle - self.stretched_angle, 2.0 * math.pi)) <= STRETCHED_ANGLE_TOL:
@@ -144,15 +148,20 @@ class Linkage:
         folded = self.folded_angle
         if folded is not None and abs(math.remainder(angle - folded, 2.0 * math.pi)) <= STRETCHED_ANGLE_TOL:
             return math.pi
-        return math.remainder(angle - float(self.coupler_angle(np.asarray(angle))), 2.0 * math.pi)
+        lift, run = self._lift_and_run(angle)
+        turn = math.atan2(-lift, run)
+        return math.remainder(angle - (turn if self.branch > 0 else math.pi - turn), 2.0 * math.pi)
+
+    def _lift_and_run(self, angle: float) -> tuple[float, float]:
+        """Return how far the crank pin is above the slider's path, and `_run`, at one crank angle [m]."""
+        lift = self.crank * math.sin(angle) - self.offset
+        squared = (self.coupler - lift) * (self.coupler + lift)
+        return lift, math.sqrt(squared) if squared >= 0.0 else math.nan
 
     def _run(self, lift: FloatArray) -> FloatArray:
         """Return the length of the coupler along x, not negative [LH, eq. 5a]."""
-        squared = (self.coupler - lift) * (self.coupler + lift)
-        if not np.ndim(squared) and squared >= 0.0:  # of one place, as parts are put together one by one
-            return np.sqrt(squared)
         with np.errstate(invalid="ignore"):
-            run: FloatArray = np.sqrt(squared)
+            run: FloatArray = np.sqrt((self.coupler - lift) * (self.coupler + lift))
         return run
 
 

@@ -188,7 +188,7 @@ class Assembly(ShortRepr):
     def _relaxed_ends(self) -> tuple[bool, bool]:
         """Whether the springs are relaxed at the first, and at the last place that a driven slider can reach."""
         stretched, folded = (self.knee == knee for knee in (0.0, math.pi))
-        past = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded))) < 0.0
+        past = self.linkage.branch * self.linkage.place(self.unloaded) < 0.0
         return (folded, stretched) if past else (stretched, folded)
 
     @property
@@ -361,7 +361,7 @@ def turn_unloaded(assembly: Assembly, angle: float) -> tuple[Assembly, float]:
     if assembly.drive == "torque":
         return other, 0.0
     link = assembly.linkage
-    before, after = (float(link.slider_position(np.asarray(one.unloaded))) for one in (assembly, other))
+    before, after = (link.place(one.unloaded) for one in (assembly, other))
     return other, link.branch * (before - after)
 
 
