@@ -663,6 +663,13 @@ def test_the_side_of_a_strip_is_found_without_its_stresses(monkeypatch: pytest.M
     assert not calls
 
 
+@pytest.mark.parametrize(("name", "thickness"), [("lumped", [0.908, 0.960, 0.960]), ("strip", [0.97721])])
+def test_what_bends_is_in_every_pose_as_thick_as_specified(name: str, thickness: list[float]) -> None:
+    bodies = family("slider-crank").part(cfmkit.analyze(spec(name, "analysis.points=11"))).bodies
+    halves = [np.unique(body.half_thickness) for body in bodies if body.name == "flexure"]
+    np.testing.assert_allclose(halves, 0.5 * MM * np.array(thickness)[:, None])
+
+
 def test_printing_allowance_is_not_drawn() -> None:
     thin = api.drawing(spec("strip", "mechanism.beam.offset=0.1 mm")).tables[0].columns["thickness"][0]
     np.testing.assert_allclose(thin, 0.97721 * MM)
