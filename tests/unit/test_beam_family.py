@@ -14,6 +14,7 @@ import pytest
 from beam_support import MM, at, cantilever, config, solved, value
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.cli.main import main
 from cfmkit.elastica import Section, Taper
 from cfmkit.elastica.mechanics.march import engine
@@ -21,7 +22,6 @@ from cfmkit.errors import DataError, InputError, SpecError
 from cfmkit.families import family
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as SURFACE
-from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 
 GUIDED = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: parallel}")

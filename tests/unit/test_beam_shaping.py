@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from journal_support import NotesInMemory
 
-from cfmkit import analyze, dumps, evaluate, load, loads
+from cfmkit import Run, analyze, dumps, evaluate, load, loads
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
@@ -32,7 +32,6 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
 from cfmkit.families.beam.shaping.sqp_program import Flattest, ForceRatio, Shaping, Widest
 from cfmkit.families.beam.shaping.task import STRESS_MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
-from cfmkit.families.run_control import Run
 from cfmkit.numerics.monotone_interpolation import ThroughPoints
 from cfmkit.results import Status
 from cfmkit.specs.evaluable_target_curve import TargetCurve

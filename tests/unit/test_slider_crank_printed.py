@@ -25,9 +25,8 @@ from flexure_support import (
 )
 
 import cfmkit
-from cfmkit import api
+from cfmkit import Run, api
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.printed import equilibrium_path, strip_thickness_search
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.flexure_sizing import rotations, size_flexure

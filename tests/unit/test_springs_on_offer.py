@@ -12,9 +12,9 @@ from cam_support import analyze, cam, design
 from pydantic import ValidationError
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.bought_springs import best_sets
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
