@@ -669,6 +669,16 @@ def test_what_bends_is_in_every_pose_as_thick_as_specified(name: str, thickness:
     np.testing.assert_allclose(halves, 0.5 * MM * np.array(thickness)[:, None])
 
 
+def test_forces_are_as_accurate_as_asked_for() -> None:
+    fine, usual, rough = (
+        api.analyze(spec("strip", f"analysis.accuracy={accuracy}", "analysis.points=7")).state
+        for accuracy in ("1e-10", "1e-7", "1e-3")
+    )
+    off = [np.abs(state.force - fine.force).max() for state in (usual, rough)]
+    assert off[0] < usual.effort_error < rough.effort_error
+    assert off[0] < off[1] < rough.effort_error
+
+
 def test_printing_allowance_is_not_drawn() -> None:
     thin = api.drawing(spec("strip", "mechanism.beam.offset=0.1 mm")).tables[0].columns["thickness"][0]
     np.testing.assert_allclose(thin, 0.97721 * MM)

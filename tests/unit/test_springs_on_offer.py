@@ -232,6 +232,12 @@ def test_a_compression_spring_is_not_pressed_beyond_its_turns(block, largest):
     assert spring.offer.largest == pytest.approx(1e-3 * largest)
 
 
+@pytest.mark.parametrize(("torque", "largest"), [("60 N*mm", 1.2), ("100 N*mm", 0.5 * math.pi)])
+def test_a_torsion_spring_is_wound_up_to_its_largest_angle_or_torque(torque, largest):
+    ends = {"rate": "50 N*mm/rad", "max_angle": "90 deg", "max_torque": torque}
+    assert CatalogueSpring.model_validate({"name": "T", "kind": "torsion"} | ends).offer.largest == largest
+
+
 def test_of_what_misses_the_nearest_three_are_told():
     misses = [Miss(f"s{k}", share, f"by {share}") for k, share in enumerate((0.5, 0.1, 0.3, 0.2))]
     assert nearest(misses) == "s1: by 0.1; s3: by 0.2; s2: by 0.3; 1 other misses by more"
