@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -445,3 +446,13 @@ def test_a_search_that_pushes_two_joined_nodes_into_one_place_has_no_answer_ther
     program = Shaping(Variables(task, 2), 6.8e-3, Flattest())
     assert program.begin(x) is None
     assert program.view(x) is None
+
+
+def test_a_design_takes_the_place_of_another_only_if_it_meets_its_limits_and_is_better():
+    task, better = SimpleNamespace(objective="stress"), multistart._better
+    designs = (SimpleNamespace(feasible=fits, objective=own) for fits, own in ((True, 1), (True, 2), (False, 0)))
+    best, good, missed = designs
+    assert better(task, best, good)
+    assert better(task, good, missed)
+    assert better(task, good, None)
+    assert not any(better(task, *pair) for pair in ((good, best), (missed, None), (missed, good), (None, None)))
