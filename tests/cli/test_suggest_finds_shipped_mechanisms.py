@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.metrics import window_of
 from cfmkit.runs.suggest_api import read_request
 from cfmkit.studies.suggest import search

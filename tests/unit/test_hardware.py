@@ -299,7 +299,7 @@ def test_screws_of_the_ground_are_reached_beside_what_moves():
 
 
 def test_a_design_without_stated_friction_says_what_pins_and_guide_take():
-    from cfmkit.families.run_control import Run
+    from cfmkit import Run
     from cfmkit.studies.assumed_friction import friction_note
 
     plain = cfmkit.analyze(cfmkit.load("configs/slider_crank_bilancia2019.yaml"))

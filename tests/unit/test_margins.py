@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.cli.main import main
 from cfmkit.designing import run_many_starts
 from cfmkit.designing.robust_design import RobustProblem, with_margins
 from cfmkit.families import family
 from cfmkit.families.base import DesignMethod
 from cfmkit.families.beam.force_at_few_poses import sample_poses
-from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm import model
 from cfmkit.families.vcfm.model import solve
 from cfmkit.specs.units import TravelShare

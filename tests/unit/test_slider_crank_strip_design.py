@@ -11,8 +11,8 @@ import pytest
 from flexure_support import ABS, LINKAGE, MM, UNLOADED, WIDTH, corners
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.elastica import PathStatus
-from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.printed import design as printed
 from cfmkit.families.slider_crank.printed import sqp_program, strip_thickness_search
 from cfmkit.families.slider_crank.printed.audit import judge

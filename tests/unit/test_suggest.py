@@ -12,12 +12,12 @@ import pytest
 from suggest_support import POM, propose, request
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.cli.verbs.suggest import SuggestOptions, keys, parse_envelope, seconds
 from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK
 from cfmkit.errors import SolutionError, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.beam.proposals import kept_shapes
-from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage import linkage_of
 from cfmkit.families.slider_crank.proposals import PUSHED_PROPORTIONS, _strip, largest_printed

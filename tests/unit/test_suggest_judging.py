@@ -12,12 +12,11 @@ import pytest
 from suggest_support import POM, propose, request
 
 import cfmkit
-from cfmkit import api
+from cfmkit import Run, api
 from cfmkit.errors import SpecError
 from cfmkit.families import family, stiffening_of_wide_beams
 from cfmkit.families.base import function_named
 from cfmkit.families.hardware import PartStrength
-from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, links_that_bear
 from cfmkit.runs.part_on_paper import assumed_tolerances
 from cfmkit.runs.suggest_api import read_request

@@ -8,9 +8,8 @@ linearly between its ends, where the torsion springs take hold. Counted are, per
   von Mises, the allowable stress over sqrt(3);
 - bearing of a pin: R/(d s);
 - Euler's load out of the plane, the pins as hinges: pi^2 E w s^3/(12 L^2);
-- the turn of one end of a link against the other under the moment k q of a torsion spring, all along the link: k L/(E
-  I)
-  times the spring's own turn q, I = s w^3/12. The true moment is smaller everywhere but at that end.
+- the turn of one end of a link against the other under the moment k q of a torsion spring, all along the link:
+  k L/(E I) times the spring's own turn q, I = s w^3/12. The true moment is smaller everywhere but at that end.
 
 Assumes: both links of one sheet, equal pins; no load out of the plane (links lie beside each other, a sheet apart).
 """
