@@ -28,9 +28,10 @@ LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?:)([^)#\s]+)(#[^)\s]*)?\)")
 
 
 MECHANICS = "cfmkit/elastica/mechanics"
+C_FILES = "module", "march", "compare", "newton", "terms", "contact", "sides", "gaps", "factor"
 MARCH = Extension(
     "cfmkit.elastica.mechanics._march",
-    [f"{MECHANICS}/{name}.c" for name in ("module", "march", "newton", "terms", "contact", "sides", "gaps", "factor")],
+    [f"{MECHANICS}/{name}.c" for name in C_FILES],
     depends=[f"{MECHANICS}/march.h"],
     libraries=[] if os.name == "nt" else ["m"],
     extra_compile_args=[] if os.name == "nt" else ["-O3", "-std=c99"],

@@ -19,7 +19,7 @@ import numpy as np
 
 import cfmkit
 from cfmkit.families.run_control import Run
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.design import form_of, task_of
 from cfmkit.families.slider_crank.printed.model import chain_of
 from cfmkit.families.slider_crank.printed.sqp_program import StripProgram

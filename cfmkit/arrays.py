@@ -19,15 +19,9 @@ if TYPE_CHECKING:
 
     FloatArray = NDArray[np.float64]
 
-MAX_REPR_LENGTH = 1500
-"""Characters of a `repr`."""
-
-LONGEST_ITEM = 100
-"""Characters of one item in it."""
-
-PLAIN_TYPES = (str, int, float, type(None))
-"""What has a text of its own that is short."""
-
+MAX_REPR_LENGTH = 1500  # characters of a `repr`
+LONGEST_ITEM = 100  # characters of one item in it
+PLAIN_TYPES = (str, int, float, type(None))  # what has a text of its own that is short
 T = TypeVar("T")
 
 
@@ -72,7 +66,6 @@ class Named(dict[str, T]):
     """Values by name, whose text is short."""
 
     def __repr__(self) -> str:
-        """Return the first values by name, and how many more there are."""
         return "{" + _join_texts([f"{name!r}: {brief(value)}" for name, value in self.items()]) + "}"
 
 
@@ -82,7 +75,6 @@ class Several(tuple[T, ...]):
     __slots__ = ()
 
     def __repr__(self) -> str:
-        """Return the first values, and how many more there are."""
         return "(" + _join_texts([brief(value) for value in self]) + ")"
 
 
@@ -106,7 +98,6 @@ class LazyMapping(Mapping[str, T]):
     """
 
     def __init__(self, names: Iterable[str], compute: Callable[[str], T], known: Mapping[str, T] | None = None) -> None:
-        """Compute nothing yet."""
         self._known = dict(known or {})
         self._names = dict.fromkeys((*names, *self._known))
         self._compute = compute
@@ -120,15 +111,12 @@ class LazyMapping(Mapping[str, T]):
         return self._known[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Return the names."""
         return iter(self._names)
 
     def __len__(self) -> int:
-        """Return the number of names."""
         return len(self._names)
 
     def __contains__(self, name: object) -> bool:
-        """Return True if there is a value of that name, without computing it."""
         return name in self._names
 
     def __or__(self, other: Mapping[str, T]) -> LazyMapping[T]:
@@ -136,7 +124,6 @@ class LazyMapping(Mapping[str, T]):
         return LazyMapping(self._names, self._compute, {**self._known, **other})
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what pickling needs: the values."""
         return Named, (dict(self),)
 
     def __repr__(self) -> str:
@@ -155,7 +142,6 @@ class LazySequence(Sequence[T]):
     """
 
     def __init__(self, compute: Callable[[], Iterable[T]]) -> None:
-        """Compute nothing yet."""
         self._compute: Callable[[], Iterable[T]] | None = compute
         self._values: Several[T] = Several()
 
@@ -171,27 +157,21 @@ class LazySequence(Sequence[T]):
     @overload
     def __getitem__(self, index: slice) -> tuple[T, ...]: ...
     def __getitem__(self, index: int | slice) -> T | tuple[T, ...]:
-        """Return one of the values, or some."""
         return self.values[index]
 
     def __len__(self) -> int:
-        """Return their number."""
         return len(self.values)
 
     def __eq__(self, other: object) -> bool:
-        """Return True if the other sequence has the same values."""
         return isinstance(other, Sequence) and self.values == tuple(other)
 
     def __hash__(self) -> int:
-        """Return the hash of all values."""
         return hash(self.values)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what pickling needs: the values."""
         return Several, (tuple(self.values),)
 
     def __repr__(self) -> str:
-        """Return the first values, and how many more there are."""
         return repr(self.values)
 
 
@@ -199,18 +179,15 @@ class ShortRepr:
     """Makes the text of a dataclass (with ``repr=False``) short, or says that its own is."""
 
     def __repr__(self) -> str:
-        """Return the fields, each with a short text."""
         reported = [f"{item.name}={brief(getattr(self, item.name))}" for item in fields(self)]  # type: ignore[arg-type]
         return f"<{type(self).__name__}: {_join_texts(reported)}>"
 
 
 def shorten_values(values: Any) -> Any:
     """Return values by name, and those within them, with short texts."""
-    return (
-        Named({name: shorten_values(value) for name, value in values.items()})
-        if isinstance(values, Mapping)
-        else values
-    )
+    if not isinstance(values, Mapping):
+        return values
+    return Named({name: shorten_values(value) for name, value in values.items()})
 
 
 def brief(value: Any) -> str:
@@ -224,9 +201,8 @@ def brief(value: Any) -> str:
     if hasattr(value, "dtype") and getattr(value, "shape", None):
         text = _array(value)
     elif isinstance(value, (Mapping, tuple, list)):
-        is_short = (
-            not isinstance(value, Mapping) and len(value) <= 4 and all(isinstance(one, PLAIN_TYPES) for one in value)
-        )
+        few = not isinstance(value, Mapping) and len(value) <= 4
+        is_short = few and all(isinstance(one, PLAIN_TYPES) for one in value)
         text = repr(value) if is_short else f"{type(value).__name__} of {len(value)}"
     elif is_dataclass(value) and not isinstance(value, ShortRepr):
         is_short = all(isinstance(getattr(value, item.name), PLAIN_TYPES) for item in fields(value))

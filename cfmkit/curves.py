@@ -34,7 +34,6 @@ class Column(ShortRepr):
     dimension: str
 
     def __post_init__(self) -> None:
-        """Freeze the values."""
         dtype: Any = np.str_ if self.dimension == "text" else np.float64
         object.__setattr__(self, "values", read_only(self.values, dtype))
 
@@ -72,7 +71,6 @@ class Curve(ShortRepr):
     label: Mapping[str, tuple[float | str, str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check that they belong together."""
         for name, dtype in (("motion", float), ("effort", float), ("branch", np.str_), ("stable", bool)):
             given = getattr(self, name)
             value = np.full(len(self.motion), given) if isinstance(given, str | bool) else given
@@ -87,13 +85,10 @@ class Curve(ShortRepr):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what pickling needs (mapping proxies do not pickle)."""
-        return (
-            type(self),
-            (self.motion, self.effort, self.branch, self.stable, dict(self.extra), self.kind, dict(self.label)),
-        )
+        extra, label = dict(self.extra), dict(self.label)
+        return type(self), (self.motion, self.effort, self.branch, self.stable, extra, self.kind, label)
 
     def __len__(self) -> int:
-        """Return the number of points."""
         return len(self.motion)
 
     @property
@@ -145,7 +140,6 @@ class Curve(ShortRepr):
         yield from self.extra.items()
 
     def __repr__(self) -> str:
-        """Return the curve in a line: what over what, how many points, which branches."""
         low, high = (f"{float(end(self.motion)):.4g}" for end in (np.min, np.max)) if len(self.motion) else ("", "")
         reach = f"{low} ... {high} {'m' if self.kind == 'force' else 'rad'}, " if low else ""
         names = ", ".join(self.branches[:10])

@@ -24,19 +24,10 @@ if TYPE_CHECKING:
     from cfmkit.tables import Table
 
 
-WINDOW_OUTSIDE = "window_outside"
-"""Name of the finding that nothing was measured over a window."""
-
-PART_NOT_DRAWN = "part_not_drawn"
-"""Name of the finding that a design has no part that can be cut as it is."""
-
-THIN_WALL = "thin_wall"
-"""Name of the finding that a part is thinner somewhere than its process can make."""
-
-OVERWRITTEN_FINDING = "overwritten"
-"""Finding that a design replaces a value that was stated."""
-
-
+WINDOW_OUTSIDE = "window_outside"  # name of the finding that nothing was measured over a window
+PART_NOT_DRAWN = "part_not_drawn"  # name of the finding that a design has no part that can be cut as it is
+THIN_WALL = "thin_wall"  # name of the finding that a part is thinner somewhere than its process can make
+OVERWRITTEN_FINDING = "overwritten"  # finding that a design replaces a value that was stated
 ROUND_OFF = 1e-12
 """Error of a sum of efforts by formulas, in parts of the sum of their sizes: some thousand roundings, as places and
 lengths that they are computed from are differences themselves."""
@@ -107,7 +98,6 @@ class Quantity:
     words: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        """Return the value with its unit."""
         from cfmkit.specs.units import format_short
 
         if self.word is not None:
@@ -282,7 +272,6 @@ class Result:
     state: Any = None
 
     def __post_init__(self) -> None:
-        """Fall back to the status's sentence, and keep the texts of what is inside short."""
         if not self.message:
             object.__setattr__(self, "message", self.status.value)
         for name in ("curves", "warnings", "load_cases"):
@@ -292,7 +281,6 @@ class Result:
             object.__setattr__(self, "values", Named(self.values))
 
     def __repr__(self) -> str:
-        """Return the result in a line: what of, how it ended, how much there is."""
         about = f"{self.spec.family} {self.spec.name!r}, {self.status.key}"
         reported = [repr(curve) for curve in self.curves[:1]]
         reported += [f"{len(self.curves) - 1} more curves"] if len(self.curves) > 1 else []
@@ -376,12 +364,10 @@ class Design:
     next_best: tuple[Callable[[], Design], ...] = ()
 
     def __post_init__(self) -> None:
-        """Fall back to the status's sentence."""
         if not self.message:
             object.__setattr__(self, "message", self.status.value)
 
     def __repr__(self) -> str:
-        """Return the design in a line: how it ended, and what came of it."""
         return f"<Design {self.status.key}: {self.message[:500]}; {self.spec!r}>"
 
     def _repr_html_(self) -> str:

@@ -6,12 +6,13 @@ import dataclasses
 import inspect
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 from typer.core import TyperGroup
 
 from cfmkit.cli import verbs
+from cfmkit.cli.options import Common
 from cfmkit.cli.verbs import names
 from cfmkit.errors import UsageError
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import ModuleType
 
-    from cfmkit.cli.options import Common
     from cfmkit.cli.output import Terminal
     from cfmkit.documents.document import Document
 
@@ -81,12 +81,14 @@ def _command(name: str) -> Any:
     def callback(**values: Any) -> Call:
         return Call(module.run, options(**values))
 
-    hints = get_type_hints(options, include_extras=True)
+    hints = get_type_hints(options)
     fields = dataclasses.fields(options)
-    callback.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-        [_parameter(field, hints[field.name]) for field in sorted(fields, key=_place)]
-    )
-    callback.__annotations__ = {field.name: hints[field.name] for field in fields}
+    shared = {field.name for field in dataclasses.fields(Common)}  # by all verbs: these come last in the help
+    parameters = [
+        _parameter(field, hints[field.name]) for field in sorted(fields, key=lambda field: field.name in shared)
+    ]
+    callback.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    callback.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     app = typer.Typer(**_TYPER_OPTIONS)
     app.command(name, help=_unwrap_paragraphs(inspect.getdoc(module.run) or ""), epilog=_example(module))(callback)
     return _plain(typer.main.get_command(app))
@@ -150,15 +152,13 @@ def _drop_types(item: Any) -> Any:
 
 
 def _parameter(field: dataclasses.Field[Any], hint: Any) -> inspect.Parameter:
+    """Return what typer makes an option or argument of."""
+    names = field.metadata.get("names", ())
+    if "names" in field.metadata and not names:
+        names = (f"--{field.name.replace('_', '-')}",)
     default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
-    return inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
-
-
-def _place(field: dataclasses.Field[Any]) -> int:
-    """Return where an option stands in the help: what is common to all verbs comes last."""
-    from cfmkit.cli.options import Common
-
-    return int(field.name in {item.name for item in dataclasses.fields(Common)})
+    annotation = Annotated[hint, field.metadata["declare"](*names)]
+    return inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
 OPTIONAL_VALUE_OPTIONS = ("--figure",)

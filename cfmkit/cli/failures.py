@@ -42,17 +42,9 @@ class Stopped(StoppedBySignal):
         self.reported = "interrupted" if number == signal.SIGINT else "terminated"
         super().__init__(self.reported)
 
-    def goes_on(self, fresh: bool) -> None:
-        """Add that what is finished is kept; a command that was to reuse nothing goes on without that option."""
-        self.reported += f"; what is finished is kept: {go_on(fresh)}"
-
-    def nothing_begun(self) -> None:
-        """Add that there is nothing to go on with yet, neither computed nor cleared away by ``--fresh``."""
-        self.reported += "; nothing was computed yet: run the same command again"
-
-    def starts_over(self) -> None:
-        """Add that nothing was finished that could be kept: short searches and first points are computed again."""
-        self.reported += "; nothing that could be reused is finished yet: the same command starts from the beginning"
+    def add(self, text: str) -> None:
+        """Add what is left of what was computed, and how to go on."""
+        self.reported += f"; {text}"
 
 
 def go_on(fresh: bool) -> str:

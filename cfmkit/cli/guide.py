@@ -13,7 +13,7 @@ from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from cfmkit.errors import UsageError, visible
-from cfmkit.runs.find_shipped_folder import shipped_folder
+from cfmkit.runs.examples import shipped_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

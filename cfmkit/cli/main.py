@@ -115,7 +115,7 @@ def _answer(given: list[str], terminal: Terminal) -> ExitCode:
             answer = call.run(call.options, output)
     except Stopped as stop:
         if hasattr(call.options, "fresh") and not Stopped.began:
-            stop.nothing_begun()
+            stop.add("nothing was computed yet: run the same command again")
         raise
     hidden = output.json or output.quiet
     output.complain((*answer.complaints, *(answer.quiet_complaints if hidden else ())))

@@ -1,13 +1,14 @@
-"""Command-line options: functions that declare one for typer, and the sets of options that several commands share.
+"""Command-line options: functions that declare one, and the sets of options that several commands share.
 
-An option or argument is a field of the dataclass that a verb's `run` takes: its type, `option`, `flag` or
-`argument` with what the help says, and its default.
+An option or argument is a field of the dataclass that a verb's `run` takes, called as the field unless it states names.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from dataclasses import MISSING, dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
@@ -25,24 +26,36 @@ MAX_INTEGER = 2**63 - 1
 """The largest integer of an option: what a signed integer of 64 bits in files and generators holds."""
 
 
-def argument(metavar: str, text: str, completed: Callable[[str], list[str]] | None = None) -> Any:
-    """Return the declaration of an argument: its name in the help, what it is, and what a shell completes it to."""
-    return typer.Argument(metavar=metavar, help=text, show_default=False, autocompletion=completed)
+def argument(
+    metavar: str,  # its name in the help
+    text: str,  # what it is
+    complete: Callable[[str], list[str]] | None = None,  # what a shell completes it to
+    default: Any = MISSING,  # without one it is required
+) -> Any:
+    """Return the field of an argument."""
+    declare = partial(typer.Argument, metavar=metavar, help=text, show_default=False, autocompletion=complete)
+    return field(default=default, metadata={"declare": declare})
 
 
 def option(
-    *names: str,  # as the user writes it
-    # text, metavar: what the help says, and what it calls the value
-    text: str,
-    metavar: str | None = None,
+    metavar: str | None,  # what the help calls the value
+    text: str,  # what the help says
+    *names: str,  # as the user writes it; default: ``--`` and the name of the field
+    default: Any = None,  # `MISSING`: it is required
     shown: bool = False,  # whether the help shows the default
     # the smallest value. It is checked here and not by typer, whose help would show ``[0<=x<=...]``
     low: int | None = None,
     **more: Any,  # what else typer takes
 ) -> Any:
-    """Return the declaration of an option that takes a value."""
+    """Return the field of an option that takes a value."""
     check = None if low is None else _require_at_least(low)
-    return typer.Option(*names, metavar=metavar, help=text, show_default=shown, callback=check, **more)
+    declare = partial(typer.Option, metavar=metavar, help=text, show_default=shown, callback=check, **more)
+    return field(default=default, metadata={"declare": declare, "names": names})
+
+
+def flag(text: str, *names: str, default: bool | None = False) -> Any:
+    """Return the field of an option that is there or not."""
+    return field(default=default, metadata={"declare": partial(typer.Option, help=text), "names": names})
 
 
 def _require_at_least(low: int) -> Callable[[int | None], int | None]:
@@ -51,67 +64,43 @@ def _require_at_least(low: int) -> Callable[[int | None], int | None]:
     def check(value: int | None) -> int | None:
         if value is None or low <= value <= MAX_INTEGER:
             return value
-        raise typer.BadParameter(
-            f"{value} is not allowed: must be {f'>= {low}' if value < low else f'<= {MAX_INTEGER}'}"
-        )
+        limit = f">= {low}" if value < low else f"<= {MAX_INTEGER}"
+        raise typer.BadParameter(f"{value} is not allowed: must be {limit}")
 
     return check
 
 
-def flag(*names: str, text: str, hidden: bool = False) -> Any:
-    """Return the declaration of an option that is there or not; a hidden one is refused with a reason."""
-    return typer.Option(*names, help=text, hidden=hidden)
-
-
-Out = Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/SPEC-VERB/.")]
-Fidelity = Annotated[
-    str | None,
-    option("--fidelity", metavar="NAME", text="Model to use; `cfmkit show FAMILY` lists the models under `fidelity`."),
-]
-Seed = Annotated[int, option("--seed", metavar="N", shown=True, low=0, text="Seed of all random numbers.")]
-Quiet = Annotated[bool, flag("-q", "--quiet", text="Print only problems.")]
-NoPlots = Annotated[bool, flag("--no-plots", text="Draw no figures.")]
-Jobs = Annotated[int | None, option("-j", "--jobs", metavar="N", low=1, text="Processes; default: all cores.")]
-Timeout = Annotated[
-    float | None, option("--timeout-per-point", metavar="S", text="Stop the computation of a point after S seconds.")
-]
-NoLock = Annotated[
-    bool,
-    flag("--no-lock", text="Do not lock the output folder: no other run may use it (for file systems without locks)."),
-]
-Fresh = Annotated[bool, flag("--fresh", text="Reuse no results of an earlier run.")]
-Animate = Annotated[
-    Literal["gif", "mp4"] | None,
-    option(
-        "--animate", text="Write an animation of the mechanism beside its curve, figures/motion.gif; mp4 needs ffmpeg."
-    ),
-]
-WithReport = Annotated[bool, flag("--report", text="Write report.html, too: everything in one file to share.")]
+OUT_OPTION = partial(option, "DIR", "Output folder; default: cfm-out/SPEC-VERB/.", "-o", "--out")
+FIDELITY_OPTION = partial(option, "NAME", "Model to use; `cfmkit show FAMILY` lists the models under `fidelity`.")
+SEED_OPTION = partial(option, "N", "Seed of all random numbers.", default=0, shown=True, low=0)
+QUIET_FLAG = partial(flag, "Print only problems.", "-q", "--quiet")
+NO_PLOTS_FLAG = partial(flag, "Draw no figures.")
+JOBS_OPTION = partial(option, "N", "Processes; default: all cores.", "-j", "--jobs", low=1)
+TIMEOUT_OPTION = partial(option, "S", "Stop the computation of a point after S seconds.")
+NO_LOCK_FLAG = partial(flag, "Do not lock the output folder: no other run may use it (for file systems without locks).")
+FRESH_FLAG = partial(flag, "Reuse no results of an earlier run.")
+REPORT_FLAG = partial(flag, "Write report.html, too: everything in one file to share.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Common:
     """Options of every verb."""
 
-    json: Annotated[bool, flag("--json", text="Print one JSON document instead of text, also on failure.")] = False
-    verbose: Annotated[int, option("-v", "--verbose", count=True, text="Print more; -vv: tracebacks, too.")] = 0
+    json: bool = flag("Print one JSON document instead of text, also on failure.")
+    verbose: int = option(None, "Print more; -vv: tracebacks, too.", "-v", "--verbose", count=True, default=0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpecOptions(Common):
     """Options of verbs that read specifications."""
 
-    set: Annotated[
-        list[str] | None,
-        option(
-            "--set",
-            metavar="A.B=VALUE",
-            text="Replace a value of the spec, with its unit, e.g. --set design.force='60 N'. Repeatable. "
-            """Put a key that itself has dots in double quotes: 'a."b.c"=1 mm'. """
-            "With a family in front it applies only to specs of that family: cam:design.force='60 N'.",
-            autocompletion=shell_completion.changes,
-        ),
-    ] = None
+    set: list[str] | None = option(
+        "A.B=VALUE",
+        "Replace a value of the spec, with its unit, e.g. --set design.force='60 N'. Repeatable. "
+        """Put a key that itself has dots in double quotes: 'a."b.c"=1 mm'. """
+        "With a family in front it applies only to specs of that family: cam:design.force='60 N'.",
+        autocompletion=shell_completion.changes,
+    )
 
     @property
     def changes(self) -> tuple[str, ...]:
@@ -123,24 +112,12 @@ class SpecOptions(Common):
 class FigureChoice(Common):
     """Options of verbs that draw."""
 
-    no_plots: NoPlots = False
-    figures: Annotated[
-        str | None, option("--figures", metavar="png,svg,pdf", text="Formats of the figures; default: png.")
-    ] = None
-    figure_width: Annotated[
-        str | None,
-        option(
-            "--figure-width",
-            metavar="84mm",
-            text="Printed width of the figures; the text keeps its size. Default: 160mm.",
-        ),
-    ] = None
-    no_titles: Annotated[bool, flag("--no-titles", text="Omit the titles of the figures.")] = False
-    plain: Annotated[bool, flag("--plain", text="Figures for journals: no bands, notes, marks or titles.")] = False
-    figure_style: Annotated[
-        str | None,
-        option("--figure-style", metavar="FILE", text="Matplotlib style file (.mplstyle), applied over cfmkit's own."),
-    ] = None
+    no_plots: bool = NO_PLOTS_FLAG()
+    figures: str | None = option("png,svg,pdf", "Formats of the figures; default: png.")
+    figure_width: str | None = option("84mm", "Printed width of the figures; the text keeps its size. Default: 160mm.")
+    no_titles: bool = flag("Omit the titles of the figures.")
+    plain: bool = flag("Figures for journals: no bands, notes, marks or titles.")
+    figure_style: str | None = option("FILE", "Matplotlib style file (.mplstyle), applied over cfmkit's own.")
 
     @property
     def form(self) -> FigureForm:
@@ -165,116 +142,83 @@ class FigureChoice(Common):
         return form_of(self.figures, self.figure_width, not self.no_titles, self.figure_style, self.plain, overlay)
 
 
-Overlay = Annotated[
-    str | None,
-    option("--overlay", metavar="DIR", text="Folder of an earlier design or analyze, whose curve is drawn as well."),
-]
+@dataclass(frozen=True, kw_only=True)
+class RunPictures(Common):
+    """Options of verbs that draw one mechanism."""
+
+    animate: Literal["gif", "mp4"] | None = option(
+        None, "Write an animation of the mechanism beside its curve, figures/motion.gif; mp4 needs ffmpeg."
+    )
+    overlay: str | None = option("DIR", "Folder of an earlier design or analyze, whose curve is drawn as well.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class OneSpec(SpecOptions):
     """Options of verbs that read one specification and write a folder."""
 
-    spec: Annotated[str, argument("SPEC", "YAML file of one mechanism; - reads standard input.")]
-    out: Out = None
-    no_lock: NoLock = False
+    spec: str = argument("SPEC", "YAML file of one mechanism; - reads standard input.")
+    out: str | None = OUT_OPTION()
+    no_lock: bool = NO_LOCK_FLAG()
 
 
 @dataclass(frozen=True, kw_only=True)
 class ComputeOptions(OneSpec, FigureChoice):
     """Options of verbs that compute."""
 
-    fidelity: Fidelity = None
-    seed: Seed = 0
-    quiet: Quiet = False
+    fidelity: str | None = FIDELITY_OPTION()
+    seed: int = SEED_OPTION()
+    quiet: bool = QUIET_FLAG()
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOptions(ComputeOptions):
     """Options of verbs that evaluate many points."""
 
-    report: WithReport = False
-    table: Annotated[
-        str,
-        option(
-            "--table",
-            metavar="csv,parquet",
-            shown=True,
-            text="Formats of the table of points; results.csv is always written. Parquet needs cfmkit\\[table].",
-        ),
-    ] = "csv"
-    jobs: Jobs = None
-    cluster: Annotated[
-        str | None,
-        option(
-            "--cluster",
-            metavar="ADDRESS|local",
-            text="Dask scheduler to use, e.g. tcp://host:8786, or a local one. Needs cfmkit\\[cluster].",
-        ),
-    ] = None
-    max_points: Annotated[
-        int, option("--max-points", metavar="N", shown=True, low=1, text="Refuse studies with more points.")
-    ] = 1_000_000
-    timeout_per_point: Timeout = None
-    fresh: Fresh = False
+    report: bool = REPORT_FLAG()
+    table: str = option(
+        "csv,parquet",
+        "Formats of the table of points; results.csv is always written. Parquet needs cfmkit\\[table].",
+        shown=True,
+        default="csv",
+    )
+    jobs: int | None = JOBS_OPTION()
+    cluster: str | None = option(
+        "ADDRESS|local", "Dask scheduler to use, e.g. tcp://host:8786, or a local one. Needs cfmkit\\[cluster]."
+    )
+    max_points: int = option("N", "Refuse studies with more points.", shown=True, low=1, default=1_000_000)
+    timeout_per_point: float | None = TIMEOUT_OPTION()
+    fresh: bool = FRESH_FLAG()
 
 
 @dataclass(frozen=True, kw_only=True)
 class MeasurementOptions(Common):
     """Options of verbs that read a measurement."""
 
-    units: Annotated[
-        str | None,
-        option(
-            "--units",
-            metavar="s=mm,F=N",
-            text="Units by column name or number, if the header states none; also selects columns.",
-        ),
-    ] = None
-    tare: Annotated[
-        str | None,
-        option(
-            "--tare",
-            metavar="FORCE",
-            text="Subtract this reading of the force sensor without load, e.g. '0.4 N'; 'start': the mean reading "
-            "before the machine moves.",
-        ),
-    ] = None
-    zero: Annotated[
-        str | None,
-        option(
-            "--zero",
-            metavar="LENGTH",
-            text="Subtract this reading of the displacement sensor at the mechanism's zero; 'start': the mean reading "
-            "before the machine moves.",
-        ),
-    ] = None
-    flip: Annotated[
-        str | None,
-        option(
-            "--flip",
-            metavar="NAMES",
-            text="Reverse the sign of force, displacement (or torque, angle), or of both, separated by a comma.",
-        ),
-    ] = None
+    units: str | None = option(
+        "s=mm,F=N", "Units by column name or number, if the header states none; also selects columns."
+    )
+    tare: str | None = option(
+        "FORCE",
+        "Subtract this reading of the force sensor without load, e.g. '0.4 N'; 'start': the mean reading "
+        "before the machine moves.",
+    )
+    zero: str | None = option(
+        "LENGTH",
+        "Subtract this reading of the displacement sensor at the mechanism's zero; 'start': the mean reading "
+        "before the machine moves.",
+    )
+    flip: str | None = option(
+        "NAMES", "Reverse the sign of force, displacement (or torque, angle), or of both, separated by a comma."
+    )
 
-    cycles: Annotated[
-        str | None,
-        option(
-            "--cycles",
-            metavar="FIRST:LAST",
-            text="Cycles to use, e.g. 2:5, or 3 for one; default: the complete ones of full travel.",
-        ),
-    ] = None
-    group: Annotated[
-        str | None,
-        option(
-            "--group",
-            metavar="COLUMN",
-            text="Column that tells specimens apart; 'Specimen=2' chooses one, 'table=2' one of several tables, 'none' "
-            "takes all rows as one specimen.",
-        ),
-    ] = None
+    cycles: str | None = option(
+        "FIRST:LAST", "Cycles to use, e.g. 2:5, or 3 for one; default: the complete ones of full travel."
+    )
+    group: str | None = option(
+        "COLUMN",
+        "Column that tells specimens apart; 'Specimen=2' chooses one, 'table=2' one of several tables, 'none' "
+        "takes all rows as one specimen.",
+    )
 
     @property
     def flips(self) -> tuple[str, ...]:
@@ -282,10 +226,24 @@ class MeasurementOptions(Common):
         return tuple(word.strip() for word in self.flip.split(",")) if self.flip else ()
 
 
+def folder_of(out: str | None, source: str, verb: str) -> str:
+    """Return the folder that ``--out`` names, by default ``cfm-out/SOURCE-VERB``.
+
+    UsageError if the name is empty, or the source is standard input and none is given.
+    """
+    from cfmkit.runs.specfile import STDIN_PATH
+
+    if out is not None:
+        if not out.strip():
+            raise UsageError("--out is empty; give a folder")
+        return out
+    if source == STDIN_PATH:
+        raise UsageError("standard input has no name; give the output folder with --out")
+    return str(Path("cfm-out") / f"{Path(source).stem}-{verb}")
+
+
 def data_record(name: str) -> dict[str, Any]:
     """Return what a manifest says about a data file: where it was, and the hash of its content."""
-    from pathlib import Path
-
     from cfmkit.store import file_hash
 
     return {"data": {"source": name, "sha256": file_hash(Path(name).resolve())}}

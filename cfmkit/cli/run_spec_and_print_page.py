@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from cfmkit.cli.output_folder import folder_of
+from cfmkit.cli.options import folder_of
 from cfmkit.documents.document import BAD_TONE, Document, Note, Written
-from cfmkit.documents.run_document import RunCommand, complaints_of, data_of, document_of
+from cfmkit.documents.run_document import complaints_of, data_of, document_of
 from cfmkit.runs.run import RunTask, carry_out
 
 if TYPE_CHECKING:
@@ -27,36 +27,37 @@ def execute(
     verb: Verb, options: ComputeOptions, terminal: Terminal, page: bool = False, budget: float | None = None
 ) -> Document:
     """Run a verb over the spec that the options name, in a time budget [s] if there is one, and write the folder."""
-    out = folder_of(options.out, options.spec, verb.name)
-    wanted = RunTask(options.spec, out, options.changes, options.fidelity, options.seed, not options.no_plots)
-    wanted = replace(wanted, page=page, form=options.form, animate=getattr(options, "animate", None))
-    if wanted.animate == "mp4":
+    task = RunTask(
+        options.spec,
+        folder_of(options.out, options.spec, verb.name),
+        options.changes,
+        options.fidelity,
+        options.seed,
+        not options.no_plots,
+        page=page,
+        form=options.form,
+        animate=getattr(options, "animate", None),
+        time_budget=budget,
+    )
+    if task.animate == "mp4":
         from cfmkit.plots.animation import require_ffmpeg
 
         require_ffmpeg()
     with terminal.progress(budget) as progress:
-        outcome = carry_out(verb, wanted, terminal.arguments, progress)
-    found = _document(outcome)
-    if wanted.animate and f"figures/motion.{wanted.animate}" not in outcome.written:
-        return replace(found, complaints=(*found.complaints, NO_MOTION))
-    return found
+        finished = carry_out(verb, task, terminal.arguments, progress)
+    document = _document(finished)
+    if task.animate and f"figures/motion.{task.animate}" not in finished.manifest.files:
+        return replace(document, complaints=(*document.complaints, NO_MOTION))
+    return document
 
 
-def _document(outcome: FinishedRun) -> Document:
+def _document(run: FinishedRun) -> Document:
     """Return the document of a finished run."""
-    report, verb = outcome.report, outcome.verb
-    command = RunCommand(verb.name, outcome.source, outcome.changes, verb.words, outcome.folder)
-    written = Written(outcome.folder, (*outcome.written, "manifest.json"), outcome.seconds)
-    found = document_of(report, command, written)
-    data = data_of(report) | written.data | ({"kept": outcome.kept} if outcome.kept else {})
+    written = Written(run.command.folder, (*run.manifest.files, "manifest.json"), run.seconds)
+    document = document_of(run.report, run.command, written)
     kept = tuple(
-        Note(
-            "kept",
-            f"{name} was edited since the last run; the edited version is kept as {spare}",
-            "",
-            BAD_TONE,
-            whole=True,
-        )
-        for name, spare in outcome.kept.items()
+        Note("kept", f"{name} was edited since the last run; the edited version is kept as {spare}", "", BAD_TONE, True)
+        for name, spare in run.kept.items()
     )
-    return replace(found, data=data, notes=(*found.notes, *kept), quiet_complaints=complaints_of(report))
+    data = data_of(run.report) | written.data | ({"kept": run.kept} if run.kept else {})
+    return replace(document, data=data, notes=(*document.notes, *kept), quiet_complaints=complaints_of(run.report))

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.cli.output_folder import folder_of
+from cfmkit.cli.options import folder_of
 from cfmkit.documents.document import Written
 from cfmkit.errors import UsageError
 
@@ -30,10 +30,14 @@ if TYPE_CHECKING:
     from cfmkit.studies.serial_and_cluster_executors import Executor
 
 
+NOTHING_KEPT = "nothing that could be reused is finished yet: the same command starts from the beginning"
+"""Of short searches and first points: these are computed again."""
+
+
 @contextmanager
 def open_journal(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
     """Yield the open journal of a folder; a signal that ends the block says whether the same command goes on."""
-    from cfmkit.cli.failures import Stopped
+    from cfmkit.cli.failures import Stopped, go_on
     from cfmkit.studies.journal import Journal
 
     Stopped.began = True
@@ -41,10 +45,8 @@ def open_journal(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
         try:
             yield journal
         except Stopped as stop:
-            if len(journal):
-                stop.goes_on(fresh)
-            else:
-                stop.starts_over()
+            kept = f"what is finished is kept: {go_on(fresh)}"
+            stop.add(kept if len(journal) else NOTHING_KEPT)
             raise
 
 

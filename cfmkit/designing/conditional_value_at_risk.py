@@ -55,12 +55,11 @@ def best_move(
         move, level, slack = found
         left = parts + slopes @ move + level + slack[:, None]
         worst = np.argsort(left, axis=1)[:, :MORE_ROWS]
-        broken = (np.take_along_axis(left, worst, axis=1) < -ROW_SELECTION_LIMITS) & ~np.take_along_axis(
-            chosen, worst, axis=1
-        )
+        present = np.take_along_axis(chosen, worst, axis=1)
+        broken = (np.take_along_axis(left, worst, axis=1) < -ROW_SELECTION_LIMITS) & ~present
         if not broken.any():
             return move
-        np.put_along_axis(chosen, worst, np.take_along_axis(chosen, worst, axis=1) | broken, axis=1)
+        np.put_along_axis(chosen, worst, present | broken, axis=1)
     return move
 
 
@@ -90,9 +89,7 @@ def _program(
     high = np.minimum(trust, (bounds[:, 1] - x) / reach)
     limits = [*zip(low.tolist(), high.tolist(), strict=True), (None, None), *([(0.0, None)] * count)]
     solve: Any = linprog  # its stubs know no sparse matrices
-    found = solve(
-        cost, A_ub=hstack([moves, level, slack]).tocsr(), b_ub=parts[part, row], bounds=limits, method="highs-ds"
-    )
+    found = solve(cost, hstack([moves, level, slack]).tocsr(), parts[part, row], bounds=limits, method="highs-ds")
     if found.x is None:
         return None
     return np.asarray(found.x[:size] * reach), float(found.x[size]), np.asarray(found.x[size + 1 :])

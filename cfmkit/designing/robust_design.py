@@ -33,27 +33,17 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-DIFFERENCE_STEP = 2e-4
-"""Step of a difference by a value of the design, as a share of its range."""
-
+DIFFERENCE_STEP = 2e-4  # step of a difference by a value of the design, as a share of its range
 ONE_SIDED_MEAN = 0.25
 """An error whose mean exceeds so many standard deviations is one-sided, like a waviness, which is never below zero."""
-
-LINEAR_PARTS = 192
-"""Parts of a linear program."""
-
-YIELD_MARGIN = 0.01
-"""The estimated share is to be so much above what was requested: the estimate is of first order."""
-
-FIRST_TRUST, LEAST_TRUST, MOST_TRUST = 0.1, 1e-4, 0.5
-"""How far a step may go, as a share of the ranges."""
-
+LINEAR_PARTS = 192  # parts of a linear program
+YIELD_MARGIN = 0.01  # the estimated share is to be so much above what was requested: the estimate is of first order
+FIRST_TRUST, LEAST_TRUST, MOST_TRUST = 0.1, 1e-4, 0.5  # how far a step may go, as a share of the ranges
 SMALL_GAIN = 0.02
 """A step of drawn parts that lowers the risk by less is the last [standard deviations of the limit].
 
 With other 48 parts the risk of one normal limit at 90 % scatters by 0.27: less is not worth solving parts for.
 """
-
 MIN_RELATIVE_DEVIATION = 1e-2
 """Least standard deviation of a row, as a share of the largest of its limit: what no error moves is kept strictly."""
 
@@ -80,20 +70,6 @@ class SlopedPart(Protocol):
         """Return the derivatives at the values x (n,) and errors (d,); None if none is known."""
 
 
-def no_slopes(_x: FloatArray, _errors: FloatArray) -> PartSlopes | None:
-    """Return that no derivative is known exactly."""
-    return None
-
-
-def never() -> bool:
-    """Return that there is time enough: no search is late."""
-    return False
-
-
-def unheard(_share: float, _steps: int) -> None:
-    """Ignore the progress of a search."""
-
-
 @dataclass(frozen=True)
 class RobustProblem:
     """Variables, errors of manufacture, and constraints."""
@@ -108,9 +84,9 @@ class RobustProblem:
     constant: FloatArray
     about: NDArray[np.int64]  # (m,) which limit each row belongs to
     share: float  # of parts that are to be good
-    late: Callable[[], bool] = never  # tells whether the time is up
-    tell: Callable[[float, int], None] = unheard  # takes the share estimated and the number of steps so far
-    slopes: SlopedPart = no_slopes  # exact derivatives of a part's numbers, where there are any
+    late: Callable[[], bool]  # tells whether the time is up
+    tell: Callable[[float, int], None]  # takes the share estimated and the number of steps so far
+    slopes: SlopedPart  # exact derivatives of a part's numbers, where there are any
 
     @property
     def reach(self) -> FloatArray:
@@ -325,11 +301,9 @@ def optimise_on_samples(
         if trust < LEAST_TRUST or problem.late():
             break
         slopes = parts.differentiate_rows(x) if slopes is None else slopes
-        move = (
-            None
-            if slopes is None
-            else best_move(rows / scale, slopes / scale[:, None], asked.share, problem.bounds, x, trust)
-        )
+        if slopes is None:
+            break
+        move = best_move(rows / scale, slopes / scale[:, None], asked.share, problem.bounds, x, trust)
         if move is None:
             break
         there = np.clip(x + move, *problem.bounds.T)

@@ -21,9 +21,7 @@ Anything = TypeVar("Anything")
 
 NOT_DECIDING = {"name", "description", "requirements", "sweep", "sensitivity"}
 """Blocks of a specification that no search looks at."""
-
-KEY_DIGITS = 32
-"""Hexadecimal digits of the key under which a start is noted."""
+KEY_DIGITS = 32  # hexadecimal digits of the key under which a start is noted
 
 
 class Notes(Protocol):
@@ -69,8 +67,7 @@ class Clock:
         return None if self.deadline is None else max(self.deadline - time(), 0.0)
 
 
-UNLIMITED_CLOCK = Clock()
-"""The clock of a search that has all the time."""
+UNLIMITED_CLOCK = Clock()  # the clock of a search that has all the time
 
 
 @dataclass(frozen=True)

@@ -80,11 +80,10 @@ def page(document: Document, width: int, everything: bool = False) -> Iterator[B
         yield from document.body
         return
     top = list(_title(document, width))
+    yield from top
     if everything:
-        yield from top
         yield from _whole_page(document)
     else:
-        yield from top
         most = MAX_LINES_WITH_TABLES if document.tables and not document.metrics else MAX_LINES
         yield from _short_page(document, width, most - len(top))
 
@@ -113,7 +112,9 @@ def _short_page(document: Document, width: int, spare: int) -> Iterator[TextLine
     """Yield the lines below the title: what must stand first takes its lines, warnings and facts share the others."""
     notes = [text for note in document.notes if not note.is_detail for text in _note_lines(note, width)]
     tables = [text for table in document.tables if table.most != 0 for text in _table_lines(table, width)]
-    follow = [*_file_lines(document.files, width), *([_command("next", document.next)] if document.next else [])]
+    follow = _file_lines(document.files, width)
+    if document.next:
+        follow.append(whole_line(_word("next", GOOD_TONE), document.next))
     needed = _most_of_headline(document.headline)
     spare -= len(notes) + len(tables) + len(follow)
     warnings = _warning_lines(document.warnings, width, max(spare - needed, min(len(document.warnings), 2)))
@@ -281,7 +282,8 @@ def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
     while sum(wide) > room:  # texts give way, words and numbers do not
         able = [at for at, column in enumerate(table.columns) if column.wraps and wide[at] > least[at]]
         if not able:  # cells take several lines
-            return [*lines, _grid(table._replace(columns=tuple(map(_with_head, table.columns, heads))), rows)]
+            columns = tuple(column._replace(head=head) for column, head in zip(table.columns, heads, strict=True))
+            return [*lines, CellGrid(columns, rows, gap=2, indented=True)]
         widest = max(able, key=lambda at: wide[at])
         wide[widest] = max(wide[widest] - (sum(wide) - room), least[widest])
     cells = [[one if isinstance(one, Span) else Span(one) for one in row] for row in rows]
@@ -295,10 +297,6 @@ def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
     if more > 0:
         lines.append(line(f"  and {more} more (-v)", FAINT_TONE))
     return lines
-
-
-def _with_head(column: GridColumn, head: str) -> GridColumn:
-    return column._replace(head=head)
 
 
 def _file_lines(files: Written | None, width: int) -> list[TextLine]:
@@ -320,14 +318,6 @@ def _file_lines(files: Written | None, width: int) -> list[TextLine]:
     return [whole_line(_word("files", GOOD_TONE), text, Span(more, FAINT_TONE))]
 
 
-def _grid(table: PageTable, rows: Sequence[Sequence[str | Span]]) -> CellGrid:
-    return CellGrid(table.columns, rows, gap=2, indented=True)
-
-
-def _command(word: str, text: str) -> TextLine:
-    return whole_line(_word(word, GOOD_TONE), text)
-
-
 # --- everything -------------------------------------------------------------------------------------------------------
 
 
@@ -342,7 +332,7 @@ def _whole_page(document: Document) -> Iterator[Block]:
     for table in document.tables:
         if table.heading:
             yield line(f"  {table.heading}", LABEL_TONE)
-        yield _grid(table, table.rows)
+        yield CellGrid(table.columns, table.rows, gap=2, indented=True)
         yield BLANK_LINE
     for note in document.notes:
         if note.is_command:

@@ -7,7 +7,7 @@ bounding box, swept areas, pictures, animations, the frame around what moves, pl
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.arrays import distinct
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
 
@@ -136,7 +136,8 @@ class PosedPart:
     depth: float | None = None  # out of the plane [m]; None if nothing is known of it
     pieces: int = 1  # separate pieces that the mechanism is put together from, bought ones included
     assumed: str = ""  # dimensions that were assumed because the specification has none, as one clause; empty if none
-    pin: float | None = None  # diameter of its pins, which rub as they turn [m]; None without pins
+    # what rubs, by its block of the mechanism, with the sizes that the block needs beside `friction` [m]
+    rubbing: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     faults: tuple[str, ...] = ()  # parts that do not bear their loads, or cannot be made, each in a sentence
 
 
@@ -167,11 +168,12 @@ def screw_positions(
     ground: FloatArray,  # (4, 2): rectangle along the axes [m]
     moving: Sequence[PosedBody],  # what passes over it
     head: float,  # diameter of the screw's head, which is also its distance from the edge [m]
-) -> list[FloatArray]:
+) -> tuple[list[FloatArray], bool]:
     """Return a position next to each corner of a base plate where a screw can be reached beside all that moves.
 
     Positions along the edges are tried, the nearest to the corner first; a corner from which half of both edges is
-    covered has no screw. If fewer than two are left, the screws are in the corners, below what moves.
+    covered has no screw. If fewer than two are left, the screws are in the corners, below what moves, and the second
+    value is False.
     """
     from shapely import Point
 
@@ -185,7 +187,8 @@ def screw_positions(
             along = [at for pair in pairs for at in pair]
             clear = [at for at in along if covered.distance(Point(at)) >= 0.5 * head]
             result += [np.array(clear[0])] if clear else []
-    return result if len(result) > 1 else [np.array([x, y]) for x in (x0, x1) for y in (y0, y1)]
+    reached = len(result) > 1
+    return result if reached else [np.array([x, y]) for x in (x0, x1) for y in (y0, y1)], reached
 
 
 def _evenly_moved(core: FloatArray) -> Any:

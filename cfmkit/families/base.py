@@ -57,8 +57,7 @@ class MeasuredLoop:
     down: FloatArray
 
 
-INTERFACE_VERSION = 1
-"""Number of this record: changes when a family that was written for it would no longer work."""
+INTERFACE_VERSION = 1  # number of this record: changes when a family that was written for it would no longer work
 
 
 class Analyzer(Protocol):
@@ -99,8 +98,7 @@ def function_named(name: str) -> Any:
     return partial(found, *words) if words else found
 
 
-_VOWEL_SOUND_LETTERS = "aefhilmnorsx"
-"""Letters whose names begin with a vowel."""
+_VOWEL_SOUND_LETTERS = "aefhilmnorsx"  # letters whose names begin with a vowel
 
 
 def article(word: str) -> str:
@@ -296,11 +294,6 @@ class Family:
         from cfmkit.families.papers import read_papers
 
         return read_papers(self.bibtex)
-
-    @property
-    def leading(self) -> tuple[str, ...]:
-        """Values that pages show first: the headline, and how far a curve is from the one that was to be followed."""
-        return (*self.outputs.headline, "deviation_from_curve")
 
     @property
     def phrase(self) -> str:

@@ -38,8 +38,7 @@ LARGEST_FORCE = (
     "largest normal force: of a stop or an obstacle on one copy, or between tip and `analysis.surface` in both "
     "directions of the motion"
 )
-OF_STOPS = DEFINITIONS | {"contact_force_max": ("force", LARGEST_FORCE)}
-"""Those of a family with end stops."""
+OF_STOPS = DEFINITIONS | {"contact_force_max": ("force", LARGEST_FORCE)}  # those of a family with end stops
 FINDINGS = {
     "contact_begins": "a stop is reached, or a pad touches an obstacle",
     "blocked": "a rigid contact leaves the drive no way to go on: the curve ends there",

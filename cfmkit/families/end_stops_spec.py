@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 FreeWay = Annotated[Length, Field(ge=0)]
 
-BEFORE_STOP = 1e-6
-"""Distance from a rigid stop at which a complete motion ends [m]: at the stop its drive is blocked."""
+BEFORE_STOP = 1e-6  # distance from a rigid stop at which a complete motion ends [m]: at the stop its drive is blocked
 
 
 def travel_up_to_stop(end: float) -> float:

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Family
 
-ENTRY_POINT_SECTION = "[cfmkit.families]"
-"""Heading of the group in a file of entry points."""
+ENTRY_POINT_SECTION = "[cfmkit.families]"  # heading of the group in a file of entry points
 
 _INFO_PATTERN = re.compile(r"(?P<package>[^-]+)(?:-(?P<version>[^-]+))?.*\.(?:dist|egg)-info")
 """Name of a folder in which an installer describes a package, with the package's name and version."""
@@ -208,7 +207,8 @@ def _fault_of_fields(record: Any, above: str) -> str:
     for entry in fields(record):
         value, name = getattr(record, entry.name), f"{above}{entry.name}"
         if not _is_of_kind(value, str(entry.type)):
-            return f"the field {name!r} of its record must be of the type {entry.type}"
+            empty = ", and not empty" if isinstance(value, Mapping) and not value else ""
+            return f"the field {name!r} of its record must be of the type {entry.type}{empty}"
         if is_dataclass(value) and not isinstance(value, type) and (fault := _fault_of_fields(value, f"{name}.")):
             return fault
     return ""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+from cfmkit.families.no_mechanism import CannotBuild, Infeasible
 from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
 
@@ -12,37 +14,39 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 
-TOO_SOFT = 0.01
-"""Share of the energy of bending above which wide beams that are solved as narrow ones are reported."""
+TOO_SOFT = 0.01  # share of the energy of bending above which wide beams that are solved as narrow ones are reported
 
 
 MIN_PLANE_STRESS_RATIO = 3.0
 """Width over thickness up to which plane stress is within about 1 % of a solid in three dimensions (docs/solid.md)."""
 
 
-class Finder(Protocol):
-    """Makes the findings of one family."""
-
-    def __call__(self, name: str, message: str, *cures: str | tuple[str, ...], short: str = "") -> Finding:
-        """Return a finding of the family; `KeyError` for a name that the family does not explain."""
-
-
-def finder(meanings: Mapping[str, str]) -> Finder:
-    """Return what makes the findings of a family, whose names and meanings are given.
+@dataclass(frozen=True)
+class Finder:
+    """Maker of the findings of one family; `KeyError` for a name that the family does not explain.
 
     Examples
     --------
-    >>> finding = finder({"too_thin": "a leaf thinner than can be made"})
+    >>> finding = Finder({"too_thin": "a leaf thinner than can be made"})
     >>> finding("too_thin", "0.1 mm: below 0.3 mm").name
     'too_thin'
     """
 
-    def finding(name: str, message: str, *cures: str | tuple[str, ...], short: str = "") -> Finding:
-        if name not in meanings:
+    meanings: Mapping[str, str]  # by name
+
+    def __call__(self, name: str, message: str, *cures: str | tuple[str, ...], short: str = "") -> Finding:
+        """Return a finding of the family."""
+        if name not in self.meanings:
             raise KeyError(name)
         return Finding(name, message, cures, short)
 
-    return finding
+    def infeasible(self, name: str, message: str, nearest: Mapping[str, str] | None = None) -> Infeasible:
+        """Return the error of targets that nothing meets, with the nearest feasible values by path."""
+        return Infeasible(self(name, message), nearest)
+
+    def cannot_build(self, name: str, message: str) -> CannotBuild:
+        """Return the error of a mechanism that cannot exist as described."""
+        return CannotBuild(self(name, message))
 
 
 def sharp_inside(

@@ -10,8 +10,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.results import Result
 
-N_WINDOWS = 400
-"""Windows that are compared, evenly over the curve."""
+N_WINDOWS = 400  # windows that are compared, evenly over the curve
 
 WINDOW_EXTENSION_SHARE = 1e-6
 """A window is made longer by this share of its length: to write it down must not make it shorter."""

@@ -35,7 +35,8 @@ class GuideFriction:
     @property
     def there(self) -> bool:
         """Whether anything rubs."""
-        return bool(np.any(self.friction) or np.any(self.drag))
+        numbers = self.friction, self.drag
+        return any(bool(value.any() if isinstance(value, np.ndarray) else value) for value in numbers)
 
     def force(self, free: FloatArray, across: FloatArray, off_plane: float, way: float) -> FloatArray:
         """Return the force that moves the slider against the friction of its guide.
@@ -81,5 +82,4 @@ class GuideFriction:
         return force
 
 
-FRICTIONLESS_GUIDE = GuideFriction()
-"""A guide that takes nothing."""
+FRICTIONLESS_GUIDE = GuideFriction()  # a guide that takes nothing

@@ -9,28 +9,28 @@ force across its rod, because no force acts exactly in its line. Friction is in 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from cfmkit.export.posed_part import PosedBody
 from cfmkit.specs.units import format_short
 from cfmkit.stock import MATERIALS_BY_NAME
 from cfmkit.stock.joint_strength import eye_that_bears, pin_that_bears, rod_that_guides
 from cfmkit.stock.parts_list import ListedPart
-from cfmkit.stock.stock_series import SOCKET_SCREWS, series_of
+from cfmkit.stock.stock_series import SOCKET_SCREWS, pin_length, series_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from cfmkit.export.posed_part import PosedBody
+    from cfmkit.arrays import FloatArray
     from cfmkit.specs.spec import Spec
     from cfmkit.stock.material_and_part_spec import Guide, MaterialSpec
     from cfmkit.stock.stock_series import Screw, System
 
-DEFAULT_MATERIAL = "steel-s235"
-"""Of links and plates that state none."""
-
-DEFAULT_SAFETY = 1.5
-"""Against yield, where `safety_factor` is not above 1."""
+DEFAULT_MATERIAL = "steel-s235"  # of links and plates that state none
+DEFAULT_SAFETY = 1.5  # against yield, where `safety_factor` is not above 1
 
 SAFETY_METRICS = ("safety_factor", "link_safety_factor", "spring_safety_factor")
 """Metrics of strength: what a requirement asks of them is asked of pins, shafts and screws, too."""
@@ -41,18 +41,11 @@ PIN_STRENGTH = 235e6
 PIN_MODULUS = 210e9
 """Young's modulus of pins and rods [Pa]: EN 1993-1-1, sec. 3.2.6."""
 
-SIDE_SHARE = 0.1
-"""Load across a guide over the largest force on its slider, at least: assumed."""
-
-SAG_SHARE = 1e-3
-"""Sag of a guide's rod over its span, at most: assumed."""
-
-LEAST_WALL = 0.25
-"""Wall beside a hole over its diameter, at least."""
-
-
-LEAST_SCREW = 3e-3
-"""Thinnest screw of a plate or a ground [m]: thinner ones are hard to handle."""
+SIDE_SHARE = 0.1  # load across a guide over the largest force on its slider, at least: assumed
+SAG_SHARE = 1e-3  # sag of a guide's rod over its span, at most: assumed
+LEAST_WALL = 0.25  # wall beside a hole over its diameter, at least
+LEAST_SCREW = 3e-3  # thinnest screw of a plate or a ground [m]: thinner ones are hard to handle
+CUT_LENGTH = 1e-3  # how much longer than what it joins a pin may be [m]; it is cut where it is longer
 
 
 @dataclass(frozen=True)
@@ -91,8 +84,11 @@ class Hardware:
     parts: tuple[ListedPart, ...]
     bodies: tuple[PosedBody, ...] = ()  # guide, ground, fasteners: what stands beside what moves
     drawn: tuple[PosedBody, ...] = ()  # all parts as the assembly drawing shows them, the lowest first
-    pin: float | None = None  # diameter of the pins that rub [m]
+    # what rubs, by its block of the mechanism, with the sizes that the block needs beside `friction` [m]
+    rubbing: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     faults: tuple[str, ...] = ()  # parts that do not bear their loads, or cannot be made, each in a sentence
+    heads: float = 0.0  # how far heads of screws stand out of the plate or the ground [m]
+    slider_excess: float = 0.0  # how much thicker than its layer the slider is [m]
 
 
 def in_sentences(faults: Mapping[str, str]) -> tuple[str, ...]:
@@ -142,35 +138,57 @@ def screw_bears(screw: Screw, load: float, thickness: float, count: int, strengt
 
 
 @dataclass(frozen=True)
-class GuideRod:
-    """Rod that guides a slider."""
+class GuideRods:
+    """Two equal rods that guide a slider, one on either side of its pin."""
 
     diameter: float  # [m]
-    length: float  # between its supports [m]
-    bush: float  # length of the slider on it [m]
-    load: float  # across it [N]
-    pressure: float  # of the bush on the rod, the load over its shadow [Pa]
+    length: float  # between their supports [m]
+    bush: float  # length of the slider on them [m]
+    apart: float  # distance between their axes [m]
+    load: float  # across both [N]
+    pressure: float  # of the bushes on the rods, the load over their shadow [Pa]
+
+    @property
+    def slider_width(self) -> float:
+        """Width of a slider with walls around both rods [m]."""
+        return self.apart + (1.0 + 2.0 * LEAST_WALL) * self.diameter
+
+    @property
+    def slider_thickness(self) -> float:
+        """Thickness of a slider with walls around its rods [m]."""
+        return (1.0 + 2.0 * LEAST_WALL) * self.diameter
+
+    def bodies(self, ends: FloatArray) -> tuple[PosedBody, PosedBody]:
+        """Return both rods beside a line (2, 2) [m]."""
+        x, y = (ends[1] - ends[0]) / math.dist(*ends)
+        aside = 0.5 * self.apart * np.array([-y, x])
+        left, right = (
+            PosedBody.line("guide", "held", ends + side * aside, 0.5 * self.diameter) for side in (1.0, -1.0)
+        )
+        return left, right
 
 
-def guide_rod(
+def guide_rods(
     # across, force: largest loads across the guide and along it [N]
     across: float,
     force: float,
     # travel, bush: of the slider, and its length where `guide` states none [m]
     travel: float,
     bush: float,
+    pin: float,  # diameter of the slider's pin [m]
     guide: Guide | None,  # as stated
-    system: System | None,  # of its diameter
-    strength: PartStrength,  # of the rod
-) -> GuideRod:
-    """Return the rod for a load across it, at least a share of the force along it, over a travel."""
+    system: System | None,  # of their diameter
+    strength: PartStrength,  # of the rods
+) -> GuideRods:
+    """Return the rods for a load across them, at least a share of the force along them, over a travel."""
     length = bush if guide is None or guide.length is None else guide.length
-    couple = 0.0 if guide is None else 2.0 * force * guide.offset / length  # at each end of the bush
+    couple = 0.0 if guide is None else 2.0 * force * guide.offset / length  # at each end of the bushes
     load = max(across + couple, SIDE_SHARE * force)
     span, sizes = travel + length, series_sizes("pin", system)
-    result = rod_that_guides(load, span, PIN_MODULUS, strength.pins, SAG_SHARE, sizes)
+    result = rod_that_guides(0.5 * load, span, PIN_MODULUS, strength.pins, SAG_SHARE, sizes)
     diameter = sizes[-1] if result is None else result
-    return GuideRod(diameter, span, length, load, load / (diameter * length))
+    apart = pin + diameter + 2.0 * LEAST_WALL * max(pin, diameter)
+    return GuideRods(diameter, span, length, apart, load, load / (2.0 * diameter * length))
 
 
 def mm(*sizes: float) -> str:
@@ -179,30 +197,39 @@ def mm(*sizes: float) -> str:
 
 
 def pin_part(place: str, count: int, diameter: float, length: float, load: float, body: str = "") -> ListedPart:
-    """Return a pin of the list, as long as what it joins."""
-    result = next(
+    """Return a pin of the list: bought as long as what it joins or cut to that, or made of a rod if none is so long."""
+    series = next(
         (entry for entry in (series_of("pin", "metric"), series_of("pin", "inch")) if entry and entry.holds(diameter)),
         None,
     )
+    bought = pin_length(diameter, length) if series and series.system == "metric" else None
     data = f"pin, diameter {format_short(diameter, 'length')}, bears {format_short(load, 'force', 3)}"
-    standard = "" if result is None else result.standard
-    return ListedPart(place, "", count, data, "buy", mm(diameter, length), standard, body)
+    if bought is not None and bought > length + CUT_LENGTH:
+        data += f", cut to {mm(length)}"
+    if series is not None and (bought is not None or series.system == "inch"):
+        return ListedPart(place, "", count, data, "buy", mm(diameter, bought or length), series.standard, body)
+    return ListedPart(place, "", count, f"{data}, of a rod", "make", mm(diameter, length), "", body)
 
 
-def screw_part(place: str, count: int, screw: Screw, grip: float, body: str = "") -> ListedPart:
+def screw_part(
+    place: str, count: int, screw: Screw, grip: float, body: str = "", countersunk: bool = False
+) -> ListedPart:
     """Return screws of the list that reach through a grip [m] and as deep as they are thick."""
-    length = 1e-3 * math.ceil(1e3 * (grip + screw.diameter))
+    length = screw.length(grip + screw.diameter)
+    kind, standard = ("countersunk", "ISO 10642") if countersunk else ("cap", "ISO 4762")
     return ListedPart(
-        place, f"{screw.name} x {1e3 * length:g}", count, f"hexagon socket head cap screw, hole {mm(screw.hole)}",
-        "buy", mm(screw.diameter, length), "ISO 4762, holes ISO 273", body,
+        place, f"{screw.name} x {1e3 * length:g}", count, f"hexagon socket {kind} screw, hole {mm(screw.hole)}", "buy",
+        mm(screw.diameter, length), f"{standard}, holes ISO 273", body,
     )  # fmt: skip
 
 
-def guide_part(rod: GuideRod, count: int, assumed: bool) -> ListedPart:
-    """Return the guide of the list, with what is assumed of it."""
+def guide_part(rods: GuideRods, sliders: int, assumed: bool) -> ListedPart:
+    """Return the guides of the list, two for each slider, with what is assumed of them."""
     said = ", side load and friction assumed" if assumed else ""
     data = (
-        f"rod for the slider, {format_short(rod.load, 'force', 3)} across it, "
-        f"{format_short(rod.pressure, 'stress', 3)} in the bush{said}"
+        f"rod for the slider, {mm(rods.apart)} beside the other, {format_short(rods.load, 'force', 3)} across both, "
+        f"{format_short(rods.pressure, 'stress', 3)} in the bushes{said}"
     )
-    return ListedPart("guide of the slider", "guide", count, data, "make", mm(rod.diameter, rod.length), "", "guide")
+    return ListedPart(
+        "guide of the slider", "guide", 2 * sliders, data, "make", mm(rods.diameter, rods.length), "", "guide"
+    )

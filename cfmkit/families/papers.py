@@ -9,8 +9,7 @@ from cfmkit.errors import UsageError
 
 _ENTRY_PATTERN = re.compile(r"@\w+\{.*?\n\}", re.DOTALL)
 _FIELD_PATTERN = re.compile(r"(\w+)\s*=\s*\{(.*?)\}\s*(?=,\s*\n|\n\s*\}$)", re.DOTALL)
-_ACCENT_PATTERN = re.compile(r"\{?\\\W\{?(\w)\}*")
-"""An accent of LaTeX and its letter, which is shown without it."""
+_ACCENT_PATTERN = re.compile(r"\{?\\\W\{?(\w)\}*")  # an accent of LaTeX and its letter, which is shown without it
 _NO_BRACES = str.maketrans("", "", "{}")
 
 

@@ -116,6 +116,11 @@ def is_column(*values: Any) -> bool:
     return any(np.ndim(value) > 0 for value in values)
 
 
+def plain_if_equal(value: Any) -> Any:
+    """Return a number as it is, and a column of equal numbers as one of them."""
+    return value.flat[0] if np.ndim(value) and (value == value.flat[0]).all() else value
+
+
 def refuse_columns(*values: Any) -> None:
     """Raise `RowsDiffer` if one of some numbers is a column: what follows is computed for one mechanism alone."""
     if is_column(*values):
@@ -134,33 +139,51 @@ def root_between(function: Callable[[Any], Any], low: Any, high: Any) -> Any:
     return roots
 
 
+class PlacesKept(Generic[T]):
+    """A function of places of all rows that keeps its last two results.
+
+    What is wanted on the way up is asked for again on the way down, at other places in between.
+    """
+
+    def __init__(self, function: Callable[[FloatArray], T]) -> None:
+        """Keep nothing yet."""
+        self._function = function
+        self._kept: list[tuple[FloatArray, T]] = []
+
+    def __call__(self, places: FloatArray) -> T:
+        """Return the result at places."""
+        for known, result in self._kept:
+            if known is places or (known.shape == places.shape and (known == places).all()):
+                return result
+        result = self._function(places)
+        self._kept = [(places, result), *self._kept[:1]]
+        return result
+
+
 def row_of(item: T, row: int) -> T:
     """Return one row of what is stacked, in plain numbers."""
-    found: Any = item
-    if isinstance(item, np.ndarray):
-        found = item[..., row, 0].tolist() if item.ndim > 1 else item
-    elif isinstance(item, tuple):
-        found = tuple(row_of(value, row) for value in item)
-    elif isinstance(item, Model):
-        found = item.model_copy(update={name: row_of(value, row) for name, value in vars(item).items()})
-    elif is_dataclass(item):
-        found = object.__new__(type(found))
-        vars(found).update({name: row_of(value, row) for name, value in vars(item).items()})
-    return found  # type: ignore[no-any-return]
+    return _map_columns(item, lambda column: column[..., row, 0].tolist())
 
 
 def rows_of(item: T, rows: Any) -> T:
     """Return some rows of what is stacked, with what is known of it; plain numbers hold for every row."""
+    return _map_columns(item, lambda column: column[..., rows, :])
+
+
+def _map_columns(item: T, function: Callable[[FloatArray], Any]) -> T:
+    """Return what is stacked with a function of each of its columns in place of that."""
     found: Any = item
     if isinstance(item, np.ndarray):
-        found = item[..., rows, :] if item.ndim > 1 else item
+        found = function(item) if item.ndim > 1 else item
     elif isinstance(item, tuple):
-        found = tuple(rows_of(one, rows) for one in item)
-    elif isinstance(item, Model):
-        found = item.model_copy(update={name: rows_of(value, rows) for name, value in vars(item).items()})
-    elif is_dataclass(item):
-        found = object.__new__(type(found))
-        vars(found).update({name: rows_of(value, rows) for name, value in vars(item).items()})
+        found = tuple(_map_columns(value, function) for value in item)
+    elif isinstance(item, Model) or is_dataclass(item):
+        own = {name: _map_columns(value, function) for name, value in vars(item).items()}
+        if isinstance(item, Model):
+            found = item.model_copy(update=own)
+        else:
+            found = object.__new__(type(found))
+            vars(found).update(own)
     return found  # type: ignore[no-any-return]
 
 
@@ -183,6 +206,26 @@ class ScalarQuantity(Generic[S]):
     def about(self) -> tuple[str, str]:
         """Dimension and definition, as the record of a family lists them."""
         return self.dimension, self.definition
+
+
+def quantity_of_each(
+    name: str,
+    about: tuple[str, str],  # dimension and definition
+    # of a solution: for each mechanism the results, by name, that it has; in one that names it, the first has a reason
+    of_each: Callable[[S], Iterable[Mapping[str, Quantity]]],
+) -> ScalarQuantity[S]:
+    """Return a result that is computed of one mechanism after the other, and that not all of them have."""
+
+    def function(solution: S) -> FloatArray:
+        found = [quantities.get(name) for quantities in of_each(solution)]
+        return np.array([np.nan if one is None or one.value is None else one.value for one in found])
+
+    def first(solution: S) -> Mapping[str, Quantity]:
+        return next(iter(of_each(solution)))
+
+    return ScalarQuantity(
+        *about, function, lambda solution: first(solution)[name].reason, lambda solution: name in first(solution)
+    )
 
 
 def columns_of_absent_values(definitions: Mapping[str, tuple[str, str]]) -> dict[str, ScalarQuantity[Any]]:

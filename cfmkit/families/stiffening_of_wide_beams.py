@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 WIDE_BEAMS_KEY = "mechanism.wide_beams"
 
-BAND_MARGIN = 1.002
-"""How far inside its band a force is aimed at: the next solution is that of a part a little wider."""
+BAND_MARGIN = 1.002  # how far inside its band a force is aimed at: the next solution is that of a part a little wider
 
 
 PER_SQUARE = 0.007

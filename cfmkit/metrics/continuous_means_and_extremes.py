@@ -116,8 +116,8 @@ def extremes_of_all(
     own_x, other_x = motion[rows, highest], places[rows, other]
     own, others = EXTREME_SIGNS * effort[rows, highest], EXTREME_SIGNS * values[rows, other]
     is_other = (others > own) | ((others == own) & (other_x < own_x))
-    for row, side in np.argwhere(is_other):
-        highest[row, side] = np.searchsorted(motion[row, : last[row] + 1], other_x[row, side])
+    some, _ = np.nonzero(is_other)
+    highest[is_other] = (motion[some] < other_x[is_other][:, None]).sum(axis=1)
     near = np.clip(highest[..., None] + np.arange(-2, 3), 0, last[:, None, None])
     beside = _find_neighbours(places, np.where(is_other, other_x, own_x))
     rows = rows[..., None]

@@ -56,6 +56,11 @@ class RowSamples:
     def with_ends(self, window: Ends, values: FloatArray, slack: FloatArray | float = 0.0) -> RowSamples:
         """Return the samples inside of windows and their ends, with values (d, 2) there."""
         inside, ends = self.find_between(window, slack), np.stack(window, axis=1)
+        if inside.strides[0] == 0:  # all are alike
+            own = slice(int(inside[0].argmax()), int(inside[0].argmax() + inside[0].sum()))
+            motion = np.concatenate([ends[0, :1], self.motion[0, own], ends[0, 1:]])
+            inner = np.concatenate([values[:, :1], self.values[:, own], values[:, 1:]], axis=1)
+            return RowSamples(np.broadcast_to(motion, inner.shape), inner, np.full(len(inner), len(motion)))
         count = inside.sum(axis=1) + 2
         motion, inner = (
             _pack_rows(item, inside, count, last[:, :1], last[:, 1:])
@@ -115,7 +120,8 @@ class CurveRows(ShortRepr):
     """One branch of many curves, one a row."""
 
     samples: RowSamples  # efforts at the points [N or N m]
-    dense: FloatArray  # (d, q) increasing places, so dense that the effort hides nothing between two; may be repeated
+    # returns (d, q) increasing places, so dense that the effort hides nothing between two; may be repeated
+    find_dense: Callable[[], FloatArray]
     effort: Callable[[FloatArray, Any], FloatArray]  # at places of some rows, (k, m), (k,) or None for all -> (k, m)
     error: FloatArray  # (d,) numerical error of the effort
     target: FloatArray  # (d,) effort that is wanted, NaN if there is none
@@ -144,6 +150,11 @@ class CurveRows(ShortRepr):
             return self.dense_effort
         known = np.isfinite(self.peaks)
         return np.where(known, self.all_at(np.where(known, self.peaks, self.samples.motion[:, :1])), np.nan)
+
+    @cached_property
+    def dense(self) -> FloatArray:
+        """Dense places, (d, q)."""
+        return self.find_dense()
 
     @cached_property
     def dense_effort(self) -> FloatArray:
@@ -427,9 +438,14 @@ CYCLE_METRICS: Mapping[str, Callable[[Mapping[str, RowsInWindow]], FloatArray]] 
 
 
 @lru_cache(maxsize=4)
-def _functions(kind: Kind) -> Mapping[str, Callable[[RowsInWindow], FloatArray] | None]:
+def _functions(kind: Kind) -> Mapping[str, Callable[[RowsInWindow], FloatArray]]:
     """Return the functions of metrics of one branch of many curves, by name."""
-    return {item.name: item.of_rows for item in definitions(kind)}
+    return {item.name: item.of_rows for item in definitions(kind) if item.of_rows is not None}
+
+
+def is_metric_of_rows(name: str, kind: Kind) -> bool:
+    """Return True if `metric_of_branches` knows a metric of curves of a kind."""
+    return name in CYCLE_METRICS or name in RANGE_FUNCTIONS or name == "hysteresis_area" or name in _functions(kind)
 
 
 def metric_of_branches(name: str, branches: Mapping[str, RowsInWindow]) -> Mapping[str, FloatArray] | None:

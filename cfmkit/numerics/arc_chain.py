@@ -28,7 +28,6 @@ class ArcChain:
     bulges: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check their lengths."""
         object.__setattr__(self, "nodes", read_only(self.nodes, np.complex128))
         object.__setattr__(self, "bulges", read_only(self.bulges))
         if self.nodes.ndim != 1 or self.nodes.shape != (len(self.bulges) + 1,) or not len(self.bulges):

@@ -51,5 +51,4 @@ def differentiation(nodes: FloatArray) -> FloatArray:
 def _weights(nodes: FloatArray) -> FloatArray:
     gaps = nodes[:, None] - nodes
     np.fill_diagonal(gaps, 1.0)
-    weights: FloatArray = 1.0 / gaps.prod(axis=1)
-    return weights
+    return np.asarray(1.0 / gaps.prod(axis=1))

@@ -47,12 +47,10 @@ class CoarseDataError(GeometryError):
     """The samples do not determine the curve as closely as asked; `index` is the sample before the doubtful place."""
 
     def __init__(self, message: str, index: int) -> None:
-        """Keep the index beside the message."""
         super().__init__(message)
         self.index = index
 
     def __reduce__(self) -> tuple[type[CoarseDataError], tuple[str, int]]:
-        """Return what pickling needs."""
         return type(self), (str(self), self.index)
 
 
@@ -183,27 +181,16 @@ def biarc(
     )
 
 
-def fit_arcs(points: FloatArray, tangents: FloatArray, tolerance: float, lean: float = np.inf) -> ArcChain:
-    """Return a tangent-continuous chain of arcs within `tolerance` of the curve.
+def fit_arcs(
+    points: FloatArray,  # (n, 2): on the curve, in order
+    tangents: FloatArray,  # (n, 2): of unit length there, pointing along the order of the points
+    tolerance: float,  # largest distance of the curve from the chain, in the unit of the points
+    # largest angle between the curve and the chain [rad], but for pieces from one sample to the next
+    lean: float = np.inf,
+) -> ArcChain:
+    """Return a tangent-continuous chain of arcs close to a curve, from the first to the last sample.
 
     Raises CoarseDataError if the samples are too far apart for the tolerance, or the curve has a corner.
-
-    Parameters
-    ----------
-    points : (n, 2) array
-        Points on the curve, in order.
-    tangents : (n, 2) array
-        Unit tangents there, pointing along the order of the points.
-    tolerance : float
-        Largest distance of the curve from the chain, in the unit of the points.
-    lean : float
-        Largest angle between the curve and the chain [rad]. Pieces that go from one
-        sample to the next cannot be made shorter and are excepted.
-
-    Returns
-    -------
-    ArcChain
-        Begins and ends in the first and the last sample, with their tangents.
     """
     curve = _Curve.from_samples(points, tangents, (tolerance, lean), _SEARCH_PARTS)
     check = _Curve.from_samples(points, tangents, (tolerance, lean), _CHECK_PARTS)
@@ -306,14 +293,12 @@ class _Curve:
     def swept(self, share: float) -> tuple[list[int], list[int]]:
         """Return the knots of the longest pieces that use `share` of the tolerance, from the start and from the end."""
         last = len(self.points) - 1
-        forward, backward, length = [0], [last], 1
-        while forward[-1] < last:
-            length = self._longest(forward[-1], 1, share, length)
-            forward.append(forward[-1] + length)
-        length = 1
-        while backward[-1] > 0:
-            length = self._longest(backward[-1], -1, share, length)
-            backward.append(backward[-1] - length)
+        forward, backward = [0], [last]
+        for knots, sense, end in ((forward, 1, last), (backward, -1, 0)):
+            length = 1
+            while knots[-1] != end:
+                length = self._longest(knots[-1], sense, share, length)
+                knots.append(knots[-1] + sense * length)
         return forward, backward[::-1]
 
     def _longest(self, knot: int, way: int, share: float, guess: int) -> int:

@@ -32,10 +32,9 @@ class BoxAxis:
         if not self.log:
             return self.low + share * (self.high - self.low)
         far = max(abs(self.low), abs(self.high))
-        ends = (
+        first, last = (
             math.copysign(max(abs(end), ZERO_END_RATIO * far), self.low + self.high) for end in (self.low, self.high)
         )
-        first, last = ends
         return float(first * (last / first) ** share)
 
 
@@ -84,13 +83,7 @@ class _BoxSearch:
     grid: int
     fine: int
     best: float = math.inf
-    rough: bool = True
-
-    def worthwhile(self, depth: int, height: float) -> bool:
-        """Return whether to look closer around a value found on a grid."""
-        if depth == 0:
-            self.rough = False
-        return math.isfinite(height) and (not self.rough or height <= MAX_VALUE_RATIO * self.best)
+    rough: bool = True  # until the grid of the first variable is known
 
 
 def _lowest(search: _BoxSearch, outer: tuple[float, ...]) -> Lowest:
@@ -108,16 +101,15 @@ def _lowest(search: _BoxSearch, outer: tuple[float, ...]) -> Lowest:
     heights = [search_share(share) for share in shares]
     grid = [seen[share] for share in shares]
     best = int(np.argmin(heights))
-    if search.worthwhile(len(outer), heights[best]):
-        _refine(search_share, (shares[max(best - 1, 0)], shares[min(best + 1, len(shares) - 1)]), search.fine)
+    search.rough &= bool(outer)
+    if math.isfinite(heights[best]) and (not search.rough or heights[best] <= MAX_VALUE_RATIO * search.best):
+        from scipy.optimize import minimize_scalar
+
+        minimize_scalar(
+            lambda share: min(search_share(float(share)), 1e300),
+            bounds=(shares[max(best - 1, 0)], shares[min(best + 1, len(shares) - 1)]),
+            method="bounded",
+            options={"xatol": 1e-7, "maxiter": search.fine},
+        )
     found = min(seen.values(), key=lambda item: item.value)
     return Lowest(found.place, found.value, tuple((item.place, item.value) for item in grid))
-
-
-def _refine(function: Callable[[float], float], bracket: tuple[float, float], most: int) -> None:
-    from scipy.optimize import minimize_scalar
-
-    def finite(share: float) -> float:
-        return min(function(float(share)), 1e300)
-
-    minimize_scalar(finite, bounds=bracket, method="bounded", options={"xatol": 1e-7, "maxiter": most})

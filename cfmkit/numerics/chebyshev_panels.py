@@ -25,13 +25,10 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-N_PANEL_NODES = 16
-"""Of a panel."""
-
+N_PANEL_NODES = 16  # of a panel
 MAX_PLACES = 1000
 """Places at which functions are requested at once, after which halving ends: strips and flexures need some hundreds,
 and a force that is rounding alone, as that of a leg 100 m long, would never be resolved."""
-
 _UNIT_NODES = chebyshev.chebpts1(N_PANEL_NODES)
 _COEFFICIENT_TRANSFORM = (
     chebyshev.chebvander(_UNIT_NODES, N_PANEL_NODES - 1).T
@@ -56,8 +53,7 @@ class ChebyshevPanels(ShortRepr):
         c, one, two = self.coefficients[panel], np.zeros(x.shape), np.zeros(x.shape)
         for k in range(N_PANEL_NODES - 1, 0, -1):
             one, two = c[..., k] + 2.0 * t * one - two, one
-        found: FloatArray = c[..., 0] + t * one - two
-        return found
+        return np.asarray(c[..., 0] + t * one - two)
 
 
 def nodes_of(panel: tuple[float, float]) -> FloatArray:
@@ -77,8 +73,7 @@ def coefficients(panel: tuple[float, float], x: FloatArray, values: FloatArray) 
     """
     nodes = nodes_of(panel)
     at = np.minimum(np.searchsorted(x, nodes), len(x) - 1)
-    found: FloatArray = _COEFFICIENT_TRANSFORM @ np.where(x[at] == nodes, values[at], np.nan)
-    return found
+    return np.asarray(_COEFFICIENT_TRANSFORM @ np.where(x[at] == nodes, values[at], np.nan))
 
 
 def resolve_panels(

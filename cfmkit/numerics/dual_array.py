@@ -33,7 +33,6 @@ class DualArray:
     __array_ufunc__ = None  # arrays leave operators to this class
 
     def __init__(self, value: Any, slopes: Any) -> None:
-        """Keep both as they are."""
         self.value, self.slopes = value, slopes
 
     @property
@@ -63,11 +62,9 @@ class DualArray:
         )
 
     def __neg__(self) -> DualArray:
-        """Return the negative."""
         return DualArray(-self.value, -self.slopes)
 
     def __add__(self, other: Any) -> DualArray:
-        """Return the sum."""
         if not isinstance(other, DualArray):
             value = self.value + other
             return DualArray(value, self.aligned_slopes(value.ndim))
@@ -77,15 +74,12 @@ class DualArray:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> DualArray:
-        """Return the difference."""
         return self.__add__(-other)
 
     def __rsub__(self, other: Any) -> DualArray:
-        """Return the difference."""
         return (-self).__add__(other)
 
     def __mul__(self, other: Any) -> DualArray:
-        """Return the product."""
         if not isinstance(other, DualArray):
             value = self.value * other
             return DualArray(value, self.aligned_slopes(value.ndim) * other)
@@ -96,7 +90,6 @@ class DualArray:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> DualArray:
-        """Return the quotient."""
         if not isinstance(other, DualArray):
             value = self.value / other
             return DualArray(value, self.aligned_slopes(value.ndim) / other)
@@ -105,12 +98,10 @@ class DualArray:
         return DualArray(value, (own - others * value) / other.value)
 
     def __rtruediv__(self, other: Any) -> DualArray:
-        """Return the quotient."""
         value = other / self.value
         return DualArray(value, -self.aligned_slopes(value.ndim) * (value / self.value))
 
     def __pow__(self, exponent: int) -> DualArray:
-        """Return a power."""
         return DualArray(self.value**exponent, self.slopes * (exponent * self.value ** (exponent - 1)))
 
     def __matmul__(self, matrix: Any) -> DualArray:
@@ -118,7 +109,6 @@ class DualArray:
         return self.map_linear(lambda rows: rows @ matrix)
 
     def __getitem__(self, index: Any) -> DualArray:
-        """Return some of the numbers."""
         own = index if isinstance(index, tuple) else (index,)
         return DualArray(self.value[own], self.all_slopes[(slice(None), *own)])
 

@@ -79,8 +79,6 @@ def _turns(left: FloatArray, right: FloatArray, rise: FloatArray) -> tuple[Float
     With s the share, a cubic is s (left + s (b + s a)); its derivative is 3 a s^2 + 2 b s + left.
     """
     a, b = left + right - 2.0 * rise, 3.0 * rise - 2.0 * left - right
-    with np.errstate(invalid="ignore", divide="ignore"):
-        root = np.sqrt(b * b - 3.0 * a * left)
-        big = -(b + np.copysign(root, b))
-        share = np.sort(np.stack([big / (3.0 * a), left / big]), axis=0)
-        return share, (share > 0.0) & (share < 1.0)
+    big = -(b + np.copysign(np.sqrt(b * b - 3.0 * a * left), b))
+    share = np.sort(np.stack([big / (3.0 * a), left / big]), axis=0)
+    return share, (share > 0.0) & (share < 1.0)

@@ -16,17 +16,12 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-MAX_HOLE_SHARE = 0.02
-"""Largest hole, as a share of the window, with which a value over the window is still known."""
-
+MAX_HOLE_SHARE = 0.02  # largest hole, as a share of the window, with which a value over the window is still known
 HOLE_STEP_RATIO = 3.0
 """Longest step that is no hole, in usual steps: one or two outliers that were removed do not leave a hole."""
-
 N_NEIGHBOUR_STEPS = 10
 """Steps to either side of one from which the usual step there is taken, since recorders may change their step."""
-
-STEP_PERCENTILE = 80.0
-"""Percentile of those that is the usual step: up to four long ones among 21 do not raise it."""
+STEP_PERCENTILE = 80.0  # percentile of those that is the usual step: up to four long ones among 21 do not raise it
 
 
 def usual_steps(places: FloatArray) -> FloatArray:
@@ -36,8 +31,7 @@ def usual_steps(places: FloatArray) -> FloatArray:
     steps = np.diff(places)
     if len(steps) <= 2 * N_NEIGHBOUR_STEPS:
         return np.full(len(steps), np.percentile(steps, STEP_PERCENTILE) if len(steps) else 0.0)
-    found: FloatArray = percentile_filter(steps, STEP_PERCENTILE, 2 * N_NEIGHBOUR_STEPS + 1, mode="reflect")
-    return found
+    return np.asarray(percentile_filter(steps, STEP_PERCENTILE, 2 * N_NEIGHBOUR_STEPS + 1, mode="reflect"))
 
 
 def is_hole_after(places: FloatArray) -> NDArray[np.bool_]:

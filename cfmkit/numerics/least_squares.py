@@ -23,15 +23,10 @@ if TYPE_CHECKING:
 
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 LOSS_NAMES: tuple[Loss, ...] = ("linear", "soft_l1", "huber", "cauchy")
-
-DIFFERENCE_STEP = 1e-5
-"""Of finite differences, in sizes of the parameter."""
-
+DIFFERENCE_STEP = 1e-5  # of finite differences, in sizes of the parameter
 NO_EFFECT = 1e-9
 """A parameter has no effect if changing it by its size changes no value by more than this part of the data."""
-
-SINGULAR_RTOL = 1e-5
-"""Unit columns of the Jacobian are dependent where a singular value is below this."""
+SINGULAR_RTOL = 1e-5  # unit columns of the Jacobian are dependent where a singular value is below this
 
 
 class NotFinite(ValueError):
@@ -73,8 +68,7 @@ class LeastSquares:
         (above, upper), (below, lower) = ends
         if above == below:
             return np.zeros_like(here)
-        column: FloatArray = (upper - lower) * (self.size[k] / (above - below))
-        return column
+        return np.asarray((upper - lower) * (self.size[k] / (above - below)))
 
 
 @dataclass(frozen=True)
@@ -94,23 +88,20 @@ class FittedValues:
     @property
     def deviations(self) -> FloatArray:
         """Standard deviation of each value."""
-        found: FloatArray = np.sqrt(np.diag(self.covariance))
-        return found
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def correlation(self) -> FloatArray:
         """Correlation matrix of the values; 0 where one of them does not vary."""
         spread = self.deviations
         product = np.outer(spread, spread)
-        found: FloatArray = np.divide(self.covariance, product, out=np.zeros_like(product), where=product > 0)
-        return found
+        return np.divide(self.covariance, product, out=np.zeros_like(product), where=product > 0)
 
     def half_widths(self, confidence: float = 0.95) -> FloatArray:
         """Return half the width of each value's confidence interval, by Student's t."""
         from scipy.special import stdtrit
 
-        found: FloatArray = float(stdtrit(self.freedom, 0.5 + 0.5 * confidence)) * self.deviations
-        return found
+        return float(stdtrit(self.freedom, 0.5 + 0.5 * confidence)) * self.deviations
 
 
 def unidentifiable(problem: LeastSquares, values: FloatArray) -> tuple[tuple[int, ...], ...]:
@@ -175,16 +166,11 @@ def _minimum(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float)
     size = problem.size
     inside = np.clip(start, problem.low, problem.high)
 
-    def residuals(z: FloatArray) -> FloatArray:
-        return problem.residuals(z * size)
-
-    def jacobian(z: FloatArray) -> FloatArray:
-        return problem.jacobian(z * size)
-
-    return least_squares(
-        residuals,
+    solve_scaled: Any = least_squares  # its stubs take no lambdas
+    return solve_scaled(
+        lambda z: problem.residuals(z * size),
         inside / size,
-        jacobian,
+        lambda z: problem.jacobian(z * size),
         bounds=(problem.low / size, problem.high / size),
         loss=loss,
         f_scale=scale,
@@ -221,9 +207,7 @@ class LackOfFit:
     chance: float  # probability that noise alone makes means of neighbours as large
 
 
-MAX_BLOCKS = 24
-"""Means of so many stretches of each branch are compared with the noise inside them, at most."""
-
+MAX_BLOCKS = 24  # means of so many stretches of each branch are compared with the noise inside them, at most
 _SAMPLES_A_BLOCK = 8
 
 

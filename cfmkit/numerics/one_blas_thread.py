@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -24,9 +23,7 @@ THREAD_VARIABLES = (
     "BLIS_NUM_THREADS",
     "NUMEXPR_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
-)
-"""Variables of the environment that libraries read when they are loaded: who sets one has chosen how many threads."""
-
+)  # variables of the environment that libraries read when they are loaded: who sets one has chosen how many threads
 ONE_THREAD = dict.fromkeys(THREAD_VARIABLES, "1")
 """What keeps the libraries of a process to one thread: processes share the cores, and sums come out the same."""
 

@@ -41,17 +41,6 @@ class RunningIntegral:
     that a singularity near an end costs a few more panels and no accuracy. A query
     evaluates one polynomial: it does not call the function again.
 
-    Parameters
-    ----------
-    function : callable
-        ``function(t) -> values`` for an array of any shape.
-    start, stop : float
-        The interval.
-    tolerance : float
-        Size of the neglected part over the integral of the absolute value.
-    max_panels : int
-        Refinement stops here; a function that is singular inside the interval gets no further.
-
     Examples
     --------
     >>> sine = RunningIntegral(np.cos, 0.0, 2.0)
@@ -61,13 +50,12 @@ class RunningIntegral:
 
     def __init__(
         self,
-        function: Callable[[FloatArray], FloatArray],
+        function: Callable[[FloatArray], FloatArray],  # of an array of any shape
         start: float,
         stop: float,
-        tolerance: float = 1e-14,
-        max_panels: int = 4096,
+        tolerance: float = 1e-14,  # size of the neglected part over the integral of the absolute value
+        max_panels: int = 4096,  # a function that is singular inside the interval gets no further
     ) -> None:
-        """Integrate over the whole interval once."""
         edges = np.linspace(start, stop, FIRST_PANELS + 1)
         middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
         powers, rough = _panels(function, middle, half)

@@ -29,9 +29,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-_MAX_STEPS = 60
-"""The measured flanks of `configs/cam_as_built.yaml` take 23, those of built cams in the tests up to 45."""
-
+_MAX_STEPS = 60  # the measured flanks of `configs/cam_as_built.yaml` take 23, those of built cams in the tests up to 45
 _N_SAMPLES = 257
 _N_FOOT_STEPS = 12
 
@@ -79,8 +77,7 @@ class Registration:
     @property
     def deviations(self) -> FloatArray:
         """Standard deviations of angle [rad] and shift."""
-        spread: FloatArray = np.sqrt(np.diag(self.covariance))
-        return spread
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def used(self) -> tuple[Any, ...]:
@@ -88,19 +85,10 @@ class Registration:
         return tuple(weight > 0 for weight in self.weights)
 
     def weakest(self, size: float) -> tuple[FloatArray, float]:
-        """Return the least certain motion about the centre of the points, and its standard deviation.
+        """Return the least certain motion about the centre of the points, (3,), and its standard deviation.
 
-        Parameters
-        ----------
-        size : float
-            Length at which the angle is felt, such as half the part's extent.
-
-        Returns
-        -------
-        direction : (3,) array
-            Unit vector of (size times angle, shift x, shift y) at the centre.
-        deviation : float
-            How far along it the points may have been moved wrongly.
+        The motion is a unit vector of (size times angle, shift x, shift y); size: where the angle is felt, such as half
+        the part's extent.
         """
         x, y = np.concatenate(self.points).mean(axis=0)
         about = np.array([[size, 0.0, 0.0], [-y, 1.0, 0.0], [x, 0.0, 1.0]])
@@ -112,8 +100,7 @@ class Registration:
 def turn_points(points: FloatArray, angle: float, shift: FloatArray) -> FloatArray:
     """Return R(angle) p + shift for points (n, 2)."""
     c, s = math.cos(angle), math.sin(angle)
-    moved: FloatArray = points @ np.array([[c, s], [-s, c]]) + shift
-    return moved
+    return np.asarray(points @ np.array([[c, s], [-s, c]]) + shift)
 
 
 def feet(
@@ -143,27 +130,13 @@ def feet(
 
 
 def register(
-    points: Sequence[FloatArray],
-    curves: Sequence[SmoothCurve],
-    robust: bool = True,
-    start: FloatArray | None = None,
-    width: bool = False,
+    points: Sequence[FloatArray],  # measured, (n, 2) for each curve
+    curves: Sequence[SmoothCurve],  # where they belong
+    robust: bool = True,  # whether outliers lose their weight
+    start: FloatArray | None = None,  # (3,): angle [rad] and shift to start from; None: none
+    width: bool = False,  # whether the part may be larger or smaller by one amount along all normals
 ) -> Registration:
-    """Return points registered jointly to their curves.
-
-    Parameters
-    ----------
-    points : sequence of (n, 2) array
-        Measured, one array per curve.
-    curves : sequence of SmoothCurve
-        Where they belong.
-    robust : bool
-        Whether outliers lose their weight.
-    start : (3,) array, optional
-        Angle [rad] and shift to start from; default: none.
-    width : bool
-        Whether the part may be larger or smaller by one amount along all normals.
-    """
+    """Return points registered jointly to their curves."""
     state = np.zeros(4)
     state[:3] = 0.0 if start is None else start
     size = float(np.sqrt(np.mean(np.concatenate([(item - item.mean(axis=0)) ** 2 for item in points]).sum(axis=1))))
@@ -175,7 +148,7 @@ def register(
             guess = [*found]
             rows, residuals, weights = _equations(curves, moved, found, weighted, state[3])
             step = _step(rows[:, : 4 if width else 3], residuals - state[3], weights, size)
-            state[:3] = _compose_motions(state[:3], step[:3])
+            state[:3] = state[0] + step[0], *turn_points(state[None, 1:3], step[0], step[1:3])[0]
             state[3] += step[3] if width else 0.0
             if np.abs(step[:3] * [size, 1.0, 1.0]).max() <= 1e-14 * size:
                 break
@@ -185,15 +158,7 @@ def register(
 def registered_where_it_is(
     points: Sequence[FloatArray], curves: Sequence[SmoothCurve], like: Registration
 ) -> Registration:
-    """Return points that are in the part's datum already: nothing is moved, and outliers are those of a registration.
-
-    Parameters
-    ----------
-    points, curves
-        As for `register`.
-    like : Registration
-        Whose weights count, of the same points.
-    """
+    """Return points that are in the part's datum already: nothing is moved, outliers are those of `like`."""
     found = [feet(curve, item) for curve, item in zip(curves, points, strict=True)]
     _, residuals, weights = _equations(curves, points, found, False, 0.0)
     cuts = np.cumsum([len(item) for item in points])[:-1]
@@ -250,13 +215,7 @@ def _step(rows: FloatArray, residuals: FloatArray, weights: FloatArray, size: fl
     root = np.sqrt(weights)[:, None]
     scale = np.array([size, 1.0, 1.0, 1.0])[: rows.shape[1]]
     solution = np.linalg.lstsq(root * rows / scale, -root[:, 0] * residuals, rcond=None)[0]
-    step: FloatArray = solution / scale
-    return step
-
-
-def _compose_motions(state: FloatArray, step: FloatArray) -> FloatArray:
-    """Return the motion followed by a further one."""
-    return np.array([state[0] + step[0], *turn_points(state[None, 1:], step[0], step[1:])[0]])
+    return np.asarray(solution / scale)
 
 
 def _registration(
@@ -299,8 +258,7 @@ def gaps_across(
         u = np.clip(
             u + (points[:, 1 - axis] - at.points[:, 1 - axis]) / (at.speed * at.tangents[:, 1 - axis]), low, high
         )
-    across: FloatArray = points[:, axis] - curve.frame(u).points[:, axis]
-    return across
+    return np.asarray(points[:, axis] - curve.frame(u).points[:, axis])
 
 
 def _dot(one: FloatArray, other: FloatArray) -> FloatArray:

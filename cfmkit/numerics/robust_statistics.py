@@ -9,20 +9,12 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-TUKEY_CUTOFF = 4.685
-"""Where Tukey's weight falls to zero, in standard deviations: 95 % efficient for normal values."""
-
-MAD_FACTOR = 1.4826
-"""Standard deviation of normal values over their median absolute deviation."""
-
+TUKEY_CUTOFF = 4.685  # where Tukey's weight falls to zero, in standard deviations: 95 % efficient for normal values
+MAD_FACTOR = 1.4826  # standard deviation of normal values over their median absolute deviation
 SPIKE_DEVIATIONS = 8.0
 """A sample is a spike where it is off the median of its neighbours by so many standard deviations of the noise."""
-
-_MEDIAN_REACH = 3
-"""Samples on either side that the median is of: spikes of up to three samples are seen."""
-
-_MAX_SPIKE_SHARE = 0.05
-"""Where more than this part of the samples look like spikes, that is how the signal is."""
+_MEDIAN_REACH = 3  # samples on either side that the median is of: spikes of up to three samples are seen
+_MAX_SPIKE_SHARE = 0.05  # where more than this part of the samples look like spikes, that is how the signal is
 
 
 def robust_scale(values: FloatArray) -> float:
@@ -35,18 +27,15 @@ def tukey(values: FloatArray, scale: float) -> FloatArray:
     if scale == 0:
         return np.ones_like(values)
     share = values / (TUKEY_CUTOFF * scale)
-    weights: FloatArray = np.where(np.abs(share) < 1, (1 - share**2) ** 2, 0.0)
-    return weights
+    return np.where(np.abs(share) < 1, (1 - share**2) ** 2, 0.0)
 
 
-def neighbour_noise(places: FloatArray, values: FloatArray) -> float:
-    """Return the standard deviation of noise, robustly, from each point's distance to the line through its neighbours.
-
-    Parameters
-    ----------
-    places, values : (n,) array
-        In any order; points at one place are left out but for the first.
-    """
+def neighbour_noise(
+    # (n,) each, in any order; of points at one place the first counts
+    places: FloatArray,
+    values: FloatArray,
+) -> float:
+    """Return the standard deviation of noise, robustly, from distances of points to the lines through neighbours."""
     places, first = np.unique(places, return_index=True)
     values = values[first]
     if len(places) < 5:

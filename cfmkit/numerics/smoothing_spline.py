@@ -14,26 +14,21 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-MIN_SPLINE_POINTS = 5
-"""What scipy's smoothing spline needs."""
-
-_MAX_LOG_LAMBDA, _MIN_LOG_LAMBDA = 6.0, -14.0
-"""Decades of lambda, for data scaled to unit spacing, between which the spline is sought."""
+MIN_SPLINE_POINTS = 5  # what scipy's smoothing spline needs
+LOG_LAMBDA_RANGE = (-14.0, 6.0)  # decades of lambda, for data scaled to unit spacing, that are searched
 
 
 @dataclass(frozen=True)
 class SmoothedFunction:
     """A smooth function through noisy points."""
 
-    spline: Any  # the function
+    spline: Any  # the function, a BSpline of scipy
     residual: float  # root mean square of (points - function)
-    # low, high: where the points begin and end
-    low: float
-    high: float
+    ends: tuple[float, float]  # where the points begin and end
 
     def evaluate(self, places: FloatArray, derivative: int = 0) -> FloatArray:
         """Return the function or one of its derivatives; constant beyond the ends."""
-        inside = np.clip(places, self.low, self.high)
+        inside = np.clip(places, *self.ends)
         values: FloatArray = self.spline(inside, nu=derivative)
         return values if derivative == 0 else np.where(inside == places, values, 0.0)
 
@@ -55,37 +50,25 @@ def fit_smoothing_spline(
     unit = (high - low) / (len(places) - 1)
     spline = _choose_spline((places - low) / unit, values, noise)
     moved = BSpline(spline.t * unit + low, spline.c, spline.k)
-    residual = float(np.sqrt(np.mean((moved(places) - values) ** 2)))
-    return SmoothedFunction(moved, residual, low, high)
+    return SmoothedFunction(moved, float(np.sqrt(np.mean((moved(places) - values) ** 2))), (low, high))
 
 
 def _choose_spline(x: FloatArray, values: FloatArray, noise: float) -> Any:
     """Return the spline in units of the spacing."""
     from scipy.interpolate import make_interp_spline, make_smoothing_spline
+    from scipy.optimize import brentq
 
     if noise == 0:
         return make_interp_spline(x, values)
     # Values in units of the noise: the numbers that scipy works with are then of order one.
-    scaled = values / noise
+    scaled, (low, high) = values / noise, LOG_LAMBDA_RANGE
 
     def excess(decade: float) -> float:
         return float(np.mean((make_smoothing_spline(x, scaled, lam=10.0**decade)(x) - scaled) ** 2)) - 1.0
 
-    if excess(_MAX_LOG_LAMBDA) <= 0:
-        decade = _MAX_LOG_LAMBDA
-    elif excess(_MIN_LOG_LAMBDA) >= 0:
+    if excess(low) >= 0:
         return make_interp_spline(x, values)
-    else:
-        decade = _crossing(excess)
+    decade = high if excess(high) <= 0 else brentq(excess, low, high, xtol=1e-3)
     spline = make_smoothing_spline(x, scaled, lam=10.0**decade)
     spline.c = spline.c * noise
     return spline
-
-
-def _crossing(excess: Any) -> float:
-    """Return the decade at which the residuals are as large as the noise: they grow with lambda."""
-    low, high = _MIN_LOG_LAMBDA, _MAX_LOG_LAMBDA
-    while high - low > 1e-3:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if excess(middle) > 0 else (middle, high)
-    return 0.5 * (low + high)

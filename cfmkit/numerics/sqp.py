@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 _MISSING_VALUE = 1e3  # what a point without an answer counts, in units of the objective and of the constraints
-_MIN_VIOLATION_FALL = (
-    1e-4  # share by which a violation falls in steps that get somewhere; where they are stuck it changes by 1e-9
-)
+_MIN_VIOLATION_FALL = 1e-4  # share by which it falls in steps that get somewhere; where they are stuck by 1e-9
 
 
 class SearchEnding(Enum):
@@ -48,11 +46,6 @@ class Program(Protocol):
         """Return their derivatives by z, (n,) and (m, n)."""
 
 
-def _never() -> bool:
-    """Return False: there is time."""
-    return False
-
-
 @dataclass(frozen=True)
 class Effort:
     """Limits of rounds and time."""
@@ -60,7 +53,7 @@ class Effort:
     steps: int = 60  # at most so many
     tolerance: float = 1e-6  # a change of the objective that is small
     violation: float = 1e-5  # what counts as none
-    stop: Callable[[], bool] = _never  # asked before each evaluation whether the time is up
+    stop: Callable[[], bool] = bool  # asked before each evaluation whether the time is up; `bool()` is False
     enough: float = -np.inf  # end at the first point without violation whose objective is this or less
     # whether to return the point where the steps end, though a better one was seen: of those without violation the best
     # is likely to be one that just counts as such, the last one has next to none if the steps converge
@@ -132,10 +125,10 @@ def _run_solver(memory: _Memory, z: FloatArray, bounds: FloatArray) -> tuple[Flo
     found = slsqp(  # type: ignore[call-overload]
         memory.objective,
         z,
-        jac=memory.objective_slope,
+        jac=lambda z: memory.slopes_at(z)[0],
         method="SLSQP",
         bounds=[(float(low), float(high)) for low, high in bounds],
-        constraints=[{"type": "ineq", "fun": memory.constraints, "jac": memory.constraint_slopes}],
+        constraints=[{"type": "ineq", "fun": memory.constraints, "jac": lambda z: memory.slopes_at(z)[1]}],
         options={"maxiter": memory.effort.steps, "ftol": memory.effort.tolerance},
     )
     return np.clip(found.x, *bounds.T), _ENDING_BY_MODE.get(int(found.status), SearchEnding.STUCK)
@@ -210,7 +203,10 @@ class _Memory:
 
     def objective(self, z: FloatArray) -> float:
         answer = self.evaluate(z)
-        return float(answer[0]) if answer is not None else self._worst() + _MISSING_VALUE
+        if answer is not None:
+            return float(answer[0])
+        assert self.best is not None
+        return abs(self.best[2]) + _MISSING_VALUE
 
     def constraints(self, z: FloatArray) -> FloatArray:
         answer = self.evaluate(z)
@@ -218,10 +214,6 @@ class _Memory:
             return np.asarray(answer[1])
         assert self.best is not None
         return np.asarray(np.minimum(self.best[3], 0.0) - 1.0)
-
-    def _worst(self) -> float:
-        assert self.best is not None
-        return abs(self.best[2])
 
     def slopes_at(self, z: FloatArray) -> Any:
         if self.sloped is None or not np.array_equal(z, self.sloped):
@@ -231,9 +223,3 @@ class _Memory:
             self.slope = self.slope if found is None else found
             self.sloped = z.copy()
         return self.slope
-
-    def objective_slope(self, z: FloatArray) -> FloatArray:
-        return np.asarray(self.slopes_at(z)[0])
-
-    def constraint_slopes(self, z: FloatArray) -> FloatArray:
-        return np.asarray(self.slopes_at(z)[1])

@@ -25,8 +25,7 @@ SAMPLE_KINDS: dict[str, SampleKind] = {
         SampleKind("lhs", "a Latin hypercube", "LatinHypercube"),
         SampleKind("sobol", "a Sobol sequence", "Sobol"),
     )
-}
-"""Every way to draw points, in the order of the documentation; a new one is its line here."""
+}  # every way to draw points, in the order of the documentation; a new one is its line here
 
 
 def list_phrases() -> str:

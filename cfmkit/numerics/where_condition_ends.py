@@ -16,43 +16,35 @@ if TYPE_CHECKING:
     Excess = Callable[[FloatArray, NDArray[np.intp]], FloatArray]
 
 _FLOAT_EPS, _FLOAT_TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
-
 _BRACKET_GRID = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8.0)
 _BRACKET_GRID[0], _BRACKET_GRID[4], _BRACKET_GRID[8] = 0.0, 0.5, 1.0
 _EVEN_GRID = np.arange(1, 18) / 18.0
 _NEAR_OFFSETS = np.array([3e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 0.1, 0.4])
 _OFFSETS_AROUND = np.concatenate([-_NEAR_OFFSETS[::-1], [0.0], _NEAR_OFFSETS])
 """Where an end is looked for, as shares of its bracket: first; where nothing is known of it; where it is expected."""
-
 _NEIGHBOUR_OFFSETS = np.arange(-2, 2)
-
 BRACKET_RTOL = 1e-12
 """Share of its first bracket to which an end is found: less is rounding wherever the bracket is a step of a grid."""
 
 
 @np.errstate(all="ignore")
-def last_places(excess: Excess, inside: FloatArray, outside: FloatArray, rounds: int = 100) -> FloatArray:
-    """Return how far a condition holds from places inside towards places outside, one by one.
+def last_places(
+    # (e, m) -> (e, m): at m places for each of some ends, which are counted along the rows of `inside`. At most zero
+    # where the condition holds, as a share of what it is compared with; minus infinity where it holds and nothing more
+    # is known, NaN where it is lost
+    excess: Excess,
+    # (d, k) each: where it holds, and where it does not; equal where there is nothing to look for
+    inside: FloatArray,
+    outside: FloatArray,
+    rounds: int = 100,  # calls at most
+) -> FloatArray:
+    """Return the last places at which a condition still holds from places inside towards places outside, (d, k).
+
+    If it is lost more than once on the way, one of these.
 
     For all of them together, in as few calls as can be: some places all over the bracket, the end expected where
     inverse interpolation through these has it, and then places closer and closer around that. Where the
     excess jumps, brackets are cut into even parts.
-
-    Parameters
-    ----------
-    excess : callable
-        ``excess(places, ends)``, (e, m) -> (e, m): at m places for each of some ends, which are counted along the
-        rows of `inside`. At most zero where the condition holds, as a share of what it is compared with. Minus
-        infinity where it holds and nothing more is known; NaN where it is lost.
-    inside, outside : (d, k) array
-        Where it holds, and where it does not; equal where there is nothing to look for.
-    rounds : int
-        At most so many calls.
-
-    Returns
-    -------
-    (d, k) array
-        The last places at which it still holds; if it is lost more than once on the way, one of these.
 
     References
     ----------

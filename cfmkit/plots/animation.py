@@ -27,12 +27,9 @@ if TYPE_CHECKING:
 
 FRAME_WIDTH, FRAME_HEIGHT = 240.0, 100.0
 """Size of a frame [mm]; with `DOTS_PER_INCH` it has 960 x 400 pixels, half a slide."""
-
 DOTS_PER_INCH = 101.6
 """Pixels per inch: four per millimetre, so that width and height are even numbers of pixels, as mp4 needs."""
-
-FRAME_DURATION = 90
-"""Duration of each frame [ms]: with 11 a second, forth and back takes three seconds."""
+FRAME_DURATION = 90  # duration of each frame [ms]: with 11 a second, forth and back takes three seconds
 
 
 @apply_style

@@ -34,30 +34,17 @@ if TYPE_CHECKING:
 
 SHEET_SIZE = (220.0, 150.0)
 """Of the figure where the list stands beside the picture, unless another width is requested [mm]."""
-
-LIST_WIDTH = 92.0
-"""Of the parts list [mm]."""
-
+LIST_WIDTH = 92.0  # of the parts list [mm]
 MIN_WIDTH_BESIDE = 150.0
 """Of a figure in which the list stands beside the picture; in a narrower one it stands below [mm]."""
-
 HEADING_ROOM, PLAIN_ROOM, BOTTOM_ROOM = 12.0, 4.0, 4.0
 """Above the picture, with and without a heading, and below it [mm]."""
-
 LINE_HEIGHT, ITEM_GAP, LIST_TOP, KEY_ROOM = 3.4, 1.0, 4.0, 5.0
 """Of the parts list: its lines, between two items, above the first, and for what its colours mean [mm]."""
-
-EDGE_MARGIN, BALLOON_RADIUS = 12.0, 3.0
-"""Room for balloons around the parts, and their radius [mm of print]."""
-
-MAX_HEIGHT_SHARE = 1.2
-"""Height of the picture above a list, in parts of the figure's width, where a mechanism is tall."""
-
-ANCHOR_SHARES = (0.0, 0.6, -0.6, 0.3, -0.3)
-"""Where a number may point at a part whose middle is that of another one."""
-
-LETTERS_PER_MM = 0.6
-"""Of the width of the list that its texts have."""
+EDGE_MARGIN, BALLOON_RADIUS = 12.0, 3.0  # room for balloons around the parts, and their radius [mm of print]
+MAX_HEIGHT_SHARE = 1.2  # height of the picture above a list, in parts of the figure's width, where a mechanism is tall
+ANCHOR_SHARES = (0.0, 0.6, -0.6, 0.3, -0.3)  # where a number may point at a part whose middle is that of another one
+LETTERS_PER_MM = 0.6  # of the width of the list that its texts have
 
 
 @apply_style
@@ -73,16 +60,18 @@ def assembly_figure(
     low, high = points.min(axis=0), points.max(axis=0)
     width = print_width(SHEET_SIZE[0])
     top = HEADING_ROOM if has_titles() else PLAIN_ROOM
+    subject = "assembly, numbers as in parts.csv"
     if width >= MIN_WIDTH_BESIDE:
         room = (width - LIST_WIDTH, SHEET_SIZE[1] - HEADING_ROOM - BOTTOM_ROOM)
         figure = new_figure(width, room[1] + top + BOTTOM_ROOM)
         list_box = (room[0], BOTTOM_ROOM, LIST_WIDTH, room[1])
     else:
+        subject = "assembly"  # no more stands beside a name of usual length
         scale = (width - 2.0 * EDGE_MARGIN) / (high[0] - low[0])
         room = (width, min(scale * (high[1] - low[1]) + 2.0 * EDGE_MARGIN, MAX_HEIGHT_SHARE * width))
         list_box = (0.0, BOTTOM_ROOM, width, _list_height(parts, width))
         figure = new_figure(width, room[1] + list_box[3] + top + BOTTOM_ROOM)
-    write_heading(figure, Heading(title, "assembly, numbers as in parts.csv"))
+    write_heading(figure, Heading(title, subject))
     ax = _blank_axes(figure, (0.0, size_mm(figure)[1] - top - room[1], *room))
     _frame(ax, low, high)
     made = {part.body for part in parts if part.source == "make"}
@@ -96,8 +85,7 @@ def assembly_figure(
 
 def _blank_axes(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
     """Return axes without lines and numbers in a box (left, bottom, width, height) [mm of print]."""
-    width, height = size_mm(figure)
-    ax = figure.add_axes((box[0] / width, box[1] / height, box[2] / width, box[3] / height))
+    ax = figure.add_axes(tuple(np.array(box) / np.tile(size_mm(figure), 2)))
     ax.axis("off")
     ax.set(xticks=[], yticks=[])
     return ax
@@ -160,8 +148,7 @@ def _anchor(outline: FloatArray, share: float) -> tuple[float, float]:
     """Return a point of a part: the middle of its box, or a share of the way from there to its upper right corner."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     middle = 0.5 * (low + high)
-    x, y = (middle + share * (high - middle)).tolist()
-    return x, y
+    return tuple((middle + share * (high - middle)).tolist())
 
 
 def _sides(anchors: dict[int, tuple[float, float]], middle: float) -> tuple[list[int], list[int]]:

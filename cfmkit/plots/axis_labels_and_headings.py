@@ -34,15 +34,9 @@ if TYPE_CHECKING:
 
 POLE_PERCENTAGE = 3.0
 """Percentage of the points at each end of the values that may belong to a pole: three of a curve of 101 points."""
-
-LEFT_MARGIN = 3.0
-"""Distance of headings from the edge of the print [mm], about one letter."""
-
-LEAST_OF_NAME = 4
-"""Characters of a name that a heading keeps: with fewer it says nothing, and the subject stands alone."""
-
-KEY_GAP = 3.0
-"""Between the entries of a colour key [mm]: twice the space between words."""
+LEFT_MARGIN = 3.0  # distance of headings from the edge of the print [mm], about one letter
+LEAST_OF_NAME = 4  # characters of a name that a heading keeps: with fewer it says nothing, and the subject stands alone
+KEY_GAP = 3.0  # between the entries of a colour key [mm]: twice the space between words
 
 
 def axis_label(name: str, dimension: str) -> str:
@@ -73,8 +67,7 @@ def metric_label(name: str, dimension: str) -> str:
 
 def metric_values(values: Any, dimension: str) -> FloatArray:
     """Return SI values of a metric in the unit of `metric_label`."""
-    shown: FloatArray = 100.0 * np.asarray(values) if dimension == "ratio" else border_values(values, dimension)
-    return shown
+    return 100.0 * np.asarray(values) if dimension == "ratio" else border_values(values, dimension)
 
 
 def value_text(value: float, dimension: str) -> str:
@@ -146,7 +139,6 @@ def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: di
         text.set_fontsize(look["size"] * min(1.0, room / extent))
 
 
-@apply_style
 def color_key(ax: Axes, entries: Sequence[tuple[str, str]]) -> None:
     """Write texts in their colours above axes side by side, on as many lines as the width of the print demands."""
     points = 72.0 / ax.figure.dpi
@@ -182,7 +174,6 @@ def plain_ticks(axis: Axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-@apply_style
 def remark(ax: Axes, place: tuple[float, float], text: str, **options: Any) -> None:
     """Write a small grey remark at a place in fractions of the axes."""
     if is_plain():
@@ -252,10 +243,8 @@ def shown_range(values: Any) -> tuple[float, float] | None:
     if whole is None:
         return None
     array = np.asarray(values, dtype=float)
-    low, high = (
-        float(end) for end in np.percentile(array[np.isfinite(array)], (POLE_PERCENTAGE, 100.0 - POLE_PERCENTAGE))
-    )
+    array, ends = array[np.isfinite(array)], (POLE_PERCENTAGE, 100.0 - POLE_PERCENTAGE)
+    low, high = np.percentile(array, ends).tolist()
     room = 3.0 * max(high - low, 0.2 * max(abs(low), abs(high)))
-    return (whole[0] if whole[0] >= low - room else low - 0.3 * room), (
-        whole[1] if whole[1] <= high + room else high + 0.3 * room
-    )
+    least = whole[0] if whole[0] >= low - room else low - 0.3 * room
+    return least, whole[1] if whole[1] <= high + room else high + 0.3 * room

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 Bounds = tuple[float | None, float | None]
+BandNeed = tuple[float, float, float]  # the ends of a band, and what ranks branches: how much of it they need
 
 
 @dataclass(frozen=True)
@@ -93,16 +94,16 @@ def _band(outcome: Outcome, result: Result) -> Band | None:
     return Band(*bounds, start, stop, _sentence(outcome, _BAND_LABELS[metric].format(outcome.kind) + which), outcome.ok)
 
 
-def _ripple(spread: Spread, limit: float) -> tuple[float, float, float]:
+def _ripple(spread: Spread, limit: float) -> BandNeed:
     return (1.0 - limit) * spread.max, spread.max, (spread.max - spread.min) / spread.max
 
 
-def _half_band(spread: Spread, limit: float) -> tuple[float, float, float]:
+def _half_band(spread: Spread, limit: float) -> BandNeed:
     middle = 0.5 * (spread.max + spread.min)
     return (1.0 - limit) * middle, (1.0 + limit) * middle, (spread.max - spread.min) / spread.max
 
 
-def _band_about_mean(spread: Spread, limit: float) -> tuple[float, float, float]:
+def _band_about_mean(spread: Spread, limit: float) -> BandNeed:
     away = max(spread.max - spread.mean, spread.mean - spread.min) / spread.mean
     return (1.0 - limit) * spread.mean, (1.0 + limit) * spread.mean, away
 
@@ -114,15 +115,13 @@ _BAND_LABELS = {
     "half_band": "half band",
     "deviation_from_mean": "deviation from mean",
     "deviation_from_target": "deviation from target",
-}
-"""Metrics that are bands, and what they are called on a picture."""
-
+}  # metrics that are bands, and what they are called on a picture
 _BAND_RULES = {"ripple": _ripple, "half_band": _half_band, "deviation_from_mean": _band_about_mean}
 """Bounds of the band, and what ranks the branches."""
 
 
 def _worst(
-    subjects: list[Branch], rule: Callable[[Spread, float], tuple[float, float, float]], limit: float
+    subjects: list[Branch], rule: Callable[[Spread, float], BandNeed], limit: float
 ) -> tuple[Bounds | None, str]:
     """Return the band of the branch that needs most of it, and that branch's name."""
     found = []
@@ -150,9 +149,8 @@ def _band_about_target(target: float | None, limit: float) -> Bounds | None:
 
 def _sentence(outcome: Outcome, name: str) -> str:
     """Return ``ripple (load) 3.1 % ≤ 5 %``, or that it is missed."""
-    low, high = (
-        None if bound is None else value_text(bound, outcome.dimension) for bound in (outcome.min, outcome.max)
-    )
+    ends = (outcome.min, outcome.max)
+    low, high = (None if bound is None else value_text(bound, outcome.dimension) for bound in ends)
     allowed = f"{low} … {high}" if low and high else f"≤ {high}" if high else f"≥ {low}"
     if outcome.value is None:
         return f"{name} {allowed}: no value"

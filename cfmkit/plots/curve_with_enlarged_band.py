@@ -30,7 +30,6 @@ Interval = tuple[float, float]
 ENLARGE_BELOW = 0.45
 """Share of the height below which the range gets a panel of its own: above it that would enlarge it little more than
 twice."""
-
 MIN_BAND_SHARE = 0.002
 """The enlarged panel shows at least this fraction of the force to each side: nobody wants to see rounding errors."""
 

@@ -9,6 +9,7 @@ allows is shaded.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,17 +32,14 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
+    from cfmkit.plots.style import Look
 
 BRANCH_RTOL = 2e-3
 """Branches closer than this fraction of the axes are one line, with one name: 0.2 mm of a print of 100 mm is less
 than a line is thick."""
-
-
 NAME_ROOM = 0.2
 """Where several curves are named at their ends, the axes are longer by this fraction: room for a value with its unit,
 chosen by eye on the shipped studies."""
-
-
 USUAL_AXES_WIDTH = 120.0
 """Width of axes for which `NAME_ROOM` was chosen [mm]; in narrower ones names, whose letters keep their size, take a
 larger share."""
@@ -89,12 +87,15 @@ def plot_curve(
     if not curves:
         return ax
     kind = curves[0].kind
-    earlier = _earlier_lines(kind) if isinstance(source, Result) else []
+    earlier: list[_Line] = []
+    bands: tuple[Band, ...] = ()
+    wanted = None
+    if isinstance(source, Result):
+        earlier, wanted = _earlier_lines(kind), _target_line(source)
+        bands = bands_of(source) if look.bands else ()
     for line in earlier:
         ax.plot(*line.points.T, color=line.color, linewidth=1.0, dashes=(3, 1.5), zorder=2.8, gid="earlier")
-    bands = bands_of(source) if look.bands and isinstance(source, Result) else ()
-    wanted = _target_line(source) if isinstance(source, Result) else None
-    _limit(ax, ([*lines, *earlier] if wanted is None else [*lines, *earlier, wanted], bands), look, kind)
+    _limit(ax, [*lines, *earlier, *([] if wanted is None else [wanted])], bands, look, kind)
     if len(curves) > 1 and look.names and look.window is None:
         ax.set_xlim(right=ax.get_xlim()[1] + _name_room(ax) * float(np.ptp(ax.get_xlim())))
     region_names = [shade(ax, region, _motion(kind)) for region in look.regions]
@@ -107,20 +108,13 @@ def plot_curve(
     if look.arrows and not _all_coincide(ax, lines):
         for line in lines:
             _draw_arrow(ax, line)
-    target_names = [] if wanted is None else [_draw_target(ax, wanted)]
+    earlier_names = [_name(line, 0.3) for line in earlier[:1]]
+    target_names = [] if wanted is None else [_name(wanted, 0.85)]
+    if wanted is not None:
+        ax.plot(*wanted.points.T, color=wanted.color, linewidth=1.0, dashes=(6, 3), zorder=3.5)
     if look.names:
-        place_labels(
-            ax,
-            [
-                *_name_lines(ax, lines),
-                *map(_name_earlier, earlier[:1]),
-                *target_names,
-                *_unstable_name(lines),
-                *level_names,
-                *band_names,
-                *region_names,
-            ],
-        )
+        own_names = [*_name_lines(ax, lines), *earlier_names, *target_names, *_unstable_name(lines)]
+        place_labels(ax, [*own_names, *level_names, *band_names, *region_names])
     return ax
 
 
@@ -194,15 +188,8 @@ def _curve_name(curve: Curve, index: int) -> str:
 def _draw_line(ax: Axes, line: _Line) -> None:
     """Draw a branch in runs of stable (solid) and unstable (dashed) points, each run joined to the next."""
     for start, stop, stable in _runs(line.stable):
-        part = line.points[start:stop]
-        ax.plot(
-            part[:, 0],
-            part[:, 1],
-            color=line.color,
-            linestyle="-" if stable else "--",
-            linewidth=0.8 if line.faint else 1.4,
-            zorder=3,
-        )
+        look: Look = {"linestyle": "-" if stable else "--", "linewidth": 0.8 if line.faint else 1.4}
+        ax.plot(*line.points[start:stop].T, color=line.color, zorder=3, **look)
     known = np.concatenate([[False], np.isfinite(line.points).all(axis=1), [False]])
     alone = line.points[known[1:-1] & ~known[:-2] & ~known[2:]]
     if len(alone):
@@ -212,21 +199,17 @@ def _draw_line(ax: Axes, line: _Line) -> None:
 def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int, bool]]:
     """Return (start, stop, stable) of the runs; an unstable run reaches out to its stable neighbours."""
     edges = np.flatnonzero(np.diff(stable.astype(int))) + 1
-    starts, stops = [0, *edges.tolist()], [*edges.tolist(), len(stable)]
-    runs: list[tuple[int, int, bool]] = []
-    for start, stop in zip(starts, stops, strict=True):
-        kind = bool(stable[start])
-        runs.append((start, stop, kind) if kind else (max(start - 1, 0), min(stop + 1, len(stable)), kind))
-    return runs
+    runs = [(start, stop, bool(stable[start])) for start, stop in pairwise([0, *edges.tolist(), len(stable)])]
+    return [run if run[2] else (max(run[0] - 1, 0), min(run[1] + 1, len(stable)), False) for run in runs]
 
 
 def _motion(kind: str) -> str:
     return "length" if kind == "force" else "angle"
 
 
-def _limit(ax: Axes, drawn: tuple[list[_Line], Sequence[Band]], look: CurveLook, kind: str) -> None:
+def _limit(ax: Axes, lines: list[_Line], bands: Sequence[Band], look: CurveLook, kind: str) -> None:
     """Set limits that show everything from zero on, or what the look asks for."""
-    motion, (lines, bands) = _motion(kind), drawn
+    motion = _motion(kind)
     if look.window is not None:
         ax.set_xlim(*(float(to_border(value, motion)) for value in look.window[0]))
         ax.set_ylim(*(float(to_border(value, kind)) for value in look.window[1]))
@@ -287,14 +270,8 @@ def _earlier_lines(kind: Kind) -> list[_Line]:
     return [_Line(points, np.ones(len(points), dtype=np.bool_), TEXT_GREY, name) for points in earlier.branches]
 
 
-def _name_earlier(line: _Line) -> Label:
-    return Label(line.name, line.color, line.points, prefer=0.3)
-
-
-def _draw_target(ax: Axes, line: _Line) -> Label:
-    """Draw the target curve dashed, and return its name."""
-    ax.plot(*line.points.T, color=line.color, linewidth=1.0, dashes=(6, 3), zorder=3.5)
-    return Label(line.name, line.color, line.points, prefer=0.85)
+def _name(line: _Line, prefer: float) -> Label:
+    return Label(line.name, line.color, line.points, prefer)
 
 
 def _name_lines(ax: Axes, lines: list[_Line]) -> list[Label]:
@@ -304,12 +281,12 @@ def _name_lines(ax: Axes, lines: list[_Line]) -> list[Label]:
         return [Label(" and ".join(line.name for line in named), named[-1].color, named[0].points, prefer=0.6)]
     if len({line.color for line in lines}) < len(lines) or len(named) > 2:
         return [_name_at_end(line) for line in named]
-    return [Label(line.name, line.color, line.points, prefer=0.6 - 0.2 * i) for i, line in enumerate(named)]
+    return [_name(line, 0.6 - 0.2 * i) for i, line in enumerate(named)]
 
 
 def _name_at_end(line: _Line) -> Label:
     if line.faint:
-        return Label(line.name, line.color, line.points, prefer=0.5)
+        return _name(line, 0.5)
     finite = line.points[np.isfinite(line.points).all(axis=1)]
     return Label(line.name, line.color, finite[-max(len(finite) // 20, 1) :], prefer=1.0, toward=(1.0, 0.0))
 
@@ -340,15 +317,9 @@ def _draw_arrow(ax: Axes, line: _Line) -> None:
     ahead = [i for i in index if i > middle and np.hypot(*(points[i] - points[middle])) > 0.015]
     if not ahead:
         return
-    ax.annotate(
-        "",
-        xy=tuple(line.points[ahead[0]]),
-        xytext=tuple(line.points[middle]),
-        arrowprops={
-            "arrowstyle": "-|>", "color": line.color, "linewidth": 0, "mutation_scale": 11, "shrinkA": 0, "shrinkB": 0,
-        },
-        zorder=4,
-    )  # fmt: skip
+    look: Look = {"arrowstyle": "-|>", "color": line.color, "linewidth": 0, "mutation_scale": 11}
+    look |= {"shrinkA": 0, "shrinkB": 0}
+    ax.annotate("", tuple(line.points[ahead[0]]), tuple(line.points[middle]), arrowprops=look, zorder=4)
 
 
 def _unstable_name(lines: list[_Line]) -> list[Label]:

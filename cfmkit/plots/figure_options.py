@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from cfmkit.plots.overlay import EarlierCurve
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
-
 MIN_PRINT_WIDTH, MAX_PRINT_WIDTH = 0.06, 0.6
 """Widths of print that are allowed [m]: below, axes have no room beside their labels; above, no page is as wide."""
 
@@ -40,20 +39,15 @@ class FigureForm:
         """Whether nothing but the default is requested."""
         return self == DEFAULT_FORM
 
-    @property
-    def on_screen(self) -> bool:
-        """Whether figures are drawn as a page shows them, whatever files they become."""
-        return replace(self, formats=("png",)).is_default
-
     def draw(self, make: Callable[[], Figure]) -> Figure:
         """Return a figure in this form."""
         from cfmkit.plots.figure_width import draw_in_width
         from cfmkit.plots.style import style, with_settings
 
+        titles = self.titles and not self.plain
         with with_settings(self.settings, self.titles, self.plain, self.overlay), style():
-            if self.width is None and self.titles and not self.plain:
+            if self.width is None and titles:
                 return make()
-            titles = self.titles and not self.plain
             return draw_in_width(make, None if self.width is None else self.width * 1e3, titles)
 
     def write(self, figure: Figure, stem: str) -> Iterator[tuple[str, bytes]]:
@@ -79,13 +73,11 @@ class FigureForm:
     ) -> dict[str, Figure]:
         """Return figures as a page shows them: with its own headings and width, whatever is drawn for print."""
         form = FigureForm(overlay=self.overlay)
-        return {
-            stem: drawn[stem] if self.on_screen and stem in drawn else form.draw(make) for stem, make in makers.items()
-        }
+        known = drawn if replace(self, formats=("png",)).is_default else {}
+        return {stem: known[stem] if stem in known else form.draw(make) for stem, make in makers.items()}
 
 
-DEFAULT_FORM = FigureForm()
-"""PNG, as each figure is drawn."""
+DEFAULT_FORM = FigureForm()  # PNG, as each figure is drawn
 
 
 def form_of(
@@ -108,9 +100,8 @@ def form_of(
     listed = ("png" if formats is None else formats).split(",")
     names = tuple(dict.fromkeys(name.strip().lower() for name in listed if name.strip()))
     if unknown := [name for name in names if name not in FIGURE_FORMATS] or ([""] if not names else []):
-        raise UsageError(
-            f"--figures: there is no format {visible(unknown[0])!r}; there are {', '.join(FIGURE_FORMATS)}"
-        )
+        formats = ", ".join(FIGURE_FORMATS)
+        raise UsageError(f"--figures: there is no format {visible(unknown[0])!r}; there are {formats}")
     from cfmkit.plots.overlay import read_earlier
 
     earlier = None if overlay is None else read_earlier(overlay)
@@ -141,21 +132,12 @@ def settings(path: str) -> tuple[tuple[str, Any], ...]:
     Raises UsageError if it cannot be read, or says something that matplotlib does not know or that is not a file's to
     change.
     """
-    found = _read_style(path)
-    for name in found:
-        if name.startswith(FIXED_SETTINGS):
-            raise UsageError(f"--figure-style: {visible(path)}: {name} is not a style file's to change")
-    return tuple(sorted(found.items()))
-
-
-def _read_style(path: str) -> dict[str, Any]:
-    """Return what a style file says; matplotlib tells of its faults in its log."""
     import logging
     import warnings
 
     import matplotlib
 
-    reported: list[str] = []
+    reported: list[str] = []  # matplotlib tells of the faults of a file in its log
     teller = logging.Handler()
     teller.emit = lambda record: reported.append(record.getMessage())  # type: ignore[method-assign]
     log = logging.getLogger("matplotlib")
@@ -173,8 +155,8 @@ def _read_style(path: str) -> dict[str, Any]:
         log.removeHandler(teller)
         log.propagate = before
     if reported:
-        first = " ".join(reported[0].split()).partition(" You probably need")[
-            0
-        ]  # then come addresses of the library's own
+        first, _, _ = " ".join(reported[0].split()).partition(" You probably need")  # then come its own addresses
         raise UsageError(f"--figure-style: {visible(path)}: {visible(first)}")
-    return dict(read)
+    if fixed := next((name for name in read if name.startswith(FIXED_SETTINGS)), None):
+        raise UsageError(f"--figure-style: {visible(path)}: {fixed} is not a style file's to change")
+    return tuple(sorted(dict(read).items()))

@@ -24,40 +24,20 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-Box = tuple[float, float, float, float]
-"""Left, bottom, width and height [mm of print]."""
+Box = tuple[float, float, float, float]  # left, bottom, width and height [mm of print]
 
-HEADING_MM = 6.0
-"""Height of a heading, which is cut off where there is none."""
-
-PAD_MM = 1.2
-"""Around axes with their numbers and names."""
-
+HEADING_MM = 6.0  # height of a heading, which is cut off where there is none
+PAD_MM = 1.2  # around axes with their numbers and names
 MIN_SHARE_OF_WIDTH = 0.6
 """Axes side by side that would become narrower than this share stand below each other: names beside lines overlap."""
-
 MIN_HEIGHT_FACTOR, MAX_HEIGHT_FACTOR = 0.8, 1.1
 """Limits to the change of a diagram's height with its width: a column of 84 mm gets about 84 x 75 mm."""
-
-MAX_STACKED = 6
-"""More axes are not stacked: they are small ones of one kind, and would fill a page."""
-
-MAX_STACK_HEIGHT_MM = 230.0
-"""The height of a page of print."""
-
-KEY_MM = 8.0
-"""Boxes that are narrower are keys of colours: they stay beside their diagram."""
-
-EDGE_PT = 4.0
-"""Smallest distance of a name from the edge of the paper: half a letter."""
-
-MIN_FONT_FACTOR = 0.7
-"""Share of their size to which letters are made smaller: 5 to 6 pt, which print still shows."""
-
-LETTER_WIDTH = 0.55
-"""Mean width of a letter, in parts of the font size."""
-
-
+MAX_STACKED = 6  # more axes are not stacked: they are small ones of one kind, and would fill a page
+MAX_STACK_HEIGHT_MM = 230.0  # the height of a page of print
+KEY_MM = 8.0  # boxes that are narrower are keys of colours: they stay beside their diagram
+EDGE_PT = 4.0  # smallest distance of a name from the edge of the paper: half a letter
+MIN_FONT_FACTOR = 0.7  # share of their size to which letters are made smaller: 5 to 6 pt, which print still shows
+LETTER_WIDTH = 0.55  # mean width of a letter, in parts of the font size
 BOX_DIGITS = 4
 """Of boxes [mm]: constrained layout differs in its last digits each time, and a figure has the same bytes each time."""
 
@@ -219,9 +199,8 @@ def _must_stack(boxes: FloatArray, size: float, width: float) -> bool:
 def _height_of_rows(boxes: FloatArray, rows: _Cells) -> float:
     """Return the height of the rows of axes, without what is between them [mm]."""
     single = rows.first == rows.last
-    return sum(float(boxes[single & (rows.first == row), 3].max(initial=0.0)) for row in range(rows.count)) or float(
-        boxes[:, 3].max()
-    )
+    heights = [float(boxes[single & (rows.first == row), 3].max(initial=0.0)) for row in range(rows.count)]
+    return sum(heights) or float(boxes[:, 3].max())
 
 
 def _free_margins(figure: Figure, new_width: float) -> Box:
@@ -272,8 +251,7 @@ def _constrain(
     figure.set_layout_engine(engine)
     engine.execute(figure)
     bounds = [ax.get_position(original=True).bounds for ax in axes]
-    boxes: FloatArray = np.array(bounds) * np.array([size[0], size[1], size[0], size[1]])
-    return boxes.round(BOX_DIGITS)
+    return np.asarray((np.array(bounds) * np.tile(size, 2)).round(BOX_DIGITS))
 
 
 def _is_too_long(ax: Axes) -> bool:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.plots.style import SMALL_FONT, apply_style
+from cfmkit.plots.style import SMALL_FONT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,37 +22,27 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.plots.style import Look
 
 CELL_SIZE = 1.5
 """Size of a cell [pt]: a fifth of the size of the letters, which is as near to a line as a name may come."""
-
 LABEL_GAPS = (2.5, 6.0, 11.0, 18.0, 28.0)
 """Distances from the line that are tried [pt]: from a third of the size of the letters on, farther apart the farther
 away they are, where a place need not be found as exactly."""
-
 FINER_GAPS = (1.0, 2.5, 4.0, 6.0, 8.5, 11.0, 14.0, 18.0, 23.0, 28.0, 36.0, 46.0, 58.0, 72.0)
 """The same where every place of those covers a line, as in a narrow figure: nearer, closer together, and farther."""
-
 COVERING_COST = 40.0
 """What it costs to cover a line over the height of a name [pt]: more than any distance that is tried."""
-
-EDGE_MARGIN = 1.5
-"""Least distance of a name from the edge of the axes [pt]: one cell."""
-
+EDGE_MARGIN = 1.5  # least distance of a name from the edge of the axes [pt]: one cell
 MIN_LEADER_DISTANCE = 9.0
 """From this distance on a thin line leads from the name to its line [pt]: more than the height of the letters, another
 name could stand between them."""
-
 N_SIGHT_PLACES = 12
 """So many places between a name and its line are looked at: over the farthest distance they are 2.5 pt apart."""
-
 CROWDING_COST = 60.0
 """What it costs to stand at a point where the lines of other names are within a cell or two: it would name any of them.
 As much as another name between the two."""
-
-MIN_LINE_DISTANCE = 6.0
-"""From this distance on lines are told apart [pt]: four cells, the height of small letters."""
-
+MIN_LINE_DISTANCE = 6.0  # from this distance on lines are told apart [pt]: four cells, the height of small letters
 _SIDE_DIRECTIONS = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], [1, -1], [-1, -1]], dtype=float)
 
 
@@ -69,7 +59,6 @@ class Label:
     halo: bool = True  # whether to clear the background behind the name
 
 
-@apply_style
 def place_labels(
     ax: Axes,  # with everything drawn that the names must avoid
     labels: list[Label],  # in order of importance: earlier ones choose first
@@ -138,10 +127,7 @@ def _in_two_lines(text: str) -> str:
 
 
 def _thin_points(points: FloatArray, most: int = 80) -> FloatArray:
-    if len(points) <= most:
-        return points
-    thinned: FloatArray = points[np.linspace(0, len(points) - 1, most).astype(int)]
-    return thinned
+    return points if len(points) <= most else points[np.linspace(0, len(points) - 1, most).astype(int)]
 
 
 def _together(points: FloatArray, others: list[FloatArray]) -> NDArray[np.bool_]:
@@ -168,11 +154,8 @@ def _best(
     share = np.repeat(np.linspace(0.0, 1.0, len(points)) if len(points) > 1 else [label.prefer], len(offsets))
     slanted = np.tile(np.abs(sides).sum(axis=1) > 1, len(points))
     weight = 3.0 * COVERING_COST if tried is FINER_GAPS else COVERING_COST
-    covered = ground.count_covered(centers, box)
-    near = ground.count_covered(centers, box + 5.0)
-    cost = (
-        weight * covered + 2.0 * near + np.tile(away, len(points)) + 14.0 * np.abs(share - label.prefer) + 3.0 * slanted
-    )
+    cost = weight * ground.count_covered(centers, box) + 2.0 * ground.count_covered(centers, box + 5.0)
+    cost = cost + np.tile(away, len(points)) + 14.0 * np.abs(share - label.prefer) + 3.0 * slanted
     if label.toward:
         wanted = np.array(label.toward) / np.hypot(*label.toward)
         unit = sides / np.hypot(sides[:, 0], sides[:, 1])[:, None]
@@ -181,8 +164,7 @@ def _best(
     cost = cost + CROWDING_COST * np.repeat(together, len(offsets))
     cost = cost + np.where(ground.holds(centers, box), 0.0, 1e6)
     cheapest = int(np.argmin(cost))
-    center: FloatArray = centers[cheapest]
-    return center, float(cost[cheapest])
+    return centers[cheapest], float(cost[cheapest])
 
 
 def _ways(tried: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
@@ -191,10 +173,8 @@ def _ways(tried: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
     In a narrow figure a corner of the name may also stand above or below the point, not on a diagonal alone.
     """
     away = np.array(tried)
-    sides, gaps = (
-        np.repeat(_SIDE_DIRECTIONS, len(away), axis=0),
-        np.tile(away, len(_SIDE_DIRECTIONS))[:, None] * [1.0, 1.0],
-    )
+    sides = np.repeat(_SIDE_DIRECTIONS, len(away), axis=0)
+    gaps = np.tile(away, len(_SIDE_DIRECTIONS))[:, None] * [1.0, 1.0]
     if tried is not FINER_GAPS:
         return sides, gaps
     corners = np.repeat(_SIDE_DIRECTIONS[4:], len(away), axis=0)
@@ -209,19 +189,15 @@ def _cost_between(ground: _Ground, centers: FloatArray, box: FloatArray, anchors
     way = anchors - starts
     length = np.hypot(way[:, 0], way[:, 1])
     # the line that is named ends the way: its own cells are no obstacle
-    shares = (
-        np.linspace(0.0, 1.0, N_SIGHT_PLACES)
-        * np.maximum(1.0 - 2.0 * CELL_SIZE / np.maximum(length, CELL_SIZE), 0.0)[:, None]
-    )
+    reach = np.maximum(1.0 - 2.0 * CELL_SIZE / np.maximum(length, CELL_SIZE), 0.0)
+    shares = np.linspace(0.0, 1.0, N_SIGHT_PLACES) * reach[:, None]
     places = starts[:, None, :] + shares[:, :, None] * way[:, None, :]
-    cost: FloatArray = 15.0 * ground.any_at(places, ground.taken) + 60.0 * ground.any_at(places, ground.named)
-    return cost
+    return 15.0 * ground.any_at(places, ground.taken) + 60.0 * ground.any_at(places, ground.named)
 
 
 def _edges(centers: FloatArray, box: FloatArray, anchors: FloatArray) -> FloatArray:
     """Return the point of each box that is nearest to its anchor."""
-    edges: FloatArray = centers + np.clip(anchors - centers, -box / 2, box / 2)
-    return edges
+    return np.asarray(centers + np.clip(anchors - centers, -box / 2, box / 2))
 
 
 def _clear(ground: _Ground, center: FloatArray, box: FloatArray) -> None:
@@ -229,27 +205,21 @@ def _clear(ground: _Ground, center: FloatArray, box: FloatArray) -> None:
     from matplotlib.patches import Rectangle
 
     low, size = (center - box / 2 - 0.5) / ground.extent, (box + 1.0) / ground.extent
-    back = Rectangle(
-        tuple(low), *size, transform=ground.ax.transAxes, facecolor="white", alpha=0.8, linewidth=0, zorder=2.1
-    )
-    back.set_gid("no-obstacle")
-    ground.ax.add_artist(back)
+    look: Look = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "zorder": 2.1, "gid": "no-obstacle"}
+    ground.ax.add_artist(Rectangle(tuple(low), *size, transform=ground.ax.transAxes, **look))
 
 
 def _lead(ground: _Ground, where: tuple[FloatArray, FloatArray, FloatArray], color: str) -> None:
     """Draw a thin line from the edge of a name's box to its anchor."""
     center, box, anchor = where
     ends = np.array([_edges(center, box, anchor), anchor]) / ground.extent
-    ground.ax.plot(
-        ends[:, 0], ends[:, 1], transform=ground.ax.transAxes, color=color, linewidth=0.5, zorder=5, clip_on=False
-    )
+    ground.ax.plot(*ends.T, transform=ground.ax.transAxes, color=color, linewidth=0.5, zorder=5, clip_on=False)
 
 
 class _Ground:
     """The cells of some axes, and which of them are taken; lengths in points from the lower left corner."""
 
     def __init__(self, ax: Axes) -> None:
-        """Mark what is drawn already."""
         self.ax = ax
         ax.apply_aspect()
         self.scale = 72.0 / ax.figure.dpi
@@ -259,10 +229,6 @@ class _Ground:
         self.shape = np.maximum(np.ceil(self.extent / CELL_SIZE).astype(int), 1)
         self.taken = np.zeros(self.shape, dtype=np.int64)
         self.named = np.zeros(self.shape, dtype=np.int64)
-        self._mark_artists()
-        self._sum()
-
-    def _mark_artists(self) -> None:
         for line in self.ax.lines:
             if line.get_visible() and line.get_gid() != "no-obstacle":
                 self._mark(self._points(np.asarray(line.get_xydata(), dtype=float), line.get_transform()))
@@ -275,11 +241,11 @@ class _Ground:
             if text.get_text():
                 box = text.get_window_extent()
                 low = (np.array([box.x0, box.y0]) - self.corner) * self.scale
-                self._fill(low, low + np.array([box.width, box.height]) * self.scale, name=True)
+                self._fill(low, low + np.array([box.width, box.height]) * self.scale)
+        self._sum()
 
     def _points(self, values: FloatArray, transform: Transform) -> FloatArray:
-        points: FloatArray = (np.asarray(transform.transform(values)) - self.corner) * self.scale
-        return points
+        return np.asarray((np.asarray(transform.transform(values)) - self.corner) * self.scale)
 
     def to_points(self, data: FloatArray) -> FloatArray:
         """Return data coordinates in points."""
@@ -293,8 +259,7 @@ class _Ground:
     def is_inside(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return which points lie in the axes."""
         slack = 1e-6 * self.extent
-        inside: NDArray[np.bool_] = np.all((points >= -slack) & (points <= self.extent + slack), axis=1)
-        return inside
+        return np.asarray(np.all((points >= -slack) & (points <= self.extent + slack), axis=1))
 
     def _mark(self, points: FloatArray) -> None:
         """Mark the cells along a chain of points; gaps (NaN) stay open."""
@@ -302,10 +267,8 @@ class _Ground:
         keep = np.isfinite(step).all(axis=1)
         start, step = start[keep], step[keep]
         # clip far ends first, or one long segment would take a million cells
-        keep = ((np.maximum(start, start + step) > -50) & (np.minimum(start, start + step) < self.extent + 50)).all(
-            axis=1
-        )
-        start, step = start[keep], step[keep]
+        near = (np.maximum(start, start + step) > -50) & (np.minimum(start, start + step) < self.extent + 50)
+        start, step = start[near.all(axis=1)], step[near.all(axis=1)]
         # of a segment that leaves the axes by far, as many cells; the limit comes first, or the integer overflows
         count = np.minimum(np.ceil(np.abs(step).max(axis=1, initial=0.0) / CELL_SIZE) + 1, 2000).astype(int)
         if not len(count):
@@ -316,38 +279,36 @@ class _Ground:
         cells = cells[((cells >= 0) & (cells < self.shape)).all(axis=1)]
         self.taken[cells[:, 0], cells[:, 1]] = 1
 
-    def _fill(self, low: FloatArray, high: FloatArray, name: bool = False) -> None:
-        a = np.clip(np.floor(low / CELL_SIZE).astype(int), 0, self.shape)
-        b = np.clip(np.ceil(high / CELL_SIZE).astype(int), 0, self.shape)
-        self.taken[a[0] : b[0], a[1] : b[1]] = 1
-        if name:
-            self.named[a[0] : b[0], a[1] : b[1]] = 1
+    def _corners(self, low: FloatArray, high: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return the first cells of boxes, and the first ones beyond them."""
+        a, b = np.floor(low / CELL_SIZE).astype(int), np.ceil(high / CELL_SIZE).astype(int)
+        return np.clip(a, 0, self.shape), np.clip(b, 0, self.shape)
+
+    def _fill(self, low: FloatArray, high: FloatArray) -> None:
+        """Mark a box as taken by a name."""
+        a, b = self._corners(low, high)
+        self.taken[a[0] : b[0], a[1] : b[1]] = self.named[a[0] : b[0], a[1] : b[1]] = 1
 
     def _sum(self) -> None:
         self.total = np.pad(self.taken.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
 
     def occupy(self, center: FloatArray, box: FloatArray) -> None:
-        """Mark a box as taken by a name."""
-        self._fill(center - box / 2, center + box / 2, name=True)
+        """Mark a box as taken by a name, for the names that follow."""
+        self._fill(center - box / 2, center + box / 2)
         self._sum()
 
     def count_covered(self, centers: FloatArray, box: FloatArray) -> FloatArray:
         """Return how many taken cells a box covers at each centre, in units of its own height."""
-        a = np.clip(np.floor((centers - box / 2) / CELL_SIZE).astype(int), 0, self.shape)
-        b = np.clip(np.ceil((centers + box / 2) / CELL_SIZE).astype(int), 0, self.shape)
-        total = self.total
-        count = total[b[:, 0], b[:, 1]] - total[a[:, 0], b[:, 1]] - total[b[:, 0], a[:, 1]] + total[a[:, 0], a[:, 1]]
-        share: FloatArray = count / max(float(box[1]) / CELL_SIZE, 1.0)
-        return share
+        (a, c), (b, d) = (corner.T for corner in self._corners(centers - box / 2, centers + box / 2))
+        count = self.total[b, d] - self.total[a, d] - self.total[b, c] + self.total[a, c]
+        return np.asarray(count / max(float(box[1]) / CELL_SIZE, 1.0))
 
     def any_at(self, places: FloatArray, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return for each row of places (n, m, 2) whether one of them lies in a marked cell."""
         at = np.clip(np.floor(places / CELL_SIZE).astype(int), 0, np.array(self.shape) - 1)
-        found: NDArray[np.bool_] = cells[at[..., 0], at[..., 1]].any(axis=1)
-        return found
+        return np.asarray(cells[at[..., 0], at[..., 1]].any(axis=1))
 
     def holds(self, centers: FloatArray, box: FloatArray) -> NDArray[np.bool_]:
         """Return at which centres the box lies wholly in the axes."""
         low, high = centers - box / 2, centers + box / 2
-        holds: NDArray[np.bool_] = np.all((low >= EDGE_MARGIN) & (high <= self.extent - EDGE_MARGIN), axis=1)
-        return holds
+        return np.asarray(np.all((low >= EDGE_MARGIN) & (high <= self.extent - EDGE_MARGIN), axis=1))

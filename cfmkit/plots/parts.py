@@ -36,24 +36,21 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.export.posed_part import PosedBody
+    from cfmkit.plots.style import Look
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 
 PLATE_COLOUR, STEEL_COLOUR, LINK_COLOUR = "#DADADA", "#F4F7FA", "#3D5A73"
 """Fill of what is cut from sheet, of rollers, and colour of links."""
-
-TITLE_HEIGHT = 10.0
-"""Room for a title of two lines above a panel [mm]."""
+TITLE_HEIGHT = 10.0  # room for a title of two lines above a panel [mm]
 
 
 def mm(values: Any) -> FloatArray:
     """Return metres as millimetres."""
-    array: FloatArray = to_border(np.asarray(values, dtype=float), "length")
-    return array
+    return np.asarray(to_border(np.asarray(values, dtype=float), "length"))
 
 
-@apply_style
 def plate(ax: Axes, outlines: Iterable[FloatArray], gid: str = "plate") -> None:
     """Draw a plate from closed outlines (n, 2); one that runs clockwise is a hole."""
     from matplotlib.patches import PathPatch
@@ -75,29 +72,22 @@ def _line(ax: Axes, x: Any, y: Any, **look: Any) -> None:
     ax.add_artist(Line2D(x, y, **look))
 
 
-@apply_style
 def edge(ax: Axes, points: FloatArray, gid: str, **options: Any) -> None:
     """Draw a chain of points (n, 2) as a line: a flank, a path."""
-    look: dict[str, Any] = {"color": TEXT_INK, "linewidth": 0.9, "zorder": 1.6} | options
+    look: Look = {"color": TEXT_INK, "linewidth": 0.9, "zorder": 1.6} | options
     _line(ax, *mm(points).T, gid=gid, **look)
 
 
-@apply_style
 def roller(ax: Axes, center: Point, radius: float, gid: str = "roller", ghost: bool = False) -> None:
     """Draw a roller with its axis; a ghost is a dashed outline, for another place of the same roller."""
     from matplotlib.patches import Circle
 
-    x, y = mm(center)
-    circle = Circle(
-        (x, y), float(mm(radius)), facecolor=STEEL_COLOUR, edgecolor=TEXT_INK, linewidth=0.9, zorder=2.2, gid=gid
-    )
-    if ghost:
-        circle.set(facecolor="none", edgecolor=TEXT_GREY, linestyle="--")
-    ax.add_artist(circle)
-    _line(ax, [x], [y], marker="o", markersize=2.2, color=TEXT_GREY if ghost else TEXT_INK, zorder=4)
+    (x, y), colour = mm(center), TEXT_GREY if ghost else TEXT_INK
+    look: Look = {"facecolor": "none" if ghost else STEEL_COLOUR, "linestyle": "--" if ghost else "-"}
+    ax.add_artist(Circle((x, y), float(mm(radius)), edgecolor=colour, linewidth=0.9, zorder=2.2, gid=gid, **look))
+    _line(ax, [x], [y], marker="o", markersize=2.2, color=colour, zorder=4)
 
 
-@apply_style
 def link(ax: Axes, start: Point, end: Point, gid: str = "link") -> None:
     """Draw a rigid link between two pins."""
     _line(
@@ -106,7 +96,6 @@ def link(ax: Axes, start: Point, end: Point, gid: str = "link") -> None:
     )  # fmt: skip
 
 
-@apply_style
 def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring", coils: int = 12) -> None:
     """Draw a tension spring as a zigzag of some width between two pins, straight at its ends."""
     a, b = np.array(start, dtype=float), np.array(end, dtype=float)
@@ -120,42 +109,28 @@ def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring"
     _line(ax, *mm(points).T, color=SPRING_OCHRE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
 
 
-@apply_style
 def slider(ax: Axes, center: Point, size: float, gid: str = "slider") -> None:
     """Draw a square block that slides along a guide."""
     from matplotlib.patches import Rectangle
 
     (x, y), side = mm(center), float(mm(size))
-    corner = (x - side / 2, y - side / 2)
-    ax.add_artist(
-        Rectangle(corner, side, side, facecolor=LINK_COLOUR, edgecolor=TEXT_INK, linewidth=0.6, zorder=3.4, gid=gid)
-    )
+    look: Look = {"facecolor": LINK_COLOUR, "edgecolor": TEXT_INK, "linewidth": 0.6}
+    ax.add_artist(Rectangle((x - side / 2, y - side / 2), side, side, zorder=3.4, gid=gid, **look))
 
 
-@apply_style
 def axis_of_symmetry(ax: Axes, low: float, high: float) -> None:
     """Draw the vertical axis x = 0 as a dash-dotted line."""
-    _line(
-        ax,
-        [0.0, 0.0],
-        mm([low, high]),
-        color=TEXT_GREY,
-        linewidth=0.6,
-        dashes=(9, 2.5, 1.5, 2.5),
-        zorder=1.1,
-        gid="axis",
-    )
+    look: Look = {"color": TEXT_GREY, "linewidth": 0.6, "dashes": (9, 2.5, 1.5, 2.5)}
+    _line(ax, [0.0, 0.0], mm([low, high]), zorder=1.1, gid="axis", **look)
 
 
-@apply_style
 def force_arrow(ax: Axes, tail: Point, tip: Point, gid: str = "force") -> None:
     """Draw a force from `tail` to `tip`."""
-    look = {"arrowstyle": "-|>", "color": LINE_VERMILLION, "linewidth": 1.4, "mutation_scale": 10}
+    look: Look = {"arrowstyle": "-|>", "color": LINE_VERMILLION, "linewidth": 1.4, "mutation_scale": 10}
     arrow = ax.annotate("", mm(tip).tolist(), mm(tail).tolist(), arrowprops=look | {"shrinkA": 0, "shrinkB": 0})
     arrow.set(zorder=3.5, gid=gid, annotation_clip=False)
 
 
-@apply_style
 def area(ax: Axes, outline: Any, gid: str, **options: Any) -> None:
     """Fill an outline (n, 2) [m]; the limits of the axes do not follow it.
 
@@ -164,11 +139,10 @@ def area(ax: Axes, outline: Any, gid: str, **options: Any) -> None:
     """
     from matplotlib.patches import Polygon
 
-    look: dict[str, Any] = {"linewidth": 0.4, "zorder": 2.0} | options
+    look: Look = {"linewidth": 0.4, "zorder": 2.0} | options
     ax.add_artist(Polygon(mm(outline), closed=True, gid=gid, **look))
 
 
-@apply_style
 def bodies(ax: Axes, shown: Sequence[PosedBody], pose: int, colors: Mapping[str, str]) -> None:
     """Draw bodies in a pose: in their colours by name, rigid ones without a colour as one plate."""
     rigid = [body.outline(pose) for body in shown if body.name not in colors]
@@ -189,25 +163,12 @@ def box_around(shown: Iterable[PosedBody], margins: tuple[float, float, float, f
     return (left - a, bottom - b, right + c, top + d), unit
 
 
-@apply_style
 def contact(ax: Axes, point: Point, gid: str = "contact") -> None:
     """Mark a point of contact."""
-    x, y = mm(point)
-    _line(
-        ax,
-        [x],
-        [y],
-        marker="o",
-        markersize=3.2,
-        color=LINE_VERMILLION,
-        markeredgewidth=0,
-        zorder=4.5,
-        gid=gid,
-        linestyle="",
-    )
+    look: Look = {"marker": "o", "markersize": 3.2, "color": LINE_VERMILLION, "markeredgewidth": 0, "linestyle": ""}
+    _line(ax, *mm([point]).T, zorder=4.5, gid=gid, **look)
 
 
-@apply_style
 def to_scale(ax: Axes, box: Box) -> None:
     """Show the box (left, bottom, right, top) [m] with one scale in both directions and no grid."""
     left, bottom, right, top = mm(box)
@@ -226,7 +187,6 @@ def _round_below(value: float) -> float:
     return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1 + 1e-12)))
 
 
-@apply_style
 def close_up(ax: Axes, center: Point, half_width: float) -> None:
     """Fill the axes with what surrounds a point [m], one scale in both directions."""
     room = ax.get_window_extent()

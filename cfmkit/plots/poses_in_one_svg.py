@@ -27,12 +27,9 @@ if TYPE_CHECKING:
 N_FILM_POSES = 17
 """Poses of a film: every sixteenth of the travel, which the eye joins; with 25 a cam's page took 1.6 times as long as
 its figures, and half as long again is what a page may cost."""
-
-MAX_DRAWING_WIDTH, MAX_DRAWING_HEIGHT = 150.0, 110.0
-"""Largest width and height of the drawing [mm of print]."""
-
-_SVG_NAMESPACE = "http://www.w3.org/2000/svg"
-_XLINK_NAMESPACE = "http://www.w3.org/1999/xlink"
+MAX_DRAWING_WIDTH, MAX_DRAWING_HEIGHT = 150.0, 110.0  # largest width and height of the drawing [mm of print]
+_SVG_NAMESPACE, _XLINK_NAMESPACE = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
+_SVG_TAG = f"{{{_SVG_NAMESPACE}}}"
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,6 @@ def choose_poses(count: int, poses: int = N_FILM_POSES) -> FloatArray:
     return np.unique(np.linspace(0, count - 1, min(count, poses)).round().astype(int))
 
 
-@apply_style
 def film(
     moving: Moving,  # what to draw
     title: str,  # what a screen reader says about it
@@ -60,7 +56,6 @@ def film(
     return _merge_poses(poses(moving, range(len(moving.motion))), title)
 
 
-@apply_style
 def still(moving: Moving, number: int, title: str) -> str:
     """Return one pose as SVG for a page."""
     return _merge_poses(poses(moving, (number,)), title)
@@ -102,7 +97,7 @@ def _merge_poses(poses: Sequence[ElementTree.Element], title: str) -> str:
         body += [] if anchor is None else [anchor]
     shared: dict[str, str] = {}
     for pose in poses:
-        shared |= {_name_group(piece): _plain(piece) for piece in pose.iter() if piece.get("id") and _is_shared(piece)}
+        shared |= {piece.get("id", ""): _plain(piece) for piece in pose.iter() if _is_shared(piece)}
     box = poses[0].get("viewBox", "")
     return (
         f'<svg xmlns="{_SVG_NAMESPACE}" xmlns:xlink="{_XLINK_NAMESPACE}" viewBox="{box}" role="img" '
@@ -113,20 +108,15 @@ def _merge_poses(poses: Sequence[ElementTree.Element], title: str) -> str:
 
 def _pieces(pose: ElementTree.Element) -> list[ElementTree.Element]:
     """Return what is drawn, in order: paths, uses and texts that stand in no definition."""
-    hidden = {id(inner) for block in pose.iter(f"{{{_SVG_NAMESPACE}}}defs") for inner in block.iter()}
-    drawn = {f"{{{_SVG_NAMESPACE}}}{kind}" for kind in ("path", "use", "text", "image")}
+    hidden = {id(inner) for block in pose.iter(f"{_SVG_TAG}defs") for inner in block.iter()}
+    drawn = {f"{_SVG_TAG}{kind}" for kind in ("path", "use", "text", "image")}
     return [element for element in pose.iter() if element.tag in drawn and id(element) not in hidden]
 
 
 def _is_shared(piece: ElementTree.Element) -> bool:
     """Return whether a piece is a definition: a marker, or where something is cut off."""
-    return piece.tag == f"{{{_SVG_NAMESPACE}}}clipPath" or (
-        piece.tag == f"{{{_SVG_NAMESPACE}}}path" and "m" in _name_group(piece)[5:6]
-    )
-
-
-def _name_group(piece: ElementTree.Element) -> str:
-    return piece.get("id", "")
+    name = piece.get("id", "")
+    return bool(name) and (piece.tag == f"{_SVG_TAG}clipPath" or (piece.tag == f"{_SVG_TAG}path" and name[5:6] == "m"))
 
 
 def _plain(piece: ElementTree.Element) -> str:

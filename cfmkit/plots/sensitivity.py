@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.requirements import Bounds
+    from cfmkit.plots.style import Look
     from cfmkit.studies.point_evaluation import Metric
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
 
@@ -64,31 +65,27 @@ def draw_histogram(found: Findings, number: int) -> Figure:
     known = metric_values(drawn[np.isfinite(drawn)], metric.dimension)
     figure = new_figure(140, 84)
     axes = axes_mm(figure, (18, 14, 116, 56))
-    title = f"{setup.study.spec.name}: {metric.label.replace('_', ' ')}"
-    _head(figure, title)
+    _head(figure, _title(found, metric))
     width, height = size_mm(figure)
-    place = (LEFT_MARGIN / width, 1.0 - (7.6 if has_titles() else 1.6) / height)
+    allowed = () if is_plain() else setup.limits(metric)
     if not is_plain():
-        figure.text(*place, _summary(drawn, known, setup.limits(metric)), va="top", size=SMALL_FONT, color=TEXT_INK)
+        place = (LEFT_MARGIN / width, 1.0 - (7.6 if has_titles() else 1.6) / height)
+        figure.text(*place, _summary(drawn, known, allowed), va="top", size=SMALL_FONT, color=TEXT_INK)
     if len(known):
         axes.hist(known, _edges(known).tolist(), color=LINE_BLUE, alpha=0.85)
     axes.set_ylim(0, 1.22 * max(1.0, axes.get_ylim()[1]))
-    allowed = () if is_plain() else setup.limits(metric)
-    limits = [limit for one in allowed for limit in _ends(one)]
+    ends = [_ends(limits) for limits in allowed]
     nominal = float(metric_values(setup.nominal.values[number], metric.dimension))
-    _frame(axes, [*known.tolist(), *limits, nominal])
-    _limits(axes, allowed)
+    shown = [*known.tolist(), *(end for pair in ends for end in pair if end is not None), nominal]
+    low, high = min(shown), max(shown)
+    room = 0.06 * (high - low) or 0.05 * abs(high) or 1.0
+    axes.set_xlim(low - room, high + room)
+    for pair in ends:
+        _shade_allowed(axes, pair)
     axes.axvline(nominal, color=TEXT_INK, linewidth=1.0, linestyle="--")
-    axes.annotate(
-        "nominal",
-        (nominal, 1.0),
-        (2, -2),
-        xycoords=axes.get_xaxis_transform(),
-        textcoords="offset points",
-        size=SMALL_FONT,
-        va="top",
-    )
-    axes.set(xlabel=metric_label(metric.name, metric.dimension), ylabel="parts")
+    look: Look = {"xycoords": axes.get_xaxis_transform(), "textcoords": "offset points", "size": SMALL_FONT}
+    axes.annotate("nominal", (nominal, 1.0), (2, -2), va="top", **look)
+    axes.set(xlabel=_unit(metric), ylabel="parts")
     return figure
 
 
@@ -101,39 +98,20 @@ def _edges(values: FloatArray) -> FloatArray:
     return np.linspace(low, high, int(min(MOST_BINS, max(8, len(values) ** 0.5 + 1))) + 1)
 
 
-def _ends(limits: Bounds) -> list[float]:
-    return [float(metric_values(end, limits.dimension)) for end in (limits.min, limits.max) if end is not None]
+def _ends(limits: Bounds) -> list[float | None]:
+    """Return the ends of what is allowed, in the unit of the axis."""
+    return [None if end is None else float(metric_values(end, limits.dimension)) for end in (limits.min, limits.max)]
 
 
-def _frame(axes: Axes, shown: list[float]) -> None:
-    low, high = min(shown), max(shown)
-    room = 0.06 * (high - low) or 0.05 * abs(high) or 1.0
-    axes.set_xlim(low - room, high + room)
-
-
-def _limits(axes: Axes, each: tuple[Bounds, ...]) -> None:
+def _shade_allowed(axes: Axes, ends: list[float | None]) -> None:
     """Shade what is allowed and mark its ends."""
-    low, high = axes.get_xlim()
-    for limits in each:
-        ends = [
-            None if end is None else float(metric_values(end, limits.dimension)) for end in (limits.min, limits.max)
-        ]
-        inside = low if ends[0] is None else ends[0], high if ends[1] is None else ends[1]
-        axes.axvspan(*inside, color=BAND_GREEN, alpha=0.10, linewidth=0, zorder=0)
-        for end, words, side in zip(ends, ("min", "max"), (3, -3), strict=True):
-            if end is None:
-                continue
+    inside = (edge if end is None else end for end, edge in zip(ends, axes.get_xlim(), strict=True))
+    axes.axvspan(*inside, color=BAND_GREEN, alpha=0.10, linewidth=0, zorder=0)
+    look: Look = {"xycoords": axes.get_xaxis_transform(), "textcoords": "offset points", "size": SMALL_FONT}
+    for end, words, side, align in zip(ends, ("min", "max"), (3, -3), ("left", "right"), strict=True):
+        if end is not None:
             axes.axvline(end, color=TROUBLE_RED, linewidth=1.2)
-            axes.annotate(
-                f"{words} {end:.6g}",
-                (end, 0.88),
-                (side, 0),
-                xycoords=axes.get_xaxis_transform(),
-                textcoords="offset points",
-                ha="left" if side > 0 else "right",
-                size=SMALL_FONT,
-                color=TROUBLE_RED,
-            )
+            axes.annotate(f"{words} {end:.6g}", (end, 0.88), (side, 0), ha=align, color=TROUBLE_RED, **look)
 
 
 def _summary(drawn: FloatArray, known: FloatArray, limits: tuple[Bounds, ...]) -> str:
@@ -150,9 +128,7 @@ def _summary(drawn: FloatArray, known: FloatArray, limits: tuple[Bounds, ...]) -
     return ";  ".join(reported)
 
 
-MOST_SHOWN = 12
-"""Parameters on a picture, those that do most; as many as there are markers. The tables have all."""
-
+MOST_SHOWN = 12  # parameters on a picture, those that do most; as many as there are markers. The tables have all.
 MARKER_SHAPES = "osD^v<>ph*XP"
 _LEFT_MARGIN, _ROW_HEIGHT = 46.0, 8.0
 
@@ -208,6 +184,14 @@ def short(path: str) -> str:
     return f"{plain} ({len(several)})" if len(several) > 1 else plain
 
 
+def _note(axes: Axes, place: tuple[float, float], text: str = "not stated") -> None:
+    axes.annotate(text, place, (3, 0), textcoords="offset points", va="center", size=SMALL_FONT)
+
+
+def _wrap(path: str, width: int) -> str:
+    return "\n".join(textwrap.wrap(short(path), width))
+
+
 def _lines(found: Findings, metric: str, index: str) -> list[IndexLine]:
     """Return one index of all parameters, in the order of the study."""
     return [line for line in found.lines if (line.metric, line.index) == (metric, index)]
@@ -230,8 +214,7 @@ def _bar_axes(count: int, heading: str, legend: bool = False) -> tuple[Figure, A
 
 
 def _rows(axes: Axes, names: Sequence[str]) -> None:
-    labels = ["\n".join(textwrap.wrap(short(name), 28)) for name in names]
-    axes.set_yticks(range(len(names)), labels)
+    axes.set_yticks(range(len(names)), [_wrap(name, 28) for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.tick_params(axis="y", length=0)
 
@@ -244,15 +227,13 @@ def _draw_bars(
     for row, k in enumerate(order):
         line = lines[k]
         if line.value is None:
-            place = (0.0, row + shift)
-            axes.annotate("not stated", place, (3, 0), textcoords="offset points", va="center", size=SMALL_FONT)
+            _note(axes, (0.0, row + shift))
             continue
         axes.barh(row + shift, line.value, height, color=colour, label=words)
         words = ""
         if line.low is not None and line.high is not None:
-            axes.plot(
-                (line.low, line.high), (row + shift,) * 2, color=TEXT_INK, linewidth=1.0, marker="|", markersize=5
-            )
+            whisker: Look = {"color": TEXT_INK, "linewidth": 1.0, "marker": "|", "markersize": 5}
+            axes.plot((line.low, line.high), (row + shift,) * 2, **whisker)
 
 
 @apply_style
@@ -311,21 +292,10 @@ def draw_oat(found: Findings, number: int) -> Figure:
     for row, k in enumerate(order):
         values = outputs[k]
         where = np.linspace(0.0, 1.0, len(values))
-        colour = LINE_COLOURS[row % len(LINE_COLOURS)]
-        every = max(1, len(values) // 10)
-        curves.plot(
-            where, values, color=colour, marker=MARKER_SHAPES[row], markersize=3, linewidth=1.0, markevery=every
-        )
+        look: Look = {"color": LINE_COLOURS[row % len(LINE_COLOURS)], "marker": MARKER_SHAPES[row]}
+        curves.plot(where, values, markersize=3, linewidth=1.0, markevery=max(1, len(values) // 10), **look)
         _tornado(bars, row, swings[k], (nominal, float(values[0]), float(values[-1])))
-        bars.plot(
-            -0.04,
-            row,
-            marker=MARKER_SHAPES[row],
-            color=colour,
-            transform=bars.get_yaxis_transform(),
-            clip_on=False,
-            ms=4,
-        )
+        bars.plot(-0.04, row, transform=bars.get_yaxis_transform(), clip_on=False, ms=4, **look)
     _rows(bars, [swings[k].parameter for k in order])
     bars.tick_params(axis="y", pad=9)
     bars.grid(visible=False, axis="y")
@@ -337,14 +307,13 @@ def draw_oat(found: Findings, number: int) -> Figure:
 def _tornado(axes: Axes, row: int, swing: IndexLine, ends: tuple[float, float, float]) -> None:
     nominal, low, high = ends
     if swing.value is None:
-        axes.annotate("not stated", (nominal, row), (3, 0), textcoords="offset points", va="center", size=SMALL_FONT)
+        _note(axes, (nominal, row))
         return
     for value, colour, shift in ((low, LINE_BLUE, -0.18), (high, LINE_VERMILLION, 0.18)):
         if np.isfinite(value):
             axes.barh(row + shift, value - nominal, 0.34, left=nominal, color=colour)
         else:
-            place = (nominal, row + shift)
-            axes.annotate("no result there", place, (3, 0), textcoords="offset points", va="center", size=SMALL_FONT)
+            _note(axes, (nominal, row + shift), "no result there")
 
 
 def _unit(metric: Metric) -> str:
@@ -362,25 +331,20 @@ def draw_morris(found: Findings, number: int) -> Figure:
     top, factor = 0.0, 100.0 if metric.dimension == "ratio" else 1.0
     for row, k in enumerate(_rank_parameters(sizes)):
         size, scatter = sizes[k], scatters[k]
-        label = "\n".join(textwrap.wrap(short(size.parameter), 26))
+        label = _wrap(size.parameter, 26)
         if size.value is None or scatter.value is None:
             axes.plot([], [], linestyle="", label=f"{label}\n(not stated)")
             continue
-        colour, ends, up = (
-            LINE_COLOURS[row % len(LINE_COLOURS)],
-            [factor * end for end in _numbers(size)[2:]],
-            factor * scatter.value,
-        )
-        axes.plot(
-            factor * size.value, up, MARKER_SHAPES[row], label=label, linestyle="", color=colour, ms=5, clip_on=False
-        )
-        axes.plot(ends, (up,) * 2, marker="|", markersize=4, color=colour, linewidth=1.0, clip_on=False)
+        ends, up = [factor * end for end in _numbers(size)[2:]], factor * scatter.value
+        look: Look = {"color": LINE_COLOURS[row % len(LINE_COLOURS)], "clip_on": False}
+        axes.plot(factor * size.value, up, MARKER_SHAPES[row], label=label, linestyle="", ms=5, **look)
+        axes.plot(ends, (up,) * 2, marker="|", markersize=4, linewidth=1.0, **look)
         top = max(top, factor * (size.high or 0.0), up)
     if top:
-        look = {"textcoords": "offset points", "ha": "right", "size": SMALL_FONT, "color": TEXT_GREY}
+        note: Look = {"textcoords": "offset points", "ha": "right", "size": SMALL_FONT, "color": TEXT_GREY}
         axes.plot((0, top), (0, top), color=TEXT_GREY, linewidth=0.6, linestyle="--")
-        axes.annotate("sigma = mu*", (0.5 * top, 0.5 * top), (-4, 2), **look)  # type: ignore[arg-type]
-    axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), frameon=False, fontsize=SMALL_FONT)
+        axes.annotate("sigma = mu*", (0.5 * top, 0.5 * top), (-4, 2), **note)
+    _legend_beside(axes)
     unit = _unit(metric).rpartition(" ")[2]
     axes.set(xlabel=f"mu*: mean size of the effect of the whole range {unit}", ylabel=f"sigma: its scatter {unit}")
     axes.set(xlim=(0, None), ylim=(0, None))
@@ -404,17 +368,20 @@ def draw_convergence(found: Findings, number: int) -> Figure:
         sizes, values, low, high = own.T
         sizes = sizes * 1.03 ** (row - len(order) / 2)
         colour = LINE_COLOURS[row % len(LINE_COLOURS)]
-        label = "\n".join(textwrap.wrap(short(path), 26))
-        axes.plot(sizes, values, color=colour, marker=MARKER_SHAPES[row], markersize=4, label=label)
+        axes.plot(sizes, values, color=colour, marker=MARKER_SHAPES[row], markersize=4, label=_wrap(path, 26))
         axes.vlines(sizes, low, high, color=colour, linewidth=1.0)
     stages = sorted({line.samples for line in mine})
     axes.set_xscale("log", base=2)
     axes.set_xlim(stages[0] / 1.3, stages[-1] * 1.3)
     axes.set_xticks(stages, [str(size) for size in stages])
     axes.minorticks_off()
-    axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), frameon=False, fontsize=SMALL_FONT)
+    _legend_beside(axes)
     axes.set(xlabel=f"base samples ({len(order) + 2} evaluations each)", ylabel="total order index [1]")
     return figure
+
+
+def _legend_beside(axes: Axes) -> None:
+    axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), frameon=False, fontsize=SMALL_FONT)
 
 
 def _numbers(line: IndexLine) -> list[float]:

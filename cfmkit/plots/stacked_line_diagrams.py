@@ -85,7 +85,6 @@ class Diagram:
     regions: Sequence[MarkedRange] = ()  # shaded parts of the horizontal axis
 
 
-@apply_style
 def draw_diagram(diagram: Diagram, ax: Axes) -> Axes:
     """Draw a diagram on axes; return the axes."""
     if is_plain():

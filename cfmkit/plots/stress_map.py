@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray, IntArray
     from cfmkit.plots.label_placement import Label
+    from cfmkit.plots.style import Look
     from cfmkit.results import Result
     from cfmkit.solid.mesh import TriangleMesh
     from cfmkit.solid.meshed_part import MeshSolution
@@ -27,10 +28,8 @@ if TYPE_CHECKING:
 
 PARTS_WIDTH, HEIGHT_BESIDE, HEIGHT_ABOVE = 140.0, 110.0, 62.0
 """Room for the parts: across, and in height where they stand beside or above each other [mm]."""
-VIEW_GAP = 7.0
-"""Between views, for what stands above each [mm]."""
-NUMBER_SIZE = 6.0
-"""Size of the numbers of fillets [pt]."""
+VIEW_GAP = 7.0  # between views, for what stands above each [mm]
+NUMBER_SIZE = 6.0  # size of the numbers of fillets [pt]
 N_NEAREST_NODES = 8
 """Nodes around the middle of a fillet that tell how far it has turned: enough to lie around it on any mesh."""
 
@@ -99,10 +98,8 @@ def stress_map_figure(
     sizes = np.array([np.ptp(places, axis=0) for places in moved]) * 1.05
     width, height = sizes.max(axis=0)
     beside = bool(height > width)
-    scale = min(
-        (PARTS_WIDTH / len(views) if beside else PARTS_WIDTH) / width,
-        (HEIGHT_BESIDE if beside else HEIGHT_ABOVE) / height,
-    )
+    room = (PARTS_WIDTH / len(views), HEIGHT_BESIDE) if beside else (PARTS_WIDTH, HEIGHT_ABOVE)
+    scale = min(room[0] / width, room[1] / height)
     step = np.array([width * scale + 3.0, 0.0]) if beside else np.array([0.0, height * scale + VIEW_GAP])
     heading = Heading.from_result(result, f"{subject}; peaks marked")
     tall = (1 if beside else len(views)) * (height * scale + VIEW_GAP)
@@ -137,27 +134,13 @@ def _draw_part(ax: Axes, view: StressView, places: FloatArray, top: float) -> An
     grid = view.solved.problem.elements.mesh
     # each six-node triangle as four: the colour is linear in them
     small = grid.triangles[:, [0, 3, 5, 3, 1, 4, 5, 4, 2, 3, 4, 5]].reshape(-1, 3)
-    shades = ax.tripcolor(
-        Triangulation(1e3 * places[:, 0], 1e3 * places[:, 1], small),
-        view.stress / 1e6,
-        shading="gouraud",
-        vmin=0.0,
-        vmax=top,
-        cmap="viridis",
-        zorder=3,
-    )
+    places_mm = Triangulation(1e3 * places[:, 0], 1e3 * places[:, 1], small)
+    shades = ax.tripcolor(places_mm, view.stress / 1e6, shading="gouraud", vmin=0.0, vmax=top, cmap="viridis", zorder=3)
     shades.set_zorder(3)
     parts.plate(ax, [places[nodes] for nodes in boundary_nodes(grid)])
     start = int(np.hypot(*(grid.nodes - view.solved.peaks[1][view.pose]).T).argmin())
-    ax.plot(
-        *(1e3 * places[start]),
-        marker="o",
-        markersize=6,
-        color=LINE_VERMILLION,
-        fillstyle="none",
-        linestyle="",
-        zorder=4,
-    )
+    look: Look = {"marker": "o", "markersize": 6, "color": LINE_VERMILLION, "fillstyle": "none", "linestyle": ""}
+    ax.plot(*(1e3 * places[start]), zorder=4, **look)
     numbers = "; fillets numbered as in fillets.csv" if view.fillets else ""
     ax.set_title(f"{view.name}: {value_text(view.peak, 'stress')}{numbers}", fontsize=7, loc="left", pad=1.0)
     return shades

@@ -7,7 +7,7 @@ where nothing was solved it stays grey.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.plots.study_data_to_draw import DrawnScale, StudyCurve, StudyMarks
+    from cfmkit.plots.style import Look
 
 
 MOST_PANELS = 8
@@ -82,25 +83,28 @@ def draw_panels(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
     return figure
 
 
+def _draw_line(ax: Axes, line: StudyCurve, color: Any, number: int | None, width: float) -> FloatArray:
+    """Draw all branches of a curve, dashed by its number; return the points of the first, which is named."""
+    style = "-" if number is None else DASH_STYLES[number % len(DASH_STYLES)]
+    for motion, effort in line.branches.values():
+        ax.plot(motion, effort, color=color, linewidth=width, linestyle=style)
+    return np.column_stack(next(iter(line.branches.values())))
+
+
 def _draw_panel(ax: Axes, lines: Sequence[StudyCurve], second: DrawnScale) -> None:
     order = sorted({line.parameter for line in lines})
     names = []
     for line in lines:
         number = order.index(line.parameter)
-        color, style = LINE_COLOURS[number], DASH_STYLES[number % len(DASH_STYLES)] if len(order) > 2 else "-"
-        for motion, effort in line.branches.values():
-            ax.plot(motion, effort, color=color, linewidth=1.2, linestyle=style)
-        motion, effort = next(iter(line.branches.values()))
-        names.append(Label(second.text(line.parameter), color, np.column_stack([motion, effort]), prefer=0.6))
+        points = _draw_line(ax, line, LINE_COLOURS[number], number if len(order) > 2 else None, 1.2)
+        names.append(Label(second.text(line.parameter), LINE_COLOURS[number], points))
     efforts = np.concatenate([effort for line in lines for _, effort in line.branches.values()])
     low, high = finite_range(efforts) or (0.0, 1.0)
     ax.set_ylim(*pad_limits((min(low, 0.0), max(high, 0.0)), 0.05, 0.15))
     place_labels(ax, names)
 
 
-MOST_LINES = 1500
-"""Lines of a picture with parallel axes; more are thinned out evenly, as they cover each other."""
-
+MOST_LINES = 1500  # lines of a picture with parallel axes; more are thinned out evenly, as they cover each other
 MISSED_COLOUR = "#D5D5D5"
 """Colour of points that miss a requirement, where lines show them."""
 
@@ -111,24 +115,16 @@ def figures(
     labels: tuple[str, str] = ("", ""),  # (str, str): of the curves' axes
 ) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture, by name."""
+    if len(found.varied) != 1 and len(found.shape) != 2:
+        return {"parallel": partial(draw_parallel, found)} if found.metrics else {}
     pictures: dict[str, Callable[[], Figure]] = {}
-    if len(found.varied) == 1:
-        if lines:
-            pictures["curves"] = lambda: draw_curves(found, lines, labels)
-        for metric in found.metrics:
-            pictures[_stem(metric)] = lambda metric=metric: draw_metric(found, metric)  # type: ignore[misc]
-    elif len(found.shape) == 2:
-        if lines and fit_panels(found, lines):
-            pictures["curves"] = lambda: draw_panels(found, lines, labels)
-        for metric in found.metrics:
-            pictures[_stem(metric)] = lambda metric=metric: draw_map(found, metric)  # type: ignore[misc]
-    elif found.metrics:
-        pictures["parallel"] = lambda: draw_parallel(found)
+    one = len(found.varied) == 1
+    if lines and (one or fit_panels(found, lines)):
+        pictures["curves"] = partial(draw_curves if one else draw_panels, found, lines, labels)
+    for metric in found.metrics:
+        stem = metric.name.replace("[", "_").replace("]", "")
+        pictures[stem] = partial(draw_metric if one else draw_map, found, metric)
     return pictures
-
-
-def _stem(metric: DrawnScale) -> str:
-    return metric.name.replace("[", "_").replace("]", "")
 
 
 @apply_style
@@ -146,8 +142,7 @@ def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
     axes = axes_mm(figure, (16, 14, 112, 82))
     scale = Normalize(min(given), max(given) if max(given) > min(given) else min(given) + 1)
     for line in lines:
-        for motion, effort in line.branches.values():
-            axes.plot(motion, effort, color=colormaps[COLOUR_MAP](scale(line.parameter)), linewidth=1.0)
+        _draw_line(axes, line, colormaps[COLOUR_MAP](scale(line.parameter)), None, 1.0)
     axes.set(xlabel=labels[0], ylabel=labels[1])
     _clear_of_poles(axes, lines)
     bar = color_bar(ScalarMappable(scale, COLOUR_MAP), axes_mm(figure, (133, 14, 4, 82)), parameter.axis)
@@ -157,9 +152,7 @@ def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
     return figure
 
 
-MOST_NAMED = 8
-"""Curves that have their names beside them; of more, colours tell the values."""
-
+MOST_NAMED = 8  # curves that have their names beside them; of more, colours tell the values
 DASH_STYLES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (8, 2, 2, 2)))
 """Line styles in turn, so that curves differ without their colours, too."""
 
@@ -176,12 +169,9 @@ def _draw_named(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
     for number, line in enumerate(ordered):
         # the light end of the scale cannot be read as text
         color = colormaps[COLOUR_MAP](0.72 * number / max(len(ordered) - 1, 1))
-        style = DASH_STYLES[number % len(DASH_STYLES)] if len(ordered) > 2 else "-"
-        for motion, effort in line.branches.values():
-            axes.plot(motion, effort, color=color, linewidth=1.3, linestyle=style)
-        motion, effort = next(iter(line.branches.values()))
+        points = _draw_line(axes, line, color, number if len(ordered) > 2 else None, 1.3)
         along = 0.55 + 0.35 * number / max(len(ordered) - 1, 1)
-        names.append(Label(parameter.text(line.parameter), to_hex(color), np.column_stack([motion, effort]), along))
+        names.append(Label(parameter.text(line.parameter), to_hex(color), points, along))
     axes.set(xlabel=labels[0], ylabel=labels[1])
     _clear_of_poles(axes, ordered)
     place_labels(axes, names)
@@ -222,10 +212,9 @@ def draw_metric(found: StudyMarks, metric: DrawnScale) -> Figure:
 
 def _hatch_spans(axes: Axes, x: FloatArray, meets: NDArray[np.bool_]) -> None:
     ends = edges(x)
+    look: Look = {"facecolor": EMPTY_COLOUR, "edgecolor": TEXT_GREY, "hatch": MISSED_HATCH, "linewidth": 0, "zorder": 0}
     for k in np.flatnonzero(~meets) if not is_plain() else ():
-        axes.axvspan(
-            ends[k], ends[k + 1], facecolor=EMPTY_COLOUR, edgecolor=TEXT_GREY, hatch=MISSED_HATCH, linewidth=0, zorder=0
-        )
+        axes.axvspan(ends[k], ends[k + 1], **look)
     axes.set_xlim(ends[0], ends[-1])
 
 
@@ -240,10 +229,9 @@ def draw_parallel(found: StudyMarks) -> Figure:
     axes = axes_mm(figure, (14, 22, width - 28, 66))
     heights = np.column_stack([_share(scale) for scale in scales])
     chosen = np.flatnonzero(np.isfinite(heights[:, len(found.varied)]))
-    thinned = (
-        chosen[np.linspace(0, len(chosen) - 1, min(len(chosen), MOST_LINES)).astype(int)] if len(chosen) else chosen
-    )
-    for k in sorted(thinned.tolist(), key=lambda k: bool(found.meets[k])):
+    if len(chosen) > MOST_LINES:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, MOST_LINES).astype(int)]
+    for k in sorted(chosen.tolist(), key=lambda k: bool(found.meets[k])):
         colour = colormaps[COLOUR_MAP](heights[k, len(found.varied)]) if found.meets[k] else MISSED_COLOUR
         axes.plot(heights[k], color=colour, linewidth=0.6, alpha=0.7)
     if found.best is not None:
@@ -269,8 +257,7 @@ def _share(scale: DrawnScale) -> FloatArray:
     known = scale.values[np.isfinite(scale.values)]
     if is_level(scale.values):
         return np.where(np.isfinite(scale.values), 0.5, np.nan)
-    share: FloatArray = (scale.values - known.min()) / (known.max() - known.min())
-    return share
+    return np.asarray((scale.values - known.min()) / (known.max() - known.min()))
 
 
 def _parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
@@ -283,11 +270,8 @@ def _parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
         digits = digits_that_differ(known.min(), known.max())
         for height, value in ends if not is_level(known) else ends[1:]:
             text = scale.words[int(value)] if scale.words else f"{value:.{digits}g}"
-            below = height == 0.0
-            place = (k, -0.02 if below else 1.02)
-            axes.annotate(
-                text, place, ha="center", va="top" if below else "bottom", fontsize=SMALL_FONT, annotation_clip=False
-            )
+            y, align = (-0.02, "top") if height == 0.0 else (1.02, "bottom")
+            axes.annotate(text, (k, y), ha="center", va=align, fontsize=SMALL_FONT, annotation_clip=False)
     axes.set_xticks(range(len(scales)), [scale.label.replace(" [", "\n[") for scale in scales], fontsize=SMALL_FONT)
     axes.tick_params(axis="x", length=0, pad=12)
     axes.set(ylim=(0, 1), xlim=(-0.05, len(scales) - 0.95), yticks=[])
@@ -295,9 +279,7 @@ def _parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
     axes.spines[["left", "bottom"]].set_visible(False)
 
 
-MOST_TICKS = 8
-"""Values of a parameter that have a tick each: with more their numbers come close to each other (by eye)."""
-
+MOST_TICKS = 8  # values of a parameter that have a tick each: with more their numbers come close to each other (by eye)
 N_LEVEL_LINE_PLACES = 80
 """Places along an axis that level lines are drawn through: about 1 mm of print apart, where no corner shows."""
 
@@ -418,11 +400,10 @@ def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArra
     if len(known) == values.size:
         y, values = _finer(y, values, 0)
         x, values = _finer(x, values, 1)
-    lines = axes.contour(
-        across.value(x), up.value(y), np.ma.masked_invalid(values), levels=levels, colors="white", linewidths=0.7
-    )
     from matplotlib import patheffects
 
+    surface = across.value(x), up.value(y), np.ma.masked_invalid(values)
+    lines = axes.contour(*surface, levels=levels, colors="white", linewidths=0.7)
     # white is read on the dark end of the colours only; a dark outline carries it over the light end
     outline: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewidth=1.6, foreground=TEXT_INK)]
     lines.set_path_effects(outline)
@@ -436,8 +417,7 @@ def _round_values_between(low: float, high: float) -> FloatArray:
 
     levels = np.asarray(MaxNLocator(7).tick_values(low, high))
     room = 0.02 * (high - low)
-    found: FloatArray = levels[(levels > low + room) & (levels < high - room)]
-    return found
+    return np.asarray(levels[(levels > low + room) & (levels < high - room)])
 
 
 def _finer(places: FloatArray, values: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
@@ -464,6 +444,5 @@ def _hatch_cells(axes: Axes, x: FloatArray, y: FloatArray, cells: NDArray[np.boo
             left, right, low, high = x[start], x[stop], y[row], y[row + 1]
             corners += [(left, low), (right, low), (right, high), (left, high), (left, low)]
     codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY] * (len(corners) // 5)
-    axes.add_patch(
-        PathPatch(Path(corners, codes), facecolor="none", edgecolor="#A8A8A8", hatch=MISSED_HATCH, linewidth=0)
-    )
+    look: Look = {"facecolor": "none", "edgecolor": "#A8A8A8", "hatch": MISSED_HATCH, "linewidth": 0}
+    axes.add_patch(PathPatch(Path(corners, codes), **look))

@@ -16,12 +16,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-PERCENT_DIMENSION = "percent"
-"""Dimension of shares that are drawn in per cent."""
-
-
-MAX_LABEL_LENGTH = 64
-"""Characters of an axis label: so many of 8 pt fit on 92 mm of print, the axis of a map."""
+PERCENT_DIMENSION = "percent"  # dimension of shares that are drawn in per cent
+MAX_LABEL_LENGTH = 64  # characters of an axis label: so many of 8 pt fit on 92 mm of print, the axis of a map
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.axis_labels_and_headings import LEFT_MARGIN, Heading, write_heading
-from cfmkit.plots.style import LINE_VERMILLION, SMALL_FONT, TEXT_GREY, apply_style, has_titles, is_plain, size_mm
+from cfmkit.plots.style import LINE_VERMILLION, SMALL_FONT, TEXT_GREY, has_titles, is_plain, size_mm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,20 +19,15 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.plots.study_data_to_draw import DrawnScale, StudyMarks
+    from cfmkit.plots.style import Look
 
 COLOUR_MAP = "viridis"
 EMPTY_COLOUR = "#EFEFEF"
 """The ground where nothing was solved."""
-
-MISSED_HATCH = "////"
-"""Where a requirement is missed."""
-
-
-HEAD_HEIGHT = 12.0
-"""Room at the top of a picture of a study for its heading and its key [mm]."""
+MISSED_HATCH = "////"  # where a requirement is missed
+HEAD_HEIGHT = 12.0  # room at the top of a picture of a study for its heading and its key [mm]
 
 
-@apply_style
 def head(figure: Figure, found: StudyMarks, subject: str, key: Sequence[Artist] = ()) -> None:
     """Write above a picture whose study it is, what it shows, and what its marks mean."""
     write_heading(figure, Heading(found.name, subject) if found.name else Heading(subject, "all points"))
@@ -45,18 +40,10 @@ def _key(figure: Figure, entries: Sequence[Artist], columns: int) -> Legend:
     """Write the key below the heading, or at the top where there is none."""
     width, height = size_mm(figure)
     down = 6.0 if has_titles() else 1.0
-    return figure.legend(
-        handles=list(entries),
-        loc="upper left",
-        bbox_to_anchor=((LEFT_MARGIN - 1.0) / width, 1.0 - down / height),
-        ncols=columns,
-        frameon=False,
-        fontsize=SMALL_FONT,
-        borderpad=0.0,
-        borderaxespad=0.0,
-        handletextpad=0.4,
-        columnspacing=1.2,
-    )
+    tight: Look = {"borderpad": 0.0, "borderaxespad": 0.0, "handletextpad": 0.4, "columnspacing": 1.2}
+    place = (LEFT_MARGIN - 1.0) / width, 1.0 - down / height
+    look: Look = {"loc": "upper left", "bbox_to_anchor": place, "frameon": False, "fontsize": SMALL_FONT}
+    return figure.legend(handles=list(entries), ncols=columns, **look, **tight)
 
 
 def key_of(found: StudyMarks, starred: bool, hatched: bool, empty: bool = False) -> list[Artist]:
@@ -66,18 +53,11 @@ def key_of(found: StudyMarks, starred: bool, hatched: bool, empty: bool = False)
 
     entries: list[Artist] = []
     if starred:
-        look = {"marker": "*", "markersize": 9, "color": LINE_VERMILLION, "markeredgecolor": "white", "linestyle": ""}
-        entries.append(Line2D([], [], label=found.best_words or "best point", **look))  # type: ignore[arg-type]
+        mark: Look = {"marker": "*", "markersize": 9, "color": LINE_VERMILLION, "markeredgecolor": "white"}
+        entries.append(Line2D([], [], linestyle="", label=found.best_words or "best point", **mark))
     if hatched:
-        entries.append(
-            Patch(
-                facecolor=EMPTY_COLOUR,
-                edgecolor=TEXT_GREY,
-                hatch=MISSED_HATCH,
-                linewidth=0,
-                label="requirement missed, or not solved",
-            )
-        )
+        look: Look = {"facecolor": EMPTY_COLOUR, "edgecolor": TEXT_GREY, "hatch": MISSED_HATCH, "linewidth": 0}
+        entries.append(Patch(label="requirement missed, or not solved", **look))
     if empty:
         entries.append(Patch(facecolor=EMPTY_COLOUR, label="no value"))
     return entries
@@ -106,7 +86,6 @@ def star(axes: Axes, x: float, y: float) -> bool:
     """Mark the best point, and return whether it has a place."""
     has_place = bool(np.isfinite([x, y]).all()) and not is_plain()
     if has_place:
-        axes.plot(
-            [x], [y], marker="*", markersize=12, color=LINE_VERMILLION, markeredgecolor="white", clip_on=False, zorder=5
-        )
+        look: Look = {"marker": "*", "markersize": 12, "color": LINE_VERMILLION, "markeredgecolor": "white"}
+        axes.plot([x], [y], clip_on=False, zorder=5, **look)
     return has_place

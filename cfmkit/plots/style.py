@@ -42,37 +42,22 @@ if TYPE_CHECKING:
 
     from cfmkit.plots.overlay import EarlierCurve
 
+Look = dict[str, Any]  # arguments of a function of matplotlib that say how something looks
 P = ParamSpec("P")
 T = TypeVar("T")
-
-INCHES_PER_MM = 1.0 / 25.4
-"""Inches in a millimetre."""
-
+INCHES_PER_MM = 1.0 / 25.4  # inches in a millimetre
 PNG_DPI = 200
 """Dots per inch of every PNG: 160 x 100 mm become 1260 x 787 pixels, which a screen shows whole and where a line of
 0.5 pt is more than one pixel wide."""
-
-LINE_BLUE, LINE_VERMILLION, LINE_BLACK, LINE_PURPLE, LINE_TAN, LINE_BROWN = (
-    "#0072B2",
-    "#D55E00",
-    "#1A1A1A",
-    "#9933FF",
-    "#C28570",
-    "#663300",
-)
-LINE_COLOURS = (LINE_BLUE, LINE_VERMILLION, LINE_BLACK, LINE_PURPLE, LINE_TAN, LINE_BROWN)
+LINE_COLOURS = ("#0072B2", "#D55E00", "#1A1A1A", "#9933FF", "#C28570", "#663300")
 """Colours of lines, in this order; as dark as they must be to be read as text, too."""
-
+LINE_BLUE, LINE_VERMILLION, LINE_BLACK, LINE_PURPLE, LINE_TAN, LINE_BROWN = LINE_COLOURS
 SPRING_OCHRE = "#B78C66"
 """Springs. It stands beside every line but TAN, and beside GREY."""
-
 TEXT_INK, TEXT_GREY = "#262626", "#6B6B6B"
 BAND_GREEN, TROUBLE_RED = "#00855F", "#A50F15"
 """Where the force should be, and where something is wrong."""
-
-SMALL_FONT, NORMAL_FONT = 7.0, 8.0
-"""Font sizes [pt]: 7 is the smallest that Elsevier's journals print."""
-
+SMALL_FONT, NORMAL_FONT = 7.0, 8.0  # font sizes [pt]: 7 is the smallest that Elsevier's journals print
 _STYLE_SETTINGS: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],  # comes with matplotlib, so every machine has the same
     "font.size": NORMAL_FONT,

@@ -12,9 +12,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-MAX_NUMBER_WIDTH = 6.5
-"""Width of a number at a tick, in digits: what the margins of the figures have room for."""
-
+MAX_NUMBER_WIDTH = 6.5  # width of a number at a tick, in digits: what the margins of the figures have room for
 MIN_RANGE_SHARE = 2e-5
 """Share of the size of its values that an axis shows at least: below it their ticks would need more than seven
 digits."""

@@ -31,21 +31,17 @@ _FONT_FALLBACKS = "'DejaVu Sans', Verdana, Geneva, sans-serif"
 @apply_style
 def svg(figure: Figure) -> bytes:
     """Return a figure as SVG, with its text as text."""
-    found = _write(figure, "svg", {"Date": None, "Creator": None, "Format": None, "Type": None})
-    text = found.decode().replace("'DejaVu Sans'", _FONT_FALLBACKS)
-    return _each_id_once(text).encode()
-
-
-def _each_id_once(text: str) -> str:
-    """Return SVG in which of several parts of one name only the first has it: an id twice is no valid document."""
+    written = _write(figure, "svg", {"Date": None, "Creator": None, "Format": None, "Type": None})
     seen: set[str] = set()
 
-    def first(found: re.Match[str]) -> str:
-        known = found[1] in seen
-        seen.add(found[1])
-        return "" if known else found[0]
+    def keep_first(match: re.Match[str]) -> str:
+        """Return a name, nothing if it was there before: an id twice is no valid document."""
+        known = match[1] in seen
+        seen.add(match[1])
+        return "" if known else match[0]
 
-    return re.sub(r' id="([^"]*)"', first, text)
+    text = written.decode().replace("'DejaVu Sans'", _FONT_FALLBACKS)
+    return re.sub(r' id="([^"]*)"', keep_first, text).encode()
 
 
 @apply_style
@@ -81,19 +77,12 @@ def inline(
     text = re.sub(r"<style.*?</style>", "", text, flags=re.DOTALL)  # it would hold for the whole page
     text = re.sub(r' id="([^"]*)"', rf' id="{name}-\1"', text)
     text = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{name}-", text)
-    return _short(text)
+    # Coordinates of two decimals [pt]: 4 um of print, below what any screen or printer shows. Numbers that can be read
+    # stay: those of a drawing stand in tags. Digits are cut off, not rounded: that takes a seventh of the time.
+    return re.sub(r"<[^>]*>", lambda tag: re.sub(r"(?<=\.\d\d)\d+", "", tag[0]), text)
 
 
 def first_picture(makers: Mapping[str, Callable[[], Figure]]) -> str:
     """Return the first of some figures as a part of a page; nothing where there is none."""
     name, draw = next(iter(makers.items()), ("", None))
     return "" if draw is None else inline(svg(draw()), name)
-
-
-def _short(text: str) -> str:
-    """Return SVG with coordinates of two decimals [pt]: 4 um of print, below what any screen or printer shows.
-
-    Numbers that can be read stay: those of a drawing stand in tags, which alone are shortened. Further digits are cut
-    off, not rounded: a pattern alone takes a seventh of the time of a call for each of 100 000 numbers.
-    """
-    return re.sub(r"<[^>]*>", lambda tag: re.sub(r"(?<=\.\d\d)\d+", "", tag[0]), text)

@@ -8,6 +8,7 @@ stand outside of the part: along x below it, along y to its left, others on thei
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -37,40 +38,29 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.export.contours import Contour, Drawing, Edge
+    from cfmkit.plots.style import Look
 
-PAPER_SIZE = (240.0, 165.0)
-"""Of the figure [mm]: a landscape A4 sheet within its margins, less a caption."""
-
-COLUMN_WIDTH = 78.0
-"""Width of the column of words [mm]."""
-
-DIMENSION_STEP = 7.0
-"""Between dimension lines beside each other [mm of print]."""
-
+PAPER_SIZE = (240.0, 165.0)  # of the figure [mm]: a landscape A4 sheet within its margins, less a caption
+COLUMN_WIDTH = 78.0  # width of the column of words [mm]
+DIMENSION_STEP = 7.0  # between dimension lines beside each other [mm of print]
 PAPER_SCALES = tuple(factor * 10.0**power for power in range(3, -4, -1) for factor in (5.0, 2.0, 1.0))
 """Scales that are used on paper (ISO 5455)."""
-
-ARC_POINTS = 91
-"""Points of a full circle of the picture."""
-
-POINT_MM = 25.4 / 72.0
-"""Of type [mm]."""
-
+ARC_POINTS = 91  # points of a full circle of the picture
+POINT_MM = 25.4 / 72.0  # of type [mm]
 NUMBER_SIDES = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 """Of a hole, where its number may stand: right or left, above or below; the first one is preferred."""
-
-MOST_HOLES = 12
-"""Rows of the hole table; more are counted."""
-
-
-TITLE_BLOCK = 33.0
-"""Height of the title block [mm]."""
-
-MAX_THICKNESSES = 2
-"""Thicknesses that are drawn of one beam: of more, the smallest and the largest."""
-
+MOST_HOLES = 12  # rows of the hole table; more are counted
+TITLE_BLOCK = 33.0  # height of the title block [mm]
+MAX_THICKNESSES = 2  # thicknesses that are drawn of one beam: of more, the smallest and the largest
 STUB_LENGTH, LEADER_LENGTH = 4.0, 7.0
 """Lengths of the arrows that point at a beam from both sides, and of the line to its text [mm of print]."""
+ARROW_LOOK: Look = {"linewidth": 0.5, "color": TEXT_INK, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
+TEXT_ON_LINES: Look = {
+    "fontsize": SMALL_FONT,
+    "color": TEXT_INK,
+    # lines of other dimensions end beside a text that is longer than its own
+    "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.4},
+}
 
 
 @dataclass(frozen=True)
@@ -103,12 +93,9 @@ def drawing_figure(
     figure = new_figure(*PAPER_SIZE)
     x0, y0, x1, y1 = mm(drawing.extents).tolist()
     overall = _overall(drawing)
-    own_dimensions = [
-        dimension for dimension in drawing.dimensions if not any(_same(dimension, whole) for whole in overall)
-    ]
-    dimensions = [*own_dimensions, *overall]
-    below = DIMENSION_STEP * (1 + sum(dimension.along == "x" for dimension in dimensions))
-    beside = DIMENSION_STEP * (1 + sum(dimension.along == "y" for dimension in dimensions))
+    dimensions = [own for own in drawing.dimensions if not any(_same(own, whole) for whole in overall)]
+    dimensions += overall
+    below, beside = (DIMENSION_STEP * (1 + sum(own.along == axis for own in dimensions)) for axis in "xy")
     room = PAPER_SIZE[0] - COLUMN_WIDTH - beside - 6.0, PAPER_SIZE[1] - below - 12.0
     scale = _scale(min(room[0] / max(x1 - x0, 1e-9), room[1] / max(y1 - y0, 1e-9)))
     width, height = scale * (x1 - x0), scale * (y1 - y0)
@@ -165,24 +152,14 @@ def _thickness(ax: Axes, section: BeamSection, scale: float, decimals: int) -> N
     if across[1] < 0:
         across = -across
     half = 0.5e3 * section.thickness * across
-    look = {"arrowstyle": "-|>", "linewidth": 0.5, "color": TEXT_INK, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
-    for side, far in ((1.0, STUB_LENGTH + LEADER_LENGTH), (-1.0, STUB_LENGTH)):
-        tip = middle + side * half
-        (x, y), (x_far, y_far) = tip.tolist(), (tip + side * far / scale * across).tolist()
-        ax.annotate("", xy=(x, y), xytext=(x_far, y_far), arrowprops=look, zorder=5)
+    look = ARROW_LOOK | {"arrowstyle": "-|>"}
+    for sense, far in ((1.0, STUB_LENGTH + LEADER_LENGTH), (-1.0, STUB_LENGTH)):
+        tip = middle + sense * half
+        ax.annotate("", tip.tolist(), (tip + sense * far / scale * across).tolist(), arrowprops=look, zorder=5)
     place = middle + half + (STUB_LENGTH + LEADER_LENGTH) / scale * across
-    ax.text(
-        float(place[0]),
-        float(place[1]),
-        f"t {length_in_words(section.thickness, decimals)}",
-        ha="left" if across[0] >= 0 else "right",
-        va="center",
-        fontsize=SMALL_FONT,
-        color=TEXT_INK,
-        zorder=7,
-        gid="thickness",
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
-    )
+    side, words = "left" if across[0] >= 0 else "right", f"t {length_in_words(section.thickness, decimals)}"
+    x, y = place.tolist()
+    ax.text(x, y, words, ha=side, va="center", zorder=7, gid="thickness", **TEXT_ON_LINES)
 
 
 def holes(drawing: Drawing) -> Iterator[_Hole]:
@@ -240,9 +217,8 @@ def _contour(ax: Axes, contour: Contour) -> None:
         ax.plot(*chain.T, color=TEXT_GREY, linewidth=0.6, dashes=(8, 2, 1, 2), zorder=2, gid="path")
     elif contour.layer in UNCUT_LAYERS:
         hatch = "////" if contour.layer == HELD_LAYER else "...."
-        ax.fill(
-            *chain.T, facecolor="none", edgecolor=TEXT_GREY, linewidth=0.0, hatch=hatch, zorder=1, gid=contour.layer
-        )
+        look: Look = {"facecolor": "none", "edgecolor": TEXT_GREY, "hatch": hatch}
+        ax.fill(*chain.T, linewidth=0.0, zorder=1, gid=contour.layer, **look)
     else:
         ax.plot(*chain.T, color=TEXT_INK, linewidth=0.9, zorder=3, solid_joinstyle="round", gid=contour.layer)
 
@@ -259,17 +235,8 @@ def _hole(ax: Axes, hole: _Hole, number: int, drawing: Drawing, scale: float) ->
     spots = [(side, share * arm) for share in (0.75, 1.1, 1.5, 2.0) for side in NUMBER_SIDES]
     clear = (spot for spot in spots if _is_clear(drawing, (x, y), spot[0], spot[1], text))
     (right, up), distance = next(clear, spots[0])
-    ha, va = "left" if right > 0 else "right", "bottom" if up > 0 else "top"
-    ax.text(
-        x + right * distance,
-        y + up * distance,
-        str(number),
-        fontsize=SMALL_FONT,
-        color=LINE_VERMILLION,
-        ha=ha,
-        va=va,
-        zorder=6,
-    )
+    look: Look = {"ha": "left" if right > 0 else "right", "va": "bottom" if up > 0 else "top", "color": LINE_VERMILLION}
+    ax.text(x + right * distance, y + up * distance, str(number), fontsize=SMALL_FONT, zorder=6, **look)
 
 
 def _is_clear(
@@ -290,69 +257,35 @@ def _dimensions(
     ax: Axes, dimensions: Sequence[DrawnDimension], box: tuple[float, float, float, float], scale: float, decimals: int
 ) -> None:
     """Draw dimensions: those along x below the part, those along y at its left, the short ones nearest to it."""
-    across = sorted(
-        (dimension for dimension in dimensions if dimension.along == "x"), key=lambda dimension: dimension.value
-    )
-    up = sorted(
-        (dimension for dimension in dimensions if dimension.along == "y"), key=lambda dimension: dimension.value
-    )
-    for number, dimension in enumerate(across, start=1):
-        y = box[1] - number * DIMENSION_STEP / scale
-        (xa, ya), (xb, yb) = mm([dimension.start, dimension.end]).tolist()
-        _line(ax, (min(xa, xb), y), (max(xa, xb), y), _text(dimension, decimals), scale)
-        _extension(ax, [(xa, ya), (xa, y)], [(xb, yb), (xb, y)])
-    for number, dimension in enumerate(up, start=1):
-        x = box[0] - number * DIMENSION_STEP / scale
-        (xa, ya), (xb, yb) = mm([dimension.start, dimension.end]).tolist()
-        _line(ax, (x, min(ya, yb)), (x, max(ya, yb)), _text(dimension, decimals), scale)
-        _extension(ax, [(xa, ya), (x, ya)], [(xb, yb), (x, yb)])
-    for dimension in dimensions:
-        if dimension.along == "line":
-            start, end = mm([dimension.start, dimension.end]).tolist()
-            _line(ax, (start[0], start[1]), (end[0], end[1]), _text(dimension, decimals), scale)
-
-
-def _text(dimension: DrawnDimension, decimals: int) -> str:
-    return f"{dimension.name} {length_in_words(dimension.value, decimals)}"
-
-
-def _extension(ax: Axes, *lines: list[tuple[float, float]]) -> None:
-    for line in lines:
-        ax.plot(*np.array(line).T, color=TEXT_GREY, linewidth=0.35, zorder=1)
+    for axis, along in enumerate(("x", "y", "line")):
+        chosen = [dimension for dimension in dimensions if dimension.along == along]
+        ordered = chosen if along == "line" else sorted(chosen, key=lambda dimension: dimension.value)
+        for number, dimension in enumerate(ordered, start=1):
+            ends = mm([dimension.start, dimension.end])
+            moved = ends.copy()
+            if along != "line":
+                moved[:, 1 - axis] = box[1 - axis] - number * DIMENSION_STEP / scale
+                moved = moved[moved[:, axis].argsort()]
+            text = f"{dimension.name} {length_in_words(dimension.value, decimals)}"
+            _line(ax, tuple(moved[0].tolist()), tuple(moved[1].tolist()), text, scale)
+            for end in ends if along != "line" else ():
+                foot = np.where(np.arange(2) == axis, end, moved[0])
+                ax.plot(*np.array([end, foot]).T, color=TEXT_GREY, linewidth=0.35, zorder=1)
 
 
 def _line(ax: Axes, start: tuple[float, float], end: tuple[float, float], text: str, scale: float) -> None:
     """Draw a dimension line with arrows, and its text above it, or beside it where it is short."""
     gap = np.subtract(end, start)
     length = float(np.hypot(*gap)) * scale
-    look = {
-        "arrowstyle": "<|-|>" if length > 5 else "-",
-        "linewidth": 0.5,
-        "color": TEXT_INK,
-        "shrinkA": 0,
-        "shrinkB": 0,
-    }
-    look |= {"mutation_scale": 6}
-    ax.annotate("", xy=end, xytext=start, arrowprops=look, zorder=4, annotation_clip=False)
+    arrow = ARROW_LOOK | {"arrowstyle": "<|-|>" if length > 5 else "-"}
+    ax.annotate("", end, start, arrowprops=arrow, zorder=4, annotation_clip=False)
     angle = float(np.degrees(np.arctan2(gap[1], gap[0])))
     angle -= 180.0 * round(angle / 180.0) if abs(angle) > 90.0 + 1e-9 else 0.0
     middle = 0.5 * (np.asarray(start) + np.asarray(end))
     normal = np.array([-np.sin(np.radians(angle)), np.cos(np.radians(angle))])
-    at = middle + 0.5 / scale * normal
-    ax.text(
-        float(at[0]),
-        float(at[1]),
-        text,
-        fontsize=SMALL_FONT,
-        color=TEXT_INK,
-        ha="center",
-        va="bottom",
-        rotation=angle,
-        rotation_mode="anchor",
-        zorder=6,
-        # lines of other dimensions end beside a text that is longer than its own
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
-    )
+    x, y = (middle + 0.5 / scale * normal).tolist()
+    look = TEXT_ON_LINES | {"rotation": angle, "rotation_mode": "anchor"}
+    ax.text(x, y, text, ha="center", va="bottom", zorder=6, **look)
 
 
 def _words(
@@ -435,14 +368,11 @@ def _sheet(drawing: Drawing, decimals: int) -> str:
     return text + (f"; in part {', '.join(more)}" if more else "")
 
 
-LETTER_WIDTH = 0.235
-"""Mean width of a letter [mm] in points of its size, measured on the font of the figures."""
+LETTER_WIDTH = 0.235  # mean width of a letter [mm] in points of its size, measured on the font of the figures
 
 
 def _write_text(ax: Axes, x: float, y: float, text: str, size: float = SMALL_FONT, weight: str = "normal") -> float:
     """Write a text, broken into lines that fit, and return where the next one begins [mm]."""
-    import textwrap
-
     fit = max(int((COLUMN_WIDTH - x - 3.0) / (LETTER_WIDTH * size)), 10)
     for line in textwrap.wrap(text, fit, break_long_words=False) or [""]:
         ax.text(x, y, line, fontsize=size, color=TEXT_INK, va="top", fontweight=weight)

@@ -13,15 +13,13 @@ from typing import TYPE_CHECKING, Any, Literal
 from cfmkit.arrays import Several, shorten_values
 from cfmkit.documents.run_outcome import worst
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
-from cfmkit.metrics.compare import COMPARISON_RTOL
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.runs import batch_output_files
-from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, run_analysis, run_design, spec_of
+from cfmkit.runs.batch_reference import BatchReference
+from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, read, run_analysis, run_design
 from cfmkit.runs.run import carry_out as carry_out_run
 from cfmkit.studies.batch_sources_and_outcomes import SKIPPED_MESSAGE, Entry
 from cfmkit.studies.engine import NullMonitor
-from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, list_gone, read_earlier_batch
-from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -30,6 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.engine import Monitor
     from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
+    from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
     from cfmkit.studies.serial_and_cluster_executors import Executor, Lost
     from cfmkit.tables import Table
 
@@ -75,14 +74,14 @@ class BatchWork:
     def refusal(self, job: BatchJob) -> Entry | None:
         """Return what is wrong with a specification; None if it is valid."""
         try:
-            spec_of(replace(self.common, spec=job.spec))
+            read(replace(self.common, spec=job.spec))
         except CfmError as error:
             return _failed_entry(Entry(job.spec, job.folder), error)
         return None
 
     def _run_entry(self, entry: Entry) -> Entry:
         wanted = replace(self.common, spec=entry.spec, out=os.path.join(self.common.out, entry.folder))
-        spec = spec_of(wanted)
+        spec = read(wanted)[1]
         verb = _verb(self.verb or _natural(spec), self.fresh)
         name = " ".join(spec.name.split())
         known = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec, entry.spec))
@@ -115,8 +114,8 @@ def _data_of(spec: Spec, file: str) -> tuple[tuple[str, str | None], ...]:
 def _verb(name: str, fresh: bool) -> Verb:
     if name == "design":
         # One process: the specifications of the batch share the cores already.
-        return Verb("design", "designed and analysed", run_design, running=partial(long_run, 1, fresh))
-    return Verb("analyze", "analysed", run_analysis)
+        return Verb("design", run_design, running=partial(long_run, 1, fresh))
+    return Verb("analyze", run_analysis)
 
 
 def _entry_of(entry: Entry, outcome: FinishedRun) -> Entry:
@@ -218,9 +217,11 @@ def choose_executor(jobs: int | None, count: int, timeout: float | None) -> Exec
     return serial if wanted <= 1 and timeout is None else Pool(max(wanted, 1), timeout)
 
 
-def exit_code(entries: Sequence[Entry], interrupted: bool) -> ExitCode:
-    """Return the exit code of the process: the first of 70, 7, 3, 4, 6, 5 that occurs."""
-    return ExitCode.INTERRUPTED if interrupted else worst([one.code for one in entries])
+def exit_code(entries: Sequence[Entry], interrupted: bool, compared: BatchComparison | None = None) -> ExitCode:
+    """Return the exit code of the process: the first of 70, 7, 3, 4, 6, 5 that occurs; a change counts as 5."""
+    changed = compared is not None and compared.changes_beyond_tolerance
+    codes = [*(entry.code for entry in entries), *([ExitCode.REQUIREMENT_MISSED] if changed else [])]
+    return ExitCode.INTERRUPTED if interrupted else worst(codes)
 
 
 def complaints(entries: Sequence[Entry], tracebacks: bool) -> Iterator[str]:
@@ -372,62 +373,60 @@ def batch(
     """
     from cfmkit.documents.junit import junit as junit_of
     from cfmkit.documents.junit import prepare_file
-    from cfmkit.runs.specfile import split_address
     from cfmkit.store import RunFolder
-    from cfmkit.studies.batch_sources_and_outcomes import folders, sources
     from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 
-    place, given = os.fspath(out), (changes,) if isinstance(changes, str) else tuple(changes)
-    if not place.strip():
-        raise UsageError("--out is empty; give a folder")
-    if verb not in (None, "design", "analyze"):
-        raise UsageError(f"verb: {verb!r} is not one of 'design', 'analyze'")
-    for change in given:
-        split_address(change)
-    named = _list_named(specs)
-    files = sources(named, place)
+    place, named = os.fspath(out), _list_named(specs)
+    given = (changes,) if isinstance(changes, str) else tuple(changes)
+    _check_options(place, verb, given)
     common = RunTask("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or DEFAULT_FORM)
     work = BatchWork(common, verb, tuple(arguments), fresh)
-    todo = [BatchJob(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
+    todo = _list_jobs(named, place)
     executor = choose_executor(jobs, len(todo), timeout_per_point)
-    report = None if junit is None else prepare_file(junit)
+    write_junit = None if junit is None else prepare_file(junit)
     write_summary = None if summary is None else prepare_file(summary, "--summary")
-    tolerance = COMPARISON_RTOL if compare_tolerance is None else compare_tolerance
-    if not 0 <= tolerance < 1:
-        meant = f"; did you mean '{tolerance:g} %'?" if 1 <= tolerance < 100 else ""
-        raise UsageError(f"--compare-tolerance: {tolerance:g} is not allowed: must be >= 0 and < 1{meant}")
-    reference = "" if compare is None else os.fspath(compare)
-    begins = accept and batch_output_files.check_reference(reference, place)
-    before = None if compare is None or begins else read_earlier_batch(reference)
+    reference = BatchReference.read(compare, compare_tolerance, accept, place)
     watched = monitor or NullMonitor()
     with RunFolder(place) as folder, noting(folder, fresh) as journal:
         folder.check("results.csv", "requirements.csv", "metrics.json")
-        entries = carry_out(
-            work, todo, BatchExecution(executor, fail_fast, watched, KeptRuns(place, work.deciding, journal))
-        )
-        compared = None
-        if before is not None:
-            changed = changes_of(before, entries, place, tolerance)
-            compared = BatchComparison(reference, tolerance, changed, list_gone(before, entries))
-        code = exit_code(entries, watched.stopping())
-        if compared is not None and compared.changes_beyond_tolerance and not watched.stopping() and not accept:
-            code = worst([code, ExitCode.REQUIREMENT_MISSED])
-        written = batch_output_files.write(
-            folder,
-            entries,
-            batch_output_files.describe_batch(work.arguments, work.common.seed, named, code),
-            page,
-            compared,
-        )
-    if accepted := accept and not watched.stopping():
-        batch_output_files.write_reference(reference, place, entries, work.arguments)
-    if report is not None:
-        report(junit_of(entries))
+        kept = KeptRuns(place, work.deciding, journal)
+        entries = carry_out(work, todo, BatchExecution(executor, fail_fast, watched, kept))
+        interrupted = watched.stopping()
+        compared = None if reference is None else reference.compare(entries, place)
+        code = exit_code(entries, interrupted, None if accept else compared)
+        about = batch_output_files.describe_batch(work.arguments, seed, named, code)
+        written = batch_output_files.write(folder, entries, about, page, compared)
+    accepted = ""
+    if reference is not None and reference.accept and not interrupted:
+        reference.replace_results(place, entries, work.arguments)
+        accepted = reference.folder
+    if write_junit is not None:
+        write_junit(junit_of(entries))
     if write_summary is not None:
         from cfmkit.documents.markdown import summary as in_markdown
 
         write_summary(in_markdown(entries, compared))
-    return BatchResult(entries, code, place, written, compared, reference if accepted else "")
+    return BatchResult(entries, code, place, written, compared, accepted)
+
+
+def _check_options(out: str, verb: str | None, changes: Iterable[str]) -> None:
+    """Raise UsageError if an option is malformed."""
+    from cfmkit.runs.specfile import split_address
+
+    if not out.strip():
+        raise UsageError("--out is empty; give a folder")
+    if verb not in (None, "design", "analyze"):
+        raise UsageError(f"verb: {verb!r} is not one of 'design', 'analyze'")
+    for change in changes:
+        split_address(change)
+
+
+def _list_jobs(named: Sequence[str], out: str) -> list[BatchJob]:
+    """Return a job for each specification that the names stand for."""
+    from cfmkit.studies.batch_sources_and_outcomes import folders, sources
+
+    files = sources(named, out)
+    return [BatchJob(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
 
 
 def _list_named(specs: Any) -> list[str]:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import shlex
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.documents import html
 from cfmkit.documents.batch_document import document_of
-from cfmkit.errors import ExitCode, UsageError, visible
+from cfmkit.errors import ExitCode
 from cfmkit.studies.batch_sources_and_outcomes import message
 from cfmkit.studies.metric_changes_since_earlier_batch import changes_table
 
@@ -56,33 +54,6 @@ def write(
         document = document_of(entries, ExitCode(about["exit_code"]), compared=compared)
         folder.write(html.REPORT_NAME, html.page(document, subject=subject, command=command))
     return (*folder.commit(about).files, "manifest.json")
-
-
-def check_reference(reference: str, place: str) -> bool:
-    """Return True if the folder of a reference that is to be accepted is not there yet.
-
-    Raises UsageError if none is named, or it is the output folder of the batch itself.
-    """
-    if not reference:
-        raise UsageError("--accept replaces a reference: name its folder with --compare")
-    if os.path.realpath(reference) == os.path.realpath(place):
-        raise UsageError(f"--accept: {visible(reference)} is the output folder itself, which has the current results")
-    return not os.path.lexists(reference)
-
-
-def write_reference(reference: str, folder: str, entries: Sequence[Entry], arguments: Sequence[str]) -> None:
-    """Replace the results in the folder of a reference by those of a batch: what a comparison reads, and nothing else.
-
-    Raises OutputError if the folder cannot be written, or has a file of those names that cfmkit did not write.
-    """
-    from cfmkit.store import RunFolder
-
-    named = ("metrics.json", *(f"{entry.folder}/metrics.json" for entry in entries if entry.written))
-    with RunFolder(reference) as target:
-        target.check(*named)
-        for name in named:
-            target.write(name, Path(folder, name).read_bytes())
-        target.commit({"command": "batch", "arguments": list(arguments), "status": "complete", "exit_code": 0})
 
 
 def data(entries: Sequence[Entry], code: ExitCode, compared: BatchComparison | None = None) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from cfmkit.experiment.redrawn_values import NotMakeable, dimension_of
 from cfmkit.metrics import evaluate
 from cfmkit.metrics.metric_definitions import words
 from cfmkit.results import Design, Status
+from cfmkit.runs.comparisons import extend_by_recording
 from cfmkit.specs.units import border_unit, format_short, to_border
 from cfmkit.tables import Table, TableColumn, to_csv
 
@@ -92,38 +93,29 @@ def report_on_corrected(source: MeasuredCurves, fit: str | None, tared: bool, sp
 def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: bool) -> Report:
     """Return the report on a correction."""
     calibration = correction.explanation.calibration
-    after = calibration.after
     rows = rows_of(correction)
     made = replace(correction.predicted, spec=correction.corrected)
-    report = report_on(made, Design(correction.corrected, Status.COMPLETE))
     files = {
         **dict(_specs(correction)),
         "correction.csv": lambda: to_csv(_table(rows)),
         "residuals.csv": lambda: to_csv(add.residuals_table(calibration)),
-        **add.comparison_files(source),
     }
     if calibration.parameters:
         files["parameters.csv"] = lambda: to_csv(add.parameters_table(calibration))
     heads = ("", "before (95 %)", "after", "predicted (95 %)")
     shown = rows if correction.changes else rows[:1]  # else every value is as before
     table = PageTable("", tuple(map(GridColumn, heads)), tuple(row.cells for row in shown), N_ROWS_ON_PAGE)
-    return replace(
-        report,
-        metrics=dict(report.metrics) | after.metrics() | after.loss(),
-        supplement=Supplement(
-            add.comparison_data(after, source)
-            | add.calibration_data(calibration)
-            | {"correction": _data(correction, rows)},
-            files,
-            tuple(_lines(correction, zero_known)),
-            (*add.comparison_warnings(after, source), *calibration.warnings, *correction.warnings),
-            shortfall=add.shortfall(after),
-            figures=add.comparison_figures(
-                after, correction.drawn.name, calibration.before if calibration.parameters else None
-            ),
-            tables=(table,),
-        ),
+    own = Supplement(
+        add.calibration_data(calibration) | {"correction": _data(correction, rows)},
+        files,
+        warnings=(*calibration.warnings, *correction.warnings),
+        tables=(table,),
     )
+    before = calibration.before if calibration.parameters else None
+    report = report_on(made, Design(correction.corrected, Status.COMPLETE))
+    report = extend_by_recording(report, calibration.after, source, own, before)
+    # how the file was read and the residuals are no news here
+    return replace(report, supplement=replace(report.supplement, lines=tuple(_lines(correction, zero_known))))
 
 
 def rows_of(correction: DesignCorrection) -> tuple[CorrectedValue, ...]:

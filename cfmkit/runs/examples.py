@@ -14,7 +14,6 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError, UsageError, visible
-from cfmkit.runs.find_shipped_folder import shipped_folder
 
 if TYPE_CHECKING:
     import os
@@ -23,30 +22,32 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Example:
-    """One example.
+    """One example."""
 
-    Attributes
-    ----------
-    name : str
-        Path below the folder of all, without its ending: ``cam``, ``studies/cam_tolerance``.
-    family : str
-        As the file says.
-    about : str
-        What it is: the first sentence of the file's comment.
-    path : Path
-        The file.
-    searches : bool
-        Whether `design` searches for its shape from many starts, which takes minutes; all others take seconds.
-    """
-
-    name: str
-    family: str
-    about: str
-    path: Path
+    name: str  # path below the folder of all, without its ending: ``cam``, ``studies/cam_tolerance``
+    family: str  # as the file says
+    about: str  # what it is: the first sentence of the file's comment
+    path: Path  # the file
+    # whether `design` searches for its shape from many starts, which takes minutes; all others take seconds
     searches: bool = False
 
 
 ABBREVIATED_WORDS = ("sec.", "eqs.", "figs.")
+
+
+def shipped_folder(
+    name: str,  # as it stands in the tree: ``configs``, ``docs``
+    sample: str,  # a file that it must have: another package's folder of that name may stand beside this one
+) -> Path:
+    """Return a folder that comes with the package.
+
+    Raises UsageError if this installation has none.
+    """
+    package = Path(__file__).parents[1]
+    for place in (package / name, package.parent / name):
+        if (place / sample).is_file():
+            return place
+    raise UsageError(f"this installation has no {name}; install cfmkit from a wheel or from its source")
 
 
 def folder() -> Path:

@@ -107,7 +107,6 @@ def warnings_of_part(spec: Spec) -> tuple[Finding, ...]:
 def _checked_part(spec: Spec) -> Drawing | None:
     """Return the part of a family that has one; GeometryError where it cannot be cut as it is."""
     from cfmkit.export.arc_outlines import outlines
-    from cfmkit.families import family
 
     if not family(spec.family).outline:
         return None

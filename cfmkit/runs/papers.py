@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from cfmkit.errors import CfmError, UsageError, visible
 
@@ -122,15 +122,7 @@ def choose_rows(name: str | None) -> tuple[PrintedRow, ...]:
 
 
 def check(some: Sequence[PrintedRow], everything: bool = False) -> Iterator[ComputedRow]:
-    """Compute rows again, one after the other.
-
-    Parameters
-    ----------
-    some : sequence of PrintedRow
-        What to compute.
-    everything : bool
-        Those that take long, too.
-    """
+    """Compute rows again, one after the other; those that take long only with `everything`."""
     for row in some:
         if not row.ask:
             yield ComputedRow(row)
@@ -249,45 +241,35 @@ def _report_value(value: float, text: str) -> str:
 # --- what a row asks ---------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Scope:
-    """Values of the names in a question."""
+class _Scope(NamedTuple):
+    """Where the names of a question are looked up: an example with changes, as it is analysed, designed or swept."""
 
     spec: str
     changes: tuple[str, ...] = ()
     verb: str = "analyze"
 
-    def add_change(self, change: str) -> _Scope:
-        return _Scope(self.spec, (*self.changes, change), self.verb)
-
-    def specification(self) -> Spec:
-        return _specification(self.spec, self.changes, self.verb)
-
-    def result(self) -> AnalysisView:
-        return _result(self.spec, self.changes, self.verb)
-
 
 @cache
-def _specification(name: str, changes: tuple[str, ...], verb: str) -> Spec:
+def _specification(scope: _Scope) -> Spec:
     from cfmkit import api
     from cfmkit.runs.examples import example
 
-    if not name:
+    if not scope.spec:
         raise ValueError("no example is named")
-    spec = api.load(example(name).path, changes)
-    if verb != "design":
+    spec = api.load(example(scope.spec).path, scope.changes)
+    if scope.verb != "design":
         return spec
-    found = api.design(spec).spec
-    if found is None:
+    designed = api.design(spec).spec
+    if designed is None:
         raise ValueError("the design has no solution")
-    return found
+    return designed
 
 
 @cache
-def _result(name: str, changes: tuple[str, ...], verb: str) -> AnalysisView:
+def _result(scope: _Scope) -> AnalysisView:
     from cfmkit import api
 
-    return api.analyze(_specification(name, changes, verb))
+    return api.analyze(_specification(scope))
 
 
 _BINARY_OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -335,14 +317,14 @@ def _value(node: ast.expr, scope: _Scope) -> Any:
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY_OPERATORS:
             return _BINARY_OPERATORS[type(op)](_value(left, scope), _value(right, scope))
         case ast.Call(func=ast.Name(id="changed"), args=[ast.Constant(value=str(change)), inner]):
-            return _value(inner, scope.add_change(change))
+            return _value(inner, scope._replace(changes=(*scope.changes, change)))
         case ast.Call(func=ast.Name(id="varied"), args=[ast.Constant(value=str(path))]):
-            return _varied_values(scope.specification(), path)
+            return _varied_values(_specification(scope), path)
         case ast.Call(func=ast.Name(id=name), args=args) if name in _MATH_FUNCTIONS:
             return _MATH_FUNCTIONS[name](*(_value(one, scope) for one in args))
         case ast.Call(func=ast.Name(id=column), args=[place, *branch]):
             return _value_on_curve(
-                scope.result().curves[0], column, _value(place, scope), *map(ast.literal_eval, branch)
+                _result(scope).curves[0], column, _value(place, scope), *map(ast.literal_eval, branch)
             )
         case ast.Name() | ast.Attribute() | ast.Subscript():
             return _value_named(ast.unparse(node), scope)
@@ -352,8 +334,8 @@ def _value(node: ast.expr, scope: _Scope) -> Any:
 def _value_named(name: str, scope: _Scope) -> Any:
     """Return a value of the specification, or a metric."""
     if name.startswith(tuple(f"{block}." for block in _SPEC_BLOCKS)):
-        return scope.specification().get_value(name.replace("[", ".").replace("]", ""))
-    metric = scope.result().metrics.get(name)
+        return _specification(scope).get_value(name.replace("[", ".").replace("]", ""))
+    metric = _result(scope).metrics.get(name)
     if metric is None or metric.value is None:
         raise ValueError(f"{name} has no value")
     return metric.value

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
 from math import inf, isclose
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from cfmkit import api
 from cfmkit.documents import run_outcome
 from cfmkit.documents.run_document import RunCommand
 from cfmkit.errors import SpecError, UsageError
-from cfmkit.families.run_control import Run
+from cfmkit.families.run_control import Run, silent
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.results import OVERWRITTEN_FINDING, Finding, Status
 from cfmkit.runs.files_a_run_writes import files, warnings_of_part
@@ -56,58 +56,25 @@ def _as_it_is(_folder: RunFolder, run: Run) -> AbstractContextManager[Run]:
 
 @dataclass(frozen=True)
 class Verb:
-    """Differences between computing verbs.
-
-    `compute` returns the report on a spec; `done` is the word for it, in the header; `inputs` is
-    what the manifest says about other files than the spec; `running` makes of a run in the folder one
-    that works in several processes, or notes what it has finished; `words` are what its command line
-    says of those files.
-    """
+    """Differences between computing verbs."""
 
     name: str
-    done: str
     compute: Callable[[Spec, Run], Report]
-    inputs: Mapping[str, Any] = field(default_factory=dict)
+    inputs: Mapping[str, Any] = field(default_factory=dict)  # what the manifest says of other files than the spec
+    # makes of a run in the folder one that works in several processes, or notes what it has finished
     running: Callable[[RunFolder, Run], AbstractContextManager[Run]] = _as_it_is
-    words: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()  # what the command line says of those files
 
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """Everything about a finished run that is shown: the report, where it was written, how long it took.
+    """Everything about a finished run that is shown."""
 
-    `changes` are those of ``--set``, and of ``--fidelity``.
-    """
-
-    verb: Verb
     report: Report
-    source: str
-    changes: tuple[str, ...]
-    folder: str
+    command: RunCommand  # how it was started
     manifest: Manifest
-    kept: dict[str, str]
+    kept: dict[str, str]  # files that were edited since the run before, and the names under which they are kept
     seconds: float
-
-    @property
-    def written(self) -> tuple[str, ...]:
-        """The files, in the order in which they were written."""
-        return tuple(self.manifest.files)
-
-
-class RunRequest(Protocol):
-    """Choice of a specification: its file, what replaces its values, and a fidelity."""
-
-    @property
-    def spec(self) -> str:
-        """The file; ``-`` is standard input."""
-
-    @property
-    def changes(self) -> tuple[str, ...]:
-        """Changes by ``--set``, in order."""
-
-    @property
-    def fidelity(self) -> str | None:
-        """Fidelity by ``--fidelity``."""
 
 
 @dataclass(frozen=True)
@@ -124,13 +91,23 @@ class RunTask:
     page: bool = False  # whether to write ``report.html``
     form: FigureForm = DEFAULT_FORM  # how figures are written
     animate: str | None = None  # whether to write the mechanism in motion, and as what
+    time_budget: float | None = None  # after which a search ends [s]
+
+    @property
+    def all_changes(self) -> tuple[str, ...]:
+        """What replaces values of the specification: ``--set``, then ``--fidelity``."""
+        if self.fidelity is None:
+            return self.changes
+        if not self.fidelity.strip():
+            raise UsageError("--fidelity is empty; `cfmkit show FAMILY` lists the models")
+        return (*self.changes, f"analysis.fidelity={self.fidelity}")
 
 
 def carry_out(
     verb: Verb,  # what to compute
     wanted: RunTask,  # of what, and where to
     arguments: Sequence[str],  # the command line, for the manifest
-    progress: Callable[[float, str], None] | None = None,  # progress callback
+    progress: Callable[[float, str], None] = silent,  # progress callback
 ) -> FinishedRun:
     """Return what a run found, after writing its folder."""
     start = time.perf_counter()
@@ -138,18 +115,16 @@ def carry_out(
     _make_ready(spec)
     with RunFolder(wanted.out) as folder:
         folder.check(*COMMON_FILES, *(["report.html"] if wanted.page else []))
-        with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
+        with verb.running(folder, Run(wanted.seed, progress, wanted.time_budget)) as run:
             found = _options_judged(_compute(verb, spec, run, document), spec, document)
         command = shlex.join(["cfmkit", *arguments])
-        started = RunCommand(verb.name, wanted.spec, _changes(wanted), verb.words, wanted.out)
+        started = RunCommand(verb.name, wanted.spec, wanted.all_changes, verb.words, wanted.out)
         for name, data in files(found, wanted.plots, wanted.page, command, wanted.form, wanted.animate, started):
             folder.write(name, data)
         origin = provenance(verb.name, spec, wanted.spec, arguments)
         ending = {"status": found.status.key, "exit_code": int(found.exit_code)}
         manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | ending)
-        kept = dict(folder.kept)
-    seconds = time.perf_counter() - start
-    return FinishedRun(verb, found, wanted.spec, _changes(wanted), wanted.out, manifest, kept, seconds)
+    return FinishedRun(found, started, manifest, dict(folder.kept), time.perf_counter() - start)
 
 
 def _make_ready(spec: Spec) -> None:
@@ -160,14 +135,9 @@ def _make_ready(spec: Spec) -> None:
     family(spec.family).model_of(spec)
 
 
-def spec_of(wanted: RunRequest) -> Spec:
-    """Return the checked specification that is meant, with what is changed in it."""
-    return read(wanted)[1]
-
-
-def read(wanted: RunRequest) -> tuple[YamlDocument, Spec]:
+def read(wanted: RunTask) -> tuple[YamlDocument, Spec]:
     """Return the document that is meant, with what is changed in it, and the checked specification."""
-    document = _document(wanted)
+    document = read_spec(wanted.spec, wanted.all_changes, wanted.of_many)
     try:
         return document, bind(document)
     except SpecError as error:
@@ -190,17 +160,6 @@ def _place_problem(document: YamlDocument, one: Problem, options: Collection[str
     if one.source or any(f"{one.path}.".startswith(f"{path}.") for path in options):
         return one
     return document.problem(one.path, one.message)
-
-
-def _document(wanted: RunRequest) -> YamlDocument:
-    if wanted.fidelity is not None and not wanted.fidelity.strip():
-        raise UsageError("--fidelity is empty; `cfmkit show FAMILY` lists the models")
-    return read_spec(wanted.spec, _changes(wanted), getattr(wanted, "of_many", False))
-
-
-def _changes(wanted: RunRequest) -> tuple[str, ...]:
-    """Return what replaces values of a specification: ``--set``, then ``--fidelity``."""
-    return (*wanted.changes, *([] if wanted.fidelity is None else [f"analysis.fidelity={wanted.fidelity}"]))
 
 
 def _compute(verb: Verb, spec: Spec, run: Run, document: YamlDocument) -> Report:

@@ -95,7 +95,7 @@ def standard_input() -> bytes:
 
     Raises UsageError if nothing can come in.
     """
-    from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES
+    from cfmkit.specs.yamlio.tree_builder import MAX_FILE_BYTES
 
     if sys.stdin is None:
         raise UsageError("standard input is closed; name a file")
@@ -107,7 +107,7 @@ def content(name: str) -> bytes:
 
     Raises UsageError in one sentence, if it is not there, a folder or not readable.
     """
-    from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES
+    from cfmkit.specs.yamlio.tree_builder import MAX_FILE_BYTES
 
     if not name or "\0" in name:
         raise UsageError(f"{name!r} is not the name of a file")
@@ -258,7 +258,7 @@ def _similar(name: str) -> str:
 
 def _shipped_hint(base: str) -> str:
     """Return how an example of that name is had: pages name it as it lies in the sources."""
-    from cfmkit.runs.find_shipped_folder import shipped_folder
+    from cfmkit.runs.examples import shipped_folder
 
     try:
         there = next(shipped_folder("configs", "cam.yaml").rglob(glob.escape(base)), None) if base else None

@@ -22,36 +22,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StudyResult:
-    """The outcome of a sweep or a sensitivity study, in border units (mm, N, ...).
+    """The outcome of a sweep or a sensitivity study, in border units (mm, N, ...)."""
 
-    Attributes
-    ----------
-    table : Table
-        As results.csv: one row per point. ``table["force_ripple"]`` is a column.
-    summary : mapping
-        As metrics.json.
-    curves : Table, optional
-        As curves.csv, of a sweep that keeps them.
-    indices, convergence : Table, optional
-        As indices.csv and convergence.csv, of a sensitivity study.
-    varied : tuple of str
-        Headers of the columns that were varied.
-    spec : Spec, optional
-        What was varied.
-    findings : Findings, optional
-        What a sensitivity study found, which its pictures are drawn from.
-    document : Document
-        What the command line prints of it.
-    """
-
-    table: Table
-    summary: Mapping[str, Any]
-    curves: Table | None = None
+    table: Table  # as results.csv: one row per point. ``table["force_ripple"]`` is a column
+    summary: Mapping[str, Any]  # as metrics.json
+    curves: Table | None = None  # as curves.csv, of a sweep that keeps them
+    # indices, convergence: as indices.csv and convergence.csv, of a sensitivity study
     indices: Table | None = None
     convergence: Table | None = None
-    varied: tuple[str, ...] = ()
-    spec: Spec | None = None
+    varied: tuple[str, ...] = ()  # headers of the columns that were varied
+    spec: Spec | None = None  # what was varied
+    # what a sensitivity study found, which its pictures are drawn from
     findings: Findings | None = field(default=None, repr=False, compare=False)
+    # what the command line prints of it
     document: Document = field(default_factory=Document, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.api import given_arguments
+from cfmkit.errors import Problem, SpecError
 from cfmkit.families.run_control import Run, read_time
+from cfmkit.runs.specfile import STDIN_PATH, content, rename_source, standard_input
+from cfmkit.runs.suggestion_record import as_json, exit_code, message
+from cfmkit.specs.yamlio import read_document
+from cfmkit.studies.suggest.search import Suggestions
+from cfmkit.studies.suggest.spec import SuggestBlock, SuggestFile
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from cfmkit.runs.notebook_suggestions import SuggestionsView
+    from collections.abc import Mapping, Sequence
 
 
 def suggest(
@@ -90,8 +95,7 @@ def suggest(
     >>> len(found.proposals), len(found.answers)
     (0, 4)
     """
-    from cfmkit.runs.notebook_suggestions import SuggestionsView
-    from cfmkit.runs.read_suggest_file import read_request
+    given = locals()
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import serial
     from cfmkit.studies.suggest.search import suggest as search_families
@@ -99,25 +103,76 @@ def suggest(
     def format_value(value: Any) -> str:
         return "[" + ", ".join(map(format_value, value)) + "]" if isinstance(value, list | tuple) else str(value)
 
-    keys = given_arguments(
-        force=force,
-        torque=torque,
-        travel=travel,
-        angle=angle,
-        ripple=ripple,
-        envelope=envelope,
-        material=material,
-        process=process,
-        adjustable=adjustable,
-        hysteresis=hysteresis,
-        cycles=cycles,
-        safety=safety,
-        springs=springs,
-        overload=overload,
-        prefer=prefer,
-    )
+    keys = {key: value for key, value in given.items() if key in SuggestBlock.model_fields and value is not None}
     keys |= {} if min_yield is None else {"yield": min_yield}
     name = None if request is None else os.fspath(request)
     block = read_request(name, {key: format_value(value) for key, value in keys.items()}, mark="")
     run = Run(seed, time_budget=read_time(time_budget), executor=serial if jobs == 1 else Pool(jobs))
     return SuggestionsView.answering(search_families(block.request(), run, block.prefer), block)
+
+
+OPTIONS_SOURCE = "options"
+"""Name of a request that has no file."""
+
+
+def read_request(
+    name: str | None,  # the file; ``-`` is standard input
+    keys: Mapping[str, str],  # key of the request -> its value as a file would have it
+    mark: str = "--",  # what stands before a key in messages; nothing where keys are arguments of a function
+) -> SuggestBlock:
+    """Return the request of a file, or of none, with keys replaced by what options say.
+
+    Raises SpecError with everything that is wrong with it.
+    """
+    if name is None:
+        document = read_document("cfmkit: 1\nsuggest: {}\n", OPTIONS_SOURCE)
+    else:
+        document = read_document(standard_input() if name == STDIN_PATH else content(name), name)
+    for key, value in keys.items():
+        document = document.set(f"suggest.{key}={value}")
+    try:
+        return document.bind(SuggestFile).suggest
+    except SpecError as error:
+        reported = error
+    for key in keys:
+        reported = rename_source(reported, f"--set suggest.{key}", f"{mark}{key}")
+    raise reported if name is not None else _name_missing_options(reported, mark)
+
+
+def _name_missing_options(error: SpecError, mark: str) -> SpecError:
+    """Return the error of a request without a file with a missing key as a missing option."""
+    return SpecError(
+        [
+            Problem("", 0, 0, "", re.sub(r"^the key '(\w+)' is missing.*", rf"{mark}\1 is missing", one.message))
+            if one.source == OPTIONS_SOURCE
+            else one
+            for one in error.problems
+        ]
+    )
+
+
+@dataclass(frozen=True, repr=False)
+class SuggestionsView(Suggestions):
+    """Proposals with what was requested; a notebook shows their table and the mechanisms to one scale."""
+
+    block: SuggestBlock | None = field(default=None, compare=False)  # always there; it follows fields with defaults
+
+    @classmethod
+    def answering(cls, suggestions: Suggestions, block: SuggestBlock) -> SuggestionsView:
+        """Return suggestions with the block `suggest` that they answer."""
+        return cls(**{item.name: getattr(suggestions, item.name) for item in fields(suggestions)}, block=block)
+
+    def __repr__(self) -> str:
+        """Return the proposals in a line: family and variant of the first ten."""
+        listed = [f"{proposal.family} {proposal.variant}"[:100] for proposal in self.listed[:10]]
+        return f"<Suggestions: {'; '.join([message(self), *listed])}>"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        from cfmkit.documents.notebook import show_html
+        from cfmkit.documents.suggestion_document import document_of
+        from cfmkit.studies.suggest.figures import to_one_scale
+
+        assert self.block is not None  # `answering`
+        figures = {"proposals": lambda: to_one_scale(self.listed, self.request)} if self.listed else {}
+        return show_html(document_of(as_json(self, self.block), exit_code(self)), figures)

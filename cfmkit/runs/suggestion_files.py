@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.documents import html
 from cfmkit.documents.suggestion_document import document_of
-from cfmkit.runs.suggestion_record import RECORD_COLUMNS, as_json, exit_code, folder_name, with_force
+from cfmkit.runs.suggestion_record import RECORD_COLUMNS, as_json, exit_code, folder_name, numbers_in_border_units
 from cfmkit.specs.units import format_short
 from cfmkit.studies.pool import give_up_at
 from cfmkit.tables.json_writing import json_bytes
@@ -134,7 +134,7 @@ def table(suggestions: Suggestions) -> bytes:
     from cfmkit.tables.table import Table, TableColumn
 
     rows = [*enumerate(suggestions.listed, 1), *((None, proposal) for proposal in suggestions.near)]
-    numbers = [with_force(suggestions, proposal) for _, proposal in rows]
+    numbers = [numbers_in_border_units(suggestions, proposal) for _, proposal in rows]
     unit = "N" if suggestions.request.kind == "force" else "N*mm"
     columns = [
         TableColumn("number", tuple(number for number, _ in rows)),

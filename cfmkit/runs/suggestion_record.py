@@ -33,23 +33,15 @@ RECORD_COLUMNS: Mapping[str, tuple[str, str]] = {
 """What is reported of each proposal: its dimension and the unit of the files."""
 
 
-def numbers_in_border_units(proposal: Proposal) -> dict[str, Any]:
-    """Return a proposal's numbers in border units, by the name of its column."""
-    found: dict[str, Any] = {}
+def numbers_in_border_units(found: Suggestions, proposal: Proposal) -> dict[str, Any]:
+    """Return a proposal's numbers in border units, the mean in N or N*mm, by the name of its column."""
+    numbers: dict[str, Any] = {}
     for name, value in proposal.numbers.items():
-        dimension = RECORD_COLUMNS[name][0] or "ratio"
-        found[name] = (
-            None if value is None else float(to_border(value, dimension)) if dimension != "count" else int(value)
+        dimension = found.request.kind if name == "mean" else RECORD_COLUMNS[name][0]
+        numbers[name] = (
+            None if value is None else int(value) if dimension == "count" else float(to_border(value, dimension))
         )
-    return found
-
-
-def with_force(found: Suggestions, proposal: Proposal) -> dict[str, Any]:
-    """Return the same with the mean in N or N*mm."""
-    mean = proposal.numbers.get("mean")
-    return numbers_in_border_units(proposal) | {
-        "mean": None if mean is None else float(to_border(mean, found.request.kind))
-    }
+    return numbers
 
 
 STATUS_BY_CODE = {
@@ -149,7 +141,7 @@ def _warnings(found: Suggestions) -> Iterator[dict[str, str]]:
 
 
 def _record(found: Suggestions, one: Proposal, number: int | None = None) -> dict[str, Any]:
-    about = {"family": one.family, "variant": one.variant, **with_force(found, one)}
+    about = {"family": one.family, "variant": one.variant, **numbers_in_border_units(found, one)}
     place = {} if number is None else {"folder": folder_name(number, one)}
     judged = {
         "verdict": one.verdict, "model": one.model, "unjudged": list(one.open), "warnings": list(one.warnings),

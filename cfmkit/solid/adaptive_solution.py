@@ -41,28 +41,21 @@ if TYPE_CHECKING:
 
 SINGULAR_LEFT = 1.5
 """Error left at a singular point, in what splitting took away: 1 where it falls like the size, the least there is."""
-SMOOTH_LEFT = 1.0 / 3.0
-"""Error left elsewhere, in what splitting took away: it falls like the square at least."""
-FORCE_ROUNDING = 5e-5
-"""Least error of the force: poses are solved, and arcs drawn, about as closely."""
+SMOOTH_LEFT = 1.0 / 3.0  # error left elsewhere, in what splitting took away: it falls like the square at least
+FORCE_ROUNDING = 5e-5  # least error of the force: poses are solved, and arcs drawn, about as closely
 STRESS_LEFT, STRESS_LEAST = 1.0, 0.03
 """Error of the largest stress in what splitting changed, and the least: an average over elements scatters."""
-STRESS_ALLOWED = 0.14
-"""Error of the largest stress from which on a mesh is called coarse."""
-MAX_NODES = 30_000
-"""Of meshes that are refined further: beyond it a pose takes seconds."""
+STRESS_ALLOWED = 0.14  # error of the largest stress from which on a mesh is called coarse
+MAX_NODES = 30_000  # of meshes that are refined further: beyond it a pose takes seconds
 MAX_ROUNDS = 8
-N_TRIAL_POSES = 4
-"""Poses at which meshes are compared before the last one is followed."""
-AIMED_SHARE = 0.6
-"""Of the allowed error, that refinement is to leave."""
+N_TRIAL_POSES = 4  # poses at which meshes are compared before the last one is followed
+AIMED_SHARE = 0.6  # of the allowed error, that refinement is to leave
 SINGULAR_AFTER_SPLIT, SMOOTH_AFTER_SPLIT = 0.5, 1.0 / 8.0
 """Error expected in a triangle once it is split, in what it was."""
 CORRECTION_SHARE, CORRECTION_LARGEST = 0.04, 2e-5
 """Of the allowed error, that the difference of meshes may have between the poses that are solved on both; and how much
 of the largest force that may be, whatever target is requested: a curve's shape is not to suffer."""
-BETWEEN_SHARE = 0.2
-"""Of the allowed error, that cubics between poses may have."""
+BETWEEN_SHARE = 0.2  # of the allowed error, that cubics between poses may have
 
 
 @dataclass(frozen=True)
@@ -201,8 +194,7 @@ class DrivenPart:
         return Level.from_poses(finer, refinement, states, before), guide, followed
 
 
-FIRST_SHARE = 0.25
-"""Of the time, that the coarse mesh takes."""
+FIRST_SHARE = 0.25  # of the time, that the coarse mesh takes
 
 
 def _followed_alike(guide: PoseGuide, stops: tuple[float, ...], report: Callable[[float], None]) -> MeshSolution:

@@ -2,8 +2,7 @@
 
 The chains are so dense that the true edge lies within the outline's tolerance of their lines. A vertex at which the
 direction turns by more than `CORNER_TURN` is a corner and becomes a node; everything else is a smooth edge, whose
-radius is
-read off the turn between neighbouring lines.
+radius is read off the turn between neighbouring lines.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from cfmkit.export.thin_walls import facing_lines
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -31,17 +30,11 @@ if TYPE_CHECKING:
 CORNER_TURN = math.radians(25.0)
 """Turn of a true corner [rad]: lines that stand for arcs turn by a degree, sharp corners of parts are rounded by the
 cutter or stand at pads, square."""
-
 SIZE_GRADING = 0.25
 """How fast element sizes may grow [m per m]: 0.2 to 0.3 keeps triangles near the boundary above 25 degrees."""
-
-
-MOST_PLACES = 20_000
-"""Places round the boundary at which sizes are looked up; more take seconds."""
-
+MOST_PLACES = 20_000  # places round the boundary at which sizes are looked up; more take seconds
 PLACES_AT_ONCE = 128
 """Places whose sizes are spread at once: more hide fewer that smaller neighbours have covered, fewer take calls."""
-
 MOST_REFINED = 1000.0
 """Largest elements in parts of the smallest: beyond it grading alone takes half a minute, and what is so thin beside
 the rest of a part is a flaw of its drawing."""
@@ -201,17 +194,11 @@ def _wanted_sizes(
     rings: tuple[Ring, ...], step: float, largest: float, share: float, across: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return places along the boundary (m, 2) no farther apart than a step, and what is wanted there (m,) [m]."""
-    arcs = [_dense(ring, step) for ring in rings]
-
-    def concatenate(found: Iterable[FloatArray]) -> FloatArray:
-        return np.concatenate(list(found))
-
-    places = concatenate(ring.locate(arc) for ring, arc in zip(rings, arcs, strict=True))
-    wanted = concatenate(
-        np.minimum(share * _radius_at(ring, arc), largest) for ring, arc in zip(rings, arcs, strict=True)
-    )
+    pairs = [(ring, _dense(ring, step)) for ring in rings]
+    places = np.concatenate([ring.locate(arc) for ring, arc in pairs])
+    wanted = np.concatenate([np.minimum(share * _radius_at(ring, arc), largest) for ring, arc in pairs])
     for behind in (False, True):
-        normals = concatenate(ring.normals(arc, behind) for ring, arc in zip(rings, arcs, strict=True))
+        normals = np.concatenate([ring.normals(arc, behind) for ring, arc in pairs])
         wanted = np.minimum(wanted, _thickness(rings, places, normals, across * largest) / across)
     return places, wanted
 
@@ -251,9 +238,8 @@ def _grade_sizes(places: FloatArray, wanted: FloatArray) -> FloatArray:
     sizes = wanted.copy()
     tree = cKDTree(places)
     top = float(wanted.max())
-    for start in range(
-        0, len(order), PLACES_AT_ONCE
-    ):  # from the smallest size on, as in Dijkstra's way through a graph
+    # from the smallest size on, as in Dijkstra's way through a graph
+    for start in range(0, len(order), PLACES_AT_ONCE):
         some = order[start : start + PLACES_AT_ONCE]
         # where a smaller neighbour has been, its reach covers this one's
         some = some[(sizes[some] < top) & (sizes[some] >= wanted[some])]

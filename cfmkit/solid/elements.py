@@ -75,16 +75,8 @@ class Elements:
         parent = slopes(at)
         jacobian = np.einsum("qai,maj->qmij", parent, x)
         det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
-        inverse = (
-            np.stack(
-                [
-                    np.stack([jacobian[..., 1, 1], -jacobian[..., 0, 1]], -1),
-                    np.stack([-jacobian[..., 1, 0], jacobian[..., 0, 0]], -1),
-                ],
-                -2,
-            )
-            / det[..., None, None]
-        )
+        adjugate = np.stack([jacobian[..., 1, 1], -jacobian[..., 0, 1], -jacobian[..., 1, 0], jacobian[..., 0, 0]], -1)
+        inverse = adjugate.reshape(jacobian.shape) / det[..., None, None]
         gradient = np.einsum("qai,qmji->ajqm", parent, inverse)
         volume = weights[:, None] * det * self.width
         return np.ascontiguousarray(gradient.reshape(6, 2, -1)), volume.ravel()
@@ -188,14 +180,9 @@ class Elements:
         )
 
     def stress(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return Cauchy's stress at the nodes, averaged over the elements that meet there.
+        """Return Cauchy's stress 11, 22, 12 at the nodes, averaged over the elements that meet there, (3, n) [Pa].
 
-        Returns
-        -------
-        stress : (3, n) array
-            11, 22, 12 [Pa].
-        spread : (n,) array
-            Largest difference of an element's stress from it, as the equivalent stress of the difference [Pa].
+        And the largest difference of an element's stress from it, as the equivalent stress of that, (n,) [Pa].
         """
         f, strain = self._evaluate_strain(self._at_nodes, moved)
         s, _, across = self.law(strain)
@@ -212,22 +199,10 @@ class Elements:
         return mean, spread
 
     def evaluate_edge_stress(self, moved: FloatArray, held: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.int64]]:
-        """Return Cauchy's stress along the free edges.
+        """Return Cauchy's stress along the free edges at displacements (n, 2) [m], and at which nodes, (k,) each.
 
-        On a free edge nothing acts across, so the stress along it is all there is.
-
-        Parameters
-        ----------
-        moved : (n, 2) array
-            Displacements [m].
-        held : (n,) array of bool
-            Nodes that are no free edge.
-
-        Returns
-        -------
-        stress : (k,) array
-            Along the edge at the nodes of the boundary, positive in tension [Pa].
-        nodes : (k,) array of int
+        Positive in tension [Pa]. On a free edge nothing acts across, so that it is all there is; nodes that are held
+        (n,) are on none.
         """
         mean, _ = self.stress(moved)
         edges = self.mesh.edges[~held[self.mesh.edges].any(axis=1)]

@@ -95,13 +95,8 @@ class LinearisedPart:
     @cached_property
     def factors(self) -> Factors:
         """The tangent's factors; RuntimeError where it is singular."""
-        found = splu(
-            self.matrix,
-            permc_spec="NATURAL",
-            diag_pivot_thresh=0.0,
-            panel_size=PANEL_COLUMNS,
-            options={"SymmetricMode": True},
-        )
+        options = {"SymmetricMode": True}
+        found = splu(self.matrix, "NATURAL", diag_pivot_thresh=0.0, panel_size=PANEL_COLUMNS, options=options)
         return Factors(found, self.order)
 
 
@@ -149,31 +144,22 @@ class SolidProblem:
     def scale_loads(self, share: float) -> SolidProblem:
         """Return the part under a share of its constant loads."""
         part = replace(self, supports=self.supports.scale_loads(share))
-        part.__dict__.update(
-            {name: self.__dict__[name] for name in ("size", "_found_selection") if name in self.__dict__}
-        )
+        part.__dict__.update({name: self.__dict__[name] for name in ("size", "_selection") if name in self.__dict__})
         return part
 
     def linearise(self, unknowns: FloatArray, travel: float) -> LinearisedPart:
         """Return the problem's linearisation at some displacements; RuntimeError where it is singular at first."""
         moved = self.supports.evaluate_displacements(unknowns, travel)
         forces, stiffness = self.elements.tangent(moved)
-        beside, corner, slope, _ = self.supports.linearize_motion(unknowns, travel, forces).borders(stiffness)
-        selection = self._selection(stiffness)
+        beside, corner, slope = self.supports.linearize_motion(unknowns, travel, forces).borders(stiffness)
+        if (selection := self.__dict__.get("_selection")) is None:  # found once, from a matrix with the pattern of all
+            selection = self.__dict__["_selection"] = Selection.from_matrix(stiffness, self.supports.loose)
         order = np.concatenate([selection.order, np.arange(len(selection.order), self.supports.size)])
         matrix = selection.extract(stiffness)
         if len(corner):  # free motions are last: their full rows fill nothing in
             side = csc_array(beside[selection.order])
             matrix = csc_array(block_array([[matrix, side], [side.T, csc_array(corner)]], format="csc"))
         return LinearisedPart(matrix, order, slope, self.supports.residual(unknowns, travel, forces), forces)
-
-    def _selection(self, stiffness: csc_array) -> Selection:
-        """Return the selection of the loose displacements, found once."""
-        found: Selection | None = self.__dict__.get("_found_selection")
-        if found is None:
-            found = Selection.from_matrix(stiffness, self.supports.loose)
-            self.__dict__["_found_selection"] = found
-        return found
 
     def solve(self, guess: FloatArray, travel: float, border: Border | None = None) -> Balance | None:
         """Return the equilibrium near a guess, at its travel or where a border's condition holds; None if none is near.
@@ -185,7 +171,8 @@ class SolidProblem:
             for _ in range(MAX_NEWTON_STEPS):
                 try:
                     here = self.linearise(place[:-1], place[-1])
-                    correct = _Correction.from_state(here, border)
+                    rate = np.empty(0) if border is None else -here.factors.solve(here.slope)
+                    correct = _Correction(here.factors, border, rate)
                 except RuntimeError:  # exactly singular
                     return None
                 step = correct(here.residual, place)
@@ -262,11 +249,6 @@ class _Correction:
     factors: Factors
     border: Border | None
     rate: FloatArray  # of the unknowns by the travel, (q,); empty without a border
-
-    @classmethod
-    def from_state(cls, here: LinearisedPart, border: Border | None) -> _Correction:
-        rate = np.empty(0) if border is None else -here.factors.solve(here.slope)
-        return cls(here.factors, border, rate)
 
     def __call__(self, residual: FloatArray, place: FloatArray) -> FloatArray:
         """Return what is to be subtracted from a place where a residual is left."""

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 CORRECTION_CHECKS = 2
 """Poses that must be as predicted, one after the other: those of Lan's part are predicted to 1e-6 from seven."""
-
-
 MAX_CURVE_ERROR = 0.01
 """Part of the largest effort within which the solved poses must draw the coarse curve: what two meshes differ by, a
 thousandth of it, is then known to some 1e-5."""
@@ -90,11 +88,8 @@ class PoseGuide:
         """Travels of the poses that are not close to a bifurcation [m or rad]: it is elsewhere on each mesh."""
         course = self.coarse.course
         near = BIFURCATION_DISTANCE * abs(course.poses[-1].travel - course.poses[0].travel)
-        return tuple(
-            pose.travel
-            for pose in course.poses
-            if all(abs(pose.travel - place) > near for place in course.bifurcations)
-        )
+        travels = (pose.travel for pose in course.poses)
+        return tuple(travel for travel in travels if all(abs(travel - place) > near for place in course.bifurcations))
 
 
 BIFURCATION_DISTANCE = 0.01
@@ -199,9 +194,7 @@ def follow_some(
     course, travels = guide.coarse.course, guide.coarse.course.travel.tolist()
     if course.ending is not PathEnd.COMPLETE or course.bifurcations or len(poses) < 3:
         return None
-    if is_sharp(np.abs(travels), np.abs(stops)):
-        return None
-    if (poses[0].travel, poses[-1].travel) != (travels[0], travels[-1]):
+    if is_sharp(np.abs(travels), np.abs(stops)) or (poses[0].travel, poses[-1].travel) != (travels[0], travels[-1]):
         return None
     size = max(abs(pose.effort) for pose in course.poses)
     correction = Correction(guide, tuple(poses))

@@ -35,16 +35,13 @@ N_RELAXATIONS, MOVES_PER_ROUND = 14, 3
 """Of relaxation, and moves in each with the same bars; after 30 to 60 moves the smallest angle stays what it is."""
 BAR_LENGTH_FACTOR = 1.2
 """Bars want to be so much longer than the sizes [PS, sec. 4]: under pressure points spread everywhere."""
-PUSH_SHARE = 0.2
-"""Of the way that the bars push, a round [PS, sec. 4]."""
+PUSH_SHARE = 0.2  # of the way that the bars push, a round [PS, sec. 4].
 BOUNDARY_CLEARANCE = 0.55
 """Points inside keep so many sizes from the boundary: less makes slivers on it, more leaves long triangles."""
 SEAM_CLEARANCE = 0.75
 """Points inside keep so many sizes from those on a seam: the circles over its pieces are empty, so they are edges."""
-MAX_HALVINGS = 8
-"""Rounds of halving boundary pieces that are no edges; each mends what it finds, two are usual."""
-MOST_NODES = 400_000
-"""Of a mesh: beyond it the factors alone take more than 2 GB."""
+MAX_HALVINGS = 8  # rounds of halving boundary pieces that are no edges; each mends what it finds, two are usual
+MOST_NODES = 400_000  # of a mesh: beyond it the factors alone take more than 2 GB
 
 
 @dataclass(frozen=True)
@@ -109,9 +106,7 @@ def mesh(
             (ring.locate(arc[at[:1]])[0] for ring, arc, at in zip(rings, laid, missing, strict=True) if len(at)),
             next((middles[0] for middles in crossed if len(middles)), np.zeros(2)),
         )
-        on_seams = [
-            np.concatenate([points_on_seam, more]) for points_on_seam, more in zip(on_seams, crossed, strict=True)
-        ]
+        on_seams = [np.concatenate(pair) for pair in zip(on_seams, crossed, strict=True)]
         laid = [_halve_pieces(ring, arc, at) for ring, arc, at in zip(rings, laid, missing, strict=True)]
     reason = "it touches itself, or is thinner than an element"
     raise GeometryError(f"the outline cannot be meshed at {place_text(first)}: {reason}")
@@ -154,8 +149,7 @@ def _explain_crossing(shape: Any) -> GeometryError:
     return GeometryError(f"the outline crosses itself or touches itself at {place} ({what.strip().lower()})")
 
 
-MIN_CROSSING_SINE = 0.5
-"""Sine of the angle at which a seam must cross an edge to begin at a node of it."""
+MIN_CROSSING_SINE = 0.5  # sine of the angle at which a seam must cross an edge to begin at a node of it
 
 
 def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, tolerance: float) -> FloatArray:
@@ -169,9 +163,7 @@ def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, tolerance:
         det = np.where(steep, det, 1.0)
         share = (to_ring[:, 0] * seam[1] - to_ring[:, 1] * seam[0]) / det
         on_seam = (to_ring[:, 0] * along[:, 1] - to_ring[:, 1] * along[:, 0]) / det
-        slack = max(
-            1e-6, tolerance / float(np.hypot(*seam))
-        )  # ends of seams stand on edges, as closely as those are drawn
+        slack = max(1e-6, tolerance / float(np.hypot(*seam)))  # ends of seams are on edges as closely as they are drawn
         met = steep & (share >= 0) & (share < 1) & (on_seam >= -slack) & (on_seam <= 1 + slack)
         found.append(ring.places[:-1][met] + share[met] * ring.lengths[met])
         found.append(ring.places[:-1][_leaving(ring, start, end, tolerance)])
@@ -224,9 +216,8 @@ def _curvature_jumps(ring: Ring, stops: FloatArray, field: Sizes) -> FloatArray:
     jumps = sizes * ring.curvature_jumps
     taken = list(ring.locate(stops))
     places = []
-    for vertex in np.flatnonzero(jumps > MAX_CURVATURE_JUMP)[
-        np.argsort(-jumps[jumps > MAX_CURVATURE_JUMP], kind="stable")
-    ]:
+    order = np.argsort(-jumps, kind="stable")
+    for vertex in order[jumps[order] > MAX_CURVATURE_JUMP]:
         place = ring.points[vertex]
         if all(np.hypot(*(place - stop)) > MIN_STOP_DISTANCE * sizes[vertex] for stop in taken):
             taken.append(place)
@@ -234,8 +225,7 @@ def _curvature_jumps(ring: Ring, stops: FloatArray, field: Sizes) -> FloatArray:
     return np.array(places)
 
 
-MIN_STOP_DISTANCE = 0.4
-"""Distance between nodes that stand at stops, in sizes, from which on both do."""
+MIN_STOP_DISTANCE = 0.4  # distance between nodes that stand at stops, in sizes, from which on both do
 
 
 def _sample_interior(region: Any, field: Sizes, random: np.random.Generator) -> FloatArray:
@@ -256,8 +246,7 @@ def _sample_interior(region: Any, field: Sizes, random: np.random.Generator) -> 
     return np.concatenate(interior)
 
 
-CELL_SIZE = 16
-"""Side of the cells in which lattices are laid, in sizes: cells where no such size is wanted have none."""
+CELL_SIZE = 16  # side of the cells in which lattices are laid, in sizes: cells where no such size is wanted have none
 
 
 def _lattice(bounds: tuple[float, float, float, float], field: Sizes, size: float) -> FloatArray:
@@ -390,15 +379,9 @@ def _missing(corners: IntArray, laid: list[FloatArray]) -> list[IntArray]:
     """Return, ring by ring, which pieces of the boundary are not the edge of exactly one triangle."""
     sides = corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = int(corners.max()) + 1
-    keys = np.sort(sides[:, 0] * size + sides[:, 1])
-    back = np.sort(sides[:, 1] * size + sides[:, 0])
-    missing = []
-    for pieces in _pieces(laid):
-        key = pieces[:, 0] * size + pieces[:, 1]
-        is_edge = keys[np.clip(np.searchsorted(keys, key), 0, len(keys) - 1)] == key
-        double = back[np.clip(np.searchsorted(back, key), 0, len(back) - 1)] == key
-        missing.append(np.flatnonzero(~is_edge | double))
-    return missing
+    keys, back = sides[:, 0] * size + sides[:, 1], sides[:, 1] * size + sides[:, 0]
+    wanted = [pieces[:, 0] * size + pieces[:, 1] for pieces in _pieces(laid)]
+    return [np.flatnonzero(~np.isin(key, keys) | np.isin(key, back)) for key in wanted]
 
 
 def _crossed_pieces(
@@ -422,15 +405,13 @@ def _crossed_pieces(
     first, last = chosen[:-1], chosen[1:]
     count = len(points)
     sides = np.sort(corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    keys = np.sort(sides[:, 0] * count + sides[:, 1])
     wanted = np.minimum(first, last) * count + np.maximum(first, last)
-    is_edge = keys[np.clip(np.searchsorted(keys, wanted), 0, len(keys) - 1)] == wanted
+    is_edge = np.isin(wanted, sides[:, 0] * count + sides[:, 1])
     middles = 0.5 * (points[first] + points[last])[~is_edge]
     return np.asarray(middles[contains_xy(region, middles)])
 
 
-SEAM_DISTANCE_TOL = 1e-9
-"""Distance from a seam up to which a point is on it [m]."""
+SEAM_DISTANCE_TOL = 1e-9  # distance from a seam up to which a point is on it [m]
 
 
 def _halve_pieces(ring: Ring, arc: FloatArray, pieces: IntArray) -> FloatArray:

@@ -29,14 +29,10 @@ if TYPE_CHECKING:
 
 ELEMENT_WIDTH_RATIO = 0.1
 """Width of the deck's elements, in the thinnest place of the part at most: within 6e-4 of plane stress then."""
-NUMBERS_PER_LINE = 12
-"""Numbers on a line of a set."""
-MAX_GUIDE_NODES = 2
-"""Nodes that carry what is prescribed along a direction, at most."""
-POINTS_PER_INCREMENT = 4
-"""Points on the arc of what is turned, to each increment: between them it is led along a chord."""
-HUB_MODULUS_FACTOR = 1e3
-"""Modulus of a hub, in that of the part."""
+NUMBERS_PER_LINE = 12  # numbers on a line of a set
+MAX_GUIDE_NODES = 2  # nodes that carry what is prescribed along a direction, at most
+POINTS_PER_INCREMENT = 4  # points on the arc of what is turned, to each increment: between them it is led along a chord
+HUB_MODULUS_FACTOR = 1e3  # modulus of a hub, in that of the part
 LINE_RTOL = 1e-6
 """Height of what counts as a line, in its length: outlines are drawn a little beside the line across a beam."""
 
@@ -102,10 +98,7 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
             spare += 2 + MAX_GUIDE_NODES
         else:
             ends = to_border(travel * group.driven[:2], "length").tolist()
-            made, turned = (
-                Lines(moves=[f"{word}, {k}, {k}, {end:.10g}" for k, end in enumerate(ends, start=1)]),
-                Lines(),
-            )
+            made, turned = Lines([], [f"{word}, {k}, {k}, {end:.10g}" for k, end in enumerate(ends, start=1)]), Lines()
         yield f"*NSET, NSET={word}"
         yield from (
             ", ".join(map(str, nodes[k : k + NUMBERS_PER_LINE])) + "," for k in range(0, len(nodes), NUMBERS_PER_LINE)
@@ -123,17 +116,10 @@ def _step(sets: list[str], nodes: list[str], moves: list[str], poses: int) -> It
     yield f"{1 / poses:.10g}, 1., 1e-6, {1 / poses:.10g}"
     yield "*BOUNDARY"
     yield from moves
-    for word in sets:
-        yield f"*NODE PRINT, NSET={word}, TOTALS=ONLY"
-        yield "RF"
-    for word in nodes:
+    for word in (*(f"{one}, TOTALS=ONLY" for one in sets), *nodes):
         yield f"*NODE PRINT, NSET={word}"
         yield "RF"
-    yield "*NODE FILE"
-    yield "U, RF"
-    yield "*EL FILE"
-    yield "S"
-    yield "*END STEP"
+    yield from ("*NODE FILE", "U, RF", "*EL FILE", "S", "*END STEP")
 
 
 def _elastic(law: Law) -> Iterator[str]:
@@ -203,11 +189,9 @@ class Hub:
         a, b, c = at[found].swapaxes(0, 1)
         twice = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
         found[twice < 0] = found[twice < 0][:, [0, 2, 1]]
+        found = found[np.abs(twice) > LINE_RTOL * size**2 / len(at)]
         far = int(np.hypot(*(at - center).T).argmax())
-        arm = int(every[far]), at[far] - center
-        return cls(
-            middle, arm, added, max([spare, *added]) + 1, every[found[np.abs(twice) > LINE_RTOL * size**2 / len(at)]]
-        )
+        return cls(middle, (int(every[far]), at[far] - center), added, max([spare, *added]) + 1, every[found])
 
 
 def _stiff(word: str, hub: Hub, start: int, width: float, modulus: float) -> Iterator[str]:

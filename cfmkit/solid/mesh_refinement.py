@@ -36,12 +36,8 @@ CHILDREN_BY_SIDES = {
     (True, True, False): ((2, 0, 3), (3, 1, 4), (2, 3, 4)),
     (True, False, True): ((3, 2, 5), (0, 3, 5), (1, 2, 3)),
     (True, True, True): ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
-}
-"""Corners of the children by which sides are halved; side 0, from node 0 to node 1, is the longest."""
-
-
-N_NEWTON_STEPS = 3
-"""Of Newton's method for places in curved triangles: one is exact in straight-sided ones."""
+}  # corners of the children by which sides are halved; side 0, from node 0 to node 1, is the longest
+N_NEWTON_STEPS = 3  # of Newton's method for places in curved triangles: one is exact in straight-sided ones
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,21 +134,11 @@ def _with_side_nodes(
     split = halved[middle]
     low, high = mesh.arcs.T
     halfway = 0.5 * (low + high)
-    edges = np.concatenate(
-        [
-            np.column_stack([first, last])[~split],
-            np.column_stack([first, middle])[split],
-            np.column_stack([middle, last])[split],
-        ]
-    )
-    arcs = np.concatenate(
-        [
-            mesh.arcs[~split],
-            np.column_stack([low, halfway])[split],
-            np.column_stack([halfway, high])[split],
-        ]
-    )
-    owners = np.concatenate([mesh.rings[~split], mesh.rings[split], mesh.rings[split]])
+    whole, ahead, behind = (first, last), (first, middle), (middle, last)
+    pieces = ((whole, (low, high), ~split), (ahead, (low, halfway), split), (behind, (halfway, high), split))
+    edges = np.concatenate([np.column_stack(ends)[kept] for ends, _, kept in pieces])
+    arcs = np.concatenate([np.column_stack(reach)[kept] for _, reach, kept in pieces])
+    owners = np.concatenate([mesh.rings[kept] for _, _, kept in pieces])
     on_edge = side_of(edges[:, 0], edges[:, 1])
     for owner, ring in enumerate(rings):
         own = owners == owner
@@ -166,7 +152,7 @@ def _with_side_nodes(
         read_only(arcs),
     )
     at = np.concatenate([places, 0.5 * (places + np.roll(places, -1, axis=1))], axis=1)
-    node_parents, node_places = np.zeros((len(refined.nodes), 6), np.int64), np.zeros((len(refined.nodes), 2))
+    node_parents, node_places = np.zeros((len(refined.nodes), 6), np.int64), np.zeros_like(refined.nodes)
     node_parents[triangles] = rotated[parents][:, None]
     node_places[triangles] = at
     shares = shape_functions(_places_in(mesh.nodes[node_parents], refined.nodes, node_places))

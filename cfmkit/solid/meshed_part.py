@@ -119,24 +119,20 @@ class Part:
             edges = [np.array(edge) for pad in pads for edge in zip(pad, np.roll(pad, -1, axis=0), strict=True)]
             for seam in place.seams:
                 ends = MultiPoint(seam)
-                whole = [
-                    edge for edge in edges if max(LineString(edge).distance(end) for end in ends.geoms) <= self.near
-                ]
-                found.append(whole[0] if whole else seam)
+                close = (edge for edge in edges if max(map(LineString(edge).distance, ends.geoms)) <= self.near)
+                found.append(next(close, seam))
         return tuple(found)
 
-    def create_mesh(self, size: float | None = None, across: float = ELEMENTS_ACROSS) -> Meshed:
-        """Return the part with elements of a size [m], and of so many across the thickness at least.
+    def create_mesh(self, size: float | None = None) -> Meshed:
+        """Return the part with elements of a size [m]; by default `ELEMENTS_ACROSS` across the thinnest place.
 
-        A part with blocks has as many across as the size leaves. Without a size there are `ELEMENTS_ACROSS` across
-        the thinnest
-        place.
+        A part with blocks has as many across as the size leaves, others `ELEMENTS_ACROSS` at least.
 
         Raises GeometryError if the outline cannot be meshed so, or no node is where the part is held.
         """
         size = self.thinnest / ELEMENTS_ACROSS if size is None else size
         share = FILLET_ELEMENT_RATIO * size / (self.thinnest / ELEMENTS_ACROSS)
-        across = self.thinnest / size if self.largest > 1.0 else across
+        across = self.thinnest / size if self.largest > 1.0 else ELEMENTS_ACROSS
         grid = mesh(self.rings, self.largest * size, share, across, self.faces, self.near)
         check_mesh(grid, sum(ring.area for ring in self.rings), self.sections)
         meshed = self.assemble_on(grid, np.ones(len(grid.nodes), bool))
@@ -248,12 +244,7 @@ class Meshed:
         """Return the poses at some travels, from rest on in one direction [m or rad]; `guide` predicts unknowns."""
         return MeshSolution(self.part, self.problem, follow(self.problem, stops, report, guide=guide), self.unjudged)
 
-    def densely(
-        self,
-        stops: Sequence[float],
-        report: Callable[[float], None] = lambda _share: None,
-        allowed: float = MAX_EFFORT_ERROR,
-    ) -> MeshSolution:
+    def densely(self, stops: Sequence[float], report: Callable[[float], None], allowed: float) -> MeshSolution:
         """Return the same with poses in between, as many as the curve needs, and what it is off between poses."""
         course, off = refine_path(self.problem, follow(self.problem, stops, report), allowed)
         return MeshSolution(self.part, self.problem, course, self.unjudged, off)
@@ -335,8 +326,7 @@ def rings_of(
     )
 
 
-HALVING_ERROR_RATIO = 16.0
-"""Factor by which half an interval has less error."""
+HALVING_ERROR_RATIO = 16.0  # factor by which half an interval has less error
 N_CHECKS = 3
 """Intervals that must be below what is allowed, one after the other, those with the largest estimates first."""
 MIN_INTERVAL_SHARE = 2.0**-10
@@ -344,23 +334,11 @@ MIN_INTERVAL_SHARE = 2.0**-10
 
 
 def refine_path(problem: SolidProblem, course: PosePath, allowed: float = MAX_EFFORT_ERROR) -> tuple[PosePath, float]:
-    """Return a path with poses added where the curve needs them, and what the curve is off between poses.
+    """Return a path with poses added where the curve needs them, at most as many as it has.
 
-    Parameters
-    ----------
-    problem : SolidProblem
-    course : PosePath
-        At most as many poses are added as it has.
-    allowed : float
-        Difference of cubic and pose, in parts of the largest effort, below which poses are dense enough.
-
-    Returns
-    -------
-    PosePath
-        With the poses that were solved for the check.
-    float
-        Largest difference between cubic and pose of the last checks, in parts of the largest effort: intervals with
-        the largest estimated error were checked. NaN where fewer than three poses are known.
+    And the largest difference between cubic and pose of the last checks, of the intervals with the largest estimated
+    error, in parts of the largest effort; NaN where fewer than three poses are known. Poses are dense enough where it
+    is below what is allowed.
     """
     if len(course.poses) < 3:
         return course, float("nan")

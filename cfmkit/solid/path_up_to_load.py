@@ -23,18 +23,15 @@ if TYPE_CHECKING:
     from cfmkit.solid.meshed_part import Meshed, MeshSolution
     from cfmkit.solid.path_following import PosePath
 
-TRAVEL_RANGES = (1.25, 2.5, 5.0, 10.0)
-"""Travels in which a load is looked for, in those that the beams need for it."""
+TRAVEL_RANGES = (1.25, 2.5, 5.0, 10.0)  # travels in which a load is looked for, in those that the beams need for it
 TRAVEL_MARGIN = 1.05
 """Travel of the finer mesh, in that of a coarse one: their forces differ by up to a few thousandths, the travels by a
 few per cent where the curve is flat."""
-MAX_NEWTON_STEPS = 4
-"""Of Newton's method for the travel at the load: two are usual, as the cubic is close."""
+MAX_NEWTON_STEPS = 4  # of Newton's method for the travel at the load: two are usual, as the cubic is close
 LOAD_RTOL, MISSED_LOAD_RTOL = 1e-9, 1e-6
 """Differences from the load, in parts of it, at which it is found, and at which it is not missed: in long thin strips
 efforts are known to 1e-7 only."""
-MAX_HALVINGS = 60
-"""Of an interval between two poses: beyond them a travel has no more digits."""
+MAX_HALVINGS = 60  # of an interval between two poses: beyond them a travel has no more digits
 
 
 class LoadEnd(enum.Enum):

@@ -14,8 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-N_NEWTON_STEPS = 20
-"""Of Newton's method for the stretch across the plane; from 1 it takes four to six."""
+N_NEWTON_STEPS = 20  # of Newton's method for the stretch across the plane; from 1 it takes four to six
 
 
 class Law(Protocol):
@@ -30,21 +29,10 @@ class Law(Protocol):
         """At no strain."""
 
     def __call__(self, strain: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return stress, tangent and stretch across the plane.
+        """Return the second Piola-Kirchhoff stress (3, ...) at Green's strain 11, 22, 2 x 12 (3, ...) [Pa].
 
-        Parameters
-        ----------
-        strain : (3, ...) array
-            Green's strain: 11, 22, 2 x 12.
-
-        Returns
-        -------
-        stress : (3, ...) array
-            Second Piola-Kirchhoff [Pa].
-        tangent : (3, 3, ...) array
-            Its derivative with respect to the strain [Pa].
-        across : (...) array
-            Stretch across the plane: the thickness of the sheet now, over what it was.
+        And its derivative with respect to the strain (3, 3, ...) [Pa], and the stretch across the plane (...): the
+        thickness of the sheet now, over what it was.
         """
 
 
@@ -111,5 +99,4 @@ class NeoHookean:
 MATERIAL_LAWS: dict[str, type[SaintVenantKirchhoff | NeoHookean]] = {
     "st-venant-kirchhoff": SaintVenantKirchhoff,
     "neo-hookean": NeoHookean,
-}
-"""By the words of `material.law`."""
+}  # by the words of `material.law`

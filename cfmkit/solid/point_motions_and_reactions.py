@@ -26,10 +26,8 @@ if TYPE_CHECKING:
 
 DIFFERENCE_STEP = 1e-5
 """Of the central differences, in parts of the travel: their error is its square, below that of the cubics."""
-MAX_NEWTON_STEPS = 8
-"""Of Newton's method for a place in a triangle; straight-sided ones take one."""
-TRIANGLE_TOL = 1e-6
-"""How far beyond a triangle a place may be, in parts of it."""
+MAX_NEWTON_STEPS = 8  # of Newton's method for a place in a triangle; straight-sided ones take one
+TRIANGLE_TOL = 1e-6  # how far beyond a triangle a place may be, in parts of it
 
 
 def motion(solved: MeshSolution, place: FloatArray, name: str) -> Callable[[FloatArray], FloatArray]:

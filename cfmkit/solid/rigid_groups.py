@@ -152,25 +152,16 @@ class Carried:
     ways: FloatArray
     curved: FloatArray  # (f + 1, f + 1) what the forces on the nodes add to the stiffness as groups turn [N m]
 
-    def borders(self, stiffness: csc_array) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-        """Return the derivatives of the residual that are not those of loose nodes by each other, and the effort's.
+    def borders(self, stiffness: csc_array) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the derivatives of the residual that are not those of loose nodes by each other.
 
-        Returns
-        -------
-        beside : (l, f) array
-            Of the l residuals of loose nodes with respect to the f free motions.
-        corner : (f, f) array
-            Of the free motions' residuals with respect to them.
-        slope : (l + f,) array
-            Of all residuals with respect to the travel.
-        pinned : float
-            Of the effort on the drive with respect to the travel, the unknowns held.
+        Of loose nodes by the f free motions (l, f), of these by each other (f, f), and of all by the travel (l + f,).
         """
         pulled = stiffness @ self.ways
         corner = self.ways.T @ pulled + self.curved
         beside = pulled[self.loose]
         slope = np.concatenate([beside[:, -1], corner[:-1, -1]])
-        return beside[:, :-1], corner[:-1, :-1], slope, float(corner[-1, -1])
+        return beside[:, :-1], corner[:-1, :-1], slope
 
     def moves(self, vector: FloatArray) -> FloatArray:
         """Return how the nodes move (n, 2) in a direction of unknowns and travel (l + f + 1,)."""

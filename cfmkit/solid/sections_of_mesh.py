@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.solid.mesh import TriangleMesh
 
-LINES_PER_EDGE = 8
-"""Lines that stand for the parabola of an edge."""
+LINES_PER_EDGE = 8  # lines that stand for the parabola of an edge
 
 
 def check_mesh(grid: TriangleMesh, area: float, sections: Sequence[BeamSection]) -> None:

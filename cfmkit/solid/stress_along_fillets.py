@@ -27,10 +27,8 @@ RADIUS_RTOL = 0.02
 """Three neighbouring vertices stand on a fillet if their circle's radius differs from it by this share at most."""
 ARC_EXTENSION = math.radians(6.0)
 """How far beyond its outermost vertices an arc may go on: outlines may lack the vertex at which it begins."""
-
 MIN_STRESS_SHARE = 1e-9
 """Fillets with less than this share of the part's largest stress join pieces that move as one: it is rounding."""
-
 RADIUS_DISTANCE_TOL = 0.01
 """Points nearer to the circle of a fillet than this are on it, and ends of a fillet nearer to a piece are on its edge;
 in radii."""
@@ -71,16 +69,12 @@ class FilletArc:
         """Return the names of the pieces, closed polygons (n, 2) [m] each, on whose edges it begins or ends."""
         from shapely import LinearRing, Point
 
-        ends = [Point(end) for end in self.ends]
-        return tuple(
-            name
-            for name, polygons in pieces.items()
-            if any(
-                LinearRing(polygon).distance(end) < RADIUS_DISTANCE_TOL * self.radius
-                for polygon in polygons
-                for end in ends
-            )
-        )
+        near, ends = RADIUS_DISTANCE_TOL * self.radius, [Point(end) for end in self.ends]
+
+        def touches(polygon: FloatArray) -> bool:
+            return any(LinearRing(polygon).distance(end) < near for end in ends)
+
+        return tuple(name for name, polygons in pieces.items() if any(map(touches, polygons)))
 
 
 @dataclass(frozen=True, eq=False)

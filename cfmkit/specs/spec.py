@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, create_model, field_validator, model_validator
 
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength, keys_of
-from cfmkit.specs.leaves import stated_leaves
 from cfmkit.specs.own_metrics import name_of
 from cfmkit.specs.study_spec import Correlated, Sensitivity, Sweep, Tolerance
 from cfmkit.specs.target_curve import Target
@@ -330,7 +329,7 @@ class Spec(Model):
         Laws that are assumed of a named material are none of the specification's.
         """
         everything = self.model_dump(exclude_none=True, exclude={"sweep", "sensitivity"})
-        yield from stated_leaves(everything, self.model_dump(exclude_unset=True))
+        yield from _stated_leaves(everything, self.model_dump(exclude_unset=True))
 
 
 def readable_requirement(entry: Any) -> Requirement | None:
@@ -389,6 +388,41 @@ def frozen(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: frozen(item) for key, item in value.items()}
     return value
+
+
+ASSUMED_LAW = re.compile(r".*\.(fatigue|relaxation)(?=\.)")
+"""Path of a block that a named material has without a word in the file."""
+
+
+def _contains(data: Any, parts: list[str]) -> bool:
+    """Return True if a block is stated at a path."""
+    for part in parts:
+        if isinstance(data, tuple | list) and part.isdigit() and int(part) < len(data):
+            data = data[int(part)]
+        elif isinstance(data, Mapping) and part in data:
+            data = data[part]
+        else:
+            return False
+    return True
+
+
+def _stated_leaves(everything: Mapping[str, Any], stated: Mapping[str, Any]) -> Iterator[tuple[str, float | int]]:
+    """Yield every numeric leaf as (dotted path, value), but for those of laws that a material has by its name alone."""
+    for path, value in _leaves(everything, ""):
+        law = ASSUMED_LAW.match(path)
+        if law is None or _contains(stated, law[0].split(".")):
+            yield path, value
+
+
+def _leaves(value: Any, path: str) -> Iterator[tuple[str, float | int]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _leaves(item, f"{path}.{key}" if path else key)
+    elif isinstance(value, tuple | list):
+        for index, item in enumerate(value):
+            yield from _leaves(item, f"{path}.{index}")
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield path, value
 
 
 __all__ = [

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import itertools
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -17,12 +16,10 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from cfmkit.errors import QuantityError
 from cfmkit.specs.block import Model
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.specs.units import Displacement, Place, UnitField, format_quantity, format_short, read_quantity
-from cfmkit.specs.units.fields import plain_schema
+from cfmkit.specs.units import Displacement, Place, format_short, read_quantity
+from cfmkit.specs.units.fields import DimensionedField, DimensionedFloat
 
 if TYPE_CHECKING:
-    from pydantic_core import CoreSchema
-
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
@@ -31,45 +28,8 @@ MOTION_OF = {"force": "length", "torque": "angle"}
 MOST_POINTS = 10_000
 
 
-class DimensionedFloat(float):
-    """An SI float that knows its dimension."""
-
-    __slots__ = ("dimension",)
-    dimension: str
-
-    def __new__(cls, value: float, dimension: str) -> DimensionedFloat:
-        """Return `value` as a number of that dimension."""
-        number = super().__new__(cls, value)
-        number.dimension = dimension
-        return number
-
-    def __reduce__(self) -> tuple[type[DimensionedFloat], tuple[float, str]]:
-        """Return what copying and pickling need."""
-        return type(self), (float(self), self.dimension)
-
-
-@dataclass(frozen=True)
-class _OneOf(UnitField):
-    """Text of one of several dimensions, which the number then knows; a plain number is of the first."""
-
-    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
-        """Build the validator and the serialiser."""
-
-        def read(value: Any) -> DimensionedFloat:
-            return value if isinstance(value, DimensionedFloat) else DimensionedFloat(*self.read(value))
-
-        def write(value: DimensionedFloat) -> str:
-            return format_quantity(value, getattr(value, "dimension", self.dimensions[0]))
-
-        return plain_schema(read, write)
-
-    def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
-        """Describe the text that is expected."""
-        return self.json_schema({})
-
-
-Effort = Annotated[float, _OneOf(EFFORT_DIMENSIONS)]
-AnyStiffness = Annotated[float, _OneOf(SLOPE_DIMENSIONS)]
+Effort = Annotated[float, DimensionedField(EFFORT_DIMENSIONS)]
+AnyStiffness = Annotated[float, DimensionedField(SLOPE_DIMENSIONS)]
 Interpolation = Literal["smooth", "linear"]
 
 

@@ -105,6 +105,20 @@ class Screw:
     head: float  # diameter of the head, ISO 4762 [m]
     hole: float  # clearance hole, ISO 273 medium [m]
 
+    @property
+    def head_height(self) -> float:
+        """Height of the head [m]: that of ISO 4762 is the diameter of the thread."""
+        return self.diameter
+
+    @property
+    def countersunk_height(self) -> float:
+        """Height of the head of a countersunk screw of the same thread, ISO 10642 [m]; of M16 a little more."""
+        return 0.62 * self.diameter
+
+    def length(self, least: float) -> float:
+        """Return the shortest length of ISO 4762 that is at least so long [m], or that length beyond the longest."""
+        return next((size for size in SCREW_LENGTHS if least <= size * (1 + SIZE_RTOL)), least)
+
 
 SOCKET_SCREWS = tuple(
     Screw(f"M{diameter:g}", *_mm(diameter, head, hole))
@@ -114,6 +128,9 @@ SOCKET_SCREWS = tuple(
     )
 )  # fmt: skip
 """ISO 4762 heads and ISO 273 medium holes."""
+
+SCREW_LENGTHS = _mm(2.5, 3, 4, 5, 6, 8, 10, 12, 14, 16, *range(20, 81, 5), *range(100, 161, 10))
+"""ISO 4762 [data of the FreeCAD Fasteners workbench, iso4762def.csv]."""
 
 MARKET_SOURCE = "sellers' list"
 
@@ -205,6 +222,25 @@ def hole_with_fit(diameter: float, grade: Literal[7, 8]) -> str:
     text = format_short(diameter, "length")
     place = next((k for k, largest in enumerate(FIT_LIMITS) if diameter <= largest * (1 + SIZE_RTOL)), None)
     return text if place is None else f"{text} H{grade} (+{1e-3 * FIT_TOLERANCES[grade][place]:.3f})"
+
+
+PIN_LENGTHS = _mm(2, 3, 4, 5, 6, 8, *range(10, 33, 2), *range(35, 101, 5), *range(120, 201, 20))
+LONGEST_PINS: Mapping[float, float] = dict(zip(
+    _mm(0.6, 0.8, 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 30, 40, 50),
+    _mm(6, 8, 10, 12, 16, 20, 24, 30, 40, 50, 60, 80, 95, 140, 180, 200, 200, 200, 200, 200), strict=True,
+))  # fmt: skip
+"""ISO 2338: lengths of pins, and the largest of each diameter [m] [data of the FreeCAD Fasteners workbench,
+iso2338length.csv and iso2338range.csv]."""
+
+
+def pin_length(diameter: float, least: float) -> float | None:
+    """Return the shortest pin of ISO 2338 that is at least so long [m]; None if none of the diameter is.
+
+    >>> pin_length(0.003, 0.0131), pin_length(0.001, 0.0131)
+    (0.014, None)
+    """
+    longest = next((end for size, end in LONGEST_PINS.items() if math.isclose(size, diameter, rel_tol=SIZE_RTOL)), 0.0)
+    return next((size for size in PIN_LENGTHS if least <= size * (1 + SIZE_RTOL) and size <= longest), None)
 
 
 Path = tuple[str | int, ...]

@@ -33,7 +33,7 @@ _ERROR_REASONS = {
     errno.EACCES: "permission denied",
     errno.EPERM: "permission denied",
     errno.EISDIR: "it is a folder",
-    errno.ENOTDIR: "a part of the path is a file, not a folder",
+    errno.ENOTDIR: "a part of the path is a file, not a folder; give another path",
     errno.EEXIST: "the file exists",
     errno.ENOENT: "the folder is not there",
     errno.ENAMETOOLONG: "the name is too long",

@@ -13,7 +13,7 @@ from cfmkit.families.rows import Variants, valid
 from cfmkit.metrics import other_name, split_name
 from cfmkit.metrics.branches_cut_to_window import WINDOW_RTOL
 from cfmkit.metrics.metric_values import worst_branch
-from cfmkit.metrics.metrics_of_rows import metric_of_branches
+from cfmkit.metrics.metrics_of_rows import is_metric_of_rows, metric_of_branches
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.specs.units import TravelShare, window_places
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gather_rows
@@ -137,7 +137,12 @@ class SolvedVariants:
     @property
     def known(self) -> bool:
         """True if rows have every column of the study."""
-        return all(self.values(split_name(name)[0], over) is not None for name, over in self._asked)
+        kind = next(iter(self.solved.branches.values())).kind
+        names = {split_name(name)[0] for name, _ in self._asked}
+        return all(
+            name in self.solved.quantities or is_metric_of_rows(name, kind) or is_metric_of_rows(other_name(name), kind)
+            for name in names
+        )
 
     @property
     def _definitions(self) -> Mapping[str, Definition]:

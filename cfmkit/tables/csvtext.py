@@ -24,15 +24,12 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-_CHUNK_ROWS = 8192
-"""Rows that are formatted at one time: large enough for speed, small beside the table itself."""
-
+_CHUNK_ROWS = 8192  # rows that are formatted at one time: large enough for speed, small beside the table itself
 _INTEGER_PATTERN = re.compile(r"-?(?:0|[1-9][0-9]*)")
 _NUMBER_PATTERN = re.compile(_INTEGER_PATTERN.pattern + r"(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?|-?inf")
 _SPECIAL_CHARACTERS = re.compile(r'[",\r\n]')
 _FORMULA_START = re.compile("'*\\s*[=+\\-@\uff1d\uff0b\uff0d\uff20].", re.DOTALL)
 """How a formula begins in a spreadsheet, blanks and full-width signs included, after any number of apostrophes."""
-
 _TOKEN_PATTERN = re.compile(r'("(?:[^"]|"")*"|[^",\r\n]*)([,\n])')
 
 
@@ -124,13 +121,8 @@ def _decode_source(source: str | bytes | Path, name: str) -> str:
 def _parse_rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
     """Yield (line number, raw cells) of every row."""
     if '"' not in text and "\r" not in text:
-        for line, row in enumerate(text[:-1].split("\n"), start=1):
-            yield line, row.split(",")
+        yield from ((line, row.split(",")) for line, row in enumerate(text[:-1].split("\n"), start=1))
         return
-    yield from _parse_quoted_rows(text, name)
-
-
-def _parse_quoted_rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
     place, start = 0, 1
     row: list[str] = []
     while place < len(text):

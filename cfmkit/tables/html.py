@@ -10,8 +10,7 @@ if TYPE_CHECKING:
 
     from cfmkit.tables.table import Table
 
-MOST_ROWS = 10
-"""Rows of a long table that a notebook shows: it is to be seen beside the code."""
+MOST_ROWS = 10  # rows of a long table that a notebook shows: it is to be seen beside the code
 
 
 def html_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 COLUMN_ROLES = {"time": "time", "length": "displacement", "angle": "angle", "force": "force", "torque": "torque"}
 """What a column of a dimension can be."""
-
 _IN_HEADER = (
     re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]"),
     re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)"),
@@ -39,9 +38,7 @@ _OTHER_WORDS = {
     "°": "deg", "sec": "s", "secs": "s", "sek": "s", "micron": "um", "microns": "um", "inches": "in", "zoll": "in",
     "kilopond": "kgf", "lbsf": "lbf", "poundsforce": "lbf", "feet": "ft",
 }  # fmt: skip
-_AMBIGUOUS_UNITS = {"mn"}
-"""Spellings without regard to case that could be two units: mN and MN."""
-
+_AMBIGUOUS_UNITS = {"mn"}  # spellings without regard to case that could be two units: mN and MN
 _DIMENSIONLESS_SPELLINGS = {"-": "1", "": "1", "mm/mm": "1"}
 _LABEL_OF_UNITS = re.compile(r"(?i).*(unit|einheit).*")
 _COLUMN_WORDS = {
@@ -129,32 +126,27 @@ def describe(
     for index, unit in cells.items():
         columns[index] = columns[index].with_unit(unit, CELLS_SOURCE, file)
     for key, unit in units.items():
-        index = _index(key, columns, file)
+        index = column_named(key, columns, file).index
         columns[index] = replace(columns[index].with_unit(unit, "--units", file), named_by_option=True)
     return columns
 
 
-def _index(key: str, columns: Sequence[ColumnInfo], file: str) -> int:
-    """Return which column ``--units`` or ``--group`` means, by name or by number from 1."""
-    named = [column.index for column in columns if column.name == key]
-    if len(named) == 1:
-        return named[0]
-    if len(named) > 1:
-        numbers = " and ".join(str(index + 1) for index in named)
-        raise DataError(f"{file}: columns {numbers} are both called {quote(key)}; name the one that is meant by number")
-    if key.isdecimal() and 1 <= int(key) <= len(columns):
-        return int(key) - 1
-    near = get_close_matches(key, [column.name for column in columns], n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(quote(c.name) for c in columns)}"
-    raise DataError(f"{file}: there is no column {quote(key)}{hint}")
-
-
 def column_named(key: str, columns: Sequence[ColumnInfo], file: str) -> ColumnInfo:
-    """Return the column that an option means, by name or by number from 1.
+    """Return the column that ``--units`` or ``--group`` means, by name or by number from 1.
 
     Raises DataError if there is none, or there are several.
     """
-    return columns[_index(key, columns, file)]
+    named = [column for column in columns if column.name == key]
+    if len(named) == 1:
+        return named[0]
+    if len(named) > 1:
+        numbers = " and ".join(str(column.index + 1) for column in named)
+        raise DataError(f"{file}: columns {numbers} are both called {quote(key)}; name the one that is meant by number")
+    if key.isdecimal() and 1 <= int(key) <= len(columns):
+        return columns[int(key) - 1]
+    near = get_close_matches(key, [column.name for column in columns], n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(quote(c.name) for c in columns)}"
+    raise DataError(f"{file}: there is no column {quote(key)}{hint}")
 
 
 def _describe_column(index: int, text: str, below: str, file: str) -> ColumnInfo:
@@ -295,9 +287,8 @@ def _candidates(columns: Sequence[ColumnInfo], dimension: str) -> list[ColumnInf
     """Return the columns that could be of a dimension's role: those of --units, else of the usual name, else all."""
     found = [column for column in columns if column.dimension == dimension]
     found = [column for column in found if column.named_by_option] or found
-    named = [
-        column for column in found if re.sub(r"[\W_\d]+", " ", column.name).strip().lower() in _COLUMN_WORDS[dimension]
-    ]
+    words = [re.sub(r"[\W_\d]+", " ", column.name).strip().lower() for column in found]
+    named = [column for column, word in zip(found, words, strict=True) if word in _COLUMN_WORDS[dimension]]
     return named if len(found) > 1 and named else found
 
 

@@ -15,9 +15,10 @@ from __future__ import annotations
 
 import codecs
 import csv
+import itertools
 import re
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -43,19 +44,10 @@ if TYPE_CHECKING:
 
 SEPARATOR_NAMES = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "spaces"}
 """What may stand between cells, in the order in which it is tried, and its name."""
-
-LONGEST_LINE = 100_000
-"""Characters of a line that is read: the reader of quoted cells takes 131072 in one."""
-
-HEADER_LINES = 5
-"""So many lines above the numbers are searched for their names."""
-
-UNIT_LINES = 40
-"""So many lines above the numbers are searched for a line of units that says so: LabVIEW's are far up."""
-
-FEWEST_ROWS = 8
-"""A shorter run of lines with numbers is a part of some preamble where there is a longer one."""
-
+LONGEST_LINE = 100_000  # characters of a line that is read: the reader of quoted cells takes 131072 in one
+HEADER_LINES = 5  # so many lines above the numbers are searched for their names
+UNIT_LINES = 40  # so many lines above the numbers are searched for a line of units that says so: LabVIEW's are far up
+FEWEST_ROWS = 8  # a shorter run of lines with numbers is a part of some preamble where there is a longer one
 _N_SAMPLE_LINES = 40
 _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -72,8 +64,7 @@ _NUMBER_PATTERNS = {
 _PLAIN_CHARACTERS = frozenset("0123456789.+-eE\n")
 _GROUPED_PATTERN = re.compile(r"[-+]?[0-9]{1,3}(?:([.,' \u00a0\u2009\u202f])[0-9]{3})+(?:[.,][0-9]*)?")
 _MINUS_PATTERN = re.compile(r"[\u2010-\u2013\u2212\ufe63\uff0d](?=\s?[0-9.,])")
-EMPTY_CHARACTERS = ' \t\r;,|"\u00a0-=:+*_'
-"""What a line without a value may hold."""
+EMPTY_CHARACTERS = ' \t\r;,|"\u00a0-=:+*_'  # what a line without a value may hold
 
 
 @dataclass(frozen=True)
@@ -158,8 +149,7 @@ class LabTable:
 
     def only(self, keep: Iterable[bool]) -> LabTable:
         """Return the table with some of its rows."""
-        chosen = tuple(index for index, kept in zip(self.rows, keep, strict=True) if kept)
-        return LabTable(self.file, self.shape, self.lines, chosen, self.columns, self.header)
+        return replace(self, rows=tuple(itertools.compress(self.rows, keep)))
 
     def with_values(self, columns: Sequence[ColumnInfo]) -> LabTable:
         """Return the table without the rows that are empty in all of some columns."""
@@ -207,13 +197,11 @@ class LabTable:
         value, unit = found
         if column.unit_column is not None:
             unit = standard_spelling(row[column.unit_column])
-        if unit and unit != column.unit and (column.source != CELLS_SOURCE or not self._alike(unit, column)):
+        # a gauge that changes its range on the way shows the same kind of quantity in another unit
+        alike = column.source == CELLS_SOURCE and dimension_of(unit) == column.dimension
+        if unit and unit != column.unit and not alike:
             column.with_unit(unit, "the cell", self.file, f"line {self.rows[number] + 1}: ")
         return float(in_si(np.array(value), column.dimension or "", unit or column.unit or ""))
-
-    def _alike(self, unit: str, column: ColumnInfo) -> bool:
-        """Return whether a gauge that changed its range on the way shows the same kind of quantity."""
-        return dimension_of(unit) == column.dimension
 
     def texts(self, column: ColumnInfo) -> list[str]:
         """Return the cells of a column as they are."""
@@ -227,8 +215,7 @@ def in_si(values: FloatArray, dimension: str, unit: str) -> FloatArray:
     from cfmkit.specs.units.unit_size import unit_size
 
     if unit == border_unit(dimension):
-        converted: FloatArray = from_border(values, dimension)
-        return converted
+        return np.asarray(from_border(values, dimension))
     factor = COMMON_UNIT_SIZES[dimension, unit] if (dimension, unit) in COMMON_UNIT_SIZES else unit_size(unit).factor
     return values * float(factor)
 
@@ -302,8 +289,8 @@ def _shape(lines: list[str], filled: list[int], name: str) -> RowPattern:
     if not count:
         _refuse_groups(sample, name)
         raise DataError(
-            f"{name}: there is no block of lines with at least two numbers, separated by semicolon, tab, comma, bar or "
-            "spaces"
+            f"{name}: there are no lines below each other with at least two numbers each, separated by semicolon, tab, "
+            "comma, bar or spaces"
         )
     rows = [cells for line in sample if _is_data(cells := dialect.cells(line), dialect)]
     if count < 0.5 * len(sample) or not all(map(dialect.is_number, dialect.cells(sample[0]))):
@@ -354,7 +341,7 @@ def _table(
         found = [number[1] for row in rows if (number := shape.dialect.number(row[k]))]
         inside |= {k: found[0]} if found and found[0] else {}
     columns = describe(names, unit_row, inside, units, name)
-    placed = tuple(ColumnInfo(**{**vars(item), "unit_column": beside.get(item.index)}) for item in columns)
+    placed = tuple(replace(item, unit_column=beside.get(item.index)) for item in columns)
     return LabTable(name, shape, lines, tuple(run), placed, header)
 
 
@@ -430,9 +417,9 @@ def _refuse_groups(sample: list[str], name: str) -> None:
     """Raise if cells have a thousands separator."""
     for separator in (";", "\t", None):
         for line in sample:
-            for cell in csv.reader([line], delimiter=separator) if separator else [line.split()]:
-                for text in cell:
-                    refuse_group(text.strip(), name)
+            for row in csv.reader([line], delimiter=separator) if separator else [line.split()]:
+                for cell in row:
+                    refuse_group(cell.strip(), name)
 
 
 def refuse_group(cell: str, name: str) -> None:

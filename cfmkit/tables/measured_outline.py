@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.tables.lab_columns import ColumnInfo
     from cfmkit.tables.lab_file import LabTable
 
-MIN_SIDE_POINTS = 20
-"""Points on a side without which it cannot be told from noise."""
-
+MIN_SIDE_POINTS = 20  # points on a side without which it cannot be told from noise
 SIDE_WORDS = {"right": "right", "r": "right", "rechts": "right", "left": "left", "l": "left", "links": "left"}
 
 
@@ -110,5 +108,4 @@ def _order_points(points: FloatArray, chosen: NDArray[np.bool_], name: str) -> F
             f"{name}: has {len(points)} points, {len(side)} of them on one side; both flanks are needed with at least "
             f"{MIN_SIDE_POINTS} points each"
         )
-    found: FloatArray = side[np.argsort(side[:, 1], kind="stable")]
-    return found
+    return np.asarray(side[np.argsort(side[:, 1], kind="stable")])

@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 
 
 def require_pyarrow() -> None:
-    """Refuse where pyarrow is not there.
-
-    Raises UsageError with the command that installs it.
-    """
+    """Raise UsageError with the command that installs pyarrow where it is not there."""
     library("pyarrow", "--table parquet")
 
 

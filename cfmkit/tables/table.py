@@ -45,7 +45,6 @@ class TableColumn(ShortRepr):
     unit: str | None = None
 
     def __post_init__(self) -> None:
-        """Freeze the values and check them and the name."""
         match = HEADER_PATTERN.fullmatch(self.header)
         if not match or match["name"] != self.name or match["unit"] != self.unit:
             raise CfmError(f"{self.header!r} cannot head a column: it must be a name with a unit in brackets")
@@ -78,7 +77,6 @@ class Table(ShortRepr):
     columns: tuple[TableColumn, ...] = ()
 
     def __post_init__(self) -> None:
-        """Freeze the columns and check that they belong together."""
         object.__setattr__(self, "columns", Several(self.columns))
         headers = self.headers
         if twice := sorted({name for name in headers if headers.count(name) > 1}):
@@ -88,13 +86,11 @@ class Table(ShortRepr):
             raise CfmError(f"the columns of a table need one length ({lengths})")
 
     def __repr__(self) -> str:
-        """Return the table in a line: rows and headers."""
         heads = ", ".join(self.headers)
         shown = heads if len(heads) <= 500 else f"{heads[:500]}..."
         return f"<Table of {len(self)} rows: {shown}>"
 
     def __len__(self) -> int:
-        """Return the number of rows."""
         return len(self.columns[0].values) if self.columns else 0
 
     def __getitem__(self, name: str) -> Values:
@@ -119,8 +115,10 @@ def _frozen(values: Iterable[Any], *, numeric: bool) -> Values:
     if isinstance(values, np.ndarray):
         if values.ndim != 1:
             raise CfmError(f"a column is a sequence of values, not an array of shape {values.shape}")
-        if values.dtype.kind in "fi":
-            return _array(values)
+        if values.dtype.kind == "i":
+            return read_only(values, np.int64)
+        if values.dtype.kind == "f":
+            return read_only(values + 0.0)  # adding zero turns -0.0 into 0.0
         if values.dtype.kind == "b":
             return tuple(np.where(values, "true", "false").tolist())
         if values.dtype.kind == "U":
@@ -129,17 +127,10 @@ def _frozen(values: Iterable[Any], *, numeric: bool) -> Values:
     cells = tuple(map(_cell, values))
     kinds = set(map(type, cells))
     if kinds in ({float}, {float, type(None)}) or (numeric and kinds <= {type(None)}):
-        return _array(np.array([math.nan if cell is None else cell for cell in cells], dtype=np.float64))
+        return read_only([math.nan if cell is None else cell for cell in cells])
     if kinds == {int} and all(cell in _INT64_RANGE for cell in cells):
         return read_only(cells, np.int64)
     return cells
-
-
-def _array(values: NDArray[Any]) -> NDArray[Any]:
-    if values.dtype.kind == "i":
-        return read_only(values, np.int64)
-    # Adding zero turns -0.0 into 0.0.
-    return read_only(values + 0.0)
 
 
 def _cell(value: Any) -> Cell:
@@ -208,16 +199,11 @@ def border_values(
     # Here and above, because reading and writing CSV needs no units.
     from cfmkit.specs.units import to_border
 
-    power = _power_of_ten(float(to_border(1.0, dimension)))
-    if power is not None:
-        return shift_decimal(values, power)
-    converted: FloatArray = to_border(np.asarray(values, dtype=np.float64), dimension)
-    return converted
-
-
-def _power_of_ten(factor: float) -> int | None:
+    factor = float(to_border(1.0, dimension))
     power = round(math.log10(factor))
-    return power if factor == float(f"1e{power}") else None
+    if factor == float(f"1e{power}"):
+        return shift_decimal(values, power)
+    return np.asarray(to_border(np.asarray(values, dtype=np.float64), dimension))
 
 
 def _label_columns(curve: Curve) -> dict[str, Column]:

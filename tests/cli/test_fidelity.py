@@ -61,7 +61,7 @@ def test_the_numbers_are_those_of_the_curves_in_the_table(cli, moving):
 
 def test_from_rest_to_rest_inertia_takes_no_work():
     """The mean times the stroke is the work of the difference: kinetic energy begins and ends at zero."""
-    from cfmkit.families.run_control import Run
+    from cfmkit import Run
     from cfmkit.studies.comparison_of_fidelities import choices_of, compare
 
     spec = cfmkit.load(CONFIGS / "cam_dynamics.yaml")

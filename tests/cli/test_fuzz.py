@@ -117,7 +117,7 @@ def anew(verb: str, extra: list[str]) -> list[str]:
     return [*extra, "--fresh"] if verb == "design" else extra
 
 
-def check_mutants(folder: Path, count: int, seed: int, capsys: pytest.CaptureFixture[str]) -> None:
+def assert_exit_codes_of_contract(folder: Path, count: int, seed: int, capsys: pytest.CaptureFixture[str]) -> None:
     chance = random.Random(seed)
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGPROF)}
     signal.signal(signal.SIGPROF, ring)
@@ -158,14 +158,14 @@ def quiet_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_mutated_specs_end_with_an_exit_code_of_the_contract(quiet_folder, capsys):
-    check_mutants(quiet_folder, 12, 6, capsys)
+    assert_exit_codes_of_contract(quiet_folder, 12, 6, capsys)
 
 
 @pytest.mark.parametrize(
     "seed", [pytest.param(seed, marks=pytest.mark.slow if seed < 5 else pytest.mark.long) for seed in range(10)]
 )
 def test_ten_thousand_mutated_specs_end_with_an_exit_code_of_the_contract(quiet_folder, capsys, seed):
-    check_mutants(quiet_folder, 1000, seed, capsys)
+    assert_exit_codes_of_contract(quiet_folder, 1000, seed, capsys)
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,10 @@ import time
 
 import pytest
 
+from cfmkit import Run
 from cfmkit.cli.failures import Stopped
-from cfmkit.cli.verbs.design import long_run
-from cfmkit.families.run_control import Run
+from cfmkit.cli.run_study_in_folder import open_journal
+from cfmkit.runs.run import long_run
 from cfmkit.store import RunFolder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
@@ -81,7 +82,7 @@ def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finish
     reported = []
     with RunFolder(tmp_path / "out") as folder:
         try:
-            with long_run(1, False, folder, Run()) as run:
+            with long_run(1, False, folder, Run(), open_journal) as run:
                 if finished:
                     run.notes.add("0" * 32, {"found": {}})
                 raise Stopped(signal.SIGTERM)
@@ -216,13 +217,13 @@ def test_a_signal_at_any_time_of_a_run_shows_no_traceback_and_leaves_nothing_hal
 EARLY = """
 import signal, sys
 from cfmkit.cli import main, run_spec_and_print_page
-from cfmkit.runs import batch, read_suggest_file, run
+from cfmkit.runs import batch, run, suggest_api
 
 def ended(*_, **__):
     signal.raise_signal(signal.SIGTERM)
 
 run_spec_and_print_page.execute = run.read = batch.batch = ended
-read_suggest_file.read_request = ended
+suggest_api.read_request = ended
 print(main.main(sys.argv[1:]))
 """
 

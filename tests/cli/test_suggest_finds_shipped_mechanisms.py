@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.metrics import window_of
-from cfmkit.runs.read_suggest_file import read_request
+from cfmkit.runs.suggest_api import read_request
 from cfmkit.studies.suggest import search
 from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, make_proposal
 
@@ -90,7 +90,7 @@ def test_a_shipped_mechanism_is_found_by_its_own_numbers(path):
     result, space = solved(path)
     if (reason := reason_not_asked(result, space)) is not None:
         pytest.skip(reason)
-    find(*numbers_of(result, space))
+    assert_suggested(*numbers_of(result, space))
 
 
 HALF_SIZE_OF_PETG = (
@@ -111,10 +111,10 @@ def test_a_strip_of_half_the_size_is_found_by_its_own_numbers():
     result, space = solved(CONFIGS / "slider_crank_strip.yaml", HALF_SIZE_OF_PETG)
     assert space.across == pytest.approx(53.7e-3, abs=1e-4)
     assert space.along == pytest.approx(80.4e-3, abs=1e-4)
-    find(*numbers_of(result, space))
+    assert_suggested(*numbers_of(result, space))
 
 
-def find(name, keys):
+def assert_suggested(name, keys):
     """Fail unless a candidate of a family does what is required by the model of its designs."""
     request = read_request(None, keys).request()
     offer, refused = search.offer_of(family(name), request, Run()), []

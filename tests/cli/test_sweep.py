@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from journal_support import keys_in
+from pace import wait_until
 
 RADII = "mechanism.roller_radius=8 mm:16 mm:5"
 BRACES = "mechanism.brace_length=[60 mm, 200 mm, -1 mm]"
@@ -187,7 +188,7 @@ def test_ctrl_c_writes_what_is_there_and_the_same_command_goes_on(cli, tmp_path)
     command = ("sweep", *SOME, "-o", "out", "-j", "2")
     process = cli.start(*command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     journal = tmp_path / "out" / JOURNAL
-    until(lambda: len(keys_in(journal)) > 20)
+    wait_until(lambda: len(keys_in(journal)) > 20, 30)
     process.send_signal(signal.SIGINT)
     _, complaints = process.communicate(timeout=30)
     assert process.returncode == 130
@@ -209,7 +210,7 @@ def test_a_study_that_is_terminated_says_how_it_goes_on(cli, tmp_path, options, 
     command = ("sweep", *MANY, "-o", "out", "-j", "2", *options)
     process = cli.start(*command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     journal = tmp_path / "out" / JOURNAL
-    until(lambda: len(keys_in(journal)) > 4)
+    wait_until(lambda: len(keys_in(journal)) > 4, 30)
     process.send_signal(signal.SIGTERM)
     _, complaints = process.communicate(timeout=30)
     assert process.returncode == 143
@@ -221,7 +222,7 @@ def test_ctrl_c_twice_ends_at_once_and_keeps_the_journal(cli, tmp_path):
     slow = ("--vary", "analysis.points=[21, 999999, 1000000]", "-o", "out", "--no-plots", "-j", "2")
     process = cli.start("sweep", str(CAM), *slow, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     journal = tmp_path / "out" / JOURNAL
-    until(lambda: len(keys_in(journal)) == 1)
+    wait_until(lambda: len(keys_in(journal)) == 1, 30)
     process.send_signal(signal.SIGINT)
     assert b"press Ctrl-C again to end at once" in process.stderr.readline()
     process.send_signal(signal.SIGINT)
@@ -280,7 +281,7 @@ def test_of_two_runs_into_one_folder_exactly_one_works(cli, tmp_path, races):
         os.write(gate_in, b"\n\n")
         os.close(gate_in)
         os.close(gate_out)
-        until(lambda racers=racers: any(one.poll() is not None for one in racers))
+        wait_until(lambda racers=racers: any(one.poll() is not None for one in racers), 30)
         loser = next(one for one in racers if one.poll() is not None)
         winner = racers[1 - racers.index(loser)]
         assert loser.returncode == 8, loser.stderr.read()
@@ -305,13 +306,6 @@ def test_json_says_what_was_found(cli, tmp_path):
     assert ripples[0] == pytest.approx(min(ripples), rel=1e-12)
     assert reported["best"]["point"] == 1
     assert reported["range"]["force_ripple"]["max"] == max(ripples)
-
-
-def until(condition, seconds=30):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.01)
 
 
 @pytest.mark.parametrize(

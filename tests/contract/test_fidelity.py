@@ -11,11 +11,10 @@ import plugin_support
 import pytest
 
 import cfmkit
-from cfmkit import families
+from cfmkit import Run, families
 from cfmkit.curves import Curve
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.deferred_imports import load_deferred
-from cfmkit.families.run_control import Run
 from cfmkit.results import Finding, Result, Status
 from cfmkit.studies.comparison_of_fidelities import (
     FIDELITY_KEY,

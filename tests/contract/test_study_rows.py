@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_rows import compare_rows_with_runs, study_of, vary_numbers
+from study_rows import assert_rows_equal_runs, study_of, vary_numbers
 
 import cfmkit
 from cfmkit.studies.variants_in_rows import are_solved_together
@@ -33,7 +33,7 @@ QUICK = (
 )  # fmt: skip
 
 
-def check(stem: str, seed: int, window: bool) -> None:
+def assert_rows_of_study(stem: str, seed: int, window: bool) -> None:
     """Compare rows with runs of a configuration of which some numbers vary; beams do as far as paths are traced."""
     spec = cfmkit.load(CONFIGS / f"{stem}.yaml")
     if window:
@@ -43,13 +43,13 @@ def check(stem: str, seed: int, window: bool) -> None:
         spec = spec.replace({"analysis.points": 25})
     study, plan = study_of(spec, vary_numbers(spec, np.random.default_rng(seed), 3, SPREADS[spec.family]))
     assert len(study.metrics) > 20
-    compare_rows_with_runs(study, plan, rtol=1e-11 if beam else 1e-12, flat=1e-8 if beam else 1e-12)
+    assert_rows_equal_runs(study, plan, rtol=1e-11 if beam else 1e-12, flat=1e-8 if beam else 1e-12)
 
 
 @pytest.mark.parametrize("stem", QUICK)
 def test_a_row_of_a_study_is_a_run_of_its_own(stem: str) -> None:
     """Whatever is varied, with every metric that a sweep notes."""
-    check(stem, 7, window=False)
+    assert_rows_of_study(stem, 7, window=False)
 
 
 @pytest.mark.slow
@@ -57,7 +57,7 @@ def test_a_row_of_a_study_is_a_run_of_its_own(stem: str) -> None:
 @pytest.mark.parametrize("stem", SOLVED_IN_ROWS)
 def test_every_row_of_a_study_is_a_run_of_its_own(stem: str, number: int) -> None:
     """Paths of beams that do not go straight on are run one by one."""
-    check(stem, 100 + number, window=bool(number % 2))
+    assert_rows_of_study(stem, 100 + number, window=bool(number % 2))
 
 
 @pytest.mark.parametrize(
@@ -72,4 +72,4 @@ def test_rows_of_beams_are_solved_together_and_are_runs_of_their_own(stem: str, 
     spec, draw = cfmkit.load(CONFIGS / f"beam_{stem}.yaml").replace(changes), np.random.default_rng(7)
     study, plan = study_of(spec, {path: spec.get_value(path) * draw.uniform(0.99, 1.01, 3) for path in paths})
     assert are_solved_together(study, plan)
-    compare_rows_with_runs(study, plan, rtol=1e-11, flat=1e-8)
+    assert_rows_equal_runs(study, plan, rtol=1e-11, flat=1e-8)

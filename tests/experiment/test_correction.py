@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.api import resolve
 from cfmkit.errors import DataError
 from cfmkit.experiment.reading import Recording
 from cfmkit.experiment.redrawn_values import NotMakeable
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 
 MODULUS = "mechanism.material.youngs_modulus"
 LEAVES = ("mechanism.positive.thickness", "mechanism.bistable.thickness")

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from flexure_support import ABS, LINKAGE, MM, SHARES, THICKNESS, UNLOADED, WIDTH, corners, strip_chain
 
-from cfmkit.families.run_control import Run
+from cfmkit import Run
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity, joints
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink as offset
 from cfmkit.families.slider_crank.printed.solution import first_at

@@ -12,7 +12,7 @@ from functional_paths import beam_stress
 from vcfm_support import leaf, side
 
 import cfmkit.elastica as el
-from cfmkit.families.vcfm.leaves import positive_stiffness_springs, truss
+from cfmkit.families.vcfm.leaves import positive_stiffness_springs, v_beam
 from cfmkit.families.vcfm.leaves import v_beam as vbeam
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
@@ -119,7 +119,7 @@ def test_stress_of_a_buckled_leaf():
 
 def test_truss_law_of_a_leaf_and_its_error():
     """The bar's peak is 36 % above that of the leaf, at twice the travel; its steepest slope is 2.76 times as steep."""
-    bar, travel = truss.TrussLeaf(leaf()), np.linspace(0, 4.3, 430001)
+    bar, travel = v_beam.TrussLeaf(leaf()), np.linspace(0, 4.3, 430001)
     force = bar.force(travel)
     assert bar.force(1.80) == pytest.approx(3.086970, abs=6e-7)
     assert travel[force.argmax()] == pytest.approx(1.80, abs=5e-3)

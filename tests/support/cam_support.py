@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit import Run
 from cfmkit.families import family
 from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.statics import forces
-from cfmkit.families.run_control import Run
 from cfmkit.specs.spec import frozen
 
 if TYPE_CHECKING:

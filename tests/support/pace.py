@@ -1,4 +1,4 @@
-"""Processor time in units of a known task, so that no test fails on a slow machine."""
+"""Time in tests: processor time in units of a known task, so that no test fails on a slow machine; waiting."""
 
 from __future__ import annotations
 
@@ -29,3 +29,11 @@ def within(times: float, task: Callable[[], object]) -> Iterator[None]:
     yield
     spent = time.process_time() - start
     assert spent < limit, f"{spent:.3g} s, allowed is {times:g} times the usual task, {limit:.3g} s"
+
+
+def wait_until(condition: Callable[[], bool], seconds: float) -> None:
+    """Wait until a condition holds; fail if it does not in so many seconds."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.02)

@@ -13,7 +13,7 @@ from cfmkit.specs.spec import Analysis, Model, Spec
 from cfmkit.specs.units import Stiffness  # noqa: TC001  pydantic reads the annotation
 
 if TYPE_CHECKING:
-    from cfmkit.families.run_control import Run
+    from cfmkit import Run
 
 TEXT = """
 cfmkit: 1

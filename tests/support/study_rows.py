@@ -38,7 +38,7 @@ def vary_numbers(spec: Any, draw: np.random.Generator, count: int, spread: float
     return {path: own[path] * draw.uniform(1 - spread, 1 + spread, count) for path in chosen}
 
 
-def compare_rows_with_runs(study: Study, plan: Any, step: int = 1, rtol: float = 1e-12, flat: float = 1e-12) -> Any:
+def assert_rows_equal_runs(study: Study, plan: Any, step: int = 1, rtol: float = 1e-12, flat: float = 1e-12) -> Any:
     """Return the rows of a study; every `step`-th has status, message, warnings, requirements, numbers of a run."""
     together = evaluate_rows(study, plan, 0, len(plan))
     sizes = np.nan_to_num(np.abs(together.values)).max(axis=0)

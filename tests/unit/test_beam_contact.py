@@ -8,6 +8,7 @@ from beam_support import CANTILEVER, CONFIGS, config, solved
 
 import cfmkit
 from cfmkit.errors import InputError, SpecError
+from cfmkit.families.beam.contacts import change_sentences
 from cfmkit.families.beam.figures import figures
 from cfmkit.results import Status
 
@@ -329,6 +330,15 @@ def test_a_side_that_touches_one_obstacle_is_seen_to_pass_through_another():
     said = {warning.name: warning.message for warning in cfmkit.analyze(over(more)).warnings}
     assert "passes through 'bore' from 0 mm on, at 0% of its length" in said["side_in_obstacle"]
     assert "'leaf' and 'pin'" in said["contact_begins"]
+
+
+@pytest.mark.parametrize("count", [5, 6, 8])
+def test_of_many_changes_the_first_six_are_told_and_the_others_counted(count):
+    solution = cfmkit.analyze(over("pin: {kind: disc, centre: [50 mm, -90 mm], radius: 4.75 mm}")).state
+    changes = [f"change {number}" for number in range(count)]
+    ((name, text),) = change_sentences(solution, str, changes)
+    assert name == "contact_begins"
+    assert text == "; ".join(changes[:6] + (["and 2 more changes"] if count > 6 else []))
 
 
 def test_friction_makes_the_way_back_a_branch_of_its_own_with_hysteresis():

@@ -14,6 +14,7 @@ import pytest
 from beam_support import MM, at, cantilever, config, solved, value
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.cli.main import main
 from cfmkit.elastica import Section, Taper
 from cfmkit.elastica.mechanics.march import engine
@@ -21,7 +22,6 @@ from cfmkit.errors import DataError, InputError, SpecError
 from cfmkit.families import family
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as SURFACE
-from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 
 GUIDED = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: parallel}")
@@ -1051,15 +1051,3 @@ def test_what_stands_in_the_way_of_a_network_is_said_with_its_cure(tmp_path, cap
     assert main(["check", str(tmp_path / "tied.yaml"), "--set", change]) == 3
     captured = capsys.readouterr()
     assert said in captured.out + captured.err
-
-
-def test_a_straight_strip_pulled_straight_has_no_solution(tmp_path, monkeypatch, capsys):
-    text = re.sub(r"    (spare|t|m|left|right): .*\n", "", TIED.replace("EXTRA", "spare"))
-    text = text.replace("  beams:\n", "  beams:\n    s: {start: a, end: b}\n").replace(
-        "support: pinned", "support: guided, direction: 0 deg"
-    )
-    text = text.replace("kind: rotation, node: m", "kind: displacement, node: b, direction: 0 deg")
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "strip.yaml").write_text(text.replace("10 deg", "1 mm"), encoding="utf-8")
-    assert main(["analyze", "strip.yaml", "--no-plots"]) == 4
-    assert "inextensible beams lie straight along the drive (s)" in " ".join(capsys.readouterr().out.split())

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from journal_support import NotesInMemory
 
-from cfmkit import analyze, dumps, evaluate, load, loads
+from cfmkit import Run, analyze, dumps, evaluate, load, loads
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
@@ -32,7 +33,6 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
 from cfmkit.families.beam.shaping.sqp_program import Flattest, ForceRatio, Shaping, Widest
 from cfmkit.families.beam.shaping.task import STRESS_MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
-from cfmkit.families.run_control import Run
 from cfmkit.numerics.monotone_interpolation import ThroughPoints
 from cfmkit.results import Status
 from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -446,3 +446,13 @@ def test_a_search_that_pushes_two_joined_nodes_into_one_place_has_no_answer_ther
     program = Shaping(Variables(task, 2), 6.8e-3, Flattest())
     assert program.begin(x) is None
     assert program.view(x) is None
+
+
+def test_a_design_takes_the_place_of_another_only_if_it_meets_its_limits_and_is_better():
+    task, better = SimpleNamespace(objective="stress"), multistart._better
+    designs = (SimpleNamespace(feasible=fits, objective=own) for fits, own in ((True, 1), (True, 2), (False, 0)))
+    best, good, missed = designs
+    assert better(task, best, good)
+    assert better(task, good, missed)
+    assert better(task, good, None)
+    assert not any(better(task, *pair) for pair in ((good, best), (missed, None), (missed, good), (None, None)))

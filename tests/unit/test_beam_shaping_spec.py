@@ -36,6 +36,14 @@ def test_nonsense_is_refused_at_its_place(old, new, path, words):
     assert fault.line > 20
 
 
+def test_limits_of_the_specification_are_those_of_the_search():
+    limits = "limits: {joint_opening: 0.5, clearance: 2 mm, min_radius: 3 mm, max_length_ratio: 1.2, "
+    assert "limits: {" in TEXT
+    spec = cfmkit.loads(TEXT.replace("limits: {", limits))
+    held = task_of(spec, spec.design.optimise).limits
+    assert (held.opening, held.clearance, held.radius, held.length_ratio) == (0.5, 2e-3, 3e-3, 1.2)
+
+
 def test_nothing_that_may_vary_is_refused():
     text = TEXT.replace("free: {b: {y: [2 mm, 20 mm]}}", "beams: []")
     with pytest.raises(SpecError, match="leaves nothing to vary"):

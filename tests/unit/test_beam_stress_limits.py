@@ -6,8 +6,8 @@ import pytest
 from beam_support import TOGGLE, cantilever, config, value
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.families.beam.design import design
-from cfmkit.families.run_control import Run
 from cfmkit.specs.units import format_short
 
 TWO = (

@@ -297,10 +297,10 @@ def test_no_text_is_clipped_or_covers_another(name, make):
             figure = draw()
             with style():
                 figure.draw_without_rendering()
-                check_texts(figure, f"{name} {stem}")
+                assert_texts_are_legible(figure, f"{name} {stem}")
 
 
-def check_texts(figure, place):
+def assert_texts_are_legible(figure, place):
     texts = [*figure.texts, *(text for ax in figure.axes for text in texts_on(ax))]
     boxes = [(text.get_text(), text.get_window_extent()) for text in texts if text.get_visible() and text.get_text()]
     assert len(boxes) > 10

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from cam_motion import moving, response
 from cam_support import analyze, cam
 
 from cfmkit.errors import SpecError
+from cfmkit.families.cam.dynamics.axis_springs import AxisSprings
 from cfmkit.families.cam.dynamics.force_of_given_motion import inverse_history, multibody_history
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.lagrange_multiplier_check import CornerContact, NineCoordinates, Scheme
@@ -63,6 +64,31 @@ def test_the_two_formulations_agree_in_every_force_and_speed(changes):
     assert np.abs(other.traction - exact.traction).max() < 1e-9 * exact.contact.max()
     if "left" in changes:
         assert relative(exact.contact[1], exact.contact[0]) > 0.1
+
+
+@dataclass(frozen=True)
+class DampedSprings(AxisSprings):
+    """Springs with a damper beside them [N s/m]."""
+
+    damping: float = 30.0
+
+    def force(self, gap):
+        along = gap.vector / np.abs(gap.vector)
+        return super().force(gap) - self.damping * (gap.velocity * along.conj()).real * along
+
+
+@pytest.mark.parametrize("changes", [{}, UNLIKE], ids=["prototype", "unlike sides"])
+def test_a_damper_between_the_axes_takes_its_power_from_the_slider_in_both_formulations(changes):
+    parts = build(moving(**changes))
+    damped = replace(parts.machine, springs=DampedSprings(**asdict(parts.machine.springs)))
+    times = parts.motion.times(101)
+    response, without = (respond(machine, parts.motion.evaluate(times)) for machine in (damped, parts.machine))
+    other = multibody_history(damped, parts.motion, 101, Scheme(steps=8))
+    assert relative(other.force, response.force) < 1e-9
+    assert relative(other.contact, response.contact) < 1e-9
+    lengthening = (response.axis_distance[2:] - response.axis_distance[:-2]) / (times[2:] - times[:-2])
+    power = (response.force - without.force) * response.moment.speed
+    np.testing.assert_allclose(power[1:-1], 30.0 * lengthening**2, rtol=0, atol=2e-3 * power.max())
 
 
 def test_the_integration_converges_with_the_fourth_order():

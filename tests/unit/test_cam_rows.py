@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from given_points import GivenPoints
-from study_rows import compare_rows_with_runs, study_of
+from study_rows import assert_rows_equal_runs, study_of
 
 import cfmkit
 from cfmkit.families.cam.cams_in_rows import solve_rows
@@ -59,7 +59,7 @@ def listed(values):
 
 def compare(many):
     """Return the rows of a study, which are runs of their own."""
-    return compare_rows_with_runs(many.study, many.plan)
+    return assert_rows_equal_runs(many.study, many.plan)
 
 
 def members(many):

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import cfmkit
-from cfmkit import api
+from cfmkit import Run, api
 from cfmkit.errors import ExitCode
 from cfmkit.families.beam.shaping import multistart
-from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.printed import strip_thickness_search
 from cfmkit.results import Status
 from cfmkit.runs.run import run_design as compute

@@ -21,12 +21,18 @@ from cfmkit.designing.robust_design import (
 PHI = NormalDist().cdf
 
 
+UNWATCHED = (lambda: False, lambda _share, _steps: None, lambda _x, _errors: None)
+"""All the time, no report of progress, no exact derivatives."""
+
+
 def problem(seen, errors, matrix, constant, bounds, share=0.9):
     """Return a problem with unit errors; every row is a limit of its own."""
     matrix, constant = np.asarray(matrix, dtype=float), np.asarray(constant, dtype=float)
     deviations = np.ones(errors.shape[1])
     about = np.arange(len(constant))
-    return RobustProblem(seen, np.array(bounds, dtype=float), errors, deviations, matrix, constant, about, share)
+    return RobustProblem(
+        seen, np.array(bounds, dtype=float), errors, deviations, matrix, constant, about, share, *UNWATCHED
+    )
 
 
 def normal(count, size):
@@ -114,6 +120,7 @@ def test_an_error_to_one_side_is_never_looked_at_on_the_other():
         np.zeros(1),
         np.zeros(1, dtype=int),
         0.9,
+        *UNWATCHED,
     )
     found = with_margins(problem, np.array([0.5]))
     assert found.linear.by_error[0, 0] == pytest.approx(-2.0)

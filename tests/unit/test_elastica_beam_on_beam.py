@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from contact_paths import at_drive, check_complementarity, check_work, place_of
+from contact_paths import assert_work_is_energy, at_drive, check_complementarity, place_of, shoot
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -109,17 +109,6 @@ def test_two_sides_that_begin_to_nest_end_the_path_where_shooting_says():
     assert path.contact_events[-1].kind == "spreads"
     assert path.contact_events[-1].drive == pytest.approx(3.0199, abs=5e-5)
     assert "contact of 'upper' and 'lower' spreads along a length at 3.0199" in path.message
-
-
-def shoot(start, force, length, curvature):
-    """Return x, y, angle and moment at the end of a leaf, EI = 1, from those at its start [DOP853]."""
-    from scipy.integrate import solve_ivp
-
-    def slopes(_, state):
-        cos, sin = np.cos(state[2]), np.sin(state[2])
-        return [cos, sin, curvature + state[3], force[0] * sin - force[1] * cos]
-
-    return solve_ivp(slopes, (0, length), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
 
 
 @pytest.mark.parametrize(("bend", "lower", "load"), [(1.3, -0.2, (0.1, -2.5)), (0.9, 0.3, (-0.2, -2.0))])
@@ -250,4 +239,4 @@ def test_the_work_of_the_drive_is_the_energy_of_two_leaves_that_shear():
         "root": Node(0, 0.1 + depth, CLAMPED_SUPPORT),
         "tip": replace(BULGE.nodes["tip"], y=BULGE.nodes["tip"].y + depth),
     }
-    check_work(replace(BULGE, nodes=nodes, beams=beams), "tip", 0.1, 0.3)
+    assert_work_is_energy(replace(BULGE, nodes=nodes, beams=beams), "tip", 0.1, 0.3)

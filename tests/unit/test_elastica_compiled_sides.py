@@ -108,16 +108,16 @@ def random_states(mesh: Discretisation, count: int) -> Any:
 @pytest.mark.parametrize("closed", [None, True])
 @pytest.mark.parametrize("ramp", [False, True])
 def test_equations_of_sides_are_those_of_numpy(shape: str, section: str, closed: bool | None, ramp: bool) -> None:
-    check_equations(touching(closed, shape=shape, section=section), ramp)
+    assert_equations_agree(touching(closed, shape=shape, section=section), ramp)
 
 
 @pytest.mark.parametrize("closed", [None, True])
 @pytest.mark.parametrize("ramp", [False, True])
 def test_equations_of_pads_on_beams_and_of_two_beams_are_those_of_numpy(closed: bool | None, ramp: bool) -> None:
-    check_equations(leaves_that_touch(closed, LEAF_PLACES), ramp)
+    assert_equations_agree(leaves_that_touch(closed, LEAF_PLACES), ramp)
 
 
-def check_equations(mesh: Discretisation, ramp: bool) -> None:
+def assert_equations_agree(mesh: Discretisation, ramp: bool) -> None:
     """Both have the same residual, tangent, solutions and unstable directions."""
     compiled = equations(mesh, ramp)
     assert isinstance(compiled, CompiledSides)
@@ -138,14 +138,14 @@ def check_equations(mesh: Discretisation, ramp: bool) -> None:
 @pytest.mark.parametrize("flanks", [(), (0.35, 0.6, 0.8)])
 def test_least_gaps_of_sides_are_those_of_numpy(flanks: tuple[float, ...]) -> None:
     mesh = touching(None, flanks, shape="curved", section="soft")
-    check_gaps(mesh, random_states(mesh, 20), LoadStage(np.linspace(0, 1, 20)))
+    assert_gaps_agree(mesh, random_states(mesh, 20), LoadStage(np.linspace(0, 1, 20)))
 
 
 @pytest.mark.parametrize("places", [(), LEAF_PLACES])
 def test_least_gaps_of_pads_on_beams_and_of_two_beams_are_those_of_numpy(places: tuple[FlankPlace, ...]) -> None:
     whole, stage = leaves_that_touch(None, ()), LoadStage(np.linspace(0, 1, 20))
     mesh = leaves_that_touch(None, places)
-    check_gaps(mesh, carry(whole, random_states(whole, 20), stage, mesh), stage)  # lines are continuous
+    assert_gaps_agree(mesh, carry(whole, random_states(whole, 20), stage, mesh), stage)  # lines are continuous
 
 
 @pytest.mark.parametrize("mesh", [touching(None, ()), leaves_that_touch(None, ())], ids=["obstacles", "leaves"])
@@ -168,7 +168,7 @@ def test_gaps_that_are_not_measured_again_are_below_those_that_would_be(mesh: Di
     assert passed > 1000
 
 
-def check_gaps(mesh: Discretisation, states: Any, stage: LoadStage) -> None:
+def assert_gaps_agree(mesh: Discretisation, states: Any, stage: LoadStage) -> None:
     """Both find the same least gaps and places, of states near and far."""
     counts = np.zeros(2, int)
     for item in mesh.fits.network.contacts:

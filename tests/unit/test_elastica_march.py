@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import zipfile
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 import pytest
 from batch_networks import two_leaves
 from contact_layouts import with_pads
+from network_cases import from_json, read_cases
 
 import cfmkit
 import cfmkit.elastica as el
@@ -24,16 +24,13 @@ from cfmkit.elastica.contact.equations import ContactEquations, open_all_contact
 from cfmkit.elastica.contact.terms import gaps
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE, CompiledEquations, load_compiled
-from cfmkit.elastica.mechanics.designs import NetworkDesigns, raise_designs, set_up
+from cfmkit.elastica.mechanics.compiled_batch import CompiledBatch
+from cfmkit.elastica.mechanics.designs import set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations, begin
-from cfmkit.elastica.mechanics.march import (
-    engine,
-    equations,
-    march_many,
-    solve_designs,
-)
-from cfmkit.elastica.mechanics.refine import embed, raise_degree
+from cfmkit.elastica.mechanics.march import engine, equations
+from cfmkit.elastica.model.plain_beams_at_once import is_plain
+from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, NEXT_CORRECTION, compare_states
 from cfmkit.families.beam.network_from_spec import assemble
 
 ROOT = Path(__file__).parents[2]
@@ -283,84 +280,101 @@ def test_a_march_stops_before_a_step_that_is_less_stable(kind: Any) -> None:
 TARGETS = np.linspace(0, 5e-3, 11)[1:]
 
 
-def leaf(thickness: float, taper: bool = False) -> tuple[el.Network, el.Displacement]:
-    thick = el.Taper(np.array([0.0, 1.0]), thickness * np.array([1.0, 0.8])) if taper else thickness
+def leaf(thickness: float) -> tuple[el.Network, el.Displacement]:
     nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.08, 0.03, el.slider_support(0.0, rotates=False))}
-    net = el.Network(nodes, {"x": el.Beam("a", "b", el.Section(2e9, 1e-2, thick), el.Polynomial((0.0, 1.0, -0.8)))})
-    return net, el.Displacement("b", np.pi, TARGETS)
+    section, shape = el.Section(2e9, 1e-2, thickness), el.Polynomial((0.0, 1.0, -0.8))
+    return el.Network(nodes, {"x": el.Beam("a", "b", section, shape)}), el.Displacement("b", np.pi, TARGETS)
 
 
-def leaves(count: int, taper: bool = False) -> NetworkDesigns:
-    pairs = [leaf(thickness, taper) for thickness in np.linspace(0.5e-3, 1e-3, count)]
-    return set_up(discretise(*pairs[0], 8), pairs[0], pairs)
+def leaves(count: int, degree: int = 8) -> CompiledBatch:
+    pairs = [leaf(thickness) for thickness in np.linspace(0.5e-3, 1e-3, count)]
+    return CompiledBatch(set_up(discretise(*pairs[0], degree), pairs[0], pairs))
 
 
-@pytest.mark.parametrize("taper", [False, True])
-def test_a_batch_has_the_efforts_of_single_marches(taper: bool) -> None:
-    """Of beams that are set up together, and one by one."""
-    efforts, codes, _ = march_many(leaves(4, taper), TARGETS)
+@needs_c
+def test_a_batch_has_the_efforts_of_single_marches() -> None:
+    efforts, codes, _ = leaves(4).march(TARGETS)
     assert (codes == MarchCode.DONE).all()
     for thickness, row in zip(np.linspace(0.5e-3, 1e-3, 4), efforts, strict=True):
-        own = NumpyEquations(discretise(*leaf(thickness, taper), 8))
+        own = NumpyEquations(discretise(*leaf(thickness), 8))
         goals = TARGETS / own.mesh.scales.drive
         march = own.march(begin(own), goals, MarchPlan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
         known = [state.effort * own.effort_unit for state in march.states if state.target >= 0]
         assert row == pytest.approx(known, rel=1e-7)
 
 
+@needs_c
 def test_a_batch_of_several_beams_has_the_efforts_of_single_marches() -> None:
     pairs = [(two_leaves(bend=bend), el.Displacement("d", np.pi, TARGETS)) for bend in (0.8, 1.0, 1.3)]
-    efforts, codes, _ = march_many(set_up(discretise(*pairs[0], 16), pairs[0], pairs), TARGETS)
+    efforts, codes, _ = CompiledBatch(set_up(discretise(*pairs[0], 16), pairs[0], pairs)).march(TARGETS)
     assert (codes == MarchCode.DONE).all()
     for pair, row in zip(pairs, efforts, strict=True):
         path = el.trace(*pair, el.Control(tolerance=1e-8))
         assert row == pytest.approx(path.effort[path.at_requested], rel=1e-6)
 
 
-def test_designs_of_a_batch_may_differ_in_their_springs() -> None:
-    net, drive = leaf(1e-3)
-    pairs = [(replace(net, springs=(el.SlideSpring("b", 0.0, stiffness),)), drive) for stiffness in (10.0, 500.0)]
-    efforts, *_ = march_many(set_up(discretise(*pairs[0], 8), pairs[0], pairs), TARGETS)
-    assert np.abs(efforts[1] - efforts[0]) == pytest.approx(490.0 * TARGETS, rel=1e-9)
+@needs_c
+def test_states_of_a_batch_lead_to_those_of_a_higher_degree() -> None:
+    """Efforts of designs from states of a lower degree are those of a march with the higher one."""
+    batch, chosen = leaves(2), [3, 9]
+    _, _, states = batch.march(TARGETS, chosen=chosen)
+    finer = batch.compare(states, TARGETS[chosen], 12, 1e-12)
+    assert finer.converged.all()
+    right = leaves(2, 12).march(TARGETS)[0][:, chosen]
+    assert finer.effort * batch.effort_unit == pytest.approx(right, rel=1e-9)
+    assert not batch.compare(states + 1e3, TARGETS[chosen], 12, 1e-12).converged.any()
 
 
-@pytest.mark.parametrize("numpy_only", [False, True])
-def test_states_of_a_batch_lead_to_those_of_a_higher_degree(monkeypatch: pytest.MonkeyPatch, numpy_only: bool) -> None:
-    """Efforts of designs solved from states of a lower degree are those of a march with the higher one."""
-    if numpy_only:
-        monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
-    designs, chosen = leaves(2), [3, 9]
-    mesh, fine = designs.template, raise_degree(designs.template, 12)
-    _, _, states = march_many(designs, TARGETS, chosen=chosen)
-    z = np.zeros((2, 2, mesh.size))
-    z[..., mesh.free] = states
-    raised = raise_designs(designs, fine)
-    found = solve_designs(raised, embed(mesh, fine, z)[..., fine.free], TARGETS[chosen], 1e-12)
-    assert found == pytest.approx(march_many(raised, TARGETS)[0][:, chosen], rel=1e-9)
-    assert np.isnan(solve_designs(raised, np.full((2, 2, len(fine.free)), 1e3), TARGETS[chosen], 1e-12)).all()
+@needs_c
+def test_states_are_compared_with_a_higher_degree_in_c_as_in_numpy() -> None:
+    """Of networks of plain beams, under drives by motions and by loads: the efforts of these C does not know."""
+    compared = 0
+    for case in list(read_cases())[::4]:
+        net, drive = (from_json(case[part]) for part in ("network", "drive"))
+        if net.contacts or not all(is_plain(beam) for beam in net.beams.values()):
+            continue
+        path = el.trace(net, drive, el.Control(tolerance=1e-3, most_points=60))
+        mesh, z, drives = path.mesh, path.at.z[1::3], path.at.drive[1::3]
+        own = equations(mesh)
+        fast = own.compare(z, drives, mesh.degree + DEGREES_MORE, NEXT_CORRECTION)
+        if fast is None or not len(z):
+            continue
+        slow, compared = compare_states(path, z, drives), compared + 1
+        assert (fast.converged == slow.converged).all()
+        assert (fast.unstable == slow.unstable)[slow.converged].all()
+        pairs = [(fast.largest.max(), slow.largest[0]), (fast.force / slow.largest, slow.force / slow.largest)]
+        pairs += [
+            (fast.moved[slow.converged], slow.moved[slow.converged]),
+            (fast.motion, slow.motion),
+            (fast.ends, slow.ends),
+        ]
+        pairs += [(fast.effort * own.effort_unit, slow.effort)] if mesh.rate.any() else []
+        for mine, its in pairs:
+            assert mine == pytest.approx(its, abs=1e-10 * max(np.abs(its).max(), 1.0)), case["name"]
+    assert compared > 12
 
 
 @needs_c
 def test_several_threads_march_at_once() -> None:
-    designs, found = leaves(8), {}
-    threads = [threading.Thread(target=lambda k=k: found.update({k: march_many(designs, TARGETS)[0]})) for k in (0, 1)]
+    batch, found = leaves(8), {}
+    threads = [threading.Thread(target=lambda k=k: found.update({k: batch.march(TARGETS)[0]})) for k in (0, 1)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    together = march_many(designs, TARGETS)[0]
+    together = batch.march(TARGETS)[0]
     assert (found[0] == together).all()
     assert (found[1] == together).all()
 
 
 def test_numpy_takes_over_without_the_compiled_module(monkeypatch: pytest.MonkeyPatch) -> None:
-    compiled_efforts = march_many(leaves(2), TARGETS)[0]
+    with_what_there_is = el.trace(*leaf(1e-3))
     monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
     assert engine() == "numpy"
     assert type(equations(discretise(*leaf(1e-3), 8))) is NumpyEquations
-    efforts, codes, _ = march_many(leaves(2), TARGETS)
-    assert (codes == MarchCode.DONE).all()
-    assert efforts == pytest.approx(compiled_efforts, rel=1e-9)
+    path = el.trace(*leaf(1e-3))
+    assert path.effort == pytest.approx(with_what_there_is.effort, rel=1e-9)
+    assert path.error == pytest.approx(with_what_there_is.error, rel=1e-3)
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact_paths import at_drive, check_complementarity, place_of
+from contact_paths import at_drive, check_complementarity, place_of, shoot
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -66,17 +66,6 @@ def test_the_tip_of_a_leaf_on_another_one_has_the_force_and_the_place_of_shootin
     assert moved[[0, 2]] == pytest.approx(moved[[6, 5]], abs=1e-9)
     assert path.stable.all()
     check_complementarity(path)
-
-
-def shoot(start, force, length, curvature=0.0):
-    """Return x, y, angle and moment at the end of a leaf, EI = 1, from those at its start [DOP853]."""
-    from scipy.integrate import solve_ivp
-
-    def slopes(_, state):
-        cos, sin = np.cos(state[2]), np.sin(state[2])
-        return [cos, sin, curvature + state[3], force[0] * sin - force[1] * cos]
-
-    return solve_ivp(slopes, (0, length), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
 
 
 @pytest.mark.parametrize(("curvature", "radius", "load"), [(0.2, 0.02, 2.5), (-0.3, 0.0, 3.0), (0.4, 0.1, 4.0)])

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contact_layouts import among_discs
-from contact_paths import check_work
+from contact_paths import assert_work_is_energy, check_complementarity, place_of
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -58,20 +58,6 @@ def at_drive(path, drive):
     return int(np.flatnonzero(np.abs(path.drive - drive) < 1e-12)[0])
 
 
-def tip_at(path, point):
-    node = path.network.nodes["tip"]
-    return path.motion("tip")[point, :2] + [node.x, node.y]
-
-
-def check_complementarity(path):
-    """Forces press, nothing lies in an obstacle, and what is apart has no force."""
-    for number in range(len(path.network.contacts)):
-        force, gap = path.contact_force(number), path.contact_gap(number)
-        assert force.min() > -1e-9 * max(1.0, force.max())
-        assert gap.min() > -1e-9
-        assert np.minimum(gap, force).max() < 1e-8
-
-
 ROUND = 0.05 - HALF
 APEX = -0.1 + np.sqrt(2) * ROUND  # of a roof whose ridge is rounded about (0.5, -0.1)
 PINS = {
@@ -92,7 +78,9 @@ def test_a_pin_under_a_leaf_has_the_force_and_the_place_of_shooting_both_ways(pi
         point = at_drive(path, load)
         assert path.contact_force(0)[point] == pytest.approx(force, rel=1e-10)
         assert path.contact_places(0)[point] == pytest.approx([place, place], rel=1e-10)
-    assert tip_at(path, at_drive(path, 3.0)) == pytest.approx((0.932836562878431, -0.285087474732345), abs=1e-10)
+    assert place_of(path, "tip", at_drive(path, 3.0)) == pytest.approx(
+        (0.932836562878431, -0.285087474732345), abs=1e-10
+    )
     assert path.stable.all()
     check_complementarity(path)
 
@@ -148,8 +136,8 @@ def test_a_leaf_wraps_around_a_disc_as_the_closed_form_says(radius, onset, known
         point = at_drive(path, load)
         assert path.contact_places(0)[point] == pytest.approx([0.0, wrapped], rel=1e-10)
         if tip[0] is not None:
-            assert tip_at(path, point)[0] == pytest.approx(tip[0], abs=1e-10)
-        assert tip_at(path, point)[1] == pytest.approx(tip[1], abs=1e-10)
+            assert place_of(path, "tip", point)[0] == pytest.approx(tip[0], abs=1e-10)
+        assert place_of(path, "tip", point)[1] == pytest.approx(tip[1], abs=1e-10)
     bent = path.states("leaf").moment[at_drive(path, 4.0), :5]
     assert bent == pytest.approx(np.full(5, -1 / radius), rel=1e-9)  # along the drum it has its curvature
 
@@ -315,7 +303,7 @@ def over_disc(slenderness, radius):
 def test_a_leaf_that_shears_has_the_force_and_the_place_of_shooting(slenderness, radius, load, known, spread):
     """`spread` is of shooting with the force spread over the length along which the leaf follows the disc."""
     path = trace(over_disc(slenderness, radius), Loading(TIP_LOAD, np.array([0.5, load])), EXACT)
-    force, place, tip = path.contact_force(0)[-1], path.contact_places(0)[-1, 0], tip_at(path, -1)
+    force, place, tip = path.contact_force(0)[-1], path.contact_places(0)[-1, 0], place_of(path, "tip", -1)
     assert (force, place, *tip) == pytest.approx(known, abs=1e-10)
     assert (force, tip[1]) == pytest.approx(spread[:2], abs=spread[2])
     check_complementarity(path)
@@ -342,4 +330,4 @@ TAPERED = leaf(side("pin", circle((0.6, -0.275), 0.2)), section=soft(20, STRETCH
 )  # fmt: skip
 def test_the_work_of_the_drive_is_the_energy_of_a_leaf_that_shears_or_stretches(net, node, begin, end):
     """Nothing works at the contact, wherever it slides: so the tangent there is the right one."""
-    check_work(net, node, begin, end)
+    assert_work_is_energy(net, node, begin, end)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.families.run_control import Run
+from cfmkit import Run
 from cfmkit.specs.spec import Requirement
 from cfmkit.studies.parts import near_parts
 from cfmkit.studies.parts.expected_forces import expected_forces

@@ -112,7 +112,7 @@ BAD = {
     "empty": ("", "the file is empty"),
     "endless line": ("x," * 200_000, "line 1 has 400000 characters; at most 100000 are read"),
     "endless cell": ('"' + "1" * 200_000 + '";2;3\n' + csv_text(), "line 1 has 200006 characters"),
-    "only text": ("no\nnumbers\nhere\n", "no block of lines with at least two numbers"),
+    "only text": ("no\nnumbers\nhere\n", "no lines below each other with at least two numbers"),
     "binary": (bytes(range(256)) * 20, "is not a text file"),
     "NaN": (csv_text(change=at(5, 2, "NaN")), "line 7: column 'F' [N] holds 'NaN', which is not a number"),
     "gap": (csv_text(change=at(5, 2, "")), "line 7: column 'F' [N] is empty"),

@@ -6,16 +6,16 @@ import pickle
 
 import pytest
 
-from cfmkit.families.findings import deg, finder, format_at_least, format_at_most, mm, mpa, newton, percent, rate
+from cfmkit import Spec
+from cfmkit.families.findings import Finder, deg, format_at_least, format_at_most, mm, mpa, newton, percent, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design, no_result, refusals_answered
 from cfmkit.results import Finding, Status
-from cfmkit.specs.spec import Spec
 
 SHORT = Finding("brace_too_short", "the braces do not reach the rollers", ("mechanism.brace_length=200 mm",))
 
 
 def test_a_family_finds_only_what_it_explains():
-    finding = finder({"brace_too_short": "the brace is shorter than half the way between the rollers"})
+    finding = Finder({"brace_too_short": "the brace is shorter than half the way between the rollers"})
     assert finding(SHORT.name, SHORT.message, *SHORT.cures) == SHORT
     with pytest.raises(KeyError, match="undercut"):
         finding("undercut", "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import runpy
 from pathlib import Path
@@ -79,3 +80,13 @@ def test_the_architecture_states_the_lines_of_every_folder():
         assert float(stated) == pytest.approx(lines, rel=0.15, abs=0.15), names
     folders = {path.name for path in (ROOT / "cfmkit").iterdir() if path.is_dir() and path.name != "__pycache__"}
     assert folders <= {name.strip("`/") for names, _ in rows for name in names.split(", ")}
+
+
+def test_every_test_shows_its_claim():
+    """It asserts, itself or by a helper named so, wants an exception, or runs a command that must not fail."""
+    shown = re.compile(r"\bassert|\braises\(|\bwarns\(|check=True|\bexpect\(")
+    files = [*(ROOT / "tests").rglob("test_*.py"), *(ROOT / "plugins").glob("*/tests/test_*.py")]
+    functions = (node for file in files for node in ast.parse(file.read_text("utf-8")).body)
+    tests = [node for node in functions if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")]
+    assert len(tests) > 2000
+    assert [test.name for test in tests if not shown.search(ast.unparse(test))] == []

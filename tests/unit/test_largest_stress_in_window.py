@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cfmkit import api
+from cfmkit import Run, api
 from cfmkit.families import family
 from cfmkit.families.beam.model import solve
-from cfmkit.families.run_control import Run
 from cfmkit.metrics import evaluate
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.runs.run import run_analysis, run_design
 from cfmkit.specs.units import TravelShare
 from cfmkit.studies.choose_metrics_to_note import metrics_of

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.cli.main import main
 from cfmkit.designing import run_many_starts
 from cfmkit.designing.robust_design import RobustProblem, with_margins
 from cfmkit.families import family
 from cfmkit.families.base import DesignMethod
 from cfmkit.families.beam.force_at_few_poses import sample_poses
-from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm import model
 from cfmkit.families.vcfm.model import solve
 from cfmkit.specs.units import TravelShare
@@ -324,9 +324,9 @@ def test_the_largest_yield_is_found_where_the_worst_parts_cannot_be_helped():
     part = TwoLimits()
     drawn = part.draw(4000, 1)
     about = np.array([0, 0, 1])
-    problem = RobustProblem(
-        part, np.array([[0.0, 0.9]]), drawn, np.ones(2), part.rows.matrix, part.rows.constant, about, 0.99
-    )
+    rows, unwatched = part.rows, (lambda: False, lambda _share, _steps: None, lambda _x, _errors: None)
+    limits = rows.matrix, rows.constant, about
+    problem = RobustProblem(part, np.array([[0.0, 0.9]]), drawn, np.ones(2), *limits, 0.99, *unwatched)
     alone = part.count_good_parts(with_margins(problem, np.array([0.1])).x)
     largest = max(part.count_good_parts(np.array([x])) for x in np.linspace(0.0, 0.9, 46))
     _, good = redesign._with_margins(problem, part, np.array([0.1]))

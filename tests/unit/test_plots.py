@@ -17,6 +17,7 @@ import pytest
 from PIL import Image
 from plot_support import axes, data_lines, loop_curve, result_of
 
+from cfmkit import Spec
 from cfmkit.families.base import Family
 from cfmkit.plots.axis_labels_and_headings import Heading, axis_label, top_axis, value_text, write_heading
 from cfmkit.plots.curve_with_enlarged_band import curve_figure
@@ -36,7 +37,6 @@ from cfmkit.plots.style import (
     style,
 )
 from cfmkit.results import Result, Status
-from cfmkit.specs.spec import Spec
 
 ROOT = Path(__file__).parents[2]
 

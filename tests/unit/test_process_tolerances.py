@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import pytest
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.runs.run import run_design
 from cfmkit.specs.spec import Requirement
 from cfmkit.stock.materials import MATERIALS_BY_NAME

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, turn_unloaded
 
 CONFIGS = Path(__file__).parents[2] / "configs"

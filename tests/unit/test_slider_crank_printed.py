@@ -25,10 +25,9 @@ from flexure_support import (
 )
 
 import cfmkit
-from cfmkit import api
+from cfmkit import Run, api
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
-from cfmkit.families.slider_crank.printed import strip_thickness_search
+from cfmkit.families.slider_crank.printed import equilibrium_path, strip_thickness_search
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.flexure_sizing import rotations, size_flexure
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
@@ -218,6 +217,20 @@ def test_a_chain_that_goes_over_to_the_other_side_has_a_curve_up_to_there() -> N
     assert "between 6 and 7 mm" in found.message
     np.testing.assert_allclose(found.travel, travel[:7])
     np.testing.assert_allclose(found.force, chain.press(travel).force[:7])
+
+
+def test_a_chain_that_loses_its_stability_says_from_where_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A real chain, but for counts of unstable directions beyond 6 mm that stand for a path that went on there."""
+    trace = equilibrium_path._trace
+
+    def lose_stability(*arguments: Any) -> Any:
+        path = trace(*arguments)
+        return replace(path, unstable=np.where(path.drive > 6.5 * MM, 1, path.unstable))
+
+    monkeypatch.setattr(equilibrium_path, "_trace", lose_stability)
+    found = lumped_chain().press(np.linspace(0.0, 10.0, 11) * MM)
+    assert found.ending is PressingEnd.UNSTABLE
+    assert found.message == "unstable from 7 mm on"
 
 
 CROSSING = """
@@ -647,6 +660,23 @@ def test_the_side_of_a_strip_is_found_without_its_stresses(monkeypatch: pytest.M
     monkeypatch.setattr("cfmkit.elastica.results.path.EquilibriumPath.sections", lambda *_: calls.append(1))
     assert api.analyze(spec("strip", "analysis.points=7")).status.usable
     assert not calls
+
+
+@pytest.mark.parametrize(("name", "thickness"), [("lumped", [0.908, 0.960, 0.960]), ("strip", [0.97721])])
+def test_what_bends_is_in_every_pose_as_thick_as_specified(name: str, thickness: list[float]) -> None:
+    bodies = family("slider-crank").part(cfmkit.analyze(spec(name, "analysis.points=11"))).bodies
+    halves = [np.unique(body.half_thickness) for body in bodies if body.name == "flexure"]
+    np.testing.assert_allclose(halves, 0.5 * MM * np.array(thickness)[:, None])
+
+
+def test_forces_are_as_accurate_as_asked_for() -> None:
+    fine, usual, rough = (
+        api.analyze(spec("strip", f"analysis.accuracy={accuracy}", "analysis.points=7")).state
+        for accuracy in ("1e-10", "1e-7", "1e-3")
+    )
+    off = [np.abs(state.force - fine.force).max() for state in (usual, rough)]
+    assert off[0] < usual.effort_error < rough.effort_error
+    assert off[0] < off[1] < rough.effort_error
 
 
 def test_printing_allowance_is_not_drawn() -> None:

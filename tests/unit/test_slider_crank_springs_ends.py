@@ -48,6 +48,17 @@ def test_springs_relaxed_folded_can_only_be_pulled():
     assert (result.curve.force[:-1] < 0).all()
 
 
+@pytest.mark.parametrize(("share", "kept"), [(2e-6, True), (5e-7, False)])
+def test_a_motion_is_cut_short_only_where_it_comes_next_to_a_pole(share, kept):
+    """By a thousandth of the way from the unloaded position; whichever end it is."""
+    assembly = assemble(config("bilancia2019", mechanism__unloaded_angle=0.8))
+    assert assembly.poles == (True, True)
+    (first, last), way = assembly.reach, np.abs(np.array(assembly.reach) - assembly.start)
+    asked = first + share * way[0], last - share * way[1]
+    cut = first + 1e-3 * way[0], last - 1e-3 * way[1]
+    assert assembly.clip_motion(*asked) == pytest.approx(asked if kept else cut, rel=1e-9)
+
+
 def test_positions_are_the_same_after_each_turn():
     turns = config("li2019_full_turn", analysis__angle=(-5 * DEG, -5 * DEG + 6 * math.pi))
     result = cfmkit.analyze(turns)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from given_points import GivenPoints
 from slider_crank import config
-from study_rows import compare_rows_with_runs, study_of
+from study_rows import assert_rows_equal_runs, study_of
 
 import cfmkit
 from cfmkit import api
@@ -98,7 +98,7 @@ def test_rows_of_springs_and_legs_are_runs_of_their_own(name, design):
     kind = RATES["bilancia2019" if name.startswith("bilancia") else "li2019"]
     values = {PATHS[row]: draw.choice([0.0, 0.5, 1.2, 3.0], 6) * kind[row] for row in range(4)}
     values[PATHS[3]] += 0.1 * kind[3]
-    compare_rows_with_runs(*study_of(spec, values))
+    assert_rows_equal_runs(*study_of(spec, values))
 
 
 def test_a_sweep_of_a_mechanism_with_a_screwed_anchor_has_the_force_per_travel_of_it():
@@ -142,7 +142,7 @@ def test_rows_have_the_warnings_of_single_runs(name, changes, expected):
     spread[3] += 0.1
     spread[:3, 0] = 0.0
     values = {path: rate * row for path, rate, row in zip(PATHS, RATES[kind], spread, strict=True)}
-    assert expected <= set(compare_rows_with_runs(*study_of(spec, values)).warned)
+    assert expected <= set(assert_rows_equal_runs(*study_of(spec, values)).warned)
 
 
 def test_what_cannot_be_solved_in_rows_is_left_out():

@@ -11,9 +11,9 @@ from cam_support import analyze, cam, design
 from pydantic import ValidationError
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.stock.springs.helical_spring_formulas import SEAT_FACTORS, HelicalSpring, buckling_deflection

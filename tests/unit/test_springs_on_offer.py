@@ -12,9 +12,9 @@ from cam_support import analyze, cam, design
 from pydantic import ValidationError
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.bought_springs import best_sets
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
@@ -230,6 +230,12 @@ def test_a_spring_that_contradicts_itself_is_refused(block, reported):
 def test_a_compression_spring_is_not_pressed_beyond_its_turns(block, largest):
     spring = CatalogueSpring.model_validate({"name": "C", "kind": "compression", "free_length": "30 mm"} | block)
     assert spring.offer.largest == pytest.approx(1e-3 * largest)
+
+
+@pytest.mark.parametrize(("torque", "largest"), [("60 N*mm", 1.2), ("100 N*mm", 0.5 * math.pi)])
+def test_a_torsion_spring_is_wound_up_to_its_largest_angle_or_torque(torque, largest):
+    ends = {"rate": "50 N*mm/rad", "max_angle": "90 deg", "max_torque": torque}
+    assert CatalogueSpring.model_validate({"name": "T", "kind": "torsion"} | ends).offer.largest == largest
 
 
 def test_of_what_misses_the_nearest_three_are_told():

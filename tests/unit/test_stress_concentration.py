@@ -12,8 +12,15 @@ from shoulder_fillets import handbook
 import cfmkit
 from cfmkit.arrays import read_only
 from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Displacement, Network, Node, Path, Section, slider_support
-from cfmkit.families.fem_results import FilletRow, fillet_table, largest_concentration
-from cfmkit.families.nominal_stress_beside_fillets import SolvedBeams, both_images, nominal_stresses, with_steps
+from cfmkit.families.fem_results import (
+    FilletRow,
+    SolvedBeams,
+    both_images,
+    fillet_table,
+    largest_concentration,
+    nominal_stresses,
+    with_steps,
+)
 from cfmkit.solid.stress_along_fillets import FilletArc
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ import weakref
 from pathlib import Path
 
 import pytest
+from pace import wait_until
 
 from cfmkit.errors import CfmError
 from cfmkit.results import Status
@@ -171,11 +172,11 @@ def test_workers_end_when_their_parent_is_killed(doer, tmp_path):
         f"list(Pool(2)(Doer({str(tmp_path)!r}), ((n, 'sleep_after_mark') for n in range(2))))\n"
     )
     parent = subprocess.Popen([sys.executable, "-c", code])
-    until(lambda: len(list(tmp_path.iterdir())) == 2, 20)
+    wait_until(lambda: len(list(tmp_path.iterdir())) == 2, 20)
     workers = [int(mark.name) for mark in tmp_path.iterdir()]
     parent.kill()
     parent.wait()
-    until(lambda: not any(alive(pid) for pid in workers), 5)
+    wait_until(lambda: not any(alive(pid) for pid in workers), 5)
     assert not any(alive(pid) for pid in workers)
 
 
@@ -234,10 +235,3 @@ def alive(pid):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
-
-
-def until(condition, seconds):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.02)

@@ -12,15 +12,14 @@ import pytest
 from suggest_support import POM, propose, request
 
 import cfmkit
-from cfmkit import api
+from cfmkit import Run, api
 from cfmkit.errors import SpecError
 from cfmkit.families import family, stiffening_of_wide_beams
 from cfmkit.families.base import function_named
 from cfmkit.families.hardware import PartStrength
-from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, links_that_bear
 from cfmkit.runs.part_on_paper import assumed_tolerances
-from cfmkit.runs.read_suggest_file import read_request
+from cfmkit.runs.suggest_api import read_request
 from cfmkit.runs.suggestion_files import table
 from cfmkit.runs.suggestion_record import as_json, exit_code
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
@@ -344,6 +343,11 @@ def test_links_are_as_narrow_as_their_loads_allow():
     assert 0.0099 < link.turn_share(acting) <= 0.01
     assert links_that_bear(acting, 0.2e-3, strength, 0.4e-3, 3e-3) is None
     assert links_that_bear(acting, 2e-3, strength, 0.4e-3, 0.5e-3) is None
+
+
+def test_the_thinnest_pins_of_links_are_those_of_1_mm():
+    link = links_that_bear(loads(pin=0.1), 2e-3, PartStrength("x", 2e9, 40e6, 235e6, assumed=False), 0.4e-3, 3e-3)
+    assert link.hole == 1e-3
 
 
 LINKAGE = {

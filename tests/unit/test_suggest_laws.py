@@ -8,7 +8,7 @@ from suggest_support import propose
 import cfmkit
 from cfmkit.families import family
 from cfmkit.families.beam.proposals import kept_shapes
-from cfmkit.runs.read_suggest_file import read_request
+from cfmkit.runs.suggest_api import read_request
 from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, judge_proposal, make_proposal
 
 ABS = "{youngs_modulus: 1800 MPa, poisson_ratio: 0.35, yield_strength: 42.5 MPa}"

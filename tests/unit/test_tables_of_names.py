@@ -12,7 +12,7 @@ from cfmkit.cli.verbs.suggest import REQUEST_KEYS
 from cfmkit.families import family
 from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS, SampleKind, sample_unit_cube
 from cfmkit.plots import sensitivity as sensitivity_pictures
-from cfmkit.runs.read_suggest_file import read_request
+from cfmkit.runs.suggest_api import read_request
 from cfmkit.specs.keys_and_schema import keys
 from cfmkit.specs.sensitivity_methods import METHOD_NAMES
 from cfmkit.studies.sensitivity.method import method_named

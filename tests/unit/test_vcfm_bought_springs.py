@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.results import Status

@@ -8,10 +8,9 @@ import yaml
 from vcfm_support import CONFIGS, MM, TABLE_I
 
 import cfmkit
-from cfmkit import api
+from cfmkit import Run, api
 from cfmkit.families import family
 from cfmkit.families.base import function_named
-from cfmkit.families.run_control import Run
 from cfmkit.families.suggestion_request import Request
 from cfmkit.families.vcfm import proposals
 from cfmkit.results import Status

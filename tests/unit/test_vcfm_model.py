@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from functional_paths import beam_stress
-from study_rows import compare_rows_with_runs
+from study_rows import assert_rows_equal_runs
 from vcfm_support import CONFIGS, MM, analyzed, leaf, table_i
 
 import cfmkit
@@ -24,13 +24,11 @@ from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw
 from cfmkit.families.vcfm.leaves.laws_in_rows import stack_laws
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.s_form import POLE_LOAD, axial_root, compliance, end_curvature, pose
-from cfmkit.families.vcfm.leaves.truss import TrussLeaf
-from cfmkit.families.vcfm.leaves.v_beam import VBeam
+from cfmkit.families.vcfm.leaves.v_beam import TrussLeaf, VBeam
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
-from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES
-from cfmkit.families.vcfm.tables_of_preloads_and_readings import spread
+from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES, spread
 from cfmkit.metrics import evaluate
 from cfmkit.metrics.longest_interval_in_band import _levels, _reach, flat_window
 from cfmkit.metrics.metrics_of_rows import metric_of_branches
@@ -261,7 +259,7 @@ def test_rows_have_the_numbers_and_warnings_of_their_points(model, window, prelo
     plan = sample_axes(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 64))
     study = Study(spec, plan.paths, metrics_of(spec, names))
     assert are_solved_together(study, plan)
-    rows = compare_rows_with_runs(study, plan, step=4)
+    rows = assert_rows_equal_runs(study, plan, step=4)
     if ranges is WIDE:
         assert sum(mask.any() for mask in rows.warned.values()) > (2 if model == "truss" else 5)
 

@@ -8,8 +8,7 @@ import pytest
 from beam_support import TOGGLE
 
 import cfmkit
-from cfmkit import api
-from cfmkit.families.run_control import Run
+from cfmkit import Run, api
 from cfmkit.results import Design, Status
 from cfmkit.studies.verify_design_by_solid_model import verify_by_solid
 

@@ -6,11 +6,11 @@ import pytest
 from suggest_support import propose, request
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.documents.document import Written
 from cfmkit.documents.suggestion_document import document_of
 from cfmkit.documents.terminal import page, print_blocks
 from cfmkit.errors import ExitCode
-from cfmkit.families.run_control import Run
 from cfmkit.families.suggestion_request import Candidate
 from cfmkit.studies.parts.near_parts import expected_shares
 from cfmkit.studies.parts.parts import Parts

@@ -4,7 +4,7 @@ A verb module has
 
 - a frozen dataclass whose fields are its arguments and options (see `cfmkit.cli.options`);
 - ``run(options, terminal) -> Document``, which takes one: its docstring is the help text;
-- ``PLACE``: where it stands in ``cfmkit --help``.
+- ``HELP_POSITION``: where it stands in ``cfmkit --help``, and perhaps ``HELP_EXAMPLE``.
 
 A module that is added here is a command; nothing else needs to know. Anything slow to
 import is imported inside ``run``.

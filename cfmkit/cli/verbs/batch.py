@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 from cfmkit.cli.options import (
-    Fidelity,
+    FIDELITY_OPTION,
+    FRESH_FLAG,
+    JOBS_OPTION,
+    NO_LOCK_FLAG,
+    QUIET_FLAG,
+    REPORT_FLAG,
+    SEED_OPTION,
+    TIMEOUT_OPTION,
     FigureChoice,
-    Fresh,
-    Jobs,
-    NoLock,
-    Quiet,
-    Seed,
     SpecOptions,
-    Timeout,
-    WithReport,
     argument,
     flag,
     option,
@@ -24,12 +24,11 @@ from cfmkit.cli.options import (
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from cfmkit.cli.output import Terminal
     from cfmkit.documents.document import Document
     from cfmkit.runs.batch import BatchResult
-    from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 
 HELP_POSITION = 26
@@ -40,53 +39,30 @@ HELP_EXAMPLE = "cfmkit batch 'specs/*.yaml' --junit results.xml"
 class BatchOptions(SpecOptions, FigureChoice):
     """Arguments and options."""
 
-    specs: Annotated[
-        list[str],
-        argument("SPEC", "YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'."),
-    ]
-    out: Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/batch/.")] = (
-        None
+    specs: list[str] = argument("SPEC", "YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'.")
+    out: str | None = option("DIR", "Output folder; default: cfm-out/batch/.", "-o", "--out")
+    verb: Literal["design", "analyze"] | None = option(
+        None, "What to do with every spec; default: design where there is a block design, else analyze."
     )
-    verb: Annotated[
-        Literal["design", "analyze"] | None,
-        option(
-            "--verb", text="What to do with every spec; default: design where there is a block design, else analyze."
-        ),
-    ] = None
-    junit: Annotated[
-        str | None, option("--junit", metavar="FILE", text="Write JUnit XML: a test for each requirement.")
-    ] = None
-    summary: Annotated[
-        str | None, option("--summary", metavar="FILE", text="Write the outcome in Markdown, e.g. for a job's summary.")
-    ] = None
-    annotations: Annotated[
-        Literal["github"] | None,
-        option("--annotations", text="Report problems with file and line, in the format of GitHub annotations."),
-    ] = None
-    compare: Annotated[
-        str | None,
-        option(
-            "--compare",
-            metavar="OLDDIR",
-            text="Compare the metrics with those of an earlier batch; end with exit code 5 if one has changed.",
-        ),
-    ] = None
-    compare_tolerance: Annotated[
-        str | None,
-        option("--compare-tolerance", metavar="SHARE", text="Relative change that is tolerated; default: 0.0001 %."),
-    ] = None
-    accept: Annotated[
-        bool, flag("--accept", text="Make the results the reference: replace those in the folder of --compare.")
-    ] = False
-    fail_fast: Annotated[bool, flag("--fail-fast", text="Start no more specs once one has failed.")] = False
-    jobs: Jobs = None
-    timeout_per_point: Timeout = None
-    fresh: Fresh = False
-    fidelity: Fidelity = None
-    seed: Seed = 0
-    report: WithReport = False
-    quiet: Quiet = False
-    no_lock: NoLock = False
+    junit: str | None = option("FILE", "Write JUnit XML: a test for each requirement.")
+    summary: str | None = option("FILE", "Write the outcome in Markdown, e.g. for a job's summary.")
+    annotations: Literal["github"] | None = option(
+        None, "Report problems with file and line, in the format of GitHub annotations."
+    )
+    compare: str | None = option(
+        "OLDDIR", "Compare the metrics with those of an earlier batch; end with exit code 5 if one has changed."
+    )
+    compare_tolerance: str | None = option("SHARE", "Relative change that is tolerated; default: 0.0001 %.")
+    accept: bool = flag("Make the results the reference: replace those in the folder of --compare.")
+    fail_fast: bool = flag("Start no more specs once one has failed.")
+    jobs: int | None = JOBS_OPTION()
+    timeout_per_point: float | None = TIMEOUT_OPTION()
+    fresh: bool = FRESH_FLAG()
+    fidelity: str | None = FIDELITY_OPTION()
+    seed: int = SEED_OPTION()
+    report: bool = REPORT_FLAG()
+    quiet: bool = QUIET_FLAG()
+    no_lock: bool = NO_LOCK_FLAG()
 
 
 def run(options: BatchOptions, terminal: Terminal) -> Document:
@@ -136,7 +112,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
         document,
         data=dict(found.summary)
         | written.data
-        | {"junit": options.junit, "reused": _count_reused(found.entries)}
+        | {"junit": options.junit, "reused": sum(one.reused for one in found.entries)}
         | ({"accepted": found.accepted} if found.accepted else {}),
         notes=(*document.notes, *named),
         complaints=(
@@ -189,7 +165,3 @@ def _complaints(found: BatchResult, options: BatchOptions, terminal: Terminal) -
     if found.exit_code is ExitCode.INTERRUPTED:
         left = sum(one.skipped for one in found.entries)
         yield f"interrupted  {left} of {len(found.entries)} specs were not run; {go_on(options.fresh)}"
-
-
-def _count_reused(entries: Sequence[Entry]) -> int:
-    return sum(one.reused for one in entries)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import (
+    REPORT_FLAG,
     ComputeOptions,
     MeasurementOptions,
-    WithReport,
     argument,
     data_record,
     given_measurement_options,
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.documents.document import Document
     from cfmkit.documents.run_outcome import Report
-    from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.families.run_control import Run
     from cfmkit.specs.spec import Spec
@@ -35,26 +34,17 @@ HELP_EXAMPLE = "cfmkit calibrate cam.yaml loop.csv --fit mechanism.rolling_frict
 class CalibrateOptions(ComputeOptions, MeasurementOptions):
     """Arguments and options."""
 
-    data: Annotated[str, argument("DATA.csv", "The measured curve, as for `measure`.")]
-    fit: Annotated[
-        str,
-        option(
-            "--fit",
-            metavar="A.B,C.D",
-            text="Numbers of the spec to fit, e.g. mechanism.rolling_friction; separate several with commas.",
-        ),
-    ]
-    bounds: Annotated[
-        list[str] | None,
-        option("--bounds", metavar="A.B=LOW:HIGH", text="Bounds of a fitted value, with units. Repeatable."),
-    ] = None
-    loss: Annotated[
-        str,
-        option(
-            "--loss", metavar="NAME", shown=True, text="Loss function of the residuals: linear, soft_l1, huber, cauchy."
-        ),
-    ] = "soft_l1"
-    report: WithReport = False
+    data: str = argument("DATA.csv", "The measured curve, as for `measure`.")
+    fit: str = option(
+        "A.B,C.D",
+        "Numbers of the spec to fit, e.g. mechanism.rolling_friction; separate several with commas.",
+        default=MISSING,
+    )
+    bounds: list[str] | None = option("A.B=LOW:HIGH", "Bounds of a fitted value, with units. Repeatable.")
+    loss: str = option(
+        "NAME", "Loss function of the residuals: linear, soft_l1, huber, cauchy.", shown=True, default="soft_l1"
+    )
+    report: bool = REPORT_FLAG()
 
 
 def run(options: CalibrateOptions, terminal: Terminal) -> Document:
@@ -70,7 +60,7 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Document:
     bounds = [("--bounds", text) for text in options.bounds or ()]
     loss = [] if options.loss == CalibrateOptions.loss else [("--loss", options.loss)]
     words = (options.data, "--fit", options.fit, *chain(*bounds, *loss, *given_measurement_options(options)))
-    verb = Verb("calibrate", "calibrated", partial(compute, options, source), data_record(options.data), words=words)
+    verb = Verb("calibrate", partial(compute, options, source), data_record(options.data), words=words)
     return execute(verb, options, terminal, options.report)
 
 
@@ -78,38 +68,9 @@ def compute(options: CalibrateOptions, source: MeasuredCurves, spec: Spec, run: 
     """Return the report on the fitted mechanism."""
     from cfmkit.experiment.parameters_to_fit import split_bounds
     from cfmkit.numerics.least_squares import LOSS_NAMES
+    from cfmkit.runs.comparisons import report_on_calibration
     from cfmkit.runs.measure_and_calibrate_api import calibrate
 
     loss = next(name for name in LOSS_NAMES if name == options.loss)
     bounds = split_bounds(options.bounds or ())
-    return report(calibrate(spec, source, options.fit, bounds=bounds, loss=loss), source)
-
-
-def report(calibration: Calibration, source: MeasuredCurves) -> Report:
-    """Return the report on a finished calibration."""
-    from dataclasses import replace
-
-    from cfmkit import api
-    from cfmkit.documents.run_outcome import Supplement, report_on
-    from cfmkit.experiment import measurement_and_calibration_outputs as add
-    from cfmkit.tables import to_csv
-
-    found, after, name = report_on(calibration.result), calibration.after, calibration.spec.name
-    files = {
-        "calibrated.yaml": lambda: api.dumps(calibration.spec).encode(),
-        "parameters.csv": lambda: to_csv(add.parameters_table(calibration)),
-        "residuals.csv": lambda: to_csv(add.residuals_table(calibration)),
-        **add.comparison_files(source),
-    }
-    return replace(
-        found,
-        metrics=dict(found.metrics) | after.metrics() | after.loss(),
-        supplement=Supplement(
-            add.comparison_data(after, source) | add.calibration_data(calibration),
-            files,
-            (*add.comparison_lines(after, source), *add.calibration_lines(calibration, source.recording)),
-            (*add.comparison_warnings(after, source), *calibration.warnings),
-            shortfall=add.shortfall(after),
-            figures=add.comparison_figures(after, name, calibration.before),
-        ),
-    )
+    return report_on_calibration(calibrate(spec, source, options.fit, bounds=bounds, loss=loss), source)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli.failures import answer_to
-from cfmkit.cli.options import Quiet, SpecOptions, argument
+from cfmkit.cli.options import QUIET_FLAG, SpecOptions, argument
 from cfmkit.documents.document import BAD_TONE, GOOD_TONE, Document, Span, format_bounds, whole_line
 from cfmkit.errors import CfmError, ExitCode, visible
 
@@ -26,11 +26,8 @@ HELP_EXAMPLE = "cfmkit check specs/"
 class CheckOptions(SpecOptions):
     """Arguments and options."""
 
-    specs: Annotated[
-        list[str],
-        argument("SPEC", "YAML files, or folders with them; - reads standard input."),
-    ]
-    quiet: Quiet = False
+    specs: list[str] = argument("SPEC", "YAML files, or folders with them; - reads standard input.")
+    quiet: bool = QUIET_FLAG()
 
 
 @dataclass(frozen=True)

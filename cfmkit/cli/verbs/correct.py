@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import (
+    REPORT_FLAG,
     ComputeOptions,
     MeasurementOptions,
-    WithReport,
     argument,
     data_record,
     given_measurement_options,
@@ -30,17 +30,13 @@ HELP_EXAMPLE = "cfmkit correct design.yaml loop.csv --tare start"
 class CorrectOptions(ComputeOptions, MeasurementOptions):
     """Arguments and options."""
 
-    data: Annotated[str, argument("DATA.csv", "The measured curve of the part, as for `measure`.")]
-    fit: Annotated[
-        str | None,
-        option(
-            "--fit",
-            metavar="A.B,C.D",
-            text="What errs in the part, as for `calibrate`; default: whichever of modulus, thickness, friction and "
-            "spring rates the recording tells apart.",
-        ),
-    ] = None
-    report: WithReport = False
+    data: str = argument("DATA.csv", "The measured curve of the part, as for `measure`.")
+    fit: str | None = option(
+        "A.B,C.D",
+        "What errs in the part, as for `calibrate`; default: whichever of modulus, thickness, friction and "
+        "spring rates the recording tells apart.",
+    )
+    report: bool = REPORT_FLAG()
 
 
 def run(options: CorrectOptions, terminal: Terminal) -> Document:
@@ -56,5 +52,5 @@ def run(options: CorrectOptions, terminal: Terminal) -> Document:
     fit = [] if options.fit is None else ["--fit", options.fit]
     words = (options.data, *fit, *chain(*given_measurement_options(options)))
     compute = partial(report_on_corrected, source, options.fit, options.tare is not None)
-    verb = Verb("correct", "corrected", compute, data_record(options.data), words=words)
+    verb = Verb("correct", compute, data_record(options.data), words=words)
     return execute(verb, options, terminal, options.report)

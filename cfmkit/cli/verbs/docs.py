@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cfmkit.cli.guide import page, pages, search, words_for_synonym
 from cfmkit.cli.options import Common, argument, option
@@ -27,11 +27,8 @@ MAX_SECTIONS = 12
 class DocsOptions(Common):
     """Arguments and options."""
 
-    name: Annotated[str | None, argument("PAGE", "Page to print, in Markdown; default: list all pages.")] = None
-    search: Annotated[
-        str | None,
-        option("--search", metavar="WORD", text="List the sections on a word or its synonyms: creep, BOM, lifetime."),
-    ] = None
+    name: str | None = argument("PAGE", "Page to print, in Markdown; default: list all pages.", default=None)
+    search: str | None = option("WORD", "List the sections on a word or its synonyms: creep, BOM, lifetime.")
 
 
 def run(options: DocsOptions, terminal: Terminal) -> Document:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cfmkit.cli.options import Common, Jobs, argument, flag, option
+from cfmkit.cli.options import JOBS_OPTION, Common, argument, flag, option
 from cfmkit.documents.document import BAD_TONE, GOOD_TONE, Document, Paragraph, field, next_command, record_table
 from cfmkit.errors import UsageError, visible
 
@@ -29,26 +29,18 @@ DURATION_TEXT = (
 class ExamplesOptions(Common):
     """Arguments and options."""
 
-    name: Annotated[str | None, argument("NAME", "Example to copy, with its data; default: list all.")] = None
-    out: Annotated[str | None, option("-o", "--out", metavar="DIR", text="Folder to copy to; default: this one.")] = (
-        None
+    name: str | None = argument("NAME", "Example to copy, with its data; default: list all.", default=None)
+    out: str | None = option("DIR", "Folder to copy to; default: this one.", "-o", "--out")
+    run: str | None = option(
+        "NAME|quick|all",
+        "Run one example, the quick ones or all of them to check this installation; no files are kept.",
     )
-    run: Annotated[
-        str | None,
-        option(
-            "--run",
-            metavar="NAME|quick|all",
-            text="Run one example, the quick ones or all of them to check this installation; no files are kept.",
-        ),
-    ] = None
-    schema: Annotated[
-        bool | None,
-        flag(
-            "--schema/--no-schema",
-            text="When copying, also write the JSON schema and the line through which editors find it; default: yes.",
-        ),
-    ] = None
-    jobs: Jobs = None
+    schema: bool | None = flag(
+        "When copying, also write the JSON schema and the line through which editors find it; default: yes.",
+        "--schema/--no-schema",
+        default=None,
+    )
+    jobs: int | None = JOBS_OPTION()
 
 
 def run(options: ExamplesOptions, terminal: Terminal) -> Document:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cfmkit.cli.failures import Stopped, report_failure
 from cfmkit.cli.options import SpecOptions, argument, flag, option
@@ -23,11 +23,9 @@ HELP_EXAMPLE = "cfmkit explore cam.yaml"
 class ExploreOptions(SpecOptions):
     """Arguments and options."""
 
-    spec: Annotated[str, argument("SPEC", "YAML file of one mechanism.")]
-    port: Annotated[
-        int, option("--port", metavar="N", low=0, text="Port of this computer to listen on; default: a free one.")
-    ] = 0
-    no_browser: Annotated[bool, flag("--no-browser", text="Open no browser; print the address only.")] = False
+    spec: str = argument("SPEC", "YAML file of one mechanism.")
+    port: int = option("N", "Port of this computer to listen on; default: a free one.", low=0, default=0)
+    no_browser: bool = flag("Open no browser; print the address only.")
 
 
 def run(options: ExploreOptions, terminal: Terminal) -> Document:

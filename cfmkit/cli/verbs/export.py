@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cfmkit.cli.options import OneSpec, Quiet, option
+from cfmkit.cli.options import QUIET_FLAG, OneSpec, option
 from cfmkit.documents.document import Document, Note, Written
 from cfmkit.errors import ExitCode, sentence_of
 
@@ -20,33 +20,20 @@ HELP_EXAMPLE = "cfmkit export cam.yaml --kerf 0.2mm"
 class ExportOptions(OneSpec):
     """Arguments and options."""
 
-    kerf: Annotated[
-        str | None,
-        option("--kerf", metavar="LENGTH", text="Width of the cut; adds a DXF that is offset by half of it."),
-    ] = None
-    tolerance: Annotated[
-        str | None,
-        option(
-            "--tolerance",
-            metavar="LENGTH",
-            text="Largest deviation from the exact curves; default: 0.005 mm; beams: a 5000th of the thinnest.",
-        ),
-    ] = None
-    format: Annotated[
-        str | None,
-        option(
-            "--format",
-            metavar="LIST",
-            text="Any of dxf,svg,csv,stl,3mf,step,inp,png,pdf (the last two: a dimensioned drawing); "
-            "default: dxf,svg,csv.",
-        ),
-    ] = None
-    quiet: Quiet = False
+    kerf: str | None = option("LENGTH", "Width of the cut; adds a DXF that is offset by half of it.")
+    tolerance: str | None = option(
+        "LENGTH", "Largest deviation from the exact curves; default: 0.005 mm; beams: a 5000th of the thinnest."
+    )
+    format: str | None = option(
+        "LIST",
+        "Any of dxf,svg,csv,stl,3mf,step,inp,png,pdf (the last two: a dimensioned drawing); default: dxf,svg,csv.",
+    )
+    quiet: bool = QUIET_FLAG()
 
 
 def run(options: ExportOptions, terminal: Terminal) -> Document:
     """Write the parts of a spec as files to cut or print, finite-element decks, or a dimensioned drawing."""
-    from cfmkit.cli.output_folder import folder_of
+    from cfmkit.cli.options import folder_of
     from cfmkit.documents.run_document import warning_of
     from cfmkit.runs.exported_files import export_files
     from cfmkit.runs.run import provenance

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, flag, option
@@ -26,19 +26,13 @@ HELP_EXAMPLE = "cfmkit new cam -o mine.yaml"
 class NewOptions(Common):
     """Arguments and options."""
 
-    family: Annotated[
-        str, argument("FAMILY", "A family of mechanisms; `cfmkit show` lists them.", shell_completion.families)
-    ]
-    out: Annotated[
-        str | None,
-        option("-o", "--out", metavar="FILE", text="File to write, - prints it; default: FAMILY.yaml."),
-    ] = None
-    schema: Annotated[
-        bool,
-        flag(
-            "--schema/--no-schema", text="Also write the JSON schema, and the line through which editors will find it."
-        ),
-    ] = True
+    family: str = argument("FAMILY", "A family of mechanisms; `cfmkit show` lists them.", shell_completion.families)
+    out: str | None = option("FILE", "File to write, - prints it; default: FAMILY.yaml.", "-o", "--out")
+    schema: bool = flag(
+        "Also write the JSON schema, and the line through which editors will find it.",
+        "--schema/--no-schema",
+        default=True,
+    )
 
 
 def run(options: NewOptions, terminal: Terminal) -> Document:
@@ -91,15 +85,7 @@ def template(name: str) -> str:
 
 
 def complete_template(text: str, known: Iterable[Key]) -> str:
-    """Return a template in which every optional key of a block stands, those that it left out as comments at its end.
-
-    Parameters
-    ----------
-    text : str
-        The template.
-    known : iterable of Key
-        Of the specification.
-    """
+    """Return a template with every optional key of its blocks, those that it left out as comments at their ends."""
     for key in known:
         block, _, name = key.path.partition(".")
         is_missing = block.isidentifier() and name.isidentifier() and f"{name}:" not in text

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cfmkit.cli.options import Common, argument, flag
+from cfmkit.cli.options import QUIET_FLAG, Common, argument, flag
 from cfmkit.documents.document import (
     BAD_TONE,
     BLANK_LINE,
@@ -40,11 +40,11 @@ HELP_EXAMPLE = "cfmkit papers lan-2010"
 class PapersOptions(Common):
     """Arguments and options."""
 
-    name: Annotated[
-        str | None, argument("PAPER|FAMILY", "Only this paper, or those of this family: lan-2010, cam; default: all.")
-    ] = None
-    everything: Annotated[bool, flag("--all", text="Also compute the numbers that take a minute.")] = False
-    quiet: Annotated[bool, flag("-q", "--quiet", text="Print only problems.")] = False
+    name: str | None = argument(
+        "PAPER|FAMILY", "Only this paper, or those of this family: lan-2010, cam; default: all.", default=None
+    )
+    everything: bool = flag("Also compute the numbers that take a minute.", "--all")
+    quiet: bool = QUIET_FLAG()
 
 
 def run(options: PapersOptions, terminal: Terminal) -> Document:

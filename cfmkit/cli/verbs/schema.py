@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument
@@ -20,9 +20,7 @@ HELP_EXAMPLE = "cfmkit schema cam > cam.schema.json"
 class SchemaOptions(Common):
     """Arguments and options."""
 
-    family: Annotated[str | None, argument("FAMILY", "One family only; default: all.", shell_completion.families)] = (
-        None
-    )
+    family: str | None = argument("FAMILY", "One family only; default: all.", shell_completion.families, default=None)
 
 
 def run(options: SchemaOptions, terminal: Terminal) -> Document:

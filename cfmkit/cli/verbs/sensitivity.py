@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import StudyOptions, flag, option
@@ -32,46 +32,17 @@ HELP_EXAMPLE = (
 class SensitivityOptions(StudyOptions):
     """Arguments and options."""
 
-    method: Annotated[
-        MethodWord | None,
-        option(
-            "--method",
-            metavar="NAME",
-            text=f"{describe_methods()}; default: the spec's, else oat.",
-        ),
-    ] = None
-    samples: Annotated[
-        int | None,
-        option(
-            "--samples",
-            metavar="N",
-            low=2,
-            text=f"{describe_samples()}.",
-        ),
-    ] = None
-    seed: Annotated[
-        int | None,
-        option("--seed", metavar="N", low=0, text="Seed of all random numbers; default: the spec's, else 0."),
-    ] = None  # type: ignore[assignment]
-    vary: Annotated[
-        list[str] | None,
-        option(
-            "--vary",
-            metavar="A.B=SPREAD",
-            text="A parameter: low:high, normal:DEVIATION or uniform:HALF-WIDTH, e.g. "
-            "mechanism.width=uniform:2%. Repeatable; replaces the spec's parameters.",
-            autocompletion=shell_completion.changes,
-        ),
-    ] = None
-    metrics: Annotated[
-        str | None,
-        option(
-            "--metrics",
-            metavar="A,B",
-            text="Metrics to study; default: those of the requirements, over their windows.",
-        ),
-    ] = None
-    design: Annotated[bool, flag("--design", text="Redesign the mechanism at each sample.")] = False
+    method: MethodWord | None = option("NAME", f"{describe_methods()}; default: the spec's, else oat.")
+    samples: int | None = option("N", f"{describe_samples()}.", low=2)
+    seed: int | None = option("N", "Seed of all random numbers; default: the spec's, else 0.", low=0)  # type: ignore[assignment]
+    vary: list[str] | None = option(
+        "A.B=SPREAD",
+        "A parameter: low:high, normal:DEVIATION or uniform:HALF-WIDTH, e.g. "
+        "mechanism.width=uniform:2%. Repeatable; replaces the spec's parameters.",
+        autocompletion=shell_completion.changes,
+    )
+    metrics: str | None = option("A,B", "Metrics to study; default: those of the requirements, over their windows.")
+    design: bool = flag("Redesign the mechanism at each sample.")
 
 
 def run(options: SensitivityOptions, terminal: Terminal) -> Document:
@@ -82,13 +53,13 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
     """
     from cfmkit.cli.run_study_in_folder import open_study
     from cfmkit.documents.sensitivity_document import document_of
-    from cfmkit.runs.run import placing, read
+    from cfmkit.runs.run import RunTask, placing, read
     from cfmkit.studies.sensitivity.output import outputs
     from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
     from cfmkit.studies.sensitivity.setup import prepare
 
     start = time.perf_counter()
-    document, spec = read(options)
+    document, spec = read(RunTask(options.spec, "", options.changes, options.fidelity))
     with placing(document, [f"sensitivity.{key}" for key in changes_of(options)]):
         setup = prepare(changed_by(options, spec), options.seed, options.max_points)
     with open_study("sensitivity", options, terminal, start) as study:

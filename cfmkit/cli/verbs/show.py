@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cfmkit.cli import shell_completion
+from cfmkit.cli import shell_completion, verbs
 from cfmkit.cli.options import Common, argument, option
 from cfmkit.documents.document import (
     BLANK_LINE,
@@ -29,23 +29,16 @@ HELP_EXAMPLE = "cfmkit show cam --figure"
 class ShowOptions(Common):
     """Arguments and options."""
 
-    topic: Annotated[
-        str | None,
-        argument(
-            "WORD",
-            "What to explain: a family, units, metrics, materials, stock, references, anything by its name: "
-            "brace_length, pla, MPa, or a word by its meaning: creep, BOM; default: list all.",
-            shell_completion.topics,
-        ),
-    ] = None
-    figure: Annotated[
-        str | None,
-        option(
-            "--figure",
-            metavar="[FILE]",
-            text="Write a drawing of a family with its dimensions named: .png, .svg or .pdf; default: FAMILY.png.",
-        ),
-    ] = None
+    topic: str | None = argument(
+        "WORD",
+        "What to explain: a family, units, metrics, materials, stock, references, anything by its name: "
+        "brace_length, pla, MPa, or a word by its meaning: creep, BOM; default: list all.",
+        shell_completion.topics,
+        default=None,
+    )
+    figure: str | None = option(
+        "[FILE]", "Write a drawing of a family with its dimensions named: .png, .svg or .pdf; default: FAMILY.png."
+    )
 
 
 def run(options: ShowOptions, terminal: Terminal) -> Document:
@@ -58,8 +51,9 @@ def run(options: ShowOptions, terminal: Terminal) -> Document:
     try:
         answer = explain(options.topic)
     except UsageError:
-        _refer_to_help(options.topic)
         topic = options.topic or ""
+        if topic in verbs.names():
+            raise UsageError(f"{topic!r} is a command: `cfmkit {topic} --help` explains it") from None
         if topic.lower() in names() or (by_meaning := explain_by_meaning(topic)) is None:
             raise
         answer = by_meaning
@@ -68,17 +62,6 @@ def run(options: ShowOptions, terminal: Terminal) -> Document:
     return with_skipped_families(
         list_skipped_families(options.topic), replace(answer, data={"show": options.topic, **answer.data})
     )
-
-
-def _refer_to_help(name: str | None) -> None:
-    """Refuse the name of a command with the way to what is known of it.
-
-    Raises UsageError if it is one.
-    """
-    from cfmkit.cli.verbs import names
-
-    if name in names():
-        raise UsageError(f"{name!r} is a command: `cfmkit {name} --help` explains it") from None
 
 
 def _copy_drawing(name: str | None, given: str) -> Document:

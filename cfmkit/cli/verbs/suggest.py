@@ -6,18 +6,18 @@ import re
 import shlex
 import time
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import (
+    FRESH_FLAG,
+    JOBS_OPTION,
+    NO_LOCK_FLAG,
+    NO_PLOTS_FLAG,
+    OUT_OPTION,
+    QUIET_FLAG,
+    REPORT_FLAG,
+    SEED_OPTION,
     Common,
-    Fresh,
-    Jobs,
-    NoLock,
-    NoPlots,
-    Out,
-    Quiet,
-    Seed,
-    WithReport,
     argument,
     option,
     seconds,
@@ -43,76 +43,46 @@ WRITING_SHARE = 0.1
 """Share of the time budget that is kept for files."""
 
 
-def _key(name: str, metavar: str, text: str) -> Any:
-    return option(f"--{name}", metavar=metavar, text=text)
-
-
 @dataclass(frozen=True, kw_only=True)
 class RequestOptions(Common):
     """Options that are keys of a request."""
 
-    force: Annotated[str | None, _key("force", "FORCE", "Constant force, '20 N', or a band, '19 N, 21 N'.")] = None
-    torque: Annotated[str | None, _key("torque", "TORQUE", "Constant torque, '100 N*mm', or a band.")] = None
-    travel: Annotated[str | None, _key("travel", "LENGTH", "Travel over which the force is to be constant.")] = None
-    angle: Annotated[str | None, _key("angle", "ANGLE", "Angle over which the torque is to be constant.")] = None
-    ripple: Annotated[str | None, _key("ripple", "SHARE", "Largest (max - min)/max over the travel; default: 5 %.")] = (
-        None
+    force: str | None = option("FORCE", "Constant force, '20 N', or a band, '19 N, 21 N'.")
+    torque: str | None = option("TORQUE", "Constant torque, '100 N*mm', or a band.")
+    travel: str | None = option("LENGTH", "Travel over which the force is to be constant.")
+    angle: str | None = option("ANGLE", "Angle over which the torque is to be constant.")
+    ripple: str | None = option("SHARE", "Largest (max - min)/max over the travel; default: 5 %.")
+    envelope: str | None = option("AxBxCmm", "Space available: across the travel, along it, and the depth (optional).")
+    material: list[str] | None = option("A,B", "Permitted materials; `cfmkit show materials` lists them. Repeatable.")
+    process: str | None = option("NAME", "Manufacturing process: fdm, sls, laser, wire-edm or mill.")
+    adjustable: str | None = option("A,B", "Lowest and highest adjustable force: 15N,25N.")
+    hysteresis: str | None = option("SHARE", "Largest energy loss of a cycle, as a share of its work.")
+    springs: str | None = option("KIND", "Helical springs it may have: catalogue or custom; default: either.")
+    safety: str | None = option("FACTOR", "Least safety factor of stresses, against yield; default: 1.5.")
+    cycles: str | None = option("N", "Required life in cycles; judged for materials with fatigue data.")
+    made_well: str | None = option(
+        "SHARE", "Required share of manufactured parts that meet the requirements.", "--yield"
     )
-    envelope: Annotated[
-        str | None,
-        _key("envelope", "AxBxCmm", "Space available: across the travel, along it, and the depth (optional)."),
-    ] = None
-    material: Annotated[
-        list[str] | None,
-        _key("material", "A,B", "Permitted materials; `cfmkit show materials` lists them. Repeatable."),
-    ] = None
-    process: Annotated[
-        str | None, _key("process", "NAME", "Manufacturing process: fdm, sls, laser, wire-edm or mill.")
-    ] = None
-    adjustable: Annotated[str | None, _key("adjustable", "A,B", "Lowest and highest adjustable force: 15N,25N.")] = None
-    hysteresis: Annotated[
-        str | None, _key("hysteresis", "SHARE", "Largest energy loss of a cycle, as a share of its work.")
-    ] = None
-    springs: Annotated[
-        str | None, _key("springs", "KIND", "Helical springs it may have: catalogue or custom; default: either.")
-    ] = None
-    safety: Annotated[
-        str | None, _key("safety", "FACTOR", "Least safety factor of stresses, against yield; default: 1.5.")
-    ] = None
-    cycles: Annotated[
-        str | None, _key("cycles", "N", "Required life in cycles; judged for materials with fatigue data.")
-    ] = None
-    made_well: Annotated[
-        str | None, _key("yield", "SHARE", "Required share of manufactured parts that meet the requirements.")
-    ] = None
-    overload: Annotated[
-        str | None, _key("overload", "FORCE", "Force to bear at the end of the travel, by a rigid end stop: '60 N'.")
-    ] = None
-    prefer: Annotated[
-        list[str] | None,
-        _key("prefer", "A,B", "Ranking, most important first: size,ripple,parts,stress,depth. Repeatable."),
-    ] = None
+    overload: str | None = option("FORCE", "Force to bear at the end of the travel, by a rigid end stop: '60 N'.")
+    prefer: list[str] | None = option(
+        "A,B", "Ranking, most important first: size,ripple,parts,stress,depth. Repeatable."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class SuggestOptions(RequestOptions):
     """Arguments and options."""
 
-    request: Annotated[
-        str | None,
-        argument("FILE", "YAML file with a block 'suggest'; - reads standard input."),
-    ] = None
-    time_budget: Annotated[
-        str, option("--time-budget", metavar="TIME", shown=True, text="Time for the whole command: 60s, 10min.")
-    ] = DEFAULT_BUDGET
-    out: Out = None
-    seed: Seed = 0
-    jobs: Jobs = None
-    fresh: Fresh = False
-    no_plots: NoPlots = False
-    report: WithReport = False
-    quiet: Quiet = False
-    no_lock: NoLock = False
+    request: str | None = argument("FILE", "YAML file with a block 'suggest'; - reads standard input.", default=None)
+    time_budget: str = option("TIME", "Time for the whole command: 60s, 10min.", shown=True, default=DEFAULT_BUDGET)
+    out: str | None = OUT_OPTION()
+    seed: int = SEED_OPTION()
+    jobs: int | None = JOBS_OPTION()
+    fresh: bool = FRESH_FLAG()
+    no_plots: bool = NO_PLOTS_FLAG()
+    report: bool = REPORT_FLAG()
+    quiet: bool = QUIET_FLAG()
+    no_lock: bool = NO_LOCK_FLAG()
 
 
 REQUEST_KEYS = tuple(one.name for one in fields(RequestOptions) if one not in fields(Common))
@@ -131,15 +101,15 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     meet all requirements are listed, then those of which not everything could be judged.
     """
     from cfmkit import families
-    from cfmkit.cli.output_folder import folder_of
+    from cfmkit.cli.options import folder_of
     from cfmkit.cli.run_study_in_folder import open_journal
     from cfmkit.designing.run_many_starts import Clock
     from cfmkit.documents import suggestion_document
     from cfmkit.documents.document import Written, with_skipped_families
     from cfmkit.families.run_control import Run
     from cfmkit.runs import suggestion_files, suggestion_record
-    from cfmkit.runs.read_suggest_file import read_request
     from cfmkit.runs.run import long_run
+    from cfmkit.runs.suggest_api import read_request
     from cfmkit.store import RunFolder
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import cores

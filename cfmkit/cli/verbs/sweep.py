@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import StudyOptions, flag, option
@@ -30,30 +30,19 @@ HELP_EXAMPLE = "cfmkit sweep cam.yaml --vary mechanism.roller_radius=8mm:16mm:5"
 class SweepOptions(StudyOptions):
     """Arguments and options."""
 
-    vary: Annotated[
-        list[str] | None,
-        option(
-            "--vary",
-            metavar="A.B=VALUES",
-            text="Vary a value: start:stop:n or \\[a, b], with units, e.g. mechanism.roller_radius='8 mm:16 mm:5'. "
-            "Repeatable; replaces what the spec's block sweep varies.",
-            autocompletion=shell_completion.changes,
-        ),
-    ] = None
-    zip: Annotated[bool, flag("--zip", text="Vary values in step instead of in all combinations.")] = False
-    sample: Annotated[
-        str | None,
-        option(
-            "--sample",
-            metavar="KIND:N",
-            text=f"Draw N points from ranges start:stop. KIND: {', '.join(SAMPLE_KINDS)} ({list_phrases()}).",
-        ),
-    ] = None
-    design: Annotated[bool, flag("--design", text="Redesign the mechanism at each point.")] = False
-    curves: Annotated[bool, flag("--curves", text="Write the curve of every point to curves.csv.")] = False
-    metrics: Annotated[str | None, option("--metrics", metavar="A,B", text="Columns of results.csv; default: all.")] = (
-        None
+    vary: list[str] | None = option(
+        "A.B=VALUES",
+        "Vary a value: start:stop:n or \\[a, b], with units, e.g. mechanism.roller_radius='8 mm:16 mm:5'. "
+        "Repeatable; replaces what the spec's block sweep varies.",
+        autocompletion=shell_completion.changes,
     )
+    zip: bool = flag("Vary values in step instead of in all combinations.")
+    sample: str | None = option(
+        "KIND:N", f"Draw N points from ranges start:stop. KIND: {', '.join(SAMPLE_KINDS)} ({list_phrases()})."
+    )
+    design: bool = flag("Redesign the mechanism at each point.")
+    curves: bool = flag("Write the curve of every point to curves.csv.")
+    metrics: str | None = option("A,B", "Columns of results.csv; default: all.")
 
 
 def run(options: SweepOptions, terminal: Terminal) -> Document:
@@ -63,11 +52,11 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
     """
     from cfmkit.cli.run_study_in_folder import open_study
     from cfmkit.documents import sweep_document
-    from cfmkit.runs.run import placing, read
+    from cfmkit.runs.run import RunTask, placing, read
     from cfmkit.studies.sweep_request_and_files import outputs, prepare, summary_of, writes_curves
 
     start = time.perf_counter()
-    document, spec = read(options)
+    document, spec = read(RunTask(options.spec, "", options.changes, options.fidelity))
     asked = request(options)
     with placing(document):
         work = prepare(spec, asked)

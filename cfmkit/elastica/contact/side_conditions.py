@@ -1,11 +1,15 @@
-"""Conditions on a piece of a path of the sides of beams, each a number that must not become negative.
+"""Conditions under which the sides of beams touch as they do: numbers along a path, none of which may become negative.
 
-touch: the least gap of a side to an obstacle, away from where it touches. tangent: a pad at the end of a beam touches
-as long as the beam runs away from the obstacle; then the contact moves into the beam. end: the way of a contact to the
-end of its beam. spreads: the curvature of the gap at a contact; then it parts into two, between which the side lies on
-the obstacle. closes: the way between two of these. wraps: the curvature of the gap at a clamped end that lies on
-the obstacle; then the side lies down from there. pulls: the tension of what lies on a round obstacle, which presses it
-on; a side that is pushed along it leaves it.
+Where one passes zero, a piece of the path ends and the contact changes (`side_changes`):
+
+- touch: least gap of a side to an obstacle, away from where it touches;
+- tangent: a pad at the end of a beam touches as long as the beam runs away from the obstacle; then the contact moves
+  into the beam;
+- end: distance of a contact from the end of its beam;
+- spreads: curvature of the gap at a contact; then it parts into two, between which the side lies on the obstacle;
+- closes: distance of two such contacts; pinch: of two contacts with different obstacles;
+- wraps: curvature of the gap at a clamped end that lies on the obstacle; then the side lies down from there;
+- pulls: tension of what lies on a round obstacle, which presses it on; a side that is pushed along it leaves it.
 """
 
 from __future__ import annotations
@@ -60,7 +64,7 @@ def step_inwards(item: Any, place: Any, angle: Any, last: bool) -> Any:
 
 
 class SideCondition(NamedTuple):
-    """A condition, and what it is of."""
+    """A condition of one kind on one side or contact; "lies" is the state behind "spreads" and "wraps"."""
 
     kind: Literal["touch", "tangent", "end", "closes", "spreads", "pinch", "wraps", "pulls", "lies"]
     number: int  # touch: in `Network.contacts`; else that of the contact in the arrays, of two the first

@@ -27,6 +27,7 @@ from cfmkit.elastica.mechanics.contact_arrays import (
 from cfmkit.elastica.mechanics.discretise import BeamElements
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
+    ComparedStates,
     LinearEquations,
     LineTables,
     MarchCode,
@@ -62,6 +63,10 @@ ADDRESS_FIELDS = (
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
 NO_NUMBERS = read_only([])
+MAX_DEGREE = 40
+"""As in march.h: arrays of one element are on the stack."""
+N_COMPARED = 7
+"""As in compare.c."""
 OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESS_FIELDS)
 WHOLE_NUMBERS = frozenset(
     ("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at", "contact_at", "side_at", "moved_at")
@@ -241,6 +246,14 @@ class CompiledEquations(NumpyEquations):
             unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
         return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
 
+    def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
+        """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""
+        mesh, bundle = self.mesh, self.mesh.fits.bundle
+        if mesh.contacts or bundle.others or self.follows or degree > MAX_DEGREE or mesh.elements.line.any():
+            return None
+        laws = angle_laws(bundle.coefficients, mesh)
+        return compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+
     def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode."""
         shape = np.array(vector, float)
@@ -275,6 +288,32 @@ class CompiledEquations(NumpyEquations):
         return replace(march, states=tuple(states))
 
 
+def angle_laws(coefficients: Any, mesh: Discretisation) -> FloatArray:
+    """Return where each element begins on the shape of its beam, its width, and its coefficients, (..., e, n)."""
+    row, cuts = mesh.numbering.row, mesh.elements.cuts
+    laws = np.empty((*coefficients.shape[:-2], len(row), 2 + coefficients.shape[-1]))
+    laws[..., 0], laws[..., 1], laws[..., 2:] = cuts[:, 0], cuts[:, 1] - cuts[:, 0], coefficients[..., row, :]
+    return laws
+
+
+def compare_rows(
+    rows: Any,  # (d, fields) or (fields,) Models of plain beams
+    mesh: Discretisation,  # of one of them
+    laws: FloatArray,  # as `angle_laws` returns them
+    z: FloatArray,  # (d, p, size) or (p, size)
+    drive: FloatArray,  # (p,)
+    degree: int,  # with which they are compared
+    tolerance: float,  # of the next correction
+) -> ComparedStates:
+    """Return how states of designs differ from equilibria of a higher degree."""
+    ends, outcomes = np.empty((*z.shape[:-1], mesh.numbering.n_ends)), np.empty((*z.shape[:-1], N_COMPARED))
+    drives = np.ascontiguousarray(drive, float)
+    if not _module().compare(rows, shape_row(degree)[0], laws, z, drives, ends, outcomes, tolerance):
+        raise MemoryError
+    code, *numbers = np.moveaxis(outcomes, -1, 0)
+    return ComparedStates._make((code == 0, *numbers, ends))
+
+
 def plan_row_of(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
     """Return a `Plan` of march.h."""
     return np.array(
@@ -307,7 +346,7 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     arrays |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
     arrays |= contact_arrays(mesh) if mesh.contacts else {}
     if mesh.moving is not None:
-        sides, parts = side_arrays(mesh, len(arrays["edge"]), slope_products(mesh.degree))
+        sides, parts = side_arrays(mesh, len(arrays["edge"]))
         arrays |= sides | {"edge": np.concatenate([arrays["edge"], parts])}
         arrays |= {name: np.array(arrays[name]) for name in IN_PLACE if arrays[name] is not None}  # which C changes
     return {
@@ -329,7 +368,17 @@ def _shape_tables(degree: int) -> dict[str, Any]:
     rule, (i, j) = basis(degree), np.tril_indices(degree + 1)
     tables = {"values": rule.values, "slopes": rule.slopes, "values_by_shape": rule.values.T}
     tables |= {"slopes_by_shape": rule.slopes.T, "products": rule.values[:, i] * rule.values[:, j]}
+    tables |= {"rule": np.stack([rule.places, rule.weights]), "unit_bend": rule.weights @ slope_products(degree)}
     return {name: np.ascontiguousarray(table) for name, table in tables.items()}
+
+
+@lru_cache(maxsize=64)
+def shape_row(degree: int) -> tuple[Any, dict[str, Any]]:
+    """Return a `Model` with the tables of shape functions alone, and these."""
+    row, tables = np.zeros(len(COUNT_FIELDS) + len(ADDRESS_FIELDS), np.int64), _shape_tables(degree)
+    row[COUNT_FIELDS.index("points")], row[COUNT_FIELDS.index("degree")] = len(basis(degree).places), degree
+    _module().place(row, len(COUNT_FIELDS), tuple(tables.get(name) for name in ADDRESS_FIELDS))
+    return row, tables
 
 
 @lru_cache(maxsize=64)

@@ -11,7 +11,6 @@ import numpy as np
 
 from cfmkit.elastica.contact.edges import find_circle, find_leading, half_thickness_of
 from cfmkit.elastica.mechanics.contact_arrays import edge_rows, side_contacts
-from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, NodeOnBeam, NodeOnObstacle, Stop
 from cfmkit.elastica.model.plain_beams_at_once import coefficients_of, has_polynomial_angle
 
@@ -39,11 +38,11 @@ def are_sides_compiled(mesh: Discretisation) -> bool:
     )
 
 
-def side_arrays(mesh: Discretisation, first_part: int, products: Any) -> tuple[dict[str, Any], Any]:
+def side_arrays(mesh: Discretisation, first_part: int) -> tuple[dict[str, Any], Any]:
     """Return the arrays of contacts of sides in a `Model`, and the parts of their outlines, which begin at a row."""
     moving, sides = mesh.moving, side_contacts(mesh)
     assert moving is not None
-    rule, length, numbers = basis(mesh.degree), mesh.scales.length, np.asarray(moving.elements).tolist()
+    length, numbers = mesh.scales.length, np.asarray(moving.elements).tolist()
     rows, values, parts = [], [], [np.empty((0, 6))]
     for contact in sides:
         item: Any = contact.item
@@ -60,8 +59,7 @@ def side_arrays(mesh: Discretisation, first_part: int, products: Any) -> tuple[d
             first_part += len(parts[-1])
     arrays = {
         "side_at": np.array(rows), "side": np.array(values), "moved_at": numbers, "moved_fixed": moving.fixed,
-        "moved_shares": moving.shares, "moved_law": measure_laws(mesh), "rule": np.stack([rule.places, rule.weights]),
-        "unit_bend": rule.weights @ products,
+        "moved_shares": moving.shares, "moved_law": measure_laws(mesh),
     }  # fmt: skip
     return arrays, np.concatenate(parts)
 

@@ -49,8 +49,7 @@ class NetworkDesigns:
     base: Any  # (d, size), None if no design changes it
     each: tuple[Discretisation, ...]  # where they were set up one by one; else empty
     networks: tuple[tuple[Network, Drive], ...]
-    # what `tables` are made of, by degree, where they were set up together
-    tables_at: Callable[[Discretisation], dict[str, Any]] | None = None
+    coefficients: Any = None  # (d, b, n) of the angles of the beams, where they were set up together
 
 
 def set_up(
@@ -122,14 +121,9 @@ def _plain(
     rotation, length = fit_to_ends(*drawn, reach)
     turned = coefficients + rotation[..., None] * (np.arange(coefficients.shape[-1]) == 0)
     rigidities = rigidities_of(every).reshape(3, *shape)
-
-    def tables_at(mesh: Discretisation) -> dict[str, Any]:
-        tables = plain_tables(turned, length * scales.length, rigidities, scales, mesh.degree, n.row, e.cuts)
-        if np.any(template.floored):
-            tables["axial"] = tables["axial"] + template.floor[:, None]
-        return tables
-
-    tables = tables_at(template)
+    tables = plain_tables(turned, length * scales.length, rigidities, scales, template.degree, n.row, e.cuts)
+    if np.any(template.floored):
+        tables["axial"] = tables["axial"] + template.floor[:, None]
     if inside.size:  # bodies between the elements of a beam
         steps = [(tables["weight"] * turn(tables["angle"])).sum(axis=-1) for turn in (np.cos, np.sin)]
         ahead = np.stack(steps, axis=-1)
@@ -139,14 +133,7 @@ def _plain(
     if frames is not None:
         frames[:, inside] = template.attachments.frame[inside]
     places = {"origin": place, "arm": arm} | ({} if frames is None else {"frame": frames})
-    return NetworkDesigns(template, len(pairs), tables, places, base, (), tuple(pairs), tables_at)
-
-
-def raise_designs(designs: NetworkDesigns, fine: Discretisation) -> NetworkDesigns:
-    """Return designs that were set up together with the degree of another template: `raise_degree` of their own."""
-    assert designs.tables_at is not None
-    assert designs.base is None
-    return replace(designs, template=fine, tables=designs.tables_at(fine))
+    return NetworkDesigns(template, len(pairs), tables, places, base, (), tuple(pairs), turned)
 
 
 def _supports(

@@ -92,6 +92,19 @@ class SolvedStates(NamedTuple):
     effort: FloatArray  # (k,)
 
 
+class ComparedStates(NamedTuple):
+    """p states beside the equilibria of a higher degree near them, or beside themselves where there is none."""
+
+    converged: Any  # (p,)
+    unstable: Any  # (p,)
+    moved: FloatArray  # (p,) largest change of a motion
+    force: FloatArray  # (p,) largest change of a force on an end of an element
+    effort: FloatArray  # (p,) of a drive by a motion, dimensionless
+    largest: FloatArray  # (p,) force or moment in a beam
+    motion: FloatArray  # (p,) largest change of the motion of an end of an element
+    ends: FloatArray  # (p, ends) unknowns that move these, which come first
+
+
 @dataclass(frozen=True)
 class MarchPlan:
     """Start of a march and its step."""
@@ -273,6 +286,10 @@ class NumpyEquations:
                 unstable = self.count_unstable(at)
                 return MarchState(free, place, rate, unstable, self._effort(free, place))
             last = largest
+        return None
+
+    def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
+        """Return how states (p, size) differ from equilibria of a higher degree; None without compiled code for it."""
         return None
 
     def solve_each(

@@ -160,6 +160,8 @@ int solve(const Model *m, double *x, double *way, const double *border, double l
 int solve_many(const Model *models, Int designs, double *x, double *way, Int count, double tolerance, int quick, double *rate,
                double *found);
 double soften(const Model *m, const double *x, double way, Int rounds, double *vector);
+int compare(const Model *models, Int designs, const Model *shapes, const double *laws, Int powers, const double *z,
+            const double *drive, Int count, double tolerance, double *ends, double *found);
 
 /* Of a march: numbers of 8 bytes, too. */
 typedef struct {

@@ -125,6 +125,23 @@ static PyObject *py_soften(PyObject *self, PyObject *arguments) {
     return PyFloat_FromDouble(flexibility);
 }
 
+/* compare(models, shapes, laws, z, drives, ends, found, tolerance) -> whether there was memory */
+static PyObject *py_compare(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    double tolerance;
+    int good;
+    (void)self;
+    if (!number(arguments, 7, &tolerance) || !take(arguments, 0, 7, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    const Model *m = at(&b, 0);
+    const Int wide = (Int)sizeof(double), designs = b.view[0].len / (Int)sizeof(Model), count = b.view[4].len / wide;
+    const Int powers = b.view[2].len / (wide * designs * m->elements) - 2;
+    good = compare(m, designs, at(&b, 1), at(&b, 2), powers, at(&b, 3), at(&b, 4), count, tolerance, at(&b, 5), at(&b, 6));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromLong(good);
+}
+
 /* place(row, first, arrays): put the addresses of arrays, 0 for None, into a row of int64 from a place on. */
 static PyObject *py_place(PyObject *self, PyObject *arguments) {
     Buffers row, one;
@@ -244,7 +261,7 @@ static PyMethodDef methods[] = {
     {"evaluate", py_evaluate, METH_VARARGS, NULL}, {"linearise", py_linearise, METH_VARARGS, NULL},
     {"resolve", py_resolve, METH_VARARGS, NULL},   {"solve", py_solve, METH_VARARGS, NULL},
     {"solve_many", py_solve_many, METH_VARARGS, NULL}, {"soften", py_soften, METH_VARARGS, NULL},
-    {"place", py_place, METH_VARARGS, NULL},
+    {"place", py_place, METH_VARARGS, NULL},       {"compare", py_compare, METH_VARARGS, NULL},
     {"contact_gaps", py_contact_gaps, METH_VARARGS, NULL}, {"side_gaps", py_side_gaps, METH_VARARGS, NULL},
     {"side_places", py_side_places, METH_VARARGS, NULL}, {"side_curvatures", py_side_curvatures, METH_VARARGS, NULL},
     {"march", py_march, METH_VARARGS, NULL},       {"march_many", py_march_many, METH_VARARGS, NULL},

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
+from cfmkit.elastica.mechanics.equations import ComparedStates
+from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.mechanics.refine import embed
-from cfmkit.elastica.results.path import largest_force, work_with_drive
-from cfmkit.numerics.continuation.problem import PathEquilibrium
+from cfmkit.elastica.mechanics.refine import embed, raise_degree
+from cfmkit.elastica.model.drive import Loading
+from cfmkit.elastica.results.path import largest_force, load_displacement, work_with_drive
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,37 +38,57 @@ NO_FORCE = 1e-6  # largest force, EI/L^2, over the largest motion, that is none;
 SMALL_MOTION = 1e-3  # largest motion up to which errors of motions are relative to this
 
 
-def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> FloatArray:
+def point_errors(path: Path, indices: Sequence[int]) -> FloatArray:
     """Return the estimated errors of efforts, reactions and motions of nodes at points, relative to the largest ones.
 
-    `finer` is the path's network with a degree that is `DEGREES_MORE` higher. Infinite where it has no equilibrium
-    nearby, or one of another stability.
+    By the network with a degree that is `DEGREES_MORE` higher. Infinite where it has no equilibrium nearby, or one of
+    another stability.
     """
     if not len(path) or not len(indices):
         return np.zeros(len(indices))
     chosen, own, mesh = list(indices), path.at, path.mesh
-    problem, z, drives = NetworkProblem(finer), own.z[chosen], own.drive[chosen]
-    n_bodies, guesses = mesh.numbering.n_ends, embed(mesh, finer, z)
-    free, states = guesses[:, finer.free], guesses
-    solved = problem.equations.solve_each(free, drives, NEXT_CORRECTION, quick=True)
-    states[:, finer.free] = np.where(solved.converged[:, None], solved.free, free)
-    n_free_motions = int(np.searchsorted(finer.free, finer.n_motions))
-    moved = np.abs(solved.free[:, :n_free_motions] - free[:, :n_free_motions]).max(axis=1, initial=0.0)
-    known = solved.converged & (moved <= MAX_CHANGE)
-    for row in np.flatnonzero(known & (solved.unstable != path.unstable[chosen])):
-        at = PathEquilibrium(solved.free[row], float(drives[row]), solved.rate[row], int(solved.unstable[row]))
-        known[row] = abs(float(problem.modes(at, 1)[0][0])) < CRITICAL_STIFFNESS
-    fine, coarse = Equilibria(finer, states, drives), Equilibria(mesh, z, drives)
-    efforts: Any = np.abs(work_with_drive(fine, path.load_case) - path.effort[chosen])
-    forces: Any = np.abs(fine.residual[:, :n_bodies] - coarse.residual[:, :n_bodies]).max(axis=1)
-    moves: Any = np.abs(states[:, :n_bodies] - z[:, :n_bodies]).max(axis=1)
-    reach = float(np.abs(own.z[:, :n_bodies]).max())
-    load = max(largest_force(fine), NO_FORCE * reach, ROUNDING_ERROR)
+    z, drives, degree = own.z[chosen], own.drive[chosen], mesh.degree + DEGREES_MORE
+    compared, effort_unit = equations(mesh).compare(z, drives, degree, NEXT_CORRECTION), 1.0
+    if compared is None:
+        compared = compare_states(path, z, drives)
+    elif isinstance(path.load_case, Loading):
+        compared = compared._replace(effort=load_displacement(Equilibria(mesh, compared.ends, drives), path.load_case))
+    else:
+        effort_unit = mesh.scales.moment / mesh.scales.drive
+    known = compared.converged & (compared.moved <= MAX_CHANGE)
+    for row in np.flatnonzero(known & (compared.unstable != path.unstable[chosen])):
+        known[row] = _is_critical(mesh, z[row], float(drives[row]))
+    efforts = np.abs(effort_unit * compared.effort - path.effort[chosen])
+    reach = float(np.abs(own.z[:, : mesh.numbering.n_ends]).max())
+    load = max(float(compared.largest.max(initial=0.0)), NO_FORCE * reach, ROUNDING_ERROR)
     size = max(float(np.abs(path.effort).max()), NO_FORCE * max(load, reach) * mesh.scales.moment / mesh.scales.drive)
-    reach = max(reach, SMALL_MOTION)
-    bearing = np.maximum(efforts / size, forces / load) - ROUNDED_PLACES * _rises(path)[chosen] / size
-    relative = np.maximum(bearing, moves / reach)
+    bearing = np.maximum(efforts / size, compared.force / load) - ROUNDED_PLACES * _rises(path)[chosen] / size
+    relative = np.maximum(bearing, compared.motion / max(reach, SMALL_MOTION))
     return np.where(known, ERROR_SAFETY * relative + ROUNDING_ERROR, np.inf)
+
+
+def compare_states(path: Path, z: FloatArray, drives: FloatArray) -> ComparedStates:
+    """Return how states (p, size) of any network differ from those of a higher degree, efforts with their units."""
+    mesh = path.mesh
+    finer = raise_degree(mesh, mesh.degree + DEGREES_MORE)
+    n_bodies, states = mesh.numbering.n_ends, embed(mesh, finer, z)
+    guess = states[:, finer.free]
+    solved = equations(finer).solve_each(guess, drives, NEXT_CORRECTION, quick=True)
+    moved = np.abs(solved.free - guess)[:, finer.free < finer.n_motions].max(axis=1, initial=0.0)
+    states[:, finer.free] = np.where(solved.converged[:, None], solved.free, guess)
+    fine, ends = Equilibria(finer, states, drives), states[:, :n_bodies]
+    change = np.abs(fine.residual[:, :n_bodies] - Equilibria(mesh, z, drives).residual[:, :n_bodies]).max(axis=1)
+    effort, motion = work_with_drive(fine, path.load_case), np.abs(ends - z[:, :n_bodies]).max(axis=1)
+    largest = np.array([largest_force(fine)])
+    return ComparedStates(solved.converged, solved.unstable, moved, change, effort, largest, motion, ends)
+
+
+def _is_critical(mesh: Discretisation, z: FloatArray, drive: float) -> bool:
+    """Return True if rounding decides at a state whether the network is stable with a higher degree."""
+    finer = raise_degree(mesh, mesh.degree + DEGREES_MORE)
+    problem = NetworkProblem(finer)
+    (at,) = problem.solve_each([embed(mesh, finer, z)[finer.free]], [drive])
+    return at is not None and abs(float(problem.modes(at, 1)[0][0])) < CRITICAL_STIFFNESS
 
 
 def _rises(path: Path) -> FloatArray:

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.designs import make_up, raise_designs, set_up
+from cfmkit.elastica.mechanics.compiled_batch import CompiledBatch, is_compiled
+from cfmkit.elastica.mechanics.designs import make_up, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.equations import MarchCode
-from cfmkit.elastica.mechanics.march import engine, march_many, solve_designs
-from cfmkit.elastica.mechanics.refine import embed, raise_degree
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import apart
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Control
     from cfmkit.elastica.model.network import Network
@@ -103,7 +101,7 @@ def _goes_straight_on(path: Path, control: Control) -> bool:
     quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
     simple = _get_common_values(path.network) is not None and arrays.pieces == 1 and not arrays.tension
     alone = control.imperfection or isinstance(path.load_case, Loading) or np.any(arrays.floored)
-    return bool(rests and quiet and simple and not alone and engine() == "C")
+    return bool(rests and quiet and simple and not alone and is_compiled(arrays))
 
 
 def _follow(path: Path, networks: list[Network], control: Control) -> Any:
@@ -111,13 +109,13 @@ def _follow(path: Path, networks: list[Network], control: Control) -> Any:
     drive, points = path.load_case, path.load_case.points
     origin, pairs = (path.network, drive), [(network, drive) for network in networks]
 
-    def set_up_at(degree: int, some: list[Any]) -> NetworkDesigns:
-        return set_up(discretise(*origin, degree, scales=path.mesh.scales, fits=path.mesh.fits), origin, some)
+    def set_up_at(degree: int, some: list[Any]) -> CompiledBatch:
+        template = discretise(*origin, degree, scales=path.mesh.scales, fits=path.mesh.fits)
+        return CompiledBatch(set_up(template, origin, some))
 
-    def efforts_of(designs: NetworkDesigns, chosen: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
+    def efforts_of(batch: CompiledBatch, chosen: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
         correction, turn = next_correction(control), control.largest_turn
-        found = march_many(designs, points, tolerance=correction, largest_turn=turn, chosen=chosen)
-        efforts, codes, states = found
+        efforts, codes, states = batch.march(points, tolerance=correction, largest_turn=turn, chosen=chosen)
         return np.where((codes == MarchCode.DONE)[:, None], efforts, np.nan), states
 
     highest = path.mesh.degree + DEGREES_MORE
@@ -130,14 +128,12 @@ def _follow(path: Path, networks: list[Network], control: Control) -> Any:
     efforts = np.full((len(pairs), len(points)), np.nan)
     left = np.arange(len(pairs))
     while left.size and degree <= highest:  # a degree for all, a higher one for those that miss the tolerance
-        designs = set_up_at(degree, [pairs[k] for k in left])
-        coarse, states = efforts_of(designs, few.tolist())
-        mesh, fine = designs.template, raise_degree(designs.template, degree + DEGREES_MORE)
-        z = np.zeros((*states.shape[:2], mesh.size))
-        z[..., mesh.free] = states
-        guesses = embed(mesh, fine, z)[..., fine.free]
-        finer = solve_designs(raise_designs(designs, fine), guesses, points[few], NEXT_CORRECTION)
-        error = ERROR_SAFETY * np.abs(finer - coarse[:, few]).max(axis=1) + ROUNDING_ERROR * size
+        batch = set_up_at(degree, [pairs[k] for k in left])
+        coarse, states = efforts_of(batch, few.tolist())
+        finer = batch.compare(states, points[few], degree + DEGREES_MORE, NEXT_CORRECTION)
+        change = np.abs(finer.effort * batch.effort_unit - coarse[:, few])
+        change[~finer.converged | (finer.unstable != 0)] = np.nan
+        error = ERROR_SAFETY * change.max(axis=1) + ROUNDING_ERROR * size
         accurate = error <= control.tolerance * np.abs(coarse).max(axis=1)
         efforts[left[accurate]] = coarse[accurate]
         left, degree = left[~accurate], degree + DEGREES_MORE

@@ -113,9 +113,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
         return replace(nothing, events=(), status=PathStatus.NO_START, message=RIGID_MESSAGE)
     if path.error <= tolerance or not len(path):
         return path
-    accurate = (
-        point_errors(path, raise_degree(path.mesh, path.mesh.degree + DEGREES_MORE), range(len(path))) <= tolerance
-    )
+    accurate = point_errors(path, range(len(path))) <= tolerance
     text = f"the tolerance of {tolerance:.3g} was not reached: error {path.error:.3g}, "
     text += f"{(~accurate).sum()} of {len(path)} points"
     complete = path.status is PathStatus.COMPLETE
@@ -145,16 +143,15 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             resolution = replace(resolution, tension={**(resolution.tension or {}), **taut}, degree=degree)
             best, attempt = attempt, None
             continue
-        finer = _finer(path)
-        attempt = _with_error(attempt, finer)
+        attempt = _with_error(attempt)
         raised = resolution.degree < MAX_DEGREE and _can_be_raised(attempt)  # which corrects all its points
         if tolerance < attempt.path.error < NEAR_ERROR_FACTOR * tolerance and not raised:
-            attempt = _with_error(attempt._replace(path=polish(path)), finer)
+            attempt = _with_error(attempt._replace(path=polish(path)))
         path = attempt.path
         if best is None or not path.error > max(best.path.error, tolerance):
             best = attempt
         reached = path.error <= tolerance and path.status in (PathStatus.COMPLETE, PathStatus.FULL)
-        if reached and _are_settled(attempt, finer, control, before):
+        if reached and _are_settled(attempt, control, before):
             break
         if path.status is PathStatus.NO_START and count >= 2:
             break
@@ -268,14 +265,9 @@ def _lift(event: PathEvent, drive: float, mesh: Discretisation, fine: Discretisa
     return replace(event, drive=drive, near=lift(event.near), modes=None, within=within)
 
 
-def _finer(path: Path) -> Discretisation:
-    """Return the arrays by which errors are estimated."""
-    return raise_degree(path.mesh, path.mesh.degree + DEGREES_MORE)
-
-
-def _with_error(attempt: TraceAttempt, finer: Discretisation) -> TraceAttempt:
+def _with_error(attempt: TraceAttempt) -> TraceAttempt:
     path = copy(attempt.path)  # with all that is known of it
-    errors = point_errors(path, finer, pick_points(path, _event_places(attempt)))
+    errors = point_errors(path, pick_points(path, _event_places(attempt)))
     object.__setattr__(path, "error", float(errors.max(initial=0.0)))
     return attempt._replace(path=path)
 
@@ -457,7 +449,7 @@ def _explain(start: DriveStart, ending: PathStop, unit: float) -> tuple[PathStat
     return status, text
 
 
-def _are_settled(attempt: TraceAttempt, finer: Discretisation, control: Control, before: Path | None) -> bool:
+def _are_settled(attempt: TraceAttempt, control: Control, before: Path | None) -> bool:
     """Return True if limit points, and bifurcations of the primary path, lie where they do at a higher degree.
 
     The path itself says little about their error: a straight column has none, while its high modes have waves.
@@ -467,6 +459,7 @@ def _are_settled(attempt: TraceAttempt, finer: Discretisation, control: Control,
     if not attempt.events or not (folds or control.branch == "primary"):
         return True
     limit = max(EVENT_TOLERANCE, control.tolerance) * _span(path)
+    finer = raise_degree(path.mesh, path.mesh.degree + DEGREES_MORE)
     moves = finer.moving is not None  # then events are on other elements
     drives = None if moves else _relocate(attempt, replace(attempt.start.problem, mesh=finer))
     if drives is not None:

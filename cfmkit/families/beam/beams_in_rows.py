@@ -69,7 +69,7 @@ class BeamRows:
         allowable = np.array([_or_nan(one.assembly.allowable_stress) for one in each])
         curves = CurveRows(
             _samples(each),
-            _pad_rows([law.places for law in self._laws]),
+            lambda: _pad_rows([law.places for law in self._laws]),
             paths.effort,
             np.array([_or_nan(one.effort_error) for one in each]),
             np.array([_or_nan(target_of(one)) for one in each]),

@@ -30,8 +30,7 @@ FreeAngle = Annotated[Angle, Field(ge=0)]
 FreeWay = Annotated[Length, Field(ge=0)]
 FrictionCoefficient = Annotated[Ratio, Field(ge=0, lt=2)]
 Fault = tuple[tuple[str | int, ...], str]
-Mechanism = Any
-"""The block `mechanism`, which imports this file."""
+Mechanism = Any  # the block `mechanism`, which imports this file
 FRICTION_COLUMNS = ("tangential", "state")
 MAX_OVERLAP_SHARE = 1e-9  # share of the mechanism's size by which a pad may lie in an obstacle at rest: rounding
 HELD_SUPPORTS = ("clamped", "pinned")  # supports of nodes that are held in place

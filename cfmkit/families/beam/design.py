@@ -37,15 +37,7 @@ if TYPE_CHECKING:
 
 
 def design(spec: BeamSpec, run: Run) -> Design:
-    """Return a complete specification that does what the `design` block asks for, or why there is none.
-
-    Parameters
-    ----------
-    spec : BeamSpec
-        With a `design` block.
-    run : Run
-        Seed, progress and time budget.
-    """
+    """Return a complete specification that does what the `design` block asks for, or why there is none."""
     if spec.design is not None and spec.design.rescale is not None:
         return rescale(spec, spec.design.rescale)
     if spec.design is not None and spec.design.optimise is not None:
@@ -63,8 +55,7 @@ MAX_ROUNDS = 12
 """Of corrections, of which `configs/beam_rescaled.yaml` needs two; of travels, each a quarter longer: the last is 14.6
 times the first."""
 
-TRAVEL_STEP = 1e-5
-"""Travel that follows from the stress is rounded down to whole hundredths of a millimetre [m]."""
+TRAVEL_STEP = 1e-5  # travel that follows from the stress is rounded down to whole hundredths of a millimetre [m]
 
 
 def rescale(

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.contact import ObstacleEdge
     from cfmkit.families.beam.solution import Solution
 
-LONGEST_ARROW = 0.12
-"""Length of the arrow of the largest force, as a share of the figure's size."""
+LONGEST_ARROW = 0.12  # length of the arrow of the largest force, as a share of the figure's size
 
 
 def both_halves(solution: Solution, lines: list[FloatArray]) -> list[FloatArray]:

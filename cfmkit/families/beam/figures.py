@@ -55,20 +55,11 @@ if TYPE_CHECKING:
 
 
 N_DRAWN_POSES = 5
-KEY_MM = 5.0
-"""Room for the key of the poses above the axes [mm]."""
-
-MOST_BEAMS = 6
-"""So many beams have lines of their own: those with the largest force or stress."""
-
-MOST_MODES = 4
-"""So many modes have lines: held and free they are twice as many."""
-
-MAX_LINEAR_FREQUENCY_RATIO = 30.0
-"""Frequencies that differ by more than this factor stand on a logarithmic axis."""
-
-LINE_RTOL = 1e-4
-"""Lines closer than this share of their size are one."""
+KEY_MM = 5.0  # room for the key of the poses above the axes [mm]
+MOST_BEAMS = 6  # so many beams have lines of their own: those with the largest force or stress
+MOST_MODES = 4  # so many modes have lines: held and free they are twice as many
+MAX_LINEAR_FREQUENCY_RATIO = 30.0  # frequencies that differ by more than this factor stand on a logarithmic axis
+LINE_RTOL = 1e-4  # lines closer than this share of their size are one
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cfmkit.families.end_stops import FINDINGS as OF_STOPS
-from cfmkit.families.findings import finder
+from cfmkit.families.findings import Finder
 
 BEAM_FINDINGS = {
     "closure_adjusted": "beams were turned and scaled to fit between rounded nodes, or nodes moved to the beams' ends",
@@ -48,5 +48,5 @@ BEAM_FINDINGS = {
     "side_in_obstacle": "the side of a beam that is not in `beams` passes through an obstacle",
 }
 
-finding = finder(BEAM_FINDINGS)
+finding = Finder(BEAM_FINDINGS)
 """Return a finding of this family; the name must be one that `BEAM_FINDINGS` explains."""

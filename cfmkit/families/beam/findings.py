@@ -44,8 +44,7 @@ def percent(share: float) -> str:
     return format_short(share, "ratio", 3)
 
 
-LENGTH_RTOL = 1e-9
-"""Share of a length: gaps, movements and errors of a thickness below it are rounding."""
+LENGTH_RTOL = 1e-9  # share of a length: gaps, movements and errors of a thickness below it are rounding
 
 SLENDERNESS_LIMIT = 10.0
 """Length over thickness at which shear makes a beam between two guided ends 3 % softer, 2.6/(5/6) (t/l)^2."""
@@ -272,9 +271,8 @@ def _thick_beam(name: str) -> FindingRule[Solution]:
     def sentence(solution: Solution) -> Sentence:
         length, thickness = (format_short(size, "length") for size in sizes(solution))
         return (
-            f"beam {name} is {length} long and {thickness} thick: below {SLENDERNESS_LIMIT:g} times the "
-            f"thickness beam theory is "
-            "inaccurate",
+            f"beam {name} is {length} long and {thickness} thick: below {SLENDERNESS_LIMIT:g} times the thickness beam "
+            "theory is inaccurate",
         )
 
     def short(solution: Solution) -> str:

@@ -242,8 +242,7 @@ class Mechanism(RoundedCorners, Model):
         {}, description="rigid bodies that nodes may touch, by name; of `kind` line, disc, hole, polyline or arc"
     )
     contacts: tuple[PartContact, ...] = Field(
-        (),
-        description="between its parts: [{between: [upper, lower]}, {between: [tip, lower], radius: 1 mm}]",
+        (), description="between its parts: [{between: [upper, lower]}, {between: [tip, lower], radius: 1 mm}]"
     )
     drive: DriveSpec = Field(description="the drive; of `kind` displacement, rotation, force, moment or loads")
     copies: Copies | None = Field(None, description="copies of the part described here")

@@ -1,7 +1,8 @@
 """Analysis of a beam mechanism: the path of its equilibria, stresses, and the forces of each beam.
 
 Beams bend without stretching unless the specification says otherwise [Lan]; with stretching and shear they follow
-Reissner. The force is that of all copies together; the forces of single beams are those of one copy.
+Reissner. The force is that of all copies together; the forces of single beams are those of one copy. A curve with
+hysteresis has branch `load` of the forward travel and branch `unload` of the return.
 
 Reference
 ---------
@@ -12,7 +13,7 @@ operations (2010), sec. 2.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -28,14 +29,12 @@ from cfmkit.families.beam.constant_force_range_and_extremes import travel_of
 from cfmkit.families.beam.contact_spec import rubs
 from cfmkit.families.beam.contacts import contact_columns, contact_values, refuse_overlap_at_rest
 from cfmkit.families.beam.findings import findings_of
-from cfmkit.families.beam.loading_and_unloading import equilibria_of_both_branches, join_branches, split_at_reversal
 from cfmkit.families.beam.network_elements_spec import LoadsDrive
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
-from cfmkit.families.beam.path_ending import ending_of, in_units
+from cfmkit.families.beam.path_ending import distance, ending_of, in_units, ways_to_supports
 from cfmkit.families.beam.requested_node_columns import END_FORCES, columns_of, output_columns
 from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, natural, target_of
 from cfmkit.families.beam.solution import Solution
-from cfmkit.families.beam.taut_beams import distance, ways_to_supports
 from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, follow_surface, values_along
 from cfmkit.families.rows import values_of_one
 from cfmkit.numerics.one_blas_thread import one_blas_thread
@@ -45,13 +44,18 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
+    from cfmkit.elastica import Path
     from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.results.between_points import BetweenPoints
+    from cfmkit.elastica.results.path import ContactEvent
     from cfmkit.families.beam.requested_node_columns import LazyColumns
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.families.beam.tip_on_uneven_surface import SurfaceResult
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
+
 
 _MAX_TRAVEL_RATIO = (
     3.0  # travel in lengths from the driven node to a support: at the end these are at least twice as long
@@ -63,10 +67,7 @@ _COIL_PLACES = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at
 def analyze(spec: BeamSpec, _run: Run) -> Result:
     """Return the force-displacement path of a beam mechanism, with everything that is wrong with it.
 
-    Returns
-    -------
-    Result
-        PARTIAL if the path ends before what was asked, NO_EQUILIBRIUM if there is none under the constant loads.
+    PARTIAL if the path ends before what was asked, NO_EQUILIBRIUM if there is none under the constant loads.
     """
     solution, resolved = solve(spec), resolve(spec)
     if len(solution.keep) < 2:
@@ -265,3 +266,90 @@ def _branches(solution: Solution) -> Any:
     names = solution.path.branch[solution.keep]
     reported = {name: in_units(solution.assembly, name) for name in sorted(set(names.tolist()))}
     return read_only(np.array([reported[name] for name in names.tolist()]), np.str_)
+
+
+SAME_PLACE = 1e-9  # share of the range within which an event is at a point
+
+
+def split_at_reversal(path: Path, count: int) -> tuple[Path, Path | None]:
+    """Return the path up to the last of `count` requested values, and the rest, the return; None if it ends before."""
+    turns = np.flatnonzero(path.requested == count - 1)
+    if not len(turns) or turns[0] == len(path) - 1:
+        return path, None
+    turn, last = int(turns[0]), len(path)
+    places = list(_points_of_events(path))
+    events = path.contact_events
+    load, unload = path.take(np.arange(turn + 1)), path.take(np.arange(turn, last))
+    # what is requested on the way back is numbered as on the way there
+    numbers = np.where(unload.requested >= count, 2 * (count - 1) - unload.requested, unload.requested)
+    return (
+        replace(load, contact_events=tuple(events[k] for k, point in enumerate(places) if point < turn)),
+        replace(
+            unload,
+            contact_events=tuple(events[k] for k, point in enumerate(places) if point >= turn),
+            requested=read_only(numbers, np.int64),
+        ),
+    )
+
+
+def _points_of_events(path: Path) -> Iterator[int]:
+    """Yield the point at which each event of a contact is."""
+    marked, number = np.flatnonzero(path.changes_contact), 0
+    event: ContactEvent
+    for event in path.contact_events:
+        near = SAME_PLACE * float(np.ptp(path.drive))
+        while number < len(marked) - 1 and abs(path.drive[marked[number]] - event.drive) > near:
+            number += 1
+        yield int(marked[number])
+
+
+def join_branches(load: Curve, unload: Curve) -> Curve:
+    """Return one curve of both branches, in the order in which the mechanism goes through them."""
+
+    def column(name: str) -> Column:
+        there, back = load.extra[name], unload.extra[name]
+        return Column(np.concatenate([there.values, back.values]), there.dimension)
+
+    return Curve(
+        np.concatenate([load.motion, unload.motion]),
+        np.concatenate([load.effort, unload.effort]),
+        np.repeat(["load", "unload"], [len(load.motion), len(unload.motion)]),
+        np.concatenate([load.stable, unload.stable]),
+        LazyMapping(load.extra, column),
+        load.kind,
+    )
+
+
+def equilibria_of_both_branches(solution: Solution) -> BothBranches | None:
+    """Return the equilibria between the points of both branches; None unless both cover the same motion."""
+    there = solution.model_between_points
+    back = None if solution.back is None else solution.back.model_between_points
+    if there is None or back is None:
+        return None
+    first, second = (np.array([way.own_points[0], way.own_points[-1]]) for way in (there, back))
+    return BothBranches({"load": there, "unload": back}) if np.allclose(first, second, rtol=0, atol=1e-12) else None
+
+
+@dataclass(frozen=True, eq=False)
+class BothBranches:
+    """Effort and stress of both branches at every place (a `cfmkit.results.ClosedForm`)."""
+
+    ways: dict[str, BetweenPoints]
+
+    @property
+    def places(self) -> FloatArray:
+        """The points of both branches, and extremes between them, increasing [m or rad]."""
+        return np.unique(np.concatenate([way.places for way in self.ways.values()]))
+
+    @property
+    def peaks(self) -> FloatArray:
+        """Places of extremes of the effort between two points, and of corners, (m,) [m or rad]."""
+        return np.unique(np.concatenate([way.peaks for way in self.ways.values()]))
+
+    def effort(self, branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the effort of a branch at places of any shape [N or N m]."""
+        return self.ways[branch].effort(branch, places)
+
+    def stress(self, branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest stress of a branch at places of any shape [Pa]."""
+        return self.ways[branch].stress(branch, places)

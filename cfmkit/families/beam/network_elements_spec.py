@@ -368,8 +368,7 @@ class Copies(Model):
         1, ge=1, le=20, description="equal stages in series: each is mounted on the moving part of the previous one"
     )
     layer_pitch: PositiveLength | None = Field(
-        None,
-        description="distance of the stages along the drive; default: 1.15 times the height of one",
+        None, description="distance of the stages along the drive; default: 1.15 times the height of one"
     )
 
 

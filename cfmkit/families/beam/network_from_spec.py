@@ -36,6 +36,7 @@ from cfmkit.families.beam.network_elements_spec import (
     MomentDrive,
     RotationDrive,
 )
+from cfmkit.families.rows import with_values
 from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
@@ -46,11 +47,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import LoadOn
     from cfmkit.elastica.vibration import NetworkMasses
     from cfmkit.families.beam.mechanism_spec import Mechanism
-    from cfmkit.families.beam.network_elements_spec import (
-        MemberSpec,
-        NodeSpec,
-        Thickness,
-    )
+    from cfmkit.families.beam.network_elements_spec import MemberSpec, NodeSpec, Thickness
     from cfmkit.families.beam.spec import BeamSpec
 
 
@@ -294,9 +291,8 @@ def _thickness(given: Thickness) -> float | engine.Taper:
 def resolve(spec: BeamSpec) -> BeamSpec:
     """Return the specification with everything derived written out: the model and what counts as stress."""
     fidelity = spec.fidelity
-    switches = {"axial": fidelity != "inextensible", "shear": fidelity in ("reissner", "solid")}
-    analysis = spec.analysis.model_copy(update={"fidelity": fidelity, "stress": spec.stress})
-    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update=switches), "analysis": analysis})
+    model = {"mechanism.axial": fidelity != "inextensible", "mechanism.shear": fidelity in ("reissner", "solid")}
+    return with_values(spec, {**model, "analysis.fidelity": fidelity, "analysis.stress": spec.stress})
 
 
 def move_free_nodes(network: Network) -> Network:

@@ -31,13 +31,7 @@ from cfmkit.families.beam.drawn_pieces import (
     pads_behind,
     section_at_bend,
 )
-from cfmkit.families.beam.network_from_spec import (
-    assemble,
-    is_on_axis,
-    mirror_axis,
-    moving_nodes,
-    thickest_of,
-)
+from cfmkit.families.beam.network_from_spec import assemble, is_on_axis, mirror_axis, moving_nodes, thickest_of
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points, strips
 from cfmkit.families.run_control import Run
 
@@ -57,20 +51,14 @@ OUTLINE_TOLERANCE = 2e-4
 """How far outlines may be from the exact ones unless somebody states another value, in thicknesses of the thinnest
 beam: both edges together change its bending stiffness by 1.2e-3 at most."""
 
-MIN_FILLET_RATIO = 1e-4
-"""Fillets smaller than this are not drawn, in thicknesses of the thinnest beam."""
-
-N_SWEPT = 25
-"""Poses at which what moves must be clear of the frame: in between beams go by less than their thickness."""
+MIN_FILLET_RATIO = 1e-4  # fillets smaller than this are not drawn, in thicknesses of the thinnest beam
+N_SWEPT = 25  # poses at which what moves must be clear of the frame: in between beams go by less than their thickness
 
 N_POSES = 13
 """Poses that a box counts: between two of them, a twelfth of the travel apart, beams bulge by next to nothing."""
 
-BOX_TOLERANCE = 5e-5
-"""Tolerance of the outline of a box: it is wanted to a tenth of a millimetre [m]."""
-
-POLYGON_TOLERANCE_SHARE = 0.2
-"""Part of the tolerance that polygons of eyes may be off."""
+BOX_TOLERANCE = 5e-5  # tolerance of the outline of a box: it is wanted to a tenth of a millimetre [m]
+POLYGON_TOLERANCE_SHARE = 0.2  # part of the tolerance that polygons of eyes may be off
 
 POINT_TOLERANCE_FACTOR = 5.0
 """How far lines between the points of a beam may be from its edges, in tolerances: edges are cubics between the points,
@@ -248,21 +236,12 @@ def as_made(assembly: Assembly) -> Iterator[PosedBody]:
 
 def bodies(
     solution: Solution,
-    points: NDArray[Any],
-    places: Sequence[HeldPlace] = (),
+    points: NDArray[Any],  # (p,) of int
+    places: Sequence[HeldPlace] = (),  # whose pads are returned, as they move
+    # from a path, a beam and a point of the path to its line (n, 2) [m]
     centre_line: Callable[[Path, str, int], FloatArray] = Path.shape,
 ) -> tuple[PosedBody, ...]:
-    """Return beams and pads, those of a mirrored half included, at points of the curve.
-
-    Parameters
-    ----------
-    solution : Solution
-    points : (p,) array of int
-    places : sequence of HeldPlace
-        Whose pads are returned, as they move.
-    centre_line : callable
-        From a path, a beam and a point of the path to its line (n, 2) [m].
-    """
+    """Return beams and pads, those of a mirrored half included, at points of the curve."""
     assembly, path = solution.assembly, solution.path
     at = [int(solution.keep[point]) for point in points]
     beams = []

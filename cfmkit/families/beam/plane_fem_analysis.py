@@ -18,25 +18,28 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
 from cfmkit.export.fixing_holes import remove_screws
 from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
-from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
 from cfmkit.families.beam.finding_names import finding
-from cfmkit.families.beam.network_from_spec import (
-    assemble,
-    constant_load,
-    is_on_axis,
-    mirror_axis,
-    resolve,
-)
-from cfmkit.families.beam.node_motions_from_fem import SolidNodes
+from cfmkit.families.beam.network_from_spec import assemble, constant_load, is_on_axis, mirror_axis, resolve
 from cfmkit.families.beam.outline import drawing
 from cfmkit.families.beam.part import drawn_fillet, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import EXTREME_METRICS, RANGE_METRICS, SCALAR_DEFINITIONS, number_of, target_of
+from cfmkit.families.beam.solid_nodes_and_fillets import SolidNodes, fillets
 from cfmkit.families.beam.strips_and_gaps import mirror_points
 from cfmkit.families.beam.tip_on_uneven_surface import N_PLACES, curve_of, findings_along, follow_surface, values_along
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
-from cfmkit.families.fem_results import fillet_table, largest_concentration
-from cfmkit.families.findings import bracket, sharp_inside
+from cfmkit.families.fem_results import (
+    columns_of_solid,
+    fillet_table,
+    findings_of_mesh,
+    largest_concentration,
+    not_meshed,
+    remove_frame,
+    stable_between_poses,
+    stress_between_poses,
+    without_repeats,
+)
+from cfmkit.families.findings import sharp_inside
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.units import format_short, window_places
 from cfmkit.stock.material_and_part_spec import usual_fillet
@@ -104,12 +107,8 @@ class SolidSolution(ShortRepr):
 
     @cached_property
     def stress(self) -> FloatArray:
-        """Largest stress along a free edge [Pa]; between poses by cubics that stay between their values."""
-        from scipy.interpolate import PchipInterpolator
-
-        rising = np.argsort(self.fine.course.travel)
-        cubics = PchipInterpolator(self.fine.course.travel[rising], self.fine.peaks[0][rising])
-        return read_only(np.maximum(cubics(self.motion), 0.0))  # at rest rounding may be below
+        """Largest stress along a free edge [Pa]."""
+        return stress_between_poses(self.fine, self.motion)
 
     @cached_property
     def along(self) -> AlongMotion:
@@ -124,10 +123,7 @@ class SolidSolution(ShortRepr):
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
         """Whether the equilibrium of each point is stable; under a load also the drive gives way if its force falls."""
-        travel = self.fine.course.travel
-        at_pose = np.array([pose.unstable == 0 for pose in self.fine.course.poses])
-        before = np.clip(np.searchsorted(np.abs(travel), np.abs(self.motion) * (1 + 1e-12)) - 1, 0, None)
-        stable = at_pose[before]
+        stable = stable_between_poses(self.fine.course, self.motion)
         return stable if self.reached is None else stable & (self.fine.course.law().derivative()(self.motion) > 0.0)
 
     @property
@@ -185,8 +181,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     try:
         assembly, solved = _solve_part(spec, run)
     except GeometryError as error:
-        message = f"the part cannot be meshed: {error}; check mechanism.part"
-        return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
+        return not_meshed(resolve(spec), error)
     if why := solved.no_curve(2):
         keys = ", ".join(f"mechanism.nodes.{name}.support" for name in spec.mechanism.nodes)
         message = f"no curve: {why}; check mechanism.drive, {keys}"
@@ -261,7 +256,9 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
 
     frame = standing_frame(spec)
-    drawn = drawing(_remove_frame(remove_screws(spec), frame))
+    pads = [shape for place in regions(spec) for shape in place.shapes if place.padded]
+    bare = remove_screws(spec)
+    drawn = drawing(remove_frame(bare, frame, pads) if frame else bare)
     cut = [contour for contour in drawn.contours if contour.layer == "cut"]
     material, width = (next(iter(spec.mechanism.of_beams(key).values())) for key in ("material", "width"))
     law = MATERIAL_LAWS[material.law](material.modulus, material.poisson)
@@ -273,20 +270,6 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     rings = rings_of(cut, thinnest)
     largest = largest_in(rings, thinnest)
     return Part(rings, thinnest, width, law, tuple(places), (), largest, frame, drawn.sections)
-
-
-def _remove_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
-    """Return what bends: without the frame, which stands, and the holes in it."""
-    from cfmkit.export.ground_frame import find_outside
-
-    part = spec.mechanism.part
-    if not frame or part is None or part.frame is None:
-        return spec
-    pads = [one for place in regions(spec) for one in place.shapes if place.padded]
-    kept = find_outside([one.at for one in part.holes], frame, pads)
-    holes = tuple(one for one, keep in zip(part.holes, kept, strict=True) if keep)
-    alone = part.model_copy(update={"frame": part.frame.model_copy(update={"ground": None}), "holes": holes})
-    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update={"part": alone})})
 
 
 def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:
@@ -327,10 +310,8 @@ def _stops(spec: BeamSpec) -> list[float]:
     end = spec.extent
     inside = [place for place in _ends_of_windows(spec, end) if 0.0 < place / end < 1.0]
     even = np.linspace(0.0, end, spec.analysis.solid.poses)
-    found = np.unique(np.concatenate([even, inside]))
     # ends of windows that are an even pose but for rounding are that pose
-    near = np.abs(np.diff(found)) < 1e-9 * abs(end)
-    return [float(place) for place in np.delete(found, np.flatnonzero(near) + 1)[:: 1 if end > 0 else -1]]
+    return without_repeats(np.concatenate([even, inside]), end)[:: 1 if end > 0 else -1].tolist()  # type: ignore[no-any-return]
 
 
 def _ends_of_windows(spec: BeamSpec, end: float) -> list[float]:
@@ -390,16 +371,9 @@ def _turns(spec: BeamSpec) -> bool:
 
 
 def _curve(solution: SolidSolution) -> Curve:
-    course, motion = solution.fine.course, solution.motion
-    solved = np.isclose(motion[:, None], course.solved_travel, rtol=0, atol=1e-9 * abs(solution.spec.extent)).any(
-        axis=1
-    )
-    extra = {
-        "max_stress": Column(solution.stress, "stress"),
-        "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),
-    } | _outputs(solution)
+    extra = columns_of_solid(solution.fine.course, solution.motion, solution.stress, solution.spec.extent)
     kind: Kind = "torque" if _turns(solution.spec) else "force"
-    return Curve(motion, solution.effort, stable=solution.stable, extra=extra, kind=kind)
+    return Curve(solution.motion, solution.effort, stable=solution.stable, extra=extra | _outputs(solution), kind=kind)
 
 
 def _outputs(solution: SolidSolution) -> dict[str, Column]:
@@ -475,11 +449,9 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     if reported := _sharp(spec):
         yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
     yield from drawing(spec).warnings
-    for name, reported in solution.error.too_large():
-        yield finding(name, reported)
     thinnest, one = _thinnest(solution.assembly), next(iter(solution.assembly.network.beams.values())).section
-    if reported := bracket(one.width, thinnest, one.poisson_ratio, spec.mechanism.wide_beams):
-        yield finding("wide_beam", reported)
+    wide = spec.mechanism.wide_beams
+    yield from findings_of_mesh(finding, solution.error, [(one.width, thinnest)], one.poisson_ratio, wide)
     allowable = solution.assembly.allowable_stress
     if allowable is not None and solution.worst is not None and solution.worst[0] > allowable:
         from cfmkit.solid.boundary_and_element_sizes import place_text

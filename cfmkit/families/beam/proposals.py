@@ -211,9 +211,14 @@ def _size_section(
         thicker *= (wide / (MIN_WIDTH_RATIO * thicker * thin)) ** 0.25
         wide = _width(request, kept, size, stiffer, thicker, force)
     if thicker * thin < request.thinnest:
-        return request.thinnest / (thicker * thin), f"beams would be {mm(thicker * thin)} thick"
+        return request.thinnest / (
+            thicker * thin
+        ), f"beams would be {mm(thicker * thin)} thick, at least {mm(request.thinnest)} needed"
     if request.depth is not None and wide > DEPTH_SHARE * request.depth:
-        return wide / request.depth, f"the beams would be {mm(wide)} wide"
+        return (
+            wide / request.depth,
+            f"the beams would be {mm(wide)} wide, at most {mm(DEPTH_SHARE * request.depth)} fit",
+        )
     spec = _write_shape(kept, size, block, (thicker * thin, wide), window)
     area = size**2 * kept.envelope.across * kept.envelope.along / (request.envelope[0] * request.envelope[1])
     # of made parts those with thick beams are most alike: an error of the thickness counts three times

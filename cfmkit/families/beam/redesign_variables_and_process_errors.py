@@ -19,15 +19,7 @@ _MAX_COEFFICIENT_TURN = 0.4
 
 
 def free(given: BeamSpec, designed: BeamSpec) -> dict[str, tuple[float, float]]:
-    """Return places of nodes and coefficients of shapes that were searched; of a rescaled mechanism width or thickness.
-
-    Parameters
-    ----------
-    given : BeamSpec
-        With the `design` block.
-    designed : BeamSpec
-        What came out.
-    """
+    """Return places of nodes and coefficients of shapes that were searched, or width or thickness that was rescaled."""
     design = given.design
     if design is None:
         return {}

@@ -340,9 +340,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         lambda solution: _gap(solution, 0),
     ),
     "gap_min_moving": _quantity(
-        "length",
-        "smallest gap between two beams at sampled places of the travel",
-        lambda solution: _gap(solution, 1),
+        "length", "smallest gap between two beams at sampled places of the travel", lambda solution: _gap(solution, 1)
     ),
     "travel_end": _quantity(
         "length",
@@ -364,9 +362,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "frequency", "lowest natural frequency in the window while the drive is held", _lowest_frequency("held")
     ),
     "frequency_free_min": _quantity(
-        "frequency",
-        "lowest natural frequency in the window while the drive is free to move",
-        _lowest_frequency("free"),
+        "frequency", "lowest natural frequency in the window while the drive is free to move", _lowest_frequency("free")
     ),
     "peak_stress_x": _quantity(
         "length", "x of the place of the largest stress in the window, on the part before any load", lambda _: None

@@ -35,8 +35,7 @@ def _returns(coefficients: Sequence[float]) -> bool:
     return bool(abs(chord) < _CLOSING_RTOL)
 
 
-MOST_WINDINGS = 1000
-"""Turns that the angle along one beam may make: a shape is sampled as densely as it winds."""
+MOST_WINDINGS = 1000  # turns that the angle along one beam may make: a shape is sampled as densely as it winds
 _MOST_SWEEP = math.radians(360 * MOST_WINDINGS)
 
 

@@ -43,9 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
-N_PLACES = 4001
-"""Places along a surface among which an extreme is searched, before the best one is refined."""
-
+N_PLACES = 4001  # places along a surface among which an extreme is searched, before the best one is refined
 _N_SURFACE_ROWS = 201  # of the curve along a surface that is given by few points
 _CORNER_OFFSET = 1e-9  # share of the length: places so far to both sides of a corner are searched, too
 

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.solid.meshed_part import Part
 
-INITIAL_TRAVEL = 1e-3
-"""Travel that is looked at first where beams have no pose under the load, in m or rad."""
+INITIAL_TRAVEL = 1e-3  # travel that is looked at first where beams have no pose under the load, in m or rad
 
 
 def driven_by_load(spec: BeamSpec) -> bool:

@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     Rows = NDArray[np.intp]
     Group = tuple[Rows, SolvedRows[Solution]]
 
-MAX_SAMPLES_AT_ONCE = 120_000
-"""Points that are worked on together: few enough to stay in a processor's cache, 400 curves of 301 points."""
+MAX_SAMPLES_AT_ONCE = 250_000
+"""Points that are worked on together: few enough to stay in a processor's cache, 512 curves of 481 points."""
 
 MIN_SHARED_CAMS = 8
 """Mechanisms around one cam from which on they are worth a solution of their own."""
@@ -159,12 +159,10 @@ def _kind(spec: CamSpec) -> str:
 
 def _in_parcels(members: Rows, spec_of: Callable[[Rows], CamSpec]) -> Iterator[Group]:
     """Yield mechanisms that are solved together, few at a time."""
-    start = 0
-    while start < len(members):
-        points = spec_of(members[start : start + 1]).analysis.points
-        rows = members[start : start + max(1, MAX_SAMPLES_AT_ONCE // points)]
-        yield from _solve_alike(spec_of(rows), rows)
-        start += len(rows)
+    if len(members):
+        samples = len(members) * spec_of(members[:1]).analysis.points
+        for rows in np.array_split(members, -(-samples // MAX_SAMPLES_AT_ONCE)):
+            yield from _solve_alike(spec_of(rows), rows)
 
 
 def _solve_alike(spec: CamSpec, rows: Rows) -> Iterator[Group]:

@@ -24,7 +24,7 @@ from cfmkit.families.cam.assembly import TRAVEL_RTOL
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
-from cfmkit.families.cam.geometry.slope_law import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.mechanism_from_spec import (
     assemble_sides,
@@ -69,19 +69,9 @@ class Choice:
 
 @refusals_answered
 def design(spec: CamSpec, run: Run) -> Design:
-    """Return a complete specification whose cam meets the targets of the `design` block.
+    """Return a complete specification whose cam meets the targets of the `design` block, in closed form.
 
-    Parameters
-    ----------
-    spec : CamSpec
-        With a `design` block.
-    run : Run
-        Not needed here: the choice is in closed form.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE, with the reason and the nearest feasible values, if there is none.
+    INFEASIBLE, with the reason and the nearest feasible values, if there is none.
     """
     target = spec.design
     if target is None:
@@ -127,13 +117,10 @@ def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
     roller, slider = weights_of(spec.mechanism).along
     least = slider + 2.0 * roller
     if force <= least:
-        raise Infeasible(
-            finding(
-                "weight_too_large",
-                f"the moving parts weigh {newton(least)}: a force of "
-                f"{newton(force)} does not even carry them; request more ('design.force'), or lighten "
-                "the parts ('mechanism.masses')",
-            ),
+        raise finding.infeasible(
+            "weight_too_large",
+            f"the moving parts weigh {newton(least)}: a force of {newton(force)} does not even carry them; request "
+            "more ('design.force'), or lighten the parts ('mechanism.masses')",
             {"design.force": f"more than {newton(least)}"},
         )
     pull = force - slider
@@ -197,13 +184,10 @@ def _smallest_constant(spec: CamSpec, target: CamDesign, factor: float) -> float
     if smallest is None:
         flat = SlopeLaw(1e6 * law.brace_length, law.rest_half_width, law.brace_length, law.friction, factor)
         largest = mm(float(flat.curvature_radius(law.rest_half_width)))
-        raise Infeasible(
-            finding(
-                "undercut",
-                f"no force constant avoids undercut: the {mm(mechanism.roller_radius)} roller is larger than the "
-                f"radius of curvature that the brace alone gives ({largest}); use a smaller roller "
-                "('mechanism.roller_radius')",
-            ),
+        raise finding.infeasible(
+            "undercut",
+            f"no force constant avoids undercut: the {mm(mechanism.roller_radius)} roller is larger than the radius of "
+            f"curvature that the brace alone gives ({largest}); use a smaller roller ('mechanism.roller_radius')",
             {"mechanism.roller_radius": f"less than {largest}"},
         )
     return smallest * (1 + 1e-12)
@@ -229,13 +213,11 @@ def _with_preload(spec: CamSpec, target: CamDesign, pull: float, factor: float, 
     law = _law(spec, target, constant, factor, 0.0)
     half = law.smallest_preload(mechanism.roller_radius)
     if half is None:
-        raise Infeasible(
-            finding(
-                "undercut",
-                f"no preload avoids undercut: cut for a friction of {target.friction:g} the path turns vertical before "
-                f"its start is wide enough for the {mm(mechanism.roller_radius)} roller; use a smaller roller "
-                "('mechanism.roller_radius') or less friction ('design.friction')",
-            )
+        raise finding.infeasible(
+            "undercut",
+            f"no preload avoids undercut: cut for a friction of {target.friction:g} the path turns vertical before "
+            f"its start is wide enough for the {mm(mechanism.roller_radius)} roller; use a smaller roller "
+            "('mechanism.roller_radius') or less friction ('design.friction')",
         )
     opened = mechanism.springs.tension_stretch
     preload = max(2.0 * half * (1 + 1e-12), opened)
@@ -256,12 +238,10 @@ def _from_constant(spec: CamSpec, target: CamDesign, pull: float, factor: float,
     """Choose the stiffness from a given A."""
     constant = target.force_constant or spec.mechanism.profile.force_constant
     if smallest is not None and _undercuts(spec, _law(spec, target, constant, factor), smallest):
-        raise Infeasible(
-            finding(
-                "force_constant_too_small",
-                f"the force constant {mm(constant)} is below {mm(smallest)}, the smallest that avoids undercut "
-                "('design.avoid_undercut')",
-            ),
+        raise finding.infeasible(
+            "force_constant_too_small",
+            f"the force constant {mm(constant)} is below {mm(smallest)}, the smallest that avoids undercut "
+            "('design.avoid_undercut')",
             {"design.force_constant": format_at_least(smallest)},
         )
     springs = spec.mechanism.springs.scaled_to(pull / (4.0 * constant))
@@ -283,9 +263,9 @@ def _from_catalogue(
     rejected = [one for one in tried if isinstance(one, Miss)]
     if not rejected:
         none = "the catalogue has no extension spring, which is what pulls the rollers together"
-        raise Infeasible(finding("no_spring_fits", f"{none} ('design.catalogue')"))
+        raise finding.infeasible("no_spring_fits", f"{none} ('design.catalogue')")
     reported = f"no spring of the catalogue fits: {nearest(rejected)}; add others to 'design.catalogue'"
-    raise Infeasible(finding("no_spring_fits", f"{reported}, or change {_in_the_way(reported)}"))
+    raise finding.infeasible("no_spring_fits", f"{reported}, or change {_in_the_way(reported)}")
 
 
 def _with_spring(
@@ -382,7 +362,8 @@ def two_way_gap(
     path, end = reach(law, target.stroke)
     x = np.linspace(law.rest_half_width, end, 801)
     x = x[path.travel(x) >= 0.02 * target.stroke]
-    states = TrackStates(x, np.zeros_like(x), *law.slopes(x), np.zeros(len(x), dtype=bool), x)
+    tangent, on_flank = brace_tangent(x, loads.brace_length), np.zeros(len(x), dtype=bool)
+    states = TrackStates(x, np.zeros_like(x), law.slope(x), tangent, on_flank, x, partial(law.slope_derivative, x))
     ways = np.stack([forces(states, loads, way * friction, way).slider for way in (1.0, -1.0)])
     if not np.isfinite(ways).all():
         return float("inf")
@@ -399,24 +380,20 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
         name = "path_vertical" if turns_vertical(law, end) else "brace_too_short"
         if reached <= 0:  # friction on the way down, or weights that help, are so large that the slider never rises
             name = "design_singular"
-        raise Infeasible(
-            finding(
-                name,
-                f"with A = {mm(law.force_constant)} the stroke ends at {mm(reached)} of {mm(target.stroke)} "
-                "('design.stroke')",
-            ),
+        raise finding.infeasible(
+            name,
+            f"with A = {mm(law.force_constant)} the stroke ends at {mm(reached)} of {mm(target.stroke)} "
+            "('design.stroke')",
             {"design.stroke": format_at_most(reached)},
         )
     limit, opened = springs.max_elongation, springs.tension_stretch
     elongation = 2.0 * (end - law.rest_half_width + law.preload) - opened
     if limit and elongation > limit:
         shorter = max(float(path.travel(law.rest_half_width + 0.5 * (limit + opened) - law.preload)), 0.0)
-        raise Infeasible(
-            finding(
-                "spring_overstretched",
-                f"at full stroke the springs would be stretched by {mm(elongation)}, their limit is {mm(limit)} "
-                f"('mechanism.springs.max_elongation'); the stroke they allow is {mm(shorter)}",
-            ),
+        raise finding.infeasible(
+            "spring_overstretched",
+            f"at full stroke the springs would be stretched by {mm(elongation)}, their limit is {mm(limit)} "
+            f"('mechanism.springs.max_elongation'); the stroke they allow is {mm(shorter)}",
             {"design.stroke": format_at_most(shorter)},
         )
 

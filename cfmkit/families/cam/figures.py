@@ -11,14 +11,7 @@ import numpy as np
 from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.clearance import nearest_pairs
 from cfmkit.families.cam.hardware import hardware
-from cfmkit.families.cam.part import (
-    moment,
-    pivoting,
-    pose,
-    scene,
-    start_curve,
-    swallowtail,
-)
+from cfmkit.families.cam.part import moment, pivoting, pose, scene, start_curve, swallowtail
 from cfmkit.families.cam.part_sizes import count_of
 from cfmkit.numerics.holes_in_samples import holes_between
 from cfmkit.plots import parts
@@ -362,8 +355,7 @@ def _cam_with_corner(solution: Solution, ax: Axes, view: Scene) -> FloatArray:
     return flank[:1]
 
 
-N_HEIGHTS = 400
-"""Heights at which the errors of measured flanks are drawn."""
+N_HEIGHTS = 400  # heights at which the errors of measured flanks are drawn
 
 
 def built_figures(result: Result) -> dict[str, Callable[[], Figure]]:

@@ -1,14 +1,16 @@
 """Braces, pins, shafts, bearings, guide and screws of a cam mechanism, dimensioned for the forces of its travel.
 
-A brace hangs beside the plate on each side: it is pulled from its roller's shaft to the slider's pin, both of which
-stand out of the plate by half of plate and brace. The springs hook on the ends of the shafts, beyond the braces; more
-than one on a side hook above each other on bars that the shafts carry. Forces are the largest on both branches; where
-they diverge at a dead point, the next computed ones.
+Each roller has a brace on both sides of the plate, pulled from the roller's shaft to the slider's pin, both of which
+stand out of the plate by half of plate and brace. Those of both rollers share a side: at the slider's pin each is half
+as thick, so that an eye there bears as much as a whole one with all of the pull. The springs hook on the ends of the
+shafts, beyond the braces; more than one on a side hook above each other on bars that the shafts carry. Forces are the
+largest on both branches; where they diverge at a dead point, the next computed ones.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,20 +21,21 @@ from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.part_sizes import (
     BRACE_WIDTH,
     PLATE_THICKNESS,
-    coil_diameter,
     count_of,
     pin_path,
     roller_path,
     stack_height,
+    wire_and_coil,
 )
 from cfmkit.families.findings import mm as length_in_words
 from cfmkit.families.findings import newton, rate
 from cfmkit.families.hardware import (
     LEAST_WALL,
+    GuideRods,
     Hardware,
     PartStrength,
     guide_part,
-    guide_rod,
+    guide_rods,
     in_sentences,
     link_width,
     mm,
@@ -44,7 +47,7 @@ from cfmkit.families.hardware import (
     screw_part,
     with_faults,
 )
-from cfmkit.stock.joint_strength import pin_that_bears
+from cfmkit.stock.joint_strength import pin_bending, pin_that_bears
 from cfmkit.stock.parts_list import ListedPart
 from cfmkit.stock.stock_series import BALL_BEARINGS, bearings_of, hole_with_fit, screw_through
 
@@ -54,10 +57,9 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.spec import Mechanism
-    from cfmkit.stock.stock_series import Bearing, Screw
+    from cfmkit.stock.stock_series import Bearing, Screw, System
 
-BEARING_IN_ROLLER = 0.9
-"""Outside diameter of a bearing over that of the roller around it, at most."""
+BEARING_IN_ROLLER = 0.9  # outside diameter of a bearing over that of the roller around it, at most
 
 SHAFT_IN_ROLLER = 0.7
 """Diameter of a plain shaft over that of the roller around it, and of the pin over the slider's side, at most."""
@@ -66,62 +68,110 @@ MAX_BAR_WIDTH = 1.0
 """Width of a bar for springs over half of the rollers' distance at the start, at most: two of them stand in it."""
 
 
+@dataclass(frozen=True)
+class _Loads:
+    """What sizes of parts follow from: the largest forces, thicknesses, and stresses that parts may have."""
+
+    strength: PartStrength
+    thickness: float  # of plate, rollers and slider [m]
+    brace: float  # thickness of a brace [m]
+    pull: float  # of both braces of a roller [N]
+    press: float  # of a roller on the cam [N]
+    force: float  # on the slider [N]
+    hooks: _Hooks
+
+    @classmethod
+    def of_solution(cls, solution: Solution) -> _Loads:
+        """Return those of a solved mechanism."""
+        spec = solution.assembly.spec
+        plate, contact = spec.mechanism.plate, spec.mechanism.contact
+        strength = PartStrength.from_material(contact.material if contact else None, required_safety(spec))
+        thickness = plate.thickness or (contact.width if contact else PLATE_THICKNESS)
+        brace = min(thickness, BRACE_WIDTH)
+        pull, press, force = (_largest(solution, name) for name in ("brace", "contact", "slider"))
+        return cls(strength, thickness, brace, pull, press, force, _hooks(solution, brace))
+
+    @property
+    def arm(self) -> float:
+        """Distance from the middle of the plate to that of a brace [m]."""
+        return 0.5 * (self.thickness + self.brace)
+
+    def thinnest_shaft(self, system: System | None) -> float:
+        """Return the shaft that bears half of the press at each brace, and the springs of a side beyond it [m]."""
+        arm = 0.5 * self.arm + self.hooks.pull * self.hooks.arm / max(self.press, 1e-9)
+        return pin_for(self.press, arm, self.thickness, self.strength, system)[0]
+
+
 def hardware(solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism."""
-    spec = solution.assembly.spec
-    mechanism = spec.mechanism
-    plate, system = mechanism.plate, mechanism.plate.stock
-    material = mechanism.contact.material if mechanism.contact else None
-    strength = PartStrength.from_material(material, required_safety(spec))
-    thick = plate.thickness or (mechanism.contact.width if mechanism.contact else PLATE_THICKNESS)
-    brace, arm = min(thick, BRACE_WIDTH), 0.5 * (thick + min(thick, BRACE_WIDTH))
-    pull, press, force = (_largest(solution, name) for name in ("brace", "contact", "slider"))
-    pin, bears = pin_for(pull, arm, brace, strength, system)
-    faults = {} if bears else {"slider pin": f"no pin of the series bears the {newton(pull)} of a brace"}
-    if mechanism.pins is not None:
-        pin, least = mechanism.pins.diameter, pin
-        if pin_that_bears(pull, arm, brace, strength.allowable, strength.pins, (pin,)) is None:
-            faults["slider pin"] = (
-                f"too weak for the {newton(pull)} of a brace {length_in_words(arm)} beside it: use at least "
-                f"{length_in_words(least)} ('mechanism.pins.diameter')"
-            )
-    hooks = _hooks(solution, brace)
-    # half of the press at each brace, and the springs of a side beyond it
-    shaft, bearing = _shaft(solution, press, 0.5 * arm + hooks.pull * hooks.arm / max(press, 1e-9), thick, strength)
+    mechanism, loads, faults = solution.assembly.spec.mechanism, _Loads.of_solution(solution), dict[str, str]()
+    strength, thick, hooks, system = loads.strength, loads.thickness, loads.hooks, mechanism.plate.stock
+    pin = _slider_pin(mechanism, loads, faults)
+    shaft, bearing = _shaft(mechanism, loads, faults)
     for place, diameter in (("slider pin", pin), ("shafts of the rollers", shaft)):
         if diameter > SHAFT_IN_ROLLER * 2.0 * mechanism.roller_radius:
             faults[place] = (
-                f"{length_in_words(diameter)} thick for {newton(max(pull, press))}, too thick for a roller and a "
-                f"slider of {length_in_words(2.0 * mechanism.roller_radius)}: make them larger"
+                f"{length_in_words(diameter)} thick for {newton(max(loads.pull, loads.press))}, too thick for a roller "
+                f"and a slider of {length_in_words(2.0 * mechanism.roller_radius)}: make them larger"
             )
-    sizes = mechanism.envelope
-    stated = sizes.brace_width if sizes else 0.0
-    width = stated or link_width(pull, brace, max(pin, shaft), strength)
+    stated = mechanism.envelope.brace_width if mechanism.envelope else 0.0
+    width = stated or link_width(loads.pull, loads.brace, max(pin, shaft), strength)
     bar = hooks.bar_width(shaft, strength)
     if bar > MAX_BAR_WIDTH * mechanism.rest_half_width:
         faults["springs to the shafts"] = (
             f"{length_in_words(bar)} wide for springs {length_in_words(hooks.height)} high: use fewer springs"
         )
     across = float(np.hypot(abs(solution.assembly.loads.sideways[1]), solution.assembly.loads.off_plane))
-    travel, radius = float(np.ptp(solution.travel)), mechanism.roller_radius
-    rod = guide_rod(across, force, travel, 2.0 * radius, mechanism.guide, system, strength)
-    holes = [edge for contour in _plate(solution)[1:] for edge in contour.edges if isinstance(edge, Arc)]
-    count = max(len(holes), 2)
-    needed = screw_for(force, thick, count, strength)
-    screw = (screw_through(plate.hole_diameter) if holes else None) or needed
-    if not screw_bears(screw, force, thick, count, strength):
-        faults["plate to its base"] = (
-            f"too weak for {newton(force)}: use {needed.name}, with holes of {length_in_words(needed.hole)} "
-            "('mechanism.plate.hole_diameter')"
+    travel, side = float(np.ptp(solution.travel)), 2.0 * mechanism.roller_radius
+    rods = guide_rods(across, loads.force, travel, side, pin, mechanism.guide, system, strength)
+    if rods.slider_thickness > thick * (1 + 1e-9):
+        faults["guide of the slider"] = (
+            f"the slider is {length_in_words(thick)} thick, as there is between the braces, too thin for rods of "
+            f"{length_in_words(rods.diameter)}: use a plate of {length_in_words(rods.slider_thickness)}"
         )
-    parts = tuple(_parts(solution, strength, (thick, brace, width), (pin, shaft, bearing), (pull, press), hooks.outer))
-    parts = (*parts, *_hook_bars(hooks, bar, shaft, strength))
-    parts = (*parts, guide_part(rod, 1, mechanism.guide is None))
+    holes = [edge for contour in _plate(solution)[1:] for edge in contour.edges if isinstance(edge, Arc)]
+    screw = _screw(mechanism, loads, len(holes), faults)
+    slider = mm(max(side, rods.slider_width), side, thick)
+    parts = (*_parts(solution, loads, width, (pin, shaft, bearing), slider), *_hook_bars(hooks, bar, shaft, strength))
+    parts = (*parts, guide_part(rods, 1, mechanism.guide is None))
     if holes:
         parts = (*parts, screw_part("plate to its base", len(holes), screw, thick, "screw"))
-    standing = tuple(_standing(solution, rod.bush, rod.diameter, holes, screw))
-    drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft)))
-    return Hardware(with_faults(parts, faults), standing, drawn, pin, in_sentences(faults))
+    standing = tuple(_standing(solution, rods, holes, screw))
+    drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft), bearing))
+    rubbing: dict[str, dict[str, float]] = {"pins": {"diameter": pin}, "guide": {}}
+    if bearing is None and mechanism.bearings is None:
+        rubbing["bearings"] = {"bore": shaft}
+    heads = screw.head_height if holes else 0.0
+    return Hardware(with_faults(parts, faults), standing, drawn, rubbing, in_sentences(faults), heads)
+
+
+def _slider_pin(mechanism: Mechanism, loads: _Loads, faults: dict[str, str]) -> float:
+    """Return the stated slider pin, or the thinnest that bears [m]; faults are added."""
+    pin, bears = pin_for(loads.pull, loads.arm, loads.brace, loads.strength, mechanism.plate.stock)
+    if not bears:
+        faults["slider pin"] = f"no pin of the series bears the {newton(loads.pull)} of a brace"
+    if mechanism.pins is None:
+        return pin
+    allowable = loads.strength.allowable, loads.strength.pins
+    if pin_that_bears(loads.pull, loads.arm, loads.brace, *allowable, (mechanism.pins.diameter,)) is None:
+        faults["slider pin"] = (
+            f"too weak for the {newton(loads.pull)} of a brace {length_in_words(loads.arm)} beside it: use at least "
+            f"{length_in_words(pin)} ('mechanism.pins.diameter')"
+        )
+    return mechanism.pins.diameter
+
+
+def _screw(mechanism: Mechanism, loads: _Loads, holes: int, faults: dict[str, str]) -> Screw:
+    """Return the screw that goes through the holes of the plate, or one that bears; faults are added."""
+    count = max(holes, 2)
+    needed = screw_for(loads.force, loads.thickness, count, loads.strength)
+    screw = (screw_through(mechanism.plate.hole_diameter) if holes else None) or needed
+    if not screw_bears(screw, loads.force, loads.thickness, count, loads.strength):
+        faults["plate to its base"] = (
+            f"too weak for {newton(loads.force)}: use {needed.name}, with holes of {length_in_words(needed.hole)} "
+            "('mechanism.plate.hole_diameter')"
+        )
+    return screw
 
 
 @dataclass(frozen=True)
@@ -131,8 +181,13 @@ class _Hooks:
     pull: float  # of all of them [N]
     arm: float  # from the middle of a brace to their middle, along the shaft [m]
     outer: float  # diameter of a coil [m]
+    loop: float  # inside of a loop [m]
     height: float  # of those above each other [m]; zero if one hooks on the shaft itself
     thickness: float  # of the bar that carries them [m]
+
+    def seat(self, shaft: float) -> float:
+        """Return the diameter of the shafts' ends where springs hook on them [m]: as thick as goes into the loops."""
+        return shaft if self.height or self.loop >= shaft else 1e-4 * math.floor(1e4 * self.loop + 1e-6)
 
     def bar_width(self, hole: float, strength: PartStrength) -> float:
         """Return the width of a bar around a shaft's hole that bears the upper and lower springs [m]; zero for none.
@@ -150,11 +205,12 @@ class _Hooks:
 def _hooks(solution: Solution, brace: float) -> _Hooks:
     springs = solution.assembly.spec.mechanism.springs
     stretch, half_width = float(solution.elongation.max()), solution.assembly.spec.mechanism.rest_half_width
-    count, outer = count_of(springs), coil_diameter(springs, stretch, half_width) or 0.0
+    count, (wire, coil) = count_of(springs), wire_and_coil(springs, stretch, half_width) or (0.0, math.inf)
+    outer = wire + coil if wire else 0.0
     share = (count + 1) // 2 / count
     pull = share * (springs.total * stretch + springs.initial_tension * count)
     height = stack_height(outer, count) if count > 2 else 0.0
-    return _Hooks(pull, 0.5 * (brace + outer), outer, height, min(brace, outer))
+    return _Hooks(pull, 0.5 * (brace + outer), outer, coil - wire, height, min(brace, outer))
 
 
 def _hook_bars(hooks: _Hooks, width: float, shaft: float, strength: PartStrength) -> Iterator[ListedPart]:
@@ -176,91 +232,118 @@ def _plate(solution: Solution) -> tuple[Any, ...]:
     return plate_contours((profile, profile), solution.assembly.spec.mechanism.plate)
 
 
-def _shaft(
-    solution: Solution, press: float, arm: float, thick: float, strength: PartStrength
-) -> tuple[float, Bearing | None]:
-    """Return the diameter of a roller's shaft [m] and its bearing: of the stated bore, or the smallest that bears."""
-    mechanism = solution.assembly.spec.mechanism
-    least, _ = pin_for(press, arm, thick, strength, mechanism.plate.stock)
-    most = BEARING_IN_ROLLER * 2.0 * mechanism.roller_radius
-    if mechanism.bearings is not None:
-        result = [entry for entry in bearings_of(mechanism.bearings.bore) if entry.outer <= most]
-        return mechanism.bearings.bore, next(iter(result), None)
-    fitting = sorted(
-        (entry for entry in BALL_BEARINGS if entry.bore >= least and entry.outer <= most), key=lambda entry: entry.outer
-    )
-    return (fitting[0].bore, fitting[0]) if fitting else (least, None)
+def roller_shaft(solution: Solution) -> tuple[float, Bearing | None]:
+    """Return the diameter of the rollers' shafts [m] and the ball bearing on each; None if the roller turns on it."""
+    return _shaft(solution.assembly.spec.mechanism, _Loads.of_solution(solution), {})
 
 
-def _springs_in_words(mechanism: Mechanism) -> str:
-    """Return what the springs between the rollers must be."""
+def _shaft(mechanism: Mechanism, loads: _Loads, faults: dict[str, str]) -> tuple[float, Bearing | None]:
+    """Return the stated shaft of a roller or the thinnest that bears [m], and its ball bearing; faults are added."""
+    least, most = loads.thinnest_shaft(mechanism.plate.stock), BEARING_IN_ROLLER * 2.0 * mechanism.roller_radius
+    stated = mechanism.bearings
+    if stated is None:
+        fitting = [entry for entry in BALL_BEARINGS if entry.bore >= least and entry.outer <= most]
+        bearing = min(fitting, key=lambda entry: entry.outer, default=None)
+        shaft = bearing.bore if bearing else least
+    else:
+        bearings = bearings_of(stated.bore) if stated.kind != "plain" else ()
+        shaft, bearing = stated.bore, next((entry for entry in bearings if entry.outer <= most), None)
+        if shaft < least * (1 - 1e-9):
+            faults["shafts of the rollers"] = (
+                f"too weak for {newton(loads.press)} and the springs: use at least {length_in_words(least)} "
+                "('mechanism.bearings.bore')"
+            )
+    hooks = loads.hooks
+    if pin_bending(hooks.pull, 0.5 * hooks.outer, hooks.seat(shaft)) > loads.strength.pins:
+        faults["between the rollers"] = (
+            f"their loops, {length_in_words(hooks.loop)} inside, do not go over shafts of {length_in_words(shaft)}, "
+            f"and ends turned to that break under {newton(hooks.pull)}: use wider coils, or more springs"
+        )
+    return shaft, bearing
+
+
+def _springs_in_words(mechanism: Mechanism, hooks: _Hooks, shaft: float) -> str:
+    """Return what the springs between the rollers must be, and how long: the insides of loops lie beyond the axes."""
     springs = mechanism.springs
     rates = springs.each if isinstance(springs.each, tuple) else (springs.each,)
     limit = f", up to {length_in_words(springs.max_elongation)}" if springs.max_elongation else ""
     opens = f", initial tension {newton(springs.initial_tension)}" if springs.initial_tension else ""
     tight = f", stretched by {length_in_words(mechanism.preload)} at the start" if mechanism.preload else ""
     reported = " to ".join(dict.fromkeys((rate(min(rates)), rate(max(rates)))))
-    return f"extension spring, {reported}{opens}{limit}{tight}"
+    relaxed = 2.0 * mechanism.springs_rest + springs.tension_stretch
+    where = "between the axes of the bars' holes" if hooks.height else "between the axes of the shafts"
+    inside = "" if hooks.height else f" ({mm(relaxed + hooks.seat(shaft))} inside the loops)"
+    return f"extension spring, {reported}{opens}{limit}{tight}, relaxed {mm(relaxed)} {where}{inside}"
 
 
 def _parts(
     solution: Solution,
-    strength: PartStrength,
-    sizes: tuple[float, float, float],
-    pins: tuple[float, float, Bearing | None],
-    loads: tuple[float, float],
-    coil: float,
+    loads: _Loads,
+    width: float,  # of a brace [m]
+    pins: tuple[float, float, Bearing | None],  # diameters of slider pin and shafts [m], and what is on a shaft
+    slider: str,  # its size
 ) -> Iterator[ListedPart]:
     """Yield plate, braces, rollers, slider, pins, shafts, bearings and springs."""
     mechanism = solution.assembly.spec.mechanism
-    (thick, brace, width), (pin, shaft, bearing), (pull, press) = sizes, pins, loads
+    thick, brace, hooks, strength, (pin, shaft, bearing) = (
+        loads.thickness,
+        loads.brace,
+        loads.hooks,
+        loads.strength,
+        pins,
+    )
     x0, y0, x1, y1 = _plate(solution)[0].extents
     of = strength.name + (", assumed" if strength.assumed else "")
     radius = mechanism.roller_radius
     yield ListedPart("cam", "cam plate", 1, f"{of}; geometry/cam.dxf", "make", mm(x1 - x0, y1 - y0, thick), "", "plate")
     ends = " and ".join(hole_with_fit(diameter, 8) for diameter in (pin, shaft))
-    data = f"{of}; {mm(mechanism.brace_length)} between holes of {ends}, bears {newton(pull)}"
+    data = (
+        f"{of}; {mm(mechanism.brace_length)} between holes of {ends}, bears {newton(0.5 * loads.pull)}; half as thick "
+        "at the slider, beside that of the other roller"
+    )
     length = mechanism.brace_length + width
-    yield ListedPart("roller to slider", "brace", 2, data, "make", mm(length, width, brace), "", "brace")
+    yield ListedPart("roller to slider", "brace", 4, data, "make", mm(length, width, brace), "", "brace")
     size = f"diameter {mm(2.0 * radius)}, {mm(thick)} wide"
     seat = hole_with_fit(shaft, 8) if bearing is None else f"{hole_with_fit(bearing.outer, 7)} for its bearing"
-    data = f"with a hole of {seat}, presses with {newton(press)}"
+    data = f"with a hole of {seat}, presses with {newton(loads.press)}"
     yield ListedPart("on the cam", "roller", 2, data, "make", size, "", "roller")
-    size = mm(2.0 * radius, 2.0 * radius, thick)
-    yield ListedPart("on its guide", "slider", 1, f"with a hole of {hole_with_fit(pin, 8)}", "make", size, "", "slider")
-    yield pin_part("slider pin", 1, pin, thick + 2.0 * brace, 2.0 * pull, "slider pin")
-    long = thick + 2.0 * brace + min(count_of(mechanism.springs), 2) * coil
-    yield pin_part("shafts of the rollers", 2, shaft, long, press, "shaft")
+    data = f"with a hole of {hole_with_fit(pin, 8)} between those of its guide"
+    yield ListedPart("on its guide", "slider", 1, data, "make", slider, "", "slider")
+    yield pin_part("slider pin", 1, pin, thick + 2.0 * brace, 2.0 * loads.pull, "slider pin")
+    long = thick + 2.0 * brace + min(count_of(mechanism.springs), 2) * hooks.outer
+    shafts = pin_part("shafts of the rollers", 2, shaft, long, loads.press, "shaft")
+    end = hooks.seat(shaft)
+    yield shafts if end == shaft else replace(shafts, data=f"{shafts.data}, ends turned to {mm(end)} for the loops")
     stated, count = mechanism.bearings, 2 * (mechanism.bearings.per_roller if mechanism.bearings else 1)
-    if stated is not None:
+    if stated is not None and stated.kind != "plain":
         rated = f", C {newton(stated.dynamic_rating)}" if stated.dynamic_rating else ""
         rated += f", C0 {newton(stated.static_rating)}" if stated.static_rating else ""
         name = stated.name or (bearing.name if bearing and stated.kind == "ball" else "")
         size = mm(bearing.bore, bearing.outer, bearing.width) if bearing else f"bore {mm(stated.bore)}"
         data = f"{stated.kind} bearing, bore {length_in_words(stated.bore)}{rated}"
-        yield ListedPart("in the rollers", name, count, data, "buy", size, "DIN 625-1" if bearing else "")
-    elif bearing is not None:
+        standard, body = ("DIN 625-1", "bearing") if bearing else ("", "")
+        yield ListedPart("in the rollers", name, count, data, "buy", size, standard, body)
+    elif stated is None and bearing is not None:
         size = mm(bearing.bore, bearing.outer, bearing.width)
-        yield ListedPart(
-            "in the rollers", bearing.name, count, "ball bearing, its life not judged", "buy", size, "DIN 625-1"
-        )
+        data = "ball bearing, its life not judged"
+        yield ListedPart("in the rollers", bearing.name, count, data, "buy", size, "DIN 625-1", "bearing")
     springs = mechanism.springs
     wound = springs.wound
     size = f"wire {mm(wound.wire)}, coil {mm(wound.coil)}, {wound.turns:g} turns" if wound else ""
-    data, number = _springs_in_words(mechanism), count_of(springs)
+    data, number = _springs_in_words(mechanism, hooks, shaft), count_of(springs)
     yield ListedPart("between the rollers", springs.name or "", number, data, "buy", size, "", "spring")
 
 
-def _standing(solution: Solution, bush: float, diameter: float, holes: list[Arc], screw: Screw) -> Iterator[PosedBody]:
-    """Yield the rod that guides the slider over its way, and the heads of the screws in the plate."""
+def _standing(solution: Solution, rods: GuideRods, holes: list[Arc], screw: Screw) -> Iterator[PosedBody]:
+    """Yield the rods that guide the slider over its way, and the heads of the screws in the plate."""
     heights = pin_path(solution)[:, 1]
-    ends = np.array([[0.0, float(heights.min()) - 0.5 * bush], [0.0, float(heights.max()) + 0.5 * bush]])
-    yield PosedBody.line("guide", "held", ends, 0.5 * diameter)
+    ends = np.array([[0.0, float(heights.min()) - 0.5 * rods.bush], [0.0, float(heights.max()) + 0.5 * rods.bush]])
+    yield from rods.bodies(ends)
     yield from (PosedBody.line("screw", "held", np.array([hole.center]), 0.5 * screw.head) for hole in holes)
 
 
 def _drawn_bodies(
-    solution: Solution, standing: tuple[PosedBody, ...], sizes: tuple[float, float, float]
+    solution: Solution, standing: tuple[PosedBody, ...], sizes: tuple[float, float, float], bearing: Bearing | None
 ) -> Iterator[PosedBody]:
     """Yield all parts as the assembly shows them, the lowest first: for braces, slider pin and shafts their widths."""
     width, pin, shaft = sizes
@@ -272,6 +355,8 @@ def _drawn_bodies(
     yield PosedBody.line("spring", "free", np.stack([rollers, rollers * mirror], axis=1), 0.35 * width)
     for side in (np.ones(2), mirror):
         yield PosedBody.line("roller", "contact", (rollers * side)[:, None], radius)
+        if bearing is not None:
+            yield PosedBody.line("bearing", "free", (rollers * side)[:, None], 0.5 * bearing.outer)
         ends: FloatArray = np.stack([rollers * side, pins], axis=1)
         yield PosedBody.line("brace", "free", ends, 0.5 * width, round=True)
         yield PosedBody.line("shaft", "free", (rollers * side)[:, None], 0.5 * shaft)

@@ -46,8 +46,7 @@ from cfmkit.families.cam.scalar_results import (
     pressure_of,
     values_of_built,
 )
-from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides
-from cfmkit.families.cam.window_of_measured_cam import large_holes, requested_travel
+from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides, large_holes, requested_travel
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between
@@ -73,8 +72,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
-MAX_HEIGHT_DEVIATION = 0.01
-"""Points are those of another part if they are off the design by this part of their height."""
+MAX_HEIGHT_DEVIATION = 0.01  # points are those of another part if they are off the design by this part of their height
 
 WIDTH_CERTAIN = 5.0
 """An error of width is taken out of the points only if it is larger than this many of its standard deviations."""
@@ -382,11 +380,8 @@ def _curve(built: MeasuredCam) -> Curve:
     return Curve(loop(built.travel) + built.origin, loop(up[0], down[0]), branch, stable, extra)
 
 
-PLACE_STEP = 5e-5
-"""Distance of the places that are computed [m]."""
-
-CONTACT_REACH = 2e-3
-"""How far along the flank, beside the place where the design touches, contact is sought [m]."""
+PLACE_STEP = 5e-5  # distance of the places that are computed [m]
+CONTACT_REACH = 2e-3  # how far along the flank, beside the place where the design touches, contact is sought [m]
 
 
 @dataclass(frozen=True)

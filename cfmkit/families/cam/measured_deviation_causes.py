@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 _MAX_ROUNDS = 12
-_DIFFERENCE_STEP = 1e-6
-"""Of friction, and of the rest half width [m], for derivatives."""
+_DIFFERENCE_STEP = 1e-6  # of friction, and of the rest half width [m], for derivatives
 
 
 def attribute(

@@ -144,11 +144,7 @@ def losses_of(mechanism: Mechanism) -> Losses | None:
     if not agree(np.not_equal(bearing, 0.0)) and not agree(np.not_equal(pin, 0.0)) and not guide.there:
         return None
     return Losses(
-        rolling=mechanism.rolling_friction,
-        roller_radius=mechanism.roller_radius,
-        bearing=bearing,
-        pin=pin,
-        guide=guide,
+        rolling=mechanism.rolling_friction, roller_radius=mechanism.roller_radius, bearing=bearing, pin=pin, guide=guide
     )
 
 
@@ -212,30 +208,24 @@ def check_start(
     """
     x0, shortest = law.rest_half_width, np.minimum(rollers[0][1], rollers[-1][1])
     if fails(x0 >= shortest * (1 - 1e-6)):
-        raise CannotBuild(
-            finding(
-                "brace_too_short",
-                f"the braces ({mm(shortest)}) do not reach from the axis to the rollers, which start at "
-                f"{mm(x0)} from it; use a brace longer than {mm(x0)} ('mechanism.brace_length')",
-            )
+        raise finding.cannot_build(
+            "brace_too_short",
+            f"the braces ({mm(shortest)}) do not reach from the axis to the rollers, which start at "
+            f"{mm(x0)} from it; use a brace longer than {mm(x0)} ('mechanism.brace_length')",
         )
     for radius, brace in rollers:
         if fails(radius >= brace):
-            raise CannotBuild(
-                finding(
-                    "rollers_collide",
-                    f"there is no room for two rollers with a radius of {mm(radius)} on braces of {mm(brace)}; "
-                    "use smaller rollers ('mechanism.roller_radius')",
-                )
+            raise finding.cannot_build(
+                "rollers_collide",
+                f"there is no room for two rollers with a radius of {mm(radius)} on braces of {mm(brace)}; "
+                "use smaller rollers ('mechanism.roller_radius')",
             )
     p = law.frictionless(x0)
     if fails(np.logical_or(p + law.friction <= 0, law.friction * p >= 1)):
-        raise CannotBuild(
-            finding(
-                "design_singular",
-                f"a profile cut for a friction of {law.friction:g} does not rise at its start: |friction| must stay "
-                f"below {p if law.friction <= 0 else 1 / p:.3g} ('friction' of 'mechanism.profile', or of 'design')",
-            )
+        raise finding.cannot_build(
+            "design_singular",
+            f"a profile cut for a friction of {law.friction:g} does not rise at its start: |friction| must stay "
+            f"below {p if law.friction <= 0 else 1 / p:.3g} ('friction' of 'mechanism.profile', or of 'design')",
         )
 
 
@@ -255,12 +245,10 @@ def _shortfall(law: SlopeLaw, stroke: float, end: float, reached: float) -> Find
         helped = law.slope_factor < 1
         cut_for = "that lets the weights help" if helped else f"cut for a friction of {law.friction:g}"
         less = "lighter parts ('mechanism.masses')" if helped else "less friction ('friction' of 'mechanism.profile')"
-        raise CannotBuild(
-            finding(
-                "design_singular",
-                f"a profile {cut_for} self-locks: the slider cannot rise anywhere as the rollers move out; use {less} "
-                "or a smaller force constant ('force_constant' of 'mechanism.profile')",
-            )
+        raise finding.cannot_build(
+            "design_singular",
+            f"a profile {cut_for} self-locks: the slider cannot rise anywhere as the rollers move out; use {less} "
+            "or a smaller force constant ('force_constant' of 'mechanism.profile')",
         )
     return finding(
         "brace_too_short",
@@ -287,15 +275,12 @@ def cut_profile(path: RollerPath, roller_radius: float, end: float) -> CamProfil
         return profile
     except WholeCamUndercut:
         smallest = float(path.law.curvature_radius(path.law.rest_half_width))
-        raise CannotBuild(
-            finding(
-                "undercut_total",
-                f"nothing of the flank remains: the {mm(roller_radius)} roller is larger than the path's radius of "
-                f"curvature ({mm(smallest)} at the start), and it would pivot on the cam's corner over the "
-                f"whole stroke; "
-                "use a smaller roller ('mechanism.roller_radius'), a larger force constant or a longer stroke "
-                "('force_constant' and 'stroke' of 'mechanism.profile')",
-            )
+        raise finding.cannot_build(
+            "undercut_total",
+            f"nothing of the flank remains: the {mm(roller_radius)} roller is larger than the path's radius of "
+            f"curvature ({mm(smallest)} at the start), and it would pivot on the cam's corner over the whole stroke; "
+            "use a smaller roller ('mechanism.roller_radius'), a larger force constant or a longer stroke "
+            "('force_constant' and 'stroke' of 'mechanism.profile')",
         ) from None
 
 
@@ -309,13 +294,11 @@ def _check_bend(profile: CamProfile) -> None:
         return
     place, radius = law.tightest(profile.end, profile.start)
     if radius < profile.roller_radius and place > profile.start:
-        raise CannotBuild(
-            finding(
-                "undercut_total",
-                f"the path that lets the weights help has a radius of curvature of {mm(radius)} at x = {mm(place)}, "
-                f"less than the roller's {mm(profile.roller_radius)}; use a smaller roller ('mechanism.roller_radius') "
-                "or leave the weight uncompensated ('design.gravity')",
-            )
+        raise finding.cannot_build(
+            "undercut_total",
+            f"the path that lets the weights help has a radius of curvature of {mm(radius)} at x = {mm(place)}, "
+            f"less than the roller's {mm(profile.roller_radius)}; use a smaller roller ('mechanism.roller_radius') "
+            "or leave the weight uncompensated ('design.gravity')",
         )
 
 
@@ -326,31 +309,24 @@ def _track(profile: CamProfile, mechanism: Mechanism) -> Track:
     except NoTrack as problem:
         brace = mechanism.brace_length
         if problem.reason == "brace":
-            raise CannotBuild(
-                finding(
-                    "brace_too_short",
-                    f"the braces ({mm(brace)}) do not reach from the axis to the rollers, which start at "
-                    f"{mm(problem.start)} from it on this cam; use a brace longer than {mm(problem.start)} "
-                    "('mechanism.brace_length')",
-                )
+            raise finding.cannot_build(
+                "brace_too_short",
+                f"the braces ({mm(brace)}) do not reach from the axis to the rollers, which start at "
+                f"{mm(problem.start)} from it on this cam; use a brace longer than {mm(problem.start)} "
+                "('mechanism.brace_length')",
             ) from None
         if problem.reason == "crossed":
-            raise CannotBuild(
-                finding(
-                    "flanks_collide",
-                    f"on this cam the right roller would start at x = {mm(problem.start)}, across the axis; use a cam "
-                    "with a larger rest half width ('mechanism.profile.rest_half_width'), or rollers nearer to "
-                    "those it "
-                    "is cut for ('mechanism.roller_radius')",
-                )
+            raise finding.cannot_build(
+                "flanks_collide",
+                f"on this cam the right roller would start at x = {mm(problem.start)}, across the axis; use a cam with "
+                "a larger rest half width ('mechanism.profile.rest_half_width'), or rollers nearer to those it is cut "
+                "for ('mechanism.roller_radius')",
             ) from None
-        raise CannotBuild(
-            finding(
-                "dead_point",
-                f"with a brace of {mm(brace)} the slider does not rise above its start while the rollers move out on "
-                "this cam; use a longer brace ('mechanism.brace_length'), or a cam cut for this one "
-                "('mechanism.profile.brace_length')",
-            )
+        raise finding.cannot_build(
+            "dead_point",
+            f"with a brace of {mm(brace)} the slider does not rise above its start while the rollers move out on "
+            "this cam; use a longer brace ('mechanism.brace_length'), or a cam cut for this one "
+            "('mechanism.profile.brace_length')",
         ) from None
 
 
@@ -446,10 +422,8 @@ def check_springs(
     """
     if elongation.max() < 0 and not (held > 0).any():
         short = mm(-float(elongation.max()))
-        raise CannotBuild(
-            finding(
-                "spring_slack",
-                f"the springs are slack over the whole travel, by at least {short}: nothing holds the rollers on the "
-                f"cam; use shorter springs ('mechanism.rest_half_width', here {mm(rest_half_width)})",
-            )
+        raise finding.cannot_build(
+            "spring_slack",
+            f"the springs are slack over the whole travel, by at least {short}: nothing holds the rollers on the "
+            f"cam; use shorter springs ('mechanism.rest_half_width', here {mm(rest_half_width)})",
         )

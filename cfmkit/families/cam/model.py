@@ -26,18 +26,13 @@ from cfmkit.families.cam.clearance import smallest, touching
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, left_out, rules_of
 from cfmkit.families.cam.hardware import hardware
-from cfmkit.families.cam.mechanism_from_spec import (
-    assemble,
-    check_first_pose,
-    check_springs,
-    displacement_origin,
-)
+from cfmkit.families.cam.mechanism_from_spec import assemble, check_first_pose, check_springs, displacement_origin
 from cfmkit.families.cam.scalar_results import SCALAR_QUANTITIES, contact_pressure, curve_cut_for
 from cfmkit.families.cam.solution import DenseLoop, Solution
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import fails, findings_of_one, values_of_one
+from cfmkit.families.rows import fails, findings_of_one, plain_if_equal, values_of_one
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import parts_tables
 
@@ -50,6 +45,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
     from cfmkit.stock.parts_list import ListedPart
 
+STROKE_RTOL = 1e-13
+"""Rounding of the travel to the end of a flank that is cut for a stroke: mechanisms side by side have one travel."""
+
 UNEQUAL_SIDES_MESSAGE = (
     "the quasi-static model is symmetric and would give the force of two right sides: add 'analysis.dynamics' with a "
     "slow motion, or accept that with analysis.fidelity: quasi-static"
@@ -59,23 +57,9 @@ UNEQUAL_SIDES_MESSAGE = (
 def analyze(spec: CamSpec, run: Run) -> Result:
     """Return the force-displacement loop of a cam that is moved slowly, with everything that is wrong with it.
 
-    Parameters
-    ----------
-    spec : CamSpec
-        The mechanism; what is left out is derived.
-    run : Run
-        Its seed, for the parts that are drawn for `analysis.manufacturing`.
-
-    Returns
-    -------
-    Result
-        Branches ``load`` (up) and ``unload`` (down). NO_EQUILIBRIUM if the mechanism cannot
-        be built, PARTIAL if the curve ends before the requested travel.
-
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        If the two sides differ and nobody has said that the symmetric model will do.
+    Branches ``load`` (up) and ``unload`` (down); the seed of the run draws the parts of `analysis.manufacturing`.
+    NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if the curve ends before the requested travel. Raises
+    `SpecError` if the two sides differ and nobody has said that the symmetric model will do.
     """
     if spec.mechanism.profile.file is not None:
         from cfmkit.families.cam.measured_cam_analysis import analyze_built
@@ -173,8 +157,8 @@ def solve(
     spec, track, loads = assembly.spec, assembly.track, assembly.loads
     low, end = reachable_travel(assembly)
     if fails(end <= low):
-        raise CannotBuild(
-            finding("end_stop", f"the lower stop at {mm(low)} leaves no travel ('mechanism.stops.lower')")
+        raise finding.cannot_build(
+            "end_stop", f"the lower stop at {mm(low)} leaves no travel ('mechanism.stops.lower')"
         )
     travel = np.linspace(low, end, spec.analysis.points, axis=-1)
     travel = travel if travel.ndim == 1 else travel[:, 0]
@@ -187,10 +171,12 @@ def solve(
 def reachable_travel(assembly: Assembly) -> tuple[Any, Any]:
     """Return where the travel begins, and as far as it goes: to what is asked, the end of the track, or a stop [m]."""
     spec, track = assembly.spec, assembly.track
-    available = track.end - track.start
+    stroke, available = spec.mechanism.profile.stroke, track.end - track.start
+    assert stroke is not None  # of a resolved spec
+    available = np.where(np.abs(available - stroke) <= STROKE_RTOL * stroke, stroke, available)
     low, high = travel_between_stops(spec)
     asked = available if spec.analysis.travel is None else spec.analysis.travel
-    return low, np.minimum(np.minimum(asked, available), high)
+    return low, plain_if_equal(np.minimum(np.minimum(asked, available), high)[()])
 
 
 def travel_between_stops(spec: CamSpec) -> tuple[Any, Any]:

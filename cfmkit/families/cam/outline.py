@@ -41,17 +41,13 @@ if TYPE_CHECKING:
     """The right flank and the left one, each as it would be on the right."""
 
 N_OUTLINE_POINTS = 1201
-TAB_CLEARANCE = 0.25
-"""Space left between the tab and a roller, in roller radii."""
+TAB_CLEARANCE = 0.25  # space left between the tab and a roller, in roller radii
 
 
 def drawing(spec: CamSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     """Return the plate, the roller paths and their point tables of a cam specification.
 
-    Raises
-    ------
-    cfmkit.families.no_mechanism.CannotBuild
-        If there is no cam to draw.
+    Raises `CannotBuild` if there is no cam to draw.
     """
     sides = assemble_sides(spec)
     profiles = sides[0].profile, sides[1].profile

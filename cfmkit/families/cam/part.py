@@ -58,11 +58,14 @@ def part_over_motion(result: Result) -> PosedPart | None:
     reported = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE_WIDTH):.4g} mm each, {wound}"
     if depth is None:
         reported = "no steel spring fits between the rollers"
-    # plate, two rollers, two braces, slider
-    pieces = 6 + count_of(mechanism.springs)
+    # plate, two rollers, four braces, slider
+    pieces = 8 + count_of(mechanism.springs)
     joining = hardware(solution)
+    depth = None if depth is None else 0.5 * depth + max(0.5 * depth, 0.5 * thick + joining.heads)
     all_bodies = (*bodies(solution), *joining.bodies, *_stacked_springs(solution, stretch))
-    return PosedPart(all_bodies, depth=depth, pieces=pieces, assumed=reported, pin=joining.pin, faults=joining.faults)
+    return PosedPart(
+        all_bodies, depth=depth, pieces=pieces, assumed=reported, rubbing=joining.rubbing, faults=joining.faults
+    )
 
 
 def bodies(solution: Solution) -> tuple[PosedBody, ...]:

@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.springs_spec import Springs
 
-PLATE_THICKNESS = 0.008
-"""Thickness of the plate where no `contact.width` says it [m]: that of the contact's example."""
+PLATE_THICKNESS = 0.008  # thickness of the plate where no `contact.width` says it [m]: that of the contact's example
 
 
 def roller_path(solution: Solution) -> FloatArray:
@@ -50,10 +49,18 @@ def coil_diameter(springs: Springs, stretch: float, half_width: float, safety: f
 
     `stretch`, `half_width`, `safety`: as of `depth_of`.
     """
+    sizes = wire_and_coil(springs, stretch, half_width, safety)
+    return None if sizes is None else sum(sizes)
+
+
+def wire_and_coil(
+    springs: Springs, stretch: float, half_width: float, safety: float = 1.0
+) -> tuple[float, float] | None:
+    """Return the wire's diameter and the mean one of the coil of each spring [m], as `coil_diameter` has them."""
     if springs.wound is not None:
-        return springs.wound.coil + springs.wound.wire
-    coil = extension_spring(springs.total / count_of(springs), stretch, 2.0 * half_width, safety)
-    return None if coil is None else coil.outer_diameter
+        return springs.wound.wire, springs.wound.coil
+    made = extension_spring(springs.total / count_of(springs), stretch, 2.0 * half_width, safety)
+    return None if made is None else (made.wire, made.coil)
 
 
 def stack_height(outer: float, count: int) -> float:

@@ -20,16 +20,17 @@ import numpy as np
 
 from cfmkit.errors import SolutionError
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
-from cfmkit.families.cam.hardware import SHAFT_IN_ROLLER
+from cfmkit.families.cam.hardware import BEARING_IN_ROLLER, SHAFT_IN_ROLLER, roller_shaft
 from cfmkit.families.cam.part_sizes import BRACE_WIDTH, coil_diameter, count_of, depth_of, stack_height
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
-from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, pin_for
+from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, guide_rods, pin_for, series_sizes
 from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.made_to_measure import as_stated, extension_spring
+from cfmkit.stock.stock_series import BALL_BEARINGS
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -63,6 +64,9 @@ PLATE_MIN = 0.002
 
 ROLLER_MIN = 0.0015
 """Smallest radius of a roller [m]: that of the smallest usual ball bearings."""
+
+THINNEST_SHAFT = 0.001
+"""Of a roller [m]: the thinnest pin that is used."""
 
 SHAFT_ARM = 0.004
 """About how far from the braces a roller presses on its shaft [m]: half of a plate of 5 mm and of a brace."""
@@ -129,6 +133,12 @@ def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
     height = stroke + rise + roller + np.maximum(roller, tab)
     contact = 0.5 * np.hypot(1.0, slope.max(axis=0))
     shaft = np.cbrt(32.0 * contact * request.target * SHAFT_ARM * request.safety / (np.pi * PIN_STRENGTH))
+    plain = np.zeros(brace.size, dtype=bool)
+    if request.hysteresis is not None:  # rollers on plain shafts rub there
+        turning = np.maximum(shaft, THINNEST_SHAFT)
+        plain = ~_turn_on_bearings(turning, roller)
+        share = 1.0 + plain * SLIDING_FRICTION * turning / (2.0 * roller * ROLLING_FRICTION)
+        loss, ripple, down = loss * share, ripple * share, down * share
     least = np.maximum(ROLLER_MIN, 0.5 * shaft / SHAFT_IN_ROLLER)
     there = (end < 0.97 * brace) & (roller > least) & (roller < 0.99 * radius) & np.isfinite(loss).all(axis=0)
     ripple = np.where(there, np.maximum(ripple, down), np.inf)
@@ -136,11 +146,17 @@ def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
     return {
         "brace": brace, "start": start, "constant": constant, "roller": roller, "run_in": run_in, "end": end,
         "width": width, "height": height, "ripple": ripple, "hysteresis": hysteresis, "loss": loss.mean(axis=0),
-        "there": there, "contact": contact,
+        "there": there, "contact": contact, "plain": plain,
         "fits": there & (width < RESERVE_SHARES * across) & (height < RESERVE_SHARES * along),
         "flat": there & (ripple < FLAT_RESERVE * request.ripple) & (loss.max(axis=0) < 0.2),
         "lossless": there & (hysteresis < RESERVE_SHARES * (request.hysteresis or np.inf)),
     }  # fmt: skip
+
+
+def _turn_on_bearings(shaft: Any, roller: Any) -> Any:
+    """Return whether a ball bearing fits around shafts and into rollers of some radius [m]."""
+    fits = [(entry.bore >= shaft) & (entry.outer <= BEARING_IN_ROLLER * 2.0 * roller) for entry in BALL_BEARINGS]
+    return np.any(fits, axis=0)
 
 
 def spare_stroke(request: Request) -> float:
@@ -173,7 +189,9 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
         modulus = material.modulus / (2.0 * (1.0 - material.poisson**2))
         bearable = YIELD_PRESSURE * material.yield_strength / request.safety
         press = CONTACT_MARGIN * size["contact"] * request.target
-        thick = max(PLATE_MIN, press * modulus / (np.pi * size["roller"] * bearable**2))
+        thick = max(
+            PLATE_MIN, press * modulus / (np.pi * size["roller"] * bearable**2), _slider(request, size, material)
+        )
         depths: dict[int, float] = {}
         pin = _slider_pin(request, size, thick, material)
         for count in SPRING_COUNTS if pin is not None else ():
@@ -181,7 +199,10 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
             depth = depth_of(thick, springs, stretch, size["start"], request.safety)
             if depth is None or depth > (request.depth or sum(request.envelope)):
                 continue
-            stack = stack_height(coil_diameter(springs, stretch, size["start"], request.safety) or 0.0, count)
+            outer = coil_diameter(springs, stretch, size["start"], request.safety) or 0.0
+            if not _shafts_as_assumed(request, size, (thick, outer), material, 0.5 * total * stretch):
+                continue
+            stack = stack_height(outer, count)
             below = 0.5 * stack - max(size["roller"], TAB_HEIGHT_RATIO * request.envelope[1])
             if size["height"] + max(below, 0.0) <= request.envelope[1]:
                 depths[count] = depth
@@ -206,7 +227,33 @@ def _slider_pin(request: Request, size: dict[str, float], thick: float, material
     pin, pin_bears = pin_for(pull, arm, brace, strength, None)
     shaft, shaft_bears = pin_for(CONTACT_MARGIN * size["contact"] * request.target, arm, thick, strength, None)
     most = SHAFT_IN_ROLLER * 2.0 * size["roller"]
-    return max(pin, PIN_SHARE * 2.0 * size["roller"]) if pin_bears and shaft_bears and max(pin, shaft) <= most else None
+    handy = next((entry for entry in series_sizes("pin", None) if entry >= PIN_SHARE * 2.0 * size["roller"]), pin)
+    return max(pin, handy) if pin_bears and shaft_bears and max(pin, shaft) <= most else None
+
+
+def _shafts_as_assumed(
+    request: Request,
+    size: dict[str, float],
+    # of the plate, and of a spring's coil [m]
+    sizes: tuple[float, float],
+    material: MaterialSpec,
+    pull: float,  # of the springs of a side [N]
+) -> bool:
+    """Return True unless friction counts, and rollers that were to have ball bearings have too thick shafts."""
+    if request.hysteresis is None or size["plain"]:
+        return True
+    (thick, outer), press = sizes, CONTACT_MARGIN * size["contact"] * request.target
+    brace = min(thick, BRACE_WIDTH)
+    arm = 0.25 * (thick + brace) + 0.5 * (brace + outer) * pull / press
+    shaft, bears = pin_for(press, arm, thick, PartStrength.from_material(material, request.safety), None)
+    return bears and bool(_turn_on_bearings(shaft, size["roller"]))
+
+
+def _slider(request: Request, size: dict[str, float], material: MaterialSpec) -> float:
+    """Return how thick the slider is around the rods that guide it [m]: so thick is the plate."""
+    strength, travel = PartStrength.from_material(material, request.safety), size["run_in"] + request.travel
+    load = (0.0, PULL_MARGIN * request.target, travel + spare_stroke(request), 2.0 * size["roller"])
+    return guide_rods(*load, 0.0, None, None, strength).slider_thickness
 
 
 def with_wire(spec: CamSpec, request: Request) -> CamSpec:
@@ -219,13 +266,30 @@ def with_wire(spec: CamSpec, request: Request) -> CamSpec:
 
     springs, solution = spec.mechanism.springs, analyze(spec, Run()).state
     if springs.wound is not None or solution is None:
-        return spec
+        return with_bearings(spec, request)
     stretch, length = float(solution.elongation.max()), 2.0 * spec.mechanism.rest_half_width
     coil = extension_spring(springs.total / count_of(springs), stretch, length, request.safety)
     if coil is None:
-        return spec
+        return with_bearings(spec, request)
     stated = {"count": springs.count, "preload": springs.preload} if springs.preload else {"count": springs.count}
-    return spec.replace({"mechanism.springs": {**stated, **as_stated(coil)}})
+    return with_bearings(spec.replace({"mechanism.springs": {**stated, **as_stated(coil)}}), request)
+
+
+def with_bearings(spec: CamSpec, request: Request) -> CamSpec:
+    """Return a cam whose rollers turn as its parts list has them, if friction counts: on ball bearings, or on shafts.
+
+    What ball bearings take is in the rolling friction, which was measured with them.
+    """
+    from cfmkit.families.cam.model import analyze
+    from cfmkit.families.run_control import Run
+
+    solution = analyze(spec, Run()).state if request.hysteresis is not None else None
+    if solution is None:
+        return spec
+    shaft, bearing = roller_shaft(solution)
+    if bearing is not None:
+        return spec.replace({"mechanism.bearings": {"bore": bearing.bore, "name": bearing.name}})
+    return spec.replace({"mechanism.bearings": {"bore": shaft, "friction": SLIDING_FRICTION, "kind": "plain"}})
 
 
 def widen_plate(spec: CamSpec, request: Request) -> CamSpec:
@@ -242,10 +306,9 @@ def widen_plate(spec: CamSpec, request: Request) -> CamSpec:
     result = analyze(spec.replace({"analysis.window": None}), Run())  # all of the travel counts
     factor = evaluate(result, ["safety_factor"])["safety_factor"].value
     if factor is None or factor >= request.safety or spec.mechanism.contact is None:
-        return spec
-    return spec.replace(
-        {"mechanism.contact.width": spec.mechanism.contact.width * CONTACT_MARGIN * (request.safety / factor) ** 2}
-    )
+        return with_bearings(spec, request)
+    width = spec.mechanism.contact.width * CONTACT_MARGIN * (request.safety / factor) ** 2
+    return with_bearings(spec.replace({"mechanism.contact.width": width}), request)
 
 
 def _from_catalogue(made: Candidate, request: Request) -> Candidate:

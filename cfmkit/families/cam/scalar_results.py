@@ -11,18 +11,18 @@ import numpy as np
 from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.contact_pressure import flank_pressure
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.cam.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.cam.solution import ON_CORNER
+from cfmkit.families.cam.solution_of_measured_cam import large_holes, profile_coverage, requested_travel, window_mask
 from cfmkit.families.cam.statics import Losses, normal_turn
-from cfmkit.families.cam.window_of_measured_cam import large_holes, profile_coverage, requested_travel, window_mask
-from cfmkit.families.rows import ScalarQuantity, row_of
+from cfmkit.families.largest_next_to_samples import extreme_next_to, largest_of_each
+from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values, quantity_of_each, row_of
 from cfmkit.results import Quantity
 from cfmkit.specs.evaluable_target_curve import TargetCurve
 from cfmkit.specs.units import window_places
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.assembly import Assembly
@@ -155,10 +155,7 @@ SCALAR_DEFINITIONS = {
     "roller_speed_max": ("angular_velocity", "largest speed at which a roller turns"),
     "slider_speed_max": ("velocity", "largest speed of the slider"),
     "slider_acceleration_max": ("acceleration", "largest acceleration of the slider"),
-    "dead_weight_peak": (
-        "ratio",
-        "largest acceleration over g: relative increase of the force of a dead weight",
-    ),
+    "dead_weight_peak": ("ratio", "largest acceleration over g: relative increase of the force of a dead weight"),
     "moving_mass_max": ("mass", "largest mass that, fixed to the slider, would have the same kinetic energy"),
     "force_peak_over_static": ("ratio", "largest F/F_0 - 1 of a motion, F_0 the static force at the same position"),
     "force_dip_under_static": ("ratio", "largest 1 - F/F_0 of a motion; above 1 the force changes sign"),
@@ -305,22 +302,9 @@ def _in_use(springs: Springs, least: float, largest: float) -> SpringInUse:
     return SpringInUse(wound, least, largest, fatigue, springs.life)
 
 
-def _wire(name: str) -> ScalarQuantity[Solution]:
-    """Return what the springs' wire bears, where it is known; of unequal springs the stiffest."""
-
-    def read(solution: Solution) -> FloatArray:
-        found = [wire_quantities([one]).get(name) for one in _springs_in_use(solution)]
-        return np.array([np.nan if one is None or one.value is None else one.value for one in found])
-
-    def of_first(solution: Solution) -> Mapping[str, Quantity]:
-        return wire_quantities(_springs_in_use(solution)[:1])
-
-    return ScalarQuantity(
-        *WIRE_DEFINITIONS[name],
-        read,
-        lambda solution: of_first(solution)[name].reason,
-        lambda solution: name in of_first(solution),
-    )
+def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
+    """Yield what the springs' wire bears, where it is known, of each mechanism; of unequal springs the stiffest."""
+    return (wire_quantities([spring]) for spring in _springs_in_use(solution))
 
 
 def _is_in_contact(solution: Solution) -> bool:
@@ -399,17 +383,14 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         name: ScalarQuantity(*SCALAR_DEFINITIONS[name], function, "", applies)
         for name, (function, applies) in _SCALAR_FUNCTIONS.items()
     },
-    **{name: _wire(name) for name in WIRE_DEFINITIONS},
+    **{name: quantity_of_each(name, about, _wires) for name, about in WIRE_DEFINITIONS.items()},
 }
 """Every scalar result of a quasi-static cam as designed, in the order in which they are shown."""
 
-_OTHER_QUANTITIES: dict[str, ScalarQuantity[Solution]] = {
-    name: ScalarQuantity(*about, lambda _solution: np.nan, applies=lambda _solution: False)
-    for name, about in SCALAR_DEFINITIONS.items()
-    if name not in SCALAR_QUANTITIES
+ROW_COLUMNS: Mapping[str, ScalarQuantity[Solution]] = {
+    **SCALAR_QUANTITIES,
+    **columns_of_absent_values({n: about for n, about in SCALAR_DEFINITIONS.items() if n not in SCALAR_QUANTITIES}),
 }
-
-ROW_COLUMNS: Mapping[str, ScalarQuantity[Solution]] = {**SCALAR_QUANTITIES, **_OTHER_QUANTITIES}
 """What studies may ask of rows: of values that only motions and measured cams have their cells are empty."""
 
 

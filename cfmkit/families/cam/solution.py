@@ -17,10 +17,9 @@ from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressur
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
 from cfmkit.families.cam.geometry.path import RollerPath
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, TrackStates
-from cfmkit.families.cam.geometry.slope_law import brace_tangent
-from cfmkit.families.cam.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.cam.statics import Forces, forces, jams
-from cfmkit.families.rows import is_column, row_of, rows_of
+from cfmkit.families.largest_next_to_samples import extreme_next_to, largest_of_each
+from cfmkit.families.rows import PlacesKept, is_column, row_of, rows_of
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.results import ROUND_OFF
 from cfmkit.specs.units import window_places
@@ -62,9 +61,9 @@ class ForceBand:
         return deviations
 
 
-def pressure_angle(states: TrackStates, brace_length: Any) -> FloatArray:
+def pressure_angle(states: TrackStates) -> FloatArray:
     """Return the angle between a brace's pull and its roller's motion [rad]; at 90 deg the slider moves nothing."""
-    slope, tangent = states.slope, brace_tangent(states.x, brace_length)
+    slope, tangent = states.slope, states.tangent
     angle: FloatArray = np.arctan2(1.0 + slope * tangent, slope - tangent)
     return angle
 
@@ -112,7 +111,7 @@ class Solution(ShortRepr):
     @cached_property
     def pressure_angle(self) -> FloatArray:
         """Angle between the brace's pull and the roller's motion [rad]; at 90 deg the slider moves nothing."""
-        return pressure_angle(self.states, self.assembly.track.brace_length)
+        return pressure_angle(self.states)
 
     @cached_property
     def elongation(self) -> FloatArray:
@@ -161,8 +160,15 @@ class Solution(ShortRepr):
         if rows is not None:
             track, loads, friction = track.of_rows(rows), rows_of(loads, rows), rows_of(friction, rows)
         slider = track.start + travel
-        states = track.states(np.maximum(slider, track.corner_end) if flank else slider)
+        if rows is None and not flank:
+            states = self._states_at(slider)
+        else:
+            states = track.states(np.maximum(slider, track.corner_end) if flank else slider)
         return states, forces(states, loads, sign * friction, sign)
+
+    @cached_property
+    def _states_at(self) -> PlacesKept[TrackStates]:
+        return PlacesKept(self.assembly.track.states)
 
     def evaluate_places(self, places: FloatArray, sign: float, rows: Any = None) -> tuple[TrackStates, Forces]:
         """Return the same at displacements, which end with the travel [m]; what is alike for all is computed once."""
@@ -191,7 +197,7 @@ class Solution(ShortRepr):
         is_looked_at = np.broadcast_to(is_looked_at, self.count)
         total = self.column(self.travel[..., -1:])
         for states, some in ((None, ~is_looked_at), (self.states, is_looked_at)):
-            rows, track, parts = np.flatnonzero(some), self.assembly.track, (friction, states, losses)
+            rows, track = np.flatnonzero(some), self.assembly.track
             if not len(rows):
                 continue
             if losses is None and not is_column(friction, self.travel[..., 0]) and not isinstance(track, TrackRows):
@@ -199,9 +205,11 @@ class Solution(ShortRepr):
                 (jam,) = jams(track, friction, states)
                 clipped = [_clip_intervals(jam, float(total[0]))] * len(rows)
             else:
+                parts = track, friction, states, losses
                 if len(rows) < self.count:
-                    track, parts = track.of_rows(rows), rows_of(parts, rows)
-                jams_and_ends = zip(jams(track, *parts, len(rows)), total[rows].tolist(), strict=True)
+                    own = states and states.combine(partial(rows_of, rows=rows))
+                    parts = track.of_rows(rows), rows_of(friction, rows), own, rows_of(losses, rows)
+                jams_and_ends = zip(jams(*parts, len(rows)), total[rows].tolist(), strict=True)
                 clipped = [_clip_intervals(jam, end) for jam, end in jams_and_ends]
             for row, jam in zip(rows.tolist(), clipped, strict=True):
                 intervals[row] = jam
@@ -280,14 +288,14 @@ class Solution(ShortRepr):
     @cached_property
     def branches(self) -> dict[str, CurveRows]:
         """The curves by branch, up and down."""
-        motion, dense = (self._of_each(places) for places in (self.travel + self.origin, self.places))
+        motion = self._of_each(self.travel + self.origin)
         corner, first = self.column(self.corner_travel), self.column(self.travel[..., :1])
         valid = np.maximum(corner, first) + self.column(self.origin), motion[:, -1]
         target = target_force(self.assembly.spec, self.assembly)
         return {
             name: CurveRows(
                 RowSamples(motion, self._of_each(state.slider), np.full(self.count, motion.shape[1])),
-                dense,
+                lambda: self._of_each(self.places),
                 partial(self._effort_in_rows, name),
                 self.column(self.effort_error),
                 np.full(self.count, np.nan) if target is None else self.column(target),
@@ -353,7 +361,7 @@ class FlankSamples(ShortRepr):
             solution,
             _append_column(corner, travel),
             _append_column(leaves, on_flank),
-            TrackStates(*map(_append_column, first.fields(), states.fields())),
+            first.combine(_append_column, states),
             _forces_behind(up, solution.up),
             _forces_behind(down, solution.down),
         )
@@ -361,8 +369,7 @@ class FlankSamples(ShortRepr):
     @property
     def pressure_angle(self) -> FloatArray:
         """Angle between the brace's pull and the roller's motion [rad]; NaN elsewhere."""
-        angle = pressure_angle(self.states, self.solution.assembly.track.brace_length)
-        return np.where(self.there, angle, np.nan)
+        return np.where(self.there, pressure_angle(self.states), np.nan)
 
     def pressure(self, travel: FloatArray) -> FloatArray:
         """Return the pressure of the contact on the way up at travels [Pa]; NaN where there is none."""
@@ -429,8 +436,9 @@ def nodes(
     """Return travels so dense that the force hides nothing between two of them, (d, n), increasing [m]."""
     if not corner.any():
         return np.asarray(total[:, None] * _SORTED_SHARES)
-    on_corner = np.minimum(corner, total)[:, None] * _ON_CORNER
-    return np.sort(np.concatenate([total[:, None] * _TRAVEL_SHARES, on_corner], axis=1), axis=1)
+    total, on_corner = np.broadcast_arrays(total, np.minimum(corner, total))
+    shares = total[:, None] * _TRAVEL_SHARES, on_corner[:, None] * _ON_CORNER
+    return np.sort(np.concatenate(shares, axis=1), axis=1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

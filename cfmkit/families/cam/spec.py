@@ -26,7 +26,6 @@ from cfmkit.stock.material_and_part_spec import (
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringSafety
 from cfmkit.stock.stock_series import StockSize, System, stock_faults
 
-Positive = Field(gt=0)
 NonNegativeInertia = Annotated[Inertia, Field(ge=0)]
 SmallAngle = Annotated[Angle, Field(ge=-radians(45), le=radians(45))]
 
@@ -127,9 +126,19 @@ class Bearings(Model):
     static_rating: Annotated[Force, Field(gt=0)] | None = Field(
         None, description="C0 of one bearing, from its data sheet"
     )
-    kind: Literal["ball", "roller"] = Field("ball", description="exponent of the life: 3, or 10/3")
+    kind: Literal["ball", "roller", "plain"] = Field(
+        "ball", description="exponent of the life: 3, or 10/3; plain: the roller itself turns on its shaft"
+    )
     per_roller: int = Field(1, ge=1, le=16, description="bearings side by side in one roller; they share its load")
     name: str | None = Field(None, min_length=1, description="designation, for the parts list")
+
+    @model_validator(mode="after")
+    def _plain_bearings_have_no_rating(self) -> Self:
+        if self.kind == "plain" and (self.dynamic_rating or self.static_rating):
+            raise ValueError(
+                "'dynamic_rating' and 'static_rating' are of rolling bearings: leave them out of plain ones"
+            )
+        return self
 
 
 MOUNTING_ANGLES = {"up": 0.5 * pi, "horizontal": 0.0, "down": -0.5 * pi}
@@ -352,8 +361,7 @@ class Dynamics(Model):
         "path-start", description="where heights are zero: at the first point of the roller path, or of the cam"
     )
     method: Literal["inverse", "multibody"] = Field(
-        "inverse",
-        description="inverse dynamics with closed kinematics, or nine coordinates with Lagrange multipliers",
+        "inverse", description="inverse dynamics with closed kinematics, or nine coordinates with Lagrange multipliers"
     )
 
     @property

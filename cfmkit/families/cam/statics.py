@@ -177,19 +177,15 @@ def forces(states: TrackStates, loads: Loads, friction: Any, way: float = 1.0) -
         sign = float(np.sign(np.ravel(friction)[0]))
         return _forces_with_losses(states, loads, np.abs(friction), sign or way)
     slope, weight = states.slope, loads.roller_weight if np.any(loads.roller_weight) else None
-    tangent = brace_tangent(states.x, loads.brace_length)
+    tangent = states.tangent
     turn, lever = levers(slope, tangent, friction)
     spring = spring_force(states, loads)
-    pull = safe_divide(2.0 * load_on_slider(turn, slope, friction, spring, weight), lever)
-    at_rest = np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
-    idle = at_rest & (np.abs(lever) < 1e-13)
-    is_limit = bool(idle.any()) and weight is None
-    if is_limit:
+    pull, limit = safe_divide(2.0 * load_on_slider(turn, slope, friction, spring, weight), lever), None
+    if weight is None and (idle := np.abs(lever) < 1e-13).any():
+        idle &= np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
         parts = loads.rest_half_width, loads.brace_length, loads.stiffness
         with np.errstate(divide="ignore", invalid="ignore"):
-            pull = np.where(idle, dead_point_limit(slope, states.bend, parts, friction), pull)
-
-    limit = (idle, turn) if is_limit else None
+            pull, limit = np.where(idle, dead_point_limit(slope, states.bend, parts, friction), pull), (idle, turn)
     return Forces(
         pull + loads.slider_weight, partial(_inner_forces, (slope, tangent, spring, weight), lever, 0.5 * pull, limit)
     )
@@ -286,7 +282,7 @@ def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward
     V l = pin (T + S) - bearing N sqrt(1 + m^2) on the way up. Eliminating T, N and V leaves one division.
     """
     slope, length, weight = states.slope, loads.brace_length, loads.roller_weight
-    tangent = brace_tangent(states.x, length)
+    tangent = states.tangent
     cos, sin = 1.0 / np.sqrt(1.0 + tangent**2), tangent / np.sqrt(1.0 + tangent**2)
     turn = way * normal_turn(losses, losses.rolling)
     (one, lever), along = levers(slope, tangent, turn), np.sqrt(1.0 + slope * slope)
@@ -337,7 +333,7 @@ def _friction_power(
     states: TrackStates, loads: Loads, losses: Losses, sides: tuple[_Side, _Side]
 ) -> dict[str, FloatArray]:
     """Return the power that each kind of friction takes, over the slider's speed [N]."""
-    tangent = brace_tangent(states.x, loads.brace_length)
+    tangent = states.tangent
     axial, contact = (sum(np.abs(getattr(side, name)) for side in sides) for name in ("axial", "contact"))
     worn = losses.bearing * np.sqrt(1.0 + normal_turn(losses, losses.rolling) ** 2)
     with np.errstate(divide="ignore", invalid="ignore"):  # at a dead point the rollers move, the slider does not
@@ -362,7 +358,7 @@ def jams(
 
     There the lever of the slider on a roller, f - mu - tan(alpha) (1 + mu f), is not positive. It is looked at in the
     `states` that are given, if force is known to be missing in one of them; else where a stretch of the track begins or
-    ends without it. With `losses` it is `leverage`.
+    ends without it. With `losses` it is `leverage`. A jam up to the end of the track has no other end.
     """
     before, found = np.zeros(count, dtype=bool), [list[float]() for _ in range(count)]
     for number, part in enumerate(track.stretches()):
@@ -382,9 +378,8 @@ def jams(
             for row, first, edge in zip(rows.tolist(), (at == 0).tolist(), travel[:, 0].tolist(), strict=True):
                 found[row].append(0.0 if first and not found[row] else edge)
         before = held[:, -1]
-    ends_of = np.broadcast_to(track.end - track.start, (count, 1))
     for row in np.flatnonzero(before).tolist():
-        found[row].append(float(ends_of[row, 0]))
+        found[row].append(np.inf)
     return [tuple(zip(edges[::2], edges[1::2], strict=True)) for edges in found]
 
 

@@ -15,7 +15,6 @@ from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.findings import format_at_most, mm, newton
-from cfmkit.families.no_mechanism import CannotBuild, Infeasible
 from cfmkit.families.rows import fails, refuse_columns
 
 if TYPE_CHECKING:
@@ -43,12 +42,10 @@ def check_target(design: CamDesign) -> None:
     first, last = curve.extent
     if not curve.covers(0.0, design.stroke) or 0.0 > first > -float("inf"):
         known = f"{mm(first)} to {mm(last)}"
-        raise Infeasible(
-            finding(
-                "target_curve",
-                f"the target curve goes from {known}, and the slider from 0 mm to {mm(design.stroke)}; let its points "
-                "begin at 0 mm and reach the stroke ('design.target', 'design.stroke')",
-            ),
+        raise finding.infeasible(
+            "target_curve",
+            f"the target curve goes from {known}, and the slider from 0 mm to {mm(design.stroke)}; let its points "
+            "begin at 0 mm and reach the stroke ('design.target', 'design.stroke')",
             {"design.stroke": format_at_most(last)} if last > 0 >= first else None,
         )
     shape = curve.to_points(0.0, design.stroke)
@@ -57,22 +54,17 @@ def check_target(design: CamDesign) -> None:
     lowest = int(np.argmin(force[1:])) + 1
     if force[lowest] <= 0 or force[0] < 0:
         at = places[0 if force[0] < min(force[lowest], 0.0) else lowest]
-        raise Infeasible(
-            finding(
-                "target_curve",
-                f"the target curve is {newton(float(curve.evaluate(at)))} at {mm(float(at))}: a cam holds "
-                f"up a force, which "
-                "must stay above 0 beyond the start, or the rollers would have to give back energy that the springs "
-                "do not have ('design.target')",
-            )
+        raise finding.infeasible(
+            "target_curve",
+            f"the target curve is {newton(float(curve.evaluate(at)))} at {mm(float(at))}: a cam holds up a force, "
+            "which must stay above 0 beyond the start, or the rollers would have to give back energy that the springs "
+            "do not have ('design.target')",
         )
     if force[0] == 0.0 and not shape.slope(0.0) > 0:
-        raise Infeasible(
-            finding(
-                "target_curve",
-                "the target curve begins at zero force and does not grow from there: the path would begin vertical; "
-                "begin with some force, or with a slope ('design.target')",
-            )
+        raise finding.infeasible(
+            "target_curve",
+            "the target curve begins at zero force and does not grow from there: the path would begin vertical; "
+            "begin with some force, or with a slope ('design.target')",
         )
 
 
@@ -91,31 +83,25 @@ def with_curve(law: SlopeLaw, shape: ThroughPoints, stroke: Any) -> CurveSlopeLa
     Raises CannotBuild if there is no such path: the finding says why.
     """
     if fails(stroke > shape.places[-1] * (1 + 1e-6)):
-        raise CannotBuild(
-            finding(
-                "target_curve",
-                f"the curve of forces ends at {mm(shape.places[-1])}, before the stroke of {mm(stroke)}; give it more "
-                "points, or a shorter stroke ('curve' and 'stroke' of 'mechanism.profile')",
-            )
+        raise finding.cannot_build(
+            "target_curve",
+            f"the curve of forces ends at {mm(shape.places[-1])}, before the stroke of {mm(stroke)}; give it more "
+            "points, or a shorter stroke ('curve' and 'stroke' of 'mechanism.profile')",
         )
     refuse_columns(law.friction, law.slope_factor)  # such a path is integrated, or has a guide of its own
     curved = CurveSlopeLaw(**vars_of(law), shape=shape)
     least = min(shape.values) - curved.carried
     if shape.values[0] == 0.0 and fails(np.not_equal(law.preload, 0.0)):
-        raise CannotBuild(
-            finding(
-                "target_curve",
-                "the force begins at zero, and the springs are stretched there: the path would begin vertical; leave "
-                "out the preload ('mechanism.springs.preload'), or begin with some force",
-            )
+        raise finding.cannot_build(
+            "target_curve",
+            "the force begins at zero, and the springs are stretched there: the path would begin vertical; leave "
+            "out the preload ('mechanism.springs.preload'), or begin with some force",
         )
     if (shape.values[0] == 0.0 and (law.friction or law.slope_factor != 1.0)) or (curved.carried and least <= 0):
-        raise CannotBuild(
-            finding(
-                "target_curve",
-                "the smallest force of the curve does not carry the weight and friction that the profile is cut for; "
-                "use a curve with more force, or cut for none ('friction' and 'gravity' of 'design')",
-            )
+        raise finding.cannot_build(
+            "target_curve",
+            "the smallest force of the curve does not carry the weight and friction that the profile is cut for; "
+            "use a curve with more force, or cut for none ('friction' and 'gravity' of 'design')",
         )
     return curved
 
@@ -130,11 +116,9 @@ def check_bends(law: CurveSlopeLaw, profile: CamProfile) -> None:
     place, radius = law.tightest(profile.end, profile.start)
     if fails(np.logical_and(radius < profile.roller_radius * (1 - 1e-9), place > profile.start)):
         at = float(law.travel(place))
-        raise CannotBuild(
-            finding(
-                "undercut_total",
-                f"at {mm(at)} of travel the force falls so quickly that the path has a radius of curvature of "
-                f"{mm(radius)}, less than the roller's {mm(profile.roller_radius)}; use a smaller roller "
-                "('mechanism.roller_radius'), softer springs, or let the force fall over more travel ('design.target')",
-            )
+        raise finding.cannot_build(
+            "undercut_total",
+            f"at {mm(at)} of travel the force falls so quickly that the path has a radius of curvature of "
+            f"{mm(radius)}, less than the roller's {mm(profile.roller_radius)}; use a smaller roller "
+            "('mechanism.roller_radius'), softer springs, or let the force fall over more travel ('design.target')",
         )

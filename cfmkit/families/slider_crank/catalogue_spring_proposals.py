@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.linkage import linkage_of
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.sprung_linkage_proposals import (
     depth_of_springs,

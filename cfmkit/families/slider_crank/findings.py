@@ -7,7 +7,7 @@ run reports carries the numbers that decide and the cure.
 from __future__ import annotations
 
 from cfmkit.families.end_stops import FINDINGS as ON_STOPS
-from cfmkit.families.findings import finder
+from cfmkit.families.findings import Finder
 
 SLIDER_CRANK_FINDINGS = {
     "not_assemblable": "crank and coupler do not reach the guide of the slider, or not in the unloaded position",
@@ -65,5 +65,5 @@ SLIDER_CRANK_FINDINGS = {
     "target_unreachable": "the target force cannot be reached within the given ranges",
 }
 
-finding = finder(SLIDER_CRANK_FINDINGS)
+finding = Finder(SLIDER_CRANK_FINDINGS)
 """Return a finding of this family; the name must be one that `SLIDER_CRANK_FINDINGS` explains."""

@@ -18,11 +18,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
 
-N_MOTION_PLACES = 91
-"""Places of the motion that are looked at for the largest effort."""
-
-N_FITTED_PLACES = 49
-"""Places of a window at which rates are fitted."""
+N_MOTION_PLACES = 91  # places of the motion that are looked at for the largest effort
+N_FITTED_PLACES = 49  # places of a window at which rates are fitted
 
 N_WINDOWS, N_NEIGHBOUR_WINDOWS = 21, 9
 """Windows of the whole motion that are compared; and of those between the neighbours of the best."""
@@ -30,11 +27,8 @@ N_WINDOWS, N_NEIGHBOUR_WINDOWS = 21, 9
 PIVOT_ENVELOPE_SHARES = (0.5, 0.3, 0.7)
 """Of the room for springs on both sides of the links, what the pivot's has: the others are on the other side."""
 
-TRAVEL_RTOL = 1e-9
-"""Travels below this share of the slider's travel count as zero."""
-
-RATE_SHARE = 0.98
-"""Share of the largest rate that is used: coils and turns are rounded."""
+TRAVEL_RTOL = 1e-9  # travels below this share of the slider's travel count as zero
+RATE_SHARE = 0.98  # share of the largest rate that is used: coils and turns are rounded
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,12 @@
-"""An eccentric slider-crank: where crank, coupler and slider can be.
+"""An eccentric slider-crank: where crank, coupler and slider can be, and the linkage of a specification.
 
 The crank turns about A = (0, 0), carries the coupler at B = r1 (cos t, sin t), and the coupler
 ends in the slider C = (x, e), which moves along x.
 
-Reference
----------
+References
+----------
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 2 and 3.
+[B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519.
 """
 
 from __future__ import annotations
@@ -16,11 +17,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.findings import deg, mm
+from cfmkit.families.rows import with_values
+from cfmkit.families.slider_crank.findings import finding
+
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
 
-STRETCHED_ANGLE_TOL = 1e-12
-"""An unloaded position so near to the stretched one [rad] is the stretched one."""
+
+STRETCHED_ANGLE_TOL = 1e-12  # an unloaded position so near to the stretched one [rad] is the stretched one
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ class Linkage:
         if abs(self.offset) > abs(short):
             return -far, far
         near = math.sqrt((short - self.offset) * (short + self.offset))
-        return (near, far) if self.branch * float(self.slider_position(np.asarray(angle))) >= 0.0 else (-far, -near)
+        return (near, far) if self.branch * self.place(angle) >= 0.0 else (-far, -near)
 
     def room(self, angle: float) -> tuple[float, float]:
         """Return how far the slider is from the ends of its `way` at a crank angle [m], from the low and the high one.
@@ -84,7 +90,7 @@ class Linkage:
         Next to an end the difference of two places has no digits left; the knee angle psi has: x_s^2 - x^2 is
         4 r1 r2 sin^2(psi/2), and x^2 exceeds that of the folded position by 4 r1 r2 cos^2(psi/2).
         """
-        place, half = self.branch * float(self.slider_position(np.asarray(angle))), 0.5 * self.knee(angle)
+        place, half = self.branch * self.place(angle), 0.5 * self.knee(angle)
         square, far = 4.0 * self.crank * self.coupler, self.stretched_position
 
         def measure_distance(end: float) -> float:
@@ -131,6 +137,10 @@ class Linkage:
         position: FloatArray = self.crank * np.cos(angle) + self.branch * self._run(lift)
         return position
 
+    def place(self, angle: float) -> float:
+        """Return `slider_position` at one crank angle [m]; NaN where the linkage does not reach."""
+        return self.crank * math.cos(angle) + self.branch * self._lift_and_run(angle)[1]
+
     def knee(self, angle: float) -> float:
         """Return the angle from the coupler's direction to the crank's [rad]: 0 where stretched, pi where folded."""
         if abs(math.remainder(angle - self.stretched_angle, 2.0 * math.pi)) <= STRETCHED_ANGLE_TOL:
@@ -138,13 +148,85 @@ class Linkage:
         folded = self.folded_angle
         if folded is not None and abs(math.remainder(angle - folded, 2.0 * math.pi)) <= STRETCHED_ANGLE_TOL:
             return math.pi
-        return math.remainder(angle - float(self.coupler_angle(np.asarray(angle))), 2.0 * math.pi)
+        lift, run = self._lift_and_run(angle)
+        turn = math.atan2(-lift, run)
+        return math.remainder(angle - (turn if self.branch > 0 else math.pi - turn), 2.0 * math.pi)
+
+    def _lift_and_run(self, angle: float) -> tuple[float, float]:
+        """Return how far the crank pin is above the slider's path, and `_run`, at one crank angle [m]."""
+        lift = self.crank * math.sin(angle) - self.offset
+        squared = (self.coupler - lift) * (self.coupler + lift)
+        return lift, math.sqrt(squared) if squared >= 0.0 else math.nan
 
     def _run(self, lift: FloatArray) -> FloatArray:
         """Return the length of the coupler along x, not negative [LH, eq. 5a]."""
-        squared = (self.coupler - lift) * (self.coupler + lift)
-        if not np.ndim(squared) and squared >= 0.0:  # of one place, as parts are put together one by one
-            return np.sqrt(squared)
         with np.errstate(invalid="ignore"):
-            run: FloatArray = np.sqrt(squared)
+            run: FloatArray = np.sqrt((self.coupler - lift) * (self.coupler + lift))
         return run
+
+
+def resolve(spec: SliderCrankSpec) -> SliderCrankSpec:
+    """Return the spec with the coupler written out: from now on it is a fixed part."""
+    mechanism = spec.mechanism
+    if mechanism.stretched_position is None:
+        return spec
+    written = {"mechanism.coupler_length": coupler_length(mechanism), "mechanism.stretched_position": None}
+    return with_values(spec, written)
+
+
+def coupler_length(mechanism: Mechanism) -> float:
+    """Return r2 [m], from the stretched position where it is not given [B, eq. 11]."""
+    if mechanism.coupler_length is not None:
+        return mechanism.coupler_length
+    reach = math.hypot(mechanism.stretched_position or 0.0, mechanism.offset)
+    if reach <= mechanism.crank_length:
+        raise finding.cannot_build(
+            "not_assemblable",
+            f"pivot and slider pin are {mm(reach)} apart when stretched, and the crank alone is "
+            f"{mm(mechanism.crank_length)}: no length is left for the coupler; make "
+            "'mechanism.crank_length' shorter, or 'mechanism.stretched_position' longer",
+        )
+    return reach - mechanism.crank_length
+
+
+def linkage_of(mechanism: Mechanism) -> Linkage:
+    """Return the linkage of a mechanism.
+
+    Raises CannotBuild if crank and coupler do not reach the slider's path.
+    """
+    branch = 1 if mechanism.branch == "right" else -1
+    linkage = Linkage(mechanism.crank_length, coupler_length(mechanism), mechanism.offset, branch)
+    if not linkage.assemblable:
+        raise finding.cannot_build(
+            "not_assemblable",
+            f"crank and coupler together are {mm(linkage.crank + linkage.coupler)}, but the slider's path passes "
+            f"the pivot at {mm(abs(linkage.offset))}; make the links longer or the "
+            "offset smaller: 'mechanism.coupler_length' or 'mechanism.offset'",
+        )
+    return linkage
+
+
+def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
+    """Return the crank angle with all springs relaxed [rad].
+
+    Raises CannotBuild if the linkage does not reach it.
+    """
+    given = mechanism.unloaded_angle
+    angle = given if given is not None else linkage.stretched_angle + (mechanism.unloaded_offset or 0.0)
+    if not linkage.reaches(angle):
+        low, high = linkage.arc(linkage.stretched_angle)
+        raise finding.cannot_build(
+            "not_assemblable",
+            f"with the crank at {deg(angle)} the coupler of {mm(linkage.coupler)} does not reach the slider's "
+            f"path; 'mechanism.unloaded_angle' must be between {deg(low)} and {deg(high)}",
+        )
+    return angle
+
+
+def side_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> int:
+    """Return 1 for a crank that is beyond the stretched position when a force drives, -1 for one before it."""
+    if spec.analysis.side is not None:
+        beyond = 1 if spec.analysis.side == "beyond" else -1
+    else:
+        beyond = -1 if linkage.knee(unloaded) < 0 else 1
+    return beyond

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc, Line, Smooth, polygons
 from cfmkit.families.deferred_imports import deferred_imports
-from cfmkit.families.slider_crank.linkage_from_spec import resolve
+from cfmkit.families.slider_crank.linkage import resolve
 
 with deferred_imports():
     from cfmkit.families.slider_crank.printed.outline import drawing as draw_part
@@ -23,10 +23,7 @@ if TYPE_CHECKING:
 def drawing(spec: SliderCrankSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     """Return the outlines of one leg as the fidelity has it: of straight edges and arcs, exact.
 
-    Raises
-    ------
-    cfmkit.families.no_mechanism.CannotBuild
-        If it cannot be assembled.
+    Raises `CannotBuild` if it cannot be assembled.
     """
     made = (draw_links if spec.built_as == "springs" else draw_part)(resolve(spec))
     legs = spec.mechanism.legs

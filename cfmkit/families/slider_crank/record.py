@@ -6,7 +6,7 @@ from cfmkit.families.base import DesignMethod, ElasticParts, Family, Pictures, R
 from cfmkit.families.deferred_imports import deferred_imports
 from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.slider_crank.findings import SLIDER_CRANK_FINDINGS
-from cfmkit.families.slider_crank.linkage_from_spec import resolve
+from cfmkit.families.slider_crank.linkage import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.bistability_class import CLASS_NAMES

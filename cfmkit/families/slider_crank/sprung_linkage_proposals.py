@@ -15,15 +15,14 @@ import numpy as np
 
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import deg, mm, percent
-from cfmkit.families.hardware import PartStrength
+from cfmkit.families.hardware import PartStrength, guide_rods
 from cfmkit.families.slider_crank.flattest_springs_that_fit import (
     TRAVEL_RTOL,
     SprungMotion,
     flattest_springs,
     largest_effort,
 )
-from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.linkage import Linkage, linkage_of
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.link_strength import least_sheet, link_loads, links_that_bear
@@ -204,7 +203,19 @@ def _sprung(
 
 def depth_of_springs(request: Request, sheet: float) -> float:
     """Return how far springs may stand out from links of a sheet [m], on both sides of them together [m]."""
-    return max(request.envelope[:2]) if request.depth is None else request.depth - N_SHEETS * sheet
+    if request.depth is None:
+        return max(request.envelope[:2])
+    return request.depth - N_SHEETS * sheet - _slider_excess(request, sheet)
+
+
+def _slider_excess(request: Request, sheet: float) -> float:
+    """Return about how much thicker than a link a slider around its rods is [m]."""
+    longest = max(request.envelope[:2])
+    pushed = request.kind == "force"
+    force, travel = (request.target, request.travel) if pushed else (request.target / (0.25 * longest), 0.5 * longest)
+    strength = PartStrength.from_material(None, request.safety)
+    rods = guide_rods(0.0, force, travel, 0.1 * longest, 0.0, None, None, strength)
+    return max(rods.slider_thickness - sheet, 0.0)
 
 
 def _pushing(spec: SliderCrankSpec, request: Request, sheet: float | None = None) -> list[SprungMotion]:

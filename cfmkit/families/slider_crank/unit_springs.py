@@ -160,8 +160,7 @@ class _SliderState:
 NEARLY_FOLDED = 0.99
 """Above this share of sin(psi/2) the knee angle is computed from its cosine, which keeps the digits next to pi."""
 
-NEAR_FOOT = 0.01
-"""Below this share of the stretched position squared, x0 squared as a difference has lost digits."""
+NEAR_FOOT = 0.01  # below this share of the stretched position squared, x0 squared as a difference has lost digits
 
 
 @dataclass(frozen=True)
@@ -191,7 +190,7 @@ class SliderPath:
             return replace(cls.from_linkage(linkage.mirror(), math.pi - unloaded, -side), is_mirrored=True)
         knee = linkage.knee(unloaded)
         start = side * math.pi if knee == math.pi else knee  # folded is on either side
-        xs, place = linkage.stretched_position, float(linkage.slider_position(np.asarray(unloaded)))
+        xs, place = linkage.stretched_position, linkage.place(unloaded)
         gap = 4.0 * linkage.crank * linkage.coupler * math.sin(0.5 * start) ** 2
         square = max(xs**2 - gap, 0.0)
         x0 = place if square < NEAR_FOOT * xs**2 else math.copysign(math.sqrt(square), place)

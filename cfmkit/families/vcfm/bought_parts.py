@@ -13,9 +13,9 @@ from cfmkit.stock.springs.guides import guide_cure, guide_needed, guide_words
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.families.vcfm.spec import VcfmSpec
+    from cfmkit.families.vcfm.surroundings_spec import BoughtSprings
 
 
 def parts_of(spec: VcfmSpec) -> tuple[ListedPart, ...]:

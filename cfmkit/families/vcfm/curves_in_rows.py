@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     Law = Callable[[FloatArray], FloatArray]
 
 
-LEAST_POINTS = 5
-"""Points below which there is no curve to speak of."""
+LEAST_POINTS = 5  # points below which there is no curve to speak of
 
 
 @dataclass(frozen=True, repr=False)
@@ -230,7 +229,3 @@ class SpringSamples(ShortRepr):
 
     force: FloatArray
     stress: FloatArray
-
-
-def _parts(samples: Any) -> tuple[Any, ...]:
-    return tuple(vars(samples).values())

@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.findings import format_at_least, mm, mpa, newton
-from cfmkit.families.no_mechanism import Infeasible, no_design, refusals_answered
+from cfmkit.families.no_mechanism import no_design, refusals_answered
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, share_of
 from cfmkit.families.vcfm.leaf_sizing import (
@@ -71,24 +71,13 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-MAX_ROUNDS = 8
-"""Most limits that are met one after the other until the nearest feasible values meet all of them."""
+MAX_ROUNDS = 8  # most limits that are met one after the other until the nearest feasible values meet all of them
 
 
 def design(spec: VcfmSpec, run: Run) -> Design:
     """Return a complete specification that meets the targets of the `design` block.
 
-    Parameters
-    ----------
-    spec : VcfmSpec
-        With a `design` block and an allowable stress.
-    run : Run
-        Not needed here: nothing is random.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE, with the reason and the nearest feasible values, if there is none.
+    INFEASIBLE, with the reason and the nearest feasible values, if there is none.
     """
     found = _attempt(spec)
     nearest, last = dict(found.nearest_feasible), found
@@ -134,13 +123,11 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> DesignSizes:
     shortest = shortest_leaf(spec, target, thickness)
     length = target.leaf_length or shortest
     if length < shortest * (1 - 1e-9):
-        raise Infeasible(
-            finding(
-                "overstressed",
-                f"leaves of {mm(length)} ('design.leaf_length') would be stressed beyond "
-                f"{mpa(spec.mechanism.allowable_stress or 0.0)}, or be steeper than 15 deg: the shortest allowed is "
-                f"{mm(shortest)}",
-            ),
+        raise finding.infeasible(
+            "overstressed",
+            f"leaves of {mm(length)} ('design.leaf_length') would be stressed beyond "
+            f"{mpa(spec.mechanism.allowable_stress or 0.0)}, or be steeper than 15 deg: the shortest allowed is "
+            f"{mm(shortest)}",
             {"design.leaf_length": format_at_least(shortest)},
         )
     sheet, count = sheet_of(spec.mechanism.part), spec.mechanism.bistable.half_beams
@@ -181,13 +168,10 @@ def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
     longer = leaf.length * LENGTH_STEP ** bisect_left(
         range(MOST_STEPS), True, key=wide_enough
     )  # widths grow with lengths
-    raise Infeasible(
-        finding(
-            "out_of_plane_buckling",
-            f"leaves of {mm(leaf.length)} would be {mm(leaf.width)} wide and {mm(leaf.thickness)} thick: below "
-            f"twice the thickness they buckle out of the plane; a 'design.leaf_length' of "
-            f"{format_at_least(longer)} is enough",
-        ),
+    raise finding.infeasible(
+        "out_of_plane_buckling",
+        f"leaves of {mm(leaf.length)} would be {mm(leaf.width)} wide and {mm(leaf.thickness)} thick: below twice the "
+        f"thickness they buckle out of the plane; a 'design.leaf_length' of {format_at_least(longer)} is enough",
         {"design.leaf_length": format_at_least(longer)},
     )
 
@@ -238,8 +222,9 @@ def check_room(target: VcfmDesign, sizes: DesignSizes) -> None:
         if limit is not None and found[name] > limit * (1 + 1e-9):
             words = "across the motion" if path == "max_span" else "out of the plane"
             verb = "need" if name == "leaves" else "needs"
-            raise Infeasible(
-                finding("envelope", f"the {name} {verb} {mm(found[name])} {words}, 'design.{path}' allows {mm(limit)}"),
+            raise finding.infeasible(
+                "envelope",
+                f"the {name} {verb} {mm(found[name])} {words}, 'design.{path}' allows {mm(limit)}",
                 {f"design.{path}": format_at_least(ENVELOPE_MARGIN * found[name])},
             )
 
@@ -271,12 +256,10 @@ def refine_sizes(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> Desi
             spring_leaf = replace(spring_leaf, length=longer, width=wider)
         sizes = replace(sizes, leaf=leaf, spring_leaf=spring_leaf)
     worst = max(stresses)
-    raise Infeasible(
-        finding(
-            "stress_unreachable",
-            f"the exact stress of leaves of {mm(float(sizes.leaf.length))} ('design.leaf_length') is {mpa(worst)}, "
-            f"{mpa(allowable)} is allowed ('mechanism.material')",
-        ),
+    raise finding.infeasible(
+        "stress_unreachable",
+        f"the exact stress of leaves of {mm(float(sizes.leaf.length))} ('design.leaf_length') is {mpa(worst)}, "
+        f"{mpa(allowable)} is allowed ('mechanism.material')",
         {"design.leaf_length": format_at_least(float(sizes.leaf.length) * sqrt(1.001 * max(over)))},
     )
 
@@ -316,11 +299,9 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
     back = -(rest_of(LawSampler(parts(made)), full, places) or 0.0)
     sampler = ExactSampler(made, last, 1.2 * back)
     if sampler.problem:
-        raise Infeasible(
-            finding(
-                "no_linear_region",
-                f"the exact model does not confirm the 'design.stroke' of {mm(target.stroke)}: {sampler.problem}",
-            ),
+        raise finding.infeasible(
+            "no_linear_region",
+            f"the exact model does not confirm the 'design.stroke' of {mm(target.stroke)}: {sampler.problem}",
             followable_stroke(target.height, sizes.leaf),
         )
     leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
@@ -344,20 +325,16 @@ def _follow_curve(curve: TargetCurve, places: FloatArray) -> FloatArray:
     low, high = float(places[0]), float(places[-1])
     if not curve.covers(low, high):
         first, last = curve.extent
-        raise Infeasible(
-            finding(
-                "target_curve",
-                f"the linear region of the leaves is {mm(low)} to {mm(high)}, and the target curve goes from "
-                f"{mm(first)} to {mm(last)}; give it points there ('design.target')",
-            )
+        raise finding.infeasible(
+            "target_curve",
+            f"the linear region of the leaves is {mm(low)} to {mm(high)}, and the target curve goes from "
+            f"{mm(first)} to {mm(last)}; give it points there ('design.target')",
         )
     if curve.extremes(low, high)[0] <= 0:
-        raise Infeasible(
-            finding(
-                "target_curve",
-                f"the target curve is not above zero from {mm(low)} to {mm(high)}, the linear region of the leaves "
-                "('design.target')",
-            )
+        raise finding.infeasible(
+            "target_curve",
+            f"the target curve is not above zero from {mm(low)} to {mm(high)}, the linear region of the leaves "
+            "('design.target')",
         )
     return np.asarray(curve.evaluate(places))
 

@@ -114,14 +114,7 @@ def elastic_networks(spec: VcfmSpec) -> tuple[DrivenNetwork, ...]:
 class ExactSampler:
     """Samples of a mechanism's leaves and spring, traced over what an analysis needs.
 
-    Parameters
-    ----------
-    spec : VcfmSpec
-        What is analysed.
-    end : float
-        How far the shuttle goes [m].
-    back : float
-        How far it is pulled back at most, positive [m].
+    `end`: how far the shuttle goes [m]; `back`: how far it is pulled back at most, positive [m].
     """
 
     # pushed, pulled: of a leaf: of beams, or of a solid (`plane_fem_analysis.SolidPath`), which answers the same
@@ -207,12 +200,7 @@ class ExactSampler:
             stiffness = float((forces[1] - forces[0]) / (2.0 * tiny))
         else:
             stiffness = self.coils.stiffness
-        return Characteristics(
-            stiffness,
-            self.each * steepest,
-            self.each * first_stiffness,
-            (first, last),
-        )
+        return Characteristics(stiffness, self.each * steepest, self.each * first_stiffness, (first, last))
 
 
 def problem_of(part: Literal["bistable", "positive"], paths: Sequence[Any], travel: float) -> str:

@@ -11,10 +11,10 @@ import numpy as np
 from cfmkit.curves import Curve
 from cfmkit.export.posed_part import box
 from cfmkit.families.fem_results import number_fillets
-from cfmkit.families.vcfm.fem_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, rest_shift
 from cfmkit.families.vcfm.model import rests_of
 from cfmkit.families.vcfm.part import bodies
+from cfmkit.families.vcfm.plane_fem_analysis import fillets
 from cfmkit.metrics.longest_interval_in_band import flat_window
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
@@ -49,14 +49,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 TRAVEL_SCALE = Scale("displacement", "length")
-N_WINDOW_PLACES = 241
-"""Places that are tried as the start of a window."""
-
-ELEMENT_COLOURS = {"leaf": LINE_BLUE, "spring": SPRING_OCHRE}
-"""Colours of the bodies that bend."""
-
-N_PRELOADS = 41
-"""Preloads for which the figure of the adjustability is computed."""
+N_WINDOW_PLACES = 241  # places that are tried as the start of a window
+ELEMENT_COLOURS = {"leaf": LINE_BLUE, "spring": SPRING_OCHRE}  # colours of the bodies that bend
+N_PRELOADS = 41  # preloads for which the figure of the adjustability is computed
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:
@@ -114,7 +109,7 @@ def stress(result: Result) -> Figure:
     nominal, most = solution.first, max(solution.pushes, key=lambda push: push.preload)
     over = most.travel
     series = [
-        Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", LINE_BLUE, prefer=0.5),
+        Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", LINE_BLUE, prefer=0.5)
     ]
     bought = solution.spec.mechanism.springs is not None  # whose wire is of another material, with another limit
     if not bought:

@@ -12,7 +12,7 @@ import numpy as np
 from cfmkit.families.end_stops import FINDINGS as ON_STOPS
 from cfmkit.families.findings import (
     TOO_SOFT,
-    finder,
+    Finder,
     format_at_least,
     mm,
     mpa,
@@ -49,8 +49,7 @@ if TYPE_CHECKING:
     Sentence = tuple[Any, ...]
 
 
-TRACED_MODELS = ("exact", "solid")
-"""Models that follow leaves along their branches."""
+TRACED_MODELS = ("exact", "solid")  # models that follow leaves along their branches
 
 VCFM_FINDINGS = {
     "no_negative_stiffness": "the leaves are too thick for their rise: no negative stiffness anywhere",
@@ -85,20 +84,16 @@ VCFM_FINDINGS = {
     "stress_unreachable": "no leaf length brings the exact stress below the allowable stress",
 }
 
-finding = finder(VCFM_FINDINGS)
+finding = Finder(VCFM_FINDINGS)
 """Return a finding of this family; the name must be one that `VCFM_FINDINGS` explains."""
 
-MAX_WAVINESS_RATIO = 0.02
-"""Waviness over thickness from which on the flatness suffers."""
+MAX_WAVINESS_RATIO = 0.02  # waviness over thickness from which on the flatness suffers
 
 TURNING_LOAD_RATIO = POLE_LOAD / (4.0 * np.pi**2)
 """Load at which a leaf buckles whose shuttle can turn, over that with a shuttle that cannot; each in E I/L^2."""
 
-STIFFNESS_RTOL = 0.01
-"""Stiffnesses that differ by less than this share cancel."""
-
-EXACT_FORM = 2e-4
-"""Share of a stress that counts for nothing: designs are fitted to 1e-4."""
+STIFFNESS_RTOL = 0.01  # stiffnesses that differ by less than this share cancel
+EXACT_FORM = 2e-4  # share of a stress that counts for nothing: designs are fitted to 1e-4
 
 
 def _slenderness(solution: Solution) -> FloatArray:
@@ -293,9 +288,8 @@ def _is_overloaded(solution: Solution) -> Any:
 def _overload(solution: Solution) -> Sentence:
     end, (at_end, last) = float(solution.linear[1][0]), (float(force[0]) for force in _forces_beyond_linear(solution))
     return (
-        f"beyond {mm(end)} the leaves straighten and stiffen: the force goes from {newton(at_end)} to "
-        f"{newton(last)} at {mm(float(solution.first.travel[-1]))}; a stop at {mm(end)} limits the travel to the "
-        "linear range",
+        f"beyond {mm(end)} the leaves straighten and stiffen: the force goes from {newton(at_end)} to {newton(last)} "
+        f"at {mm(float(solution.first.travel[-1]))}; a stop at {mm(end)} limits the travel to the linear range",
     )
 
 
@@ -314,9 +308,8 @@ def _pull(solution: Solution) -> Sentence:
     preload = solution.pushes[int(_pulled_out_of_range(solution)[0].argmax())].preload
     low, high = solution.window_of_one
     return (
-        f"with a preload of {mm(preload)} no outward force remains somewhere in {mm(low)} ... "
-        f"{mm(high)}: where the leaves are flat the force is K_p (h + dr), which vanishes at "
-        f"{mm(-float(solution.parts.balance))}",
+        f"with a preload of {mm(preload)} no outward force remains somewhere in {mm(low)} ... {mm(high)}: where the "
+        f"leaves are flat the force is K_p (h + dr), which vanishes at {mm(-float(solution.parts.balance))}",
     )
 
 

@@ -26,11 +26,8 @@ if TYPE_CHECKING:
 
 DOWN_ANGLE = -0.5 * np.pi
 
-GRID_SIZES = (127, 113)
-"""Points requested first, to find the bifurcations; the second where the first leave a doubt."""
-
-BIFURCATION_DISTANCE = 0.02
-"""Bifurcations closer than this share of the travel are looked at again."""
+GRID_SIZES = (127, 113)  # points requested first, to find the bifurcations; the second where the first leave a doubt
+BIFURCATION_DISTANCE = 0.02  # bifurcations closer than this share of the travel are looked at again
 
 PATH_TOLERANCES = (1e-9, 1e-7, 1e-6, 1e-5)
 """Of the path, relative to its largest force, which far beyond the flat pose is a thousand times the peak. Slender
@@ -48,8 +45,7 @@ BIFURCATION_CLEARANCE, PANEL_CLEARANCE = 5e-4, 0.05
 misses a branch of leaves just above the critical slenderness where a point is requested at 1e-4 of the travel behind
 its beginning. From 0.05 of a panel inside, the polynomial at its end makes 450 times the rounding, 1e-9 of the peak."""
 
-MAX_HALVINGS = 12
-"""At most so many: a corner left then is 1/16000 of its piece."""
+MAX_HALVINGS = 12  # at most so many: a corner left then is 1/16000 of its piece
 
 
 MIN_POINT_ANGLE = 1e-3
@@ -278,14 +274,7 @@ def _points(path: Path, places: FloatArray) -> PathPoints:
 def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevPanels, PathPoints, bool]:
     """Return the force as panels that have converged, all points traced for them, and whether these keep their branch.
 
-    Parameters
-    ----------
-    route : Route
-        What is traced.
-    first : First
-        The path that bifurcations are known from.
-    number : int
-        Panels of a piece at first.
+    `first`: the path that bifurcations are known from; `number`: panels of a piece at first.
     """
     points, sense = first.points, np.sign(first.edges[-1])
     ends, count = sense * np.array(first.edges), N_CORNER_PANELS if route.control.get("imperfection") else number

@@ -12,10 +12,10 @@ from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 
 if TYPE_CHECKING:
-    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
     from cfmkit.families.vcfm.leaves.kinds import LeafLaw, LeafSpring
     from cfmkit.families.vcfm.leaves_spec import Bistable, Positive
     from cfmkit.families.vcfm.spec import VcfmSpec
+    from cfmkit.families.vcfm.surroundings_spec import BoughtSprings
     from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 

@@ -16,7 +16,6 @@ from math import asin, ceil, floor, log10, pi, sin, sqrt
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import format_at_least, format_at_most, mm, mpa
-from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
@@ -27,40 +26,30 @@ from cfmkit.specs.units.windows import TravelShare
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from cfmkit.families.no_mechanism import Infeasible
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
 
 
-MIN_WIDTH_RATIO = 2.0
-"""Least width of a leaf over its thickness: narrower ones buckle out of the plane."""
-
-SNAPPING_RISE_RATIO = 3.2
-"""Rise over thickness below which leaves that buckle may do so with a jump."""
-
-FITTED_REGION_SHARE = 0.84
-"""Part of the linear region over which the widths are fitted to the force."""
-
-N_RESCALES = 4
-"""Two do for the shipped mechanisms."""
+MIN_WIDTH_RATIO = 2.0  # least width of a leaf over its thickness: narrower ones buckle out of the plane
+SNAPPING_RISE_RATIO = 3.2  # rise over thickness below which leaves that buckle may do so with a jump
+FITTED_REGION_SHARE = 0.84  # part of the linear region over which the widths are fitted to the force
+N_RESCALES = 4  # two do for the shipped mechanisms
 
 MAX_ROUNDS = 40
 """Of iterations that end after five, since forces and stresses are powers of the sizes within a few per cent."""
-WIDTH_RTOL = 1e-6
-"""Share of the width by which it may be off when sizes are found."""
+WIDTH_RTOL = 1e-6  # share of the width by which it may be off when sizes are found
 MAX_PASSES, FORCE_RTOL = 12, 1e-5
 """Of the exact model for a sheet, and how far its force may then be off: five passes are usual."""
-MOST_LEAVES = 1000
-"""As `mechanism.bistable.half_beams` allows."""
+MOST_LEAVES = 1000  # as `mechanism.bistable.half_beams` allows
 
 
 def check_guide(spec: VcfmSpec) -> None:
     """Raise if the shuttle can turn: the leaves would buckle at half the load that they are sized for."""
     if not spec.mechanism.bistable.guided:
-        raise Infeasible(
-            finding(
-                "asymmetric_buckling",
-                "the shuttle can turn ('mechanism.bistable.guided: false'), so the leaves buckle at half the load and "
-                "the force is not constant: use two Vs at a distance, or a guide",
-            ),
+        raise finding.infeasible(
+            "asymmetric_buckling",
+            "the shuttle can turn ('mechanism.bistable.guided: false'), so the leaves buckle at half the load and "
+            "the force is not constant: use two Vs at a distance, or a guide",
             {"mechanism.bistable.guided": "true"},
         )
 
@@ -85,24 +74,20 @@ def thickness_for(target: VcfmDesign) -> float:
     if free <= 0:
         # at 98 % of its limit a leaf is a fifth of the rise over pi: thin, but a leaf
         longest = 0.98 * 4.0 * rise / 3.0
-        raise Infeasible(
-            finding(
-                "stroke_unreachable",
-                f"a stroke of {mm(stroke)} ('design.stroke') needs leaves with a rise above {mm(0.75 * stroke)}; "
-                f"{_name_rise(target)} {mm(rise)}, with which every stroke is shorter than {mm(4.0 * rise / 3.0)}",
-            ),
+        raise finding.infeasible(
+            "stroke_unreachable",
+            f"a stroke of {mm(stroke)} ('design.stroke') needs leaves with a rise above {mm(0.75 * stroke)}; "
+            f"{_name_rise(target)} {mm(rise)}, with which every stroke is shorter than {mm(4.0 * rise / 3.0)}",
             {"design.stroke": format_at_most(longest)}
             if not least
             else {"design.stroke": format_at_most(_stroke_for(rise, least))},
         )
     thickness = rise * sqrt(free) / pi
     if thickness < least:
-        raise Infeasible(
-            finding(
-                "too_thin",
-                f"a stroke of {mm(stroke)} from a rise of {mm(rise)} needs leaves of {mm(thickness)}, thinner than "
-                f"{mm(least)} ('design.min_thickness')",
-            ),
+        raise finding.infeasible(
+            "too_thin",
+            f"a stroke of {mm(stroke)} from a rise of {mm(rise)} needs leaves of {mm(thickness)}, thinner than "
+            f"{mm(least)} ('design.min_thickness')",
             {"design.stroke": format_at_most(_stroke_for(rise, least))},
         )
     return thickness
@@ -119,12 +104,10 @@ def _stroke_for(rise: float, thickness: float) -> float:
     """Return the linear region of leaves of this thickness [m]; an eighth of the rise's limit where they have none."""
     free = 1.0 - (pi * thickness / rise) ** 2
     if free <= 0:
-        raise Infeasible(
-            finding(
-                "too_thin",
-                f"leaves of {mm(thickness)} ('design.min_thickness') with a rise of {mm(rise)} do not buckle at all: "
-                f"request a rise above {mm(pi * thickness)}, by 'design.rise' or a longer 'design.preload'",
-            )
+        raise finding.infeasible(
+            "too_thin",
+            f"leaves of {mm(thickness)} ('design.min_thickness') with a rise of {mm(rise)} do not buckle at all: "
+            f"request a rise above {mm(pi * thickness)}, by 'design.rise' or a longer 'design.preload'",
         )
     return 4.0 * rise / 3.0 * sqrt(free)
 
@@ -195,7 +178,7 @@ def leaves_for(have: int, wanted: float, sheet: float) -> int:
     count = have + 2 * max(0, ceil((wanted - have) / 2.0 - 1e-9))
     if count > MOST_LEAVES:
         reported = f"from a sheet of {mm(sheet)} ('mechanism.part.sheet') {count} leaves would have to be cut"
-        raise Infeasible(finding("envelope", f"{reported}, {MOST_LEAVES} at most: use a thicker sheet"))
+        raise finding.infeasible("envelope", f"{reported}, {MOST_LEAVES} at most: use a thicker sheet")
     return count
 
 
@@ -214,12 +197,10 @@ def leaf_of_sheet(
     if sheet < MIN_WIDTH_RATIO * thickness:
         least = format_at_least(MIN_WIDTH_RATIO * thickness)
         paths = ("part.sheet", "bistable.width", *(["positive.width"] if spec.mechanism.positive else []))
-        raise Infeasible(
-            finding(
-                "out_of_plane_buckling",
-                f"leaves of {mm(thickness)} from a sheet of {mm(sheet)} ('mechanism.part.sheet') would buckle out of "
-                f"the plane: below twice the thickness they do; a sheet of {least} is enough",
-            ),
+        raise finding.infeasible(
+            "out_of_plane_buckling",
+            f"leaves of {mm(thickness)} from a sheet of {mm(sheet)} ('mechanism.part.sheet') would buckle out of "
+            f"the plane: below twice the thickness they do; a sheet of {least} is enough",
             {f"mechanism.{path}": least for path in paths},
         )
     leaf, have = sized_leaf(spec, target, thickness, shortest), spec.mechanism.bistable.half_beams
@@ -280,4 +261,4 @@ def next_spring_leaf(spring_leaf: LeafStrip, stiffer: float, over: float, least:
 def stress_unreachable(leaf: LeafStrip, stress: float, allowable: float) -> Infeasible:
     """Return what is raised where the sizes do not come within the stress [Pa]."""
     reported = f"the exact stress of leaves of {mm(float(leaf.length))} from this sheet is {mpa(stress)}"
-    return Infeasible(finding("stress_unreachable", f"{reported}, {mpa(allowable)} is allowed ('mechanism.material')"))
+    return finding.infeasible("stress_unreachable", f"{reported}, {mpa(allowable)} is allowed ('mechanism.material')")

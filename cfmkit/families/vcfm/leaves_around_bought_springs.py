@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.findings import mm, mpa
-from cfmkit.families.no_mechanism import Infeasible, no_design
+from cfmkit.families.no_mechanism import Infeasible, no_design, refusals_answered
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws, coils, room_of_coils
 from cfmkit.families.vcfm.leaf_sizing import (
@@ -43,10 +43,10 @@ from cfmkit.stock.springs.stress_and_life import SpringInUse
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
     from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
+    from cfmkit.families.vcfm.surroundings_spec import BoughtSprings
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
 RETURN_TRAVEL_RATIO = 1.5
@@ -111,39 +111,23 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
 
     Of springs that fit those come first that need no guide against buckling, and of these the one whose rise, or
     preload, comes nearest to the largest that is allowed; if neither is limited, the one with the shortest leaves.
-
-    Parameters
-    ----------
-    spec : VcfmSpec
-        With springs that are bought, or a catalogue of them.
-    target : VcfmDesign
-        Its design block.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE where no spring fits: the message has the nearest three and what they miss.
+    INFEASIBLE where no spring fits: the message has the nearest three and what they miss.
     """
-    try:
-        check_guide(spec)
-        if target.rise is not None:
-            thickness_for(target)  # what the largest rise does not allow no spring does
-        tried = [_design_around(spec, target, springs, offer) for springs, offer in _choices(spec, target)]
-        fitting = sorted(
-            (choice for choice in tried if isinstance(choice, LeavesAroundSprings)),
-            key=lambda choice: choice.rank(target),
-        )
-        missed = [choice for choice in tried if isinstance(choice, Miss)]
-        for number, choice in enumerate(fitting[:MAX_TRIED_SPRINGS], 1):
-            sized = _fit_width(spec, target, choice) if target.refine else choice
-            if isinstance(sized, LeavesAroundSprings):
-                others = tuple(
-                    partial(_with_next, spec, target, following) for following in fitting[number:MAX_TRIED_SPRINGS]
-                )
-                return replace(_make_design(spec, target, sized), next_best=others)
-            missed.append(sized)
-    except Infeasible as problem:
-        return no_design(problem.finding, problem.nearest)
+    check_guide(spec)
+    if target.rise is not None:
+        thickness_for(target)  # what the largest rise does not allow no spring does
+    tried = [_design_around(spec, target, springs, offer) for springs, offer in _choices(spec, target)]
+    fitting = sorted(
+        (choice for choice in tried if isinstance(choice, LeavesAroundSprings)), key=lambda choice: choice.rank(target)
+    )
+    missed = [choice for choice in tried if isinstance(choice, Miss)]
+    for number, choice in enumerate(fitting[:MAX_TRIED_SPRINGS], 1):
+        sized = _fit_width(spec, target, choice) if target.refine else choice
+        if isinstance(sized, LeavesAroundSprings):
+            others = fitting[number:MAX_TRIED_SPRINGS]
+            next_best = tuple(partial(_with_next, spec, target, following) for following in others)
+            return replace(_make_design(spec, target, sized), next_best=next_best)
+        missed.append(sized)
     none = "it lists no spring of the required kind ('mechanism.springs.kind')"
     reported = f"no spring fits: {nearest(missed) if missed else none}"
     return no_design(
@@ -151,12 +135,10 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
     )
 
 
+@refusals_answered
 def _with_next(spec: VcfmSpec, target: VcfmDesign, choice: LeavesAroundSprings) -> Design:
     """Return the design around springs that are not the best of the catalogue."""
-    try:
-        sized = _fit_width(spec, target, choice) if target.refine else choice
-    except Infeasible as problem:
-        return no_design(problem.finding, problem.nearest)
+    sized = _fit_width(spec, target, choice) if target.refine else choice
     if isinstance(sized, Miss):
         return no_design(finding("no_spring_fits", nearest([sized])))
     return _make_design(spec, target, sized)
@@ -164,7 +146,7 @@ def _with_next(spec: VcfmSpec, target: VcfmDesign, choice: LeavesAroundSprings) 
 
 def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings, Offer | None]]:
     """Yield springs in their numbers, with their places in the catalogue; without one those of the mechanism."""
-    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
+    from cfmkit.families.vcfm.surroundings_spec import BoughtSprings
 
     stated = spec.mechanism.springs
     if not target.catalogue:

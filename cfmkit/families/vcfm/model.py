@@ -16,15 +16,14 @@ import numpy as np
 from cfmkit.arrays import LazySequence, ShortRepr, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import NO_STOPS
-from cfmkit.families.rows import SolvedRows, findings_of_one, valid, values_of_one
+from cfmkit.families.rows import SolvedRows, findings_of_one, valid, values_of_one, with_values
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, LeafSamples, Rows
 from cfmkit.families.vcfm.findings import FINDING_RULES, closed_spring, finding, is_closed
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
 from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of, stack_laws
-from cfmkit.families.vcfm.quantities import ROW_COLUMNS, SCALAR_QUANTITIES
+from cfmkit.families.vcfm.quantities import ROW_COLUMNS, SCALAR_QUANTITIES, adjustability, readings
 from cfmkit.families.vcfm.solution import Solution, target_of
-from cfmkit.families.vcfm.tables_of_preloads_and_readings import adjustability, readings
 from cfmkit.numerics.where_condition_ends import last_places
 from cfmkit.results import ROUND_OFF, Result, Status
 from cfmkit.stock.parts_list import parts_tables
@@ -47,17 +46,13 @@ MOST_BACK = 20
 """The way from the rest position to the unloaded position has at most so many times the points of the travel: a travel
 of some nanometres would take them by the billion."""
 
-MAX_SAMPLES = 60_000
-"""Samples that are worked on together: few enough to stay in a processor's cache."""
+MAX_SAMPLES = 60_000  # samples that are worked on together: few enough to stay in a processor's cache
 
 
 def analyze(spec: VcfmSpec, _run: Run) -> Result:
     """Return the force-displacement curves of a mechanism by closed forms, with everything that is wrong with it.
 
-    Returns
-    -------
-    Result
-        One curve per preload, the nominal one first. PARTIAL if the spring closes within the travel.
+    One curve per preload, the nominal one first. PARTIAL if the spring closes within the travel.
     """
     made = parts(spec)
     return result_of(solve(spec, made, LawSampler(made)))
@@ -78,7 +73,7 @@ def result_of(solution: Solution) -> Result:
     curves = tuple(_curve(push, stops, bool(push.force[0] > solution.effort_error[0])) for push in solution.pushes)
     (low, high), dense = (float(end[0]) for end in solution.linear), DenseCurve(solution)
     return Result(
-        spec=_as_run(spec),
+        spec=with_values(spec, {"analysis.travel": spec.travel}),
         status=Status.PARTIAL if short else Status.COMPLETE,
         message=reason if short else "",
         curves=curves,
@@ -320,12 +315,6 @@ def rest_of(sampler: ForceSampler, preload: float, grid: FloatArray) -> float | 
     """Return `rests_of` for one preload [m]; None if the shuttle does not rest."""
     rest = float(rests_of(sampler, [preload], grid)[0])
     return None if np.isnan(rest) else rest
-
-
-def _as_run(spec: VcfmSpec) -> VcfmSpec:
-    """Return the spec with the defaults of the analysis made explicit."""
-    analysis = spec.analysis.model_copy(update={"travel": spec.travel})
-    return spec.model_copy(update={"analysis": analysis})
 
 
 def _curve(push: Push, stops: EndStops, pressed: bool) -> Curve:

@@ -37,20 +37,14 @@ if TYPE_CHECKING:
 
     from cfmkit.families.vcfm.spec import VcfmSpec
 
-PART_GAP = 0.01
-"""Between the two parts of the drawing [m]."""
-
-COSINE_TOLERANCE_RATIO = 2e-4
-"""How far files may be from cosine arches, in thicknesses of the thinnest leaf."""
+PART_GAP = 0.01  # between the two parts of the drawing [m]
+COSINE_TOLERANCE_RATIO = 2e-4  # how far files may be from cosine arches, in thicknesses of the thinnest leaf
 
 
 def drawing(spec: VcfmSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     """Return the leaves with shuttle and walls and the spring, and a table of the leaves' centre line.
 
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If leaves overlap, or if a leaf, or the area of the part, is not that of the specification.
+    Raises `GeometryError` if leaves overlap, or if a leaf, or the area of the part, is not that of the specification.
     """
     sizes = sizes_of_frame(spec)
     places, heights, _ = leaf_law(spec.mechanism.bistable, spec.mechanism.material).centre_line

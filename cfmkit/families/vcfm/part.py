@@ -22,6 +22,7 @@ from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.fillets import round_inside_corners
 from cfmkit.export.posed_part import MIRROR_FACTORS, PosedBody, PosedPart, band, in_poses, rectangle
 from cfmkit.families.findings import mm
+from cfmkit.families.rows import with_values
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring
 from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_sizes
 
@@ -38,12 +39,10 @@ if TYPE_CHECKING:
 N_POSES = 9
 """Travels of each preload that a box counts: rigid parts move linearly, leaves bulge less than a wall is thick."""
 
-N_WINDINGS = 8
-"""Turns of a bought spring as they are drawn."""
+N_WINDINGS = 8  # turns of a bought spring as they are drawn
 
 Point = tuple[float, float]
-Item = Point | Arc | Smooth
-"""A corner, or an edge that is not straight."""
+Item = Point | Arc | Smooth  # a corner, or an edge that is not straight
 
 
 # --- over the motion --------------------------------------------------------------------------------------------
@@ -78,8 +77,7 @@ def bodies(solution: Solution, poses: Sequence[tuple[float, float]]) -> tuple[Po
     try:
         sizes = sizes_of_frame(spec)
     except GeometryError:  # such a part cannot be cut, as its export says: plain walls stand for its frame
-        plain = spec.mechanism.model_copy(update={"part": None})
-        sizes = frame_sizes(spec.model_copy(update={"mechanism": plain}), None)
+        sizes = frame_sizes(with_values(spec, {"mechanism.part": None}), None)
     # coils of which nothing says it are drawn as long as the farthest pose needs them
     farthest = max(push.preload for push in solution.pushes) + float(solution.first.travel[-1])
     return in_poses([list(_pose(spec, sizes, solution.parts.leaf, *pose, farthest)) for pose in poses])

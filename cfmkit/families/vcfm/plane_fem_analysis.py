@@ -2,7 +2,8 @@
 
 One leaf, or both of a V whose shuttle can turn, and one chain of the spring are solved and counted as those of the
 exact model are: the shuttle is rigid, so that all leaves do the same. Shuttle, walls and blocks are held from their
-faces on; the corners of a diamond bend.
+faces on; the corners of a diamond bend. Each fillet has its largest stress over the preloads of an analysis; nominal
+stresses are those of the beams that the exact model traces, as straight as they are drawn.
 
 Assumes: plane stress. No contact, no plasticity.
 """
@@ -17,12 +18,21 @@ import numpy as np
 
 from cfmkit.errors import GeometryError, SolutionError
 from cfmkit.export.arc_outlines import outlines
-from cfmkit.families.fem_results import fillet_table, largest_concentration
-from cfmkit.families.findings import bracket, sharp_inside
-from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
-from cfmkit.families.vcfm.fem_stress_in_each_fillet import fillets
+from cfmkit.families.fem_results import (
+    FilletRow,
+    both_images,
+    fillet_table,
+    findings_of_mesh,
+    largest_concentration,
+    nominal_stresses,
+    not_meshed,
+    with_nominal,
+    without_repeats,
+)
+from cfmkit.families.findings import sharp_inside
+from cfmkit.families.vcfm.exact_model import DOWN_ANGLE, ExactSampler, leaf_network, problem_of, spring_chain
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts, strip_of
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import drawing, sharp_corners
 from cfmkit.families.vcfm.part import solved_leaf, solved_spring
@@ -36,12 +46,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Network
     from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.part import SolvedPiece
+    from cfmkit.families.vcfm.solution import Solution
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Finding
     from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart
     from cfmkit.solid.meshed_part import MeshSolution, Part
+    from cfmkit.solid.stress_along_fillets import FilletStress
+
 
 POSE_EXPONENT = 1.5
 """Poses stand at (k/n) to this power of the travel: the peak of thin leaves is within its first twentieth."""
@@ -99,19 +113,7 @@ class SolidPath:
 
 
 class SolidSampler(ExactSampler):
-    """Samples of leaves and spring as solids, over what an analysis needs.
-
-    Parameters
-    ----------
-    spec : VcfmSpec
-        What is analysed.
-    end : float
-        How far the shuttle goes [m].
-    back : float
-        How far it is pulled back at most, positive [m].
-    run : Run
-        Its progress is reported.
-    """
+    """Samples of leaves and spring as solids, over what an analysis needs; the progress of `run` is reported."""
 
     def __init__(self, spec: VcfmSpec, end: float, back: float, run: Run) -> None:
         """Mesh and follow leaf and spring."""
@@ -202,8 +204,7 @@ def _stops(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ())
     count = max(5, spec.analysis.solid.poses // fewer)
     shares = np.linspace(0.0, 1.0, count) ** POSE_EXPONENT
     more = [place / end for place in places if 0.0 < place / end < 1.0]
-    found = np.unique(np.concatenate([shares, more]))
-    return tuple((end * np.delete(found, np.flatnonzero(np.diff(found) < 1e-9) + 1)).tolist())
+    return tuple((end * without_repeats(np.concatenate([shares, more]), 1.0)).tolist())
 
 
 def _pull_back(spec: VcfmSpec, pushed: AdaptiveSolution, end: float, report: Callable[[float], None]) -> SolidPath:
@@ -232,8 +233,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         outlines(drawing(spec))  # what cannot be cut is not solved: fillets too large make mountains of elements
         sampler = SolidSampler(spec, spec.travel, back, run)
     except GeometryError as error:
-        message = f"the part cannot be meshed: {error}; check mechanism.part"
-        return Result(spec, Status.NO_EQUILIBRIUM, message)
+        return not_meshed(spec, error)
     except SolutionError as error:
         return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}")
     found = result_of(solution := solve(spec, made, sampler))
@@ -250,11 +250,99 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
     if reported := sharp_inside(spec.mechanism.fillet, sharp_corners(spec)):
         yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
-    for name, reported in sampler.mesh_error.too_large():
-        yield finding(name, reported)
     about = spec.mechanism
-    for part in (about.bistable, about.positive):
-        if part is None:
-            continue
-        if reported := bracket(part.width, part.thickness, about.material.poisson, about.wide_beams):
-            yield finding("wide_beam", reported)
+    sections = [(part.width, part.thickness) for part in (about.bistable, about.positive) if part is not None]
+    yield from findings_of_mesh(finding, sampler.mesh_error, sections, about.material.poisson, about.wide_beams)
+
+
+def fillets(solution: Solution) -> tuple[tuple[FilletRow, ...], tuple[FilletRow, ...]]:
+    """Return the fillets of a leaf, and of a chain of the spring, with their largest stress up to the window's end.
+
+    That of all preloads, as in `spring_stress_max` and `bistable_stress_max`. A bought spring has none.
+    """
+    sampler: Any = solution.sampler  # of solids
+    leaf = _rows(solution, "leaf", "shuttle", (sampler.pushed, sampler.pulled))
+    network, placed = leaf_network(solution.spec), partial(_in_leaf_network, solution.spec)
+    leaf = _with_nominal(leaf, [row.motion for row in leaf], network, "shuttle", placed)
+    if not sampler.sides:
+        return leaf, ()
+    chain, spring = sampler.chain, _rows(solution, "spring", "block", sampler.sides)
+    travel = [chain.travel * (row.motion + (row.preload or 0.0)) for row in spring]
+    return leaf, _with_nominal(spring, travel, chain.network, chain.node, partial(_in_chain, solution.spec))
+
+
+def _rows(solution: Solution, piece: str, moved: str, ways: Sequence[Any]) -> tuple[FilletRow, ...]:
+    """Return the fillets of one piece that is pushed and pulled."""
+    radius = solution.spec.mechanism.fillet
+    pushed, pulled = (way.solved for way in ways)
+    rows = []
+    for one in _both_ways(pushed, pulled, radius):
+        joined = one.arc.find_touched(_rigid(pushed, moved))
+        row = _largest(solution, one, f"{piece} at {joined[0] if joined else 'corner'}", piece == "spring")
+        rows += [] if row is None else [row]
+    return tuple(rows)
+
+
+def _with_nominal(
+    rows: Sequence[FilletRow],
+    travel: Sequence[float],
+    network: Network,
+    node: str,
+    placed: Callable[[FloatArray], FloatArray],
+) -> tuple[FilletRow, ...]:
+    """Return rows with the nominal stress of beams whose node has some travels (n,) [m]."""
+    from cfmkit.elastica import Displacement
+
+    paths = partial(both_images, network, partial(Displacement, node, DOWN_ANGLE))
+    return with_nominal(rows, nominal_stresses(rows, np.array(travel), paths, placed))
+
+
+def _in_leaf_network(spec: VcfmSpec, points: FloatArray) -> FloatArray:
+    """Return where in the network of leaves points of the drawing are (m, 2) [m]: there the walls come first."""
+    strip, half = strip_of(spec.mechanism.bistable, spec.mechanism.material), 0.5 * spec.mechanism.frame.shuttle_width
+    x, y = points.T
+    return np.column_stack([float(strip.reach) + half * np.sign(x) - x, y + float(strip.rise)])
+
+
+def _in_chain(spec: VcfmSpec, points: FloatArray) -> FloatArray:
+    """Return where in the network of the spring points of the drawing are (m, 2) [m]: there the block stands."""
+    block = spec.mechanism.frame.block
+    return np.column_stack([points[:, 0] - 0.5 * block, -points[:, 1] - block])
+
+
+def _both_ways(pushed: MeshSolution, pulled: MeshSolution, radius: float) -> Iterator[FilletStress]:
+    """Yield the fillets of a part with the poses of both ways: they are of one mesh, and begin with the same pose."""
+    from cfmkit.solid.stress_along_fillets import FilletStress, stressed_fillets
+
+    back = {tuple(one.arc.middle.tolist()): one for one in stressed_fillets(pulled, radius)}
+    for one in stressed_fillets(pushed, radius):
+        other = back.get(tuple(one.arc.middle.tolist()))
+        if other is None:
+            yield one
+        else:
+            travel, stress = (np.concatenate([a[:-1], b]) for a, b in zip(_poses(other), _poses(one), strict=True))
+            yield FilletStress(one.arc, travel, stress)
+
+
+def _poses(one: FilletStress) -> tuple[Any, Any]:
+    return one.travel, one.stress
+
+
+def _rigid(solved: MeshSolution, moved: str) -> dict[str, list[Any]]:
+    """Return the polygons of what moves and of what stands [m]; the middle of a corner is a line, and no piece."""
+    found: dict[str, list[Any]] = {}
+    for place in solved.part.places:
+        name = moved if place.name == "shuttle" else {"shuttle": "wall"}.get(moved, moved)
+        found.setdefault(name, []).extend(shape for shape in place.shapes if len(shape) > 2)
+    return found
+
+
+def _largest(solution: Solution, one: FilletStress, place: str, of_spring: bool) -> FilletRow | None:
+    """Return the row of a fillet: at the preload and the travel of the shuttle where its stress is largest."""
+    found = []
+    for push in solution.pushes:
+        share, ahead = (solution.sampler.chain.travel, push.preload) if of_spring else (1.0, 0.0)  # type: ignore[attr-defined]
+        start, end = float(push.travel[0]), min(solution.window_of_one[1], float(push.travel[-1]))
+        if (worst := one.largest(share * (start + ahead), share * (end + ahead))) is not None:
+            found.append(FilletRow(place, one.arc, worst[0], worst[1] / share - ahead, push.preload))
+    return max(found, key=lambda row: abs(row.stress), default=None)

@@ -403,7 +403,7 @@ class Solution(ShortRepr):
         low, high = (np.where(self.is_linear, *ends) for ends in zip(self.linear, curves.ends, strict=True))
         found = CurveRows(
             RowSamples(curves.travel, curves.force, curves.count),
-            self.dense,
+            lambda: self.dense,
             curves.force_at,
             self.effort_error,
             self.target,

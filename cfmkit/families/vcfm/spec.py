@@ -10,9 +10,8 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.end_stops import EndStops
 from cfmkit.families.end_stops_spec import EndStop, stop_faults, travel_up_to_stop
-from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
-from cfmkit.families.vcfm.cut_and_frame_spec import CutLeaves, VcfmPart
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS, Bistable, Positive
+from cfmkit.families.vcfm.surroundings_spec import BoughtSprings, CutLeaves, VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.block import keys_of
 from cfmkit.specs.spec import (
@@ -36,8 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-MOST_PRELOAD = 100.0
-"""Lengths of a leaf that a preload may be: every spring closes, or tears, long before."""
+MOST_PRELOAD = 100.0  # lengths of a leaf that a preload may be: every spring closes, or tears, long before
 
 
 class Frame(Model):

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from cfmkit.errors import GeometryError
 from cfmkit.export.posed_part import PosedBody, rectangle
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.cut_and_frame_spec import StandingFrame
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
+from cfmkit.families.vcfm.surroundings_spec import StandingFrame
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

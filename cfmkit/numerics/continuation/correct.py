@@ -1,4 +1,11 @@
-"""Newton's method, at a drive or under a linear condition between the unknowns and the drive [Ke]."""
+"""Newton's method from a guess to a point of a path.
+
+Either the drive is given, or a border: a linear condition between the unknowns and the drive, as across an arc [Ke].
+
+Reference
+---------
+[Ke] H. B. Keller, in: Applications of Bifurcation Theory, Academic Press, 1977, 359.
+"""
 
 from __future__ import annotations
 

@@ -41,20 +41,11 @@ _WIDE_CONTEXT = Context(prec=800)
 """Wide enough for the exact digits of any float."""
 
 
-def shift_decimal(values: ArrayLike, power: int) -> FloatArray:
-    """Return `values` times ``10**power``, correctly rounded as decimals.
-
-    Parameters
-    ----------
-    values : array_like
-        Floats; NaN, infinities and zeros stay what they are.
-    power : int
-        How far the decimal point moves to the right, -15 to 15.
-
-    Returns
-    -------
-    array
-        Same shape as `values`.
+def shift_decimal(
+    values: ArrayLike,
+    power: int,  # how far the decimal point moves to the right, -15 to 15
+) -> FloatArray:
+    """Return `values` times ``10**power``, correctly rounded as decimals; NaN, infinities and zeros as they are.
 
     Examples
     --------
@@ -73,24 +64,16 @@ def shift_decimal(values: ArrayLike, power: int) -> FloatArray:
     return shifted.reshape(given.shape)
 
 
-def even_grid(start: float, stop: float, count: int) -> FloatArray:
-    """Return `count` evenly spaced places, each the float nearest to its decimal.
+def even_grid(
+    start: float,  # the first and the last place [m]; other units work as well
+    stop: float,
+    count: int,  # of places, at least 2
+) -> FloatArray:
+    """Return evenly spaced places, each the float nearest to its decimal [m].
 
     `numpy.linspace` rounds a step first and multiplies it: its 0.24 m in 480 steps
     has 4.500000000000001 mm on the way. Here both ends are taken in whole
     nanometres, where the arithmetic is exact up to one division.
-
-    Parameters
-    ----------
-    start, stop : float
-        The first and the last place [m]; other units work as well.
-    count : int
-        Number of places, at least 2.
-
-    Returns
-    -------
-    (count,) array
-        The places [m].
 
     Examples
     --------

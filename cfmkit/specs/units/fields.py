@@ -13,7 +13,7 @@ import numbers
 import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from cfmkit.errors import QuantityError
 from cfmkit.specs.units.quantities import (
@@ -158,54 +158,61 @@ class UnitField:
         )
 
 
-class Place(float):
-    """An SI float that knows whether it is a length [m] or an angle [rad].
-
-    As a field it takes text of either kind; a plain number is a length.
-    """
+class DimensionedFloat(float):
+    """An SI float that knows its dimension."""
 
     __slots__ = ("dimension",)
     dimension: str
 
-    def __new__(cls, value: float, dimension: str = "length") -> Place:
-        """Return `value` as a place of that dimension."""
-        if dimension not in PLACE_DIMENSIONS:
-            raise ValueError(f"a place is a length or an angle, not {dimension!r}")
-        place = super().__new__(cls, value)
-        place.dimension = dimension
-        return place
+    def __new__(cls, value: float, dimension: str) -> Self:
+        """Return `value` as a number of that dimension."""
+        number = super().__new__(cls, value)
+        number.dimension = dimension
+        return number
 
-    def __reduce__(self) -> tuple[type[Place], tuple[float, str]]:
+    def __reduce__(self) -> tuple[Any, ...]:
         """Return what copying and pickling need."""
         return type(self), (float(self), self.dimension)
 
     def __repr__(self) -> str:
         """Return ``Place(0.002, 'length')``."""
-        return f"Place({float(self)!r}, {self.dimension!r})"
+        return f"{type(self).__name__}({float(self)!r}, {self.dimension!r})"
 
-    @classmethod
-    def __get_pydantic_core_schema__(cls, _source: Any, _handler: Any) -> CoreSchema:
+
+class Place(DimensionedFloat):
+    """An SI float that knows whether it is a length [m] or an angle [rad]."""
+
+    __slots__ = ()
+
+    def __new__(cls, value: float, dimension: str = "length") -> Self:
+        """Return `value` as a place of that dimension."""
+        if dimension not in PLACE_DIMENSIONS:
+            raise ValueError(f"a place is a length or an angle, not {dimension!r}")
+        return super().__new__(cls, value, dimension)
+
+
+@dataclass(frozen=True)
+class DimensionedField(UnitField):
+    """Text of one of several dimensions, which the number then knows; a plain number is of the first."""
+
+    make: Callable[[float, str], DimensionedFloat] = DimensionedFloat
+
+    def write(self, value: float) -> str:
+        """Return text that `read` takes back."""
+        return format_quantity(value, getattr(value, "dimension", self.dimensions[0]))
+
+    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
         """Build the validator and the serialiser."""
-        return plain_schema(_read_place, write_place)
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, _core: Any, _handler: Any) -> dict[str, Any]:
+        def read(value: Any) -> DimensionedFloat:
+            is_read = isinstance(value, DimensionedFloat) and value.dimension in self.dimensions
+            return value if is_read else self.make(*self.read(value))
+
+        return plain_schema(read, self.write)
+
+    def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
         """Describe the text that is expected."""
-        return PLACE_FIELD.json_schema({})
-
-
-PLACE_FIELD = UnitField(PLACE_DIMENSIONS)
-
-
-def _read_place(value: Any) -> Place:
-    return (
-        value if isinstance(value, Place) and value.dimension in PLACE_DIMENSIONS else Place(*PLACE_FIELD.read(value))
-    )
-
-
-def write_place(value: float) -> str:
-    """Return a place as text with its unit."""
-    return format_quantity(value, getattr(value, "dimension", "length"))
+        return self.json_schema({})
 
 
 @dataclass(frozen=True)
@@ -297,5 +304,5 @@ Inertia = Annotated[float, quantity("inertia")]
 Density = Annotated[float, quantity("density")]
 Time = Annotated[float, quantity("time")]
 LineLoad = Annotated[float, quantity("line_load")]
-Displacement = Place
+Displacement = Annotated[float, DimensionedField(PLACE_DIMENSIONS, Place)]
 MetricValue = Annotated[str, _OpenQuantity()]

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cfmkit.errors import InputError, QuantityError
-from cfmkit.specs.units.fields import PLACE_DIMENSIONS, Place, UnitField, plain_schema, write_place
+from cfmkit.specs.units.fields import PLACE_DIMENSIONS, DimensionedField, DimensionedFloat, Place
 from cfmkit.specs.units.quantities import format_quantity
-
-if TYPE_CHECKING:
-    from pydantic_core import CoreSchema
 
 SHARE_DIMENSION = "ratio"
 """Dimension of an end of a window that is given as a share of the travel."""
@@ -23,9 +20,7 @@ class TravelShare(Place):
 
     def __new__(cls, value: float) -> TravelShare:
         """Return `value` as a share."""
-        share = float.__new__(cls, value)
-        share.dimension = SHARE_DIMENSION
-        return share
+        return DimensionedFloat.__new__(cls, value, SHARE_DIMENSION)
 
     def __eq__(self, other: object) -> bool:
         """Return whether the other is the same share."""
@@ -39,7 +34,7 @@ class TravelShare(Place):
         """Distinguish a share from a place of the same number."""
         return hash((SHARE_DIMENSION, float(self)))
 
-    def __reduce__(self) -> tuple[type[TravelShare], tuple[float]]:  # type: ignore[override]
+    def __reduce__(self) -> tuple[Any, ...]:
         """Return what copying and pickling need."""
         return type(self), (float(self),)
 
@@ -49,7 +44,7 @@ class TravelShare(Place):
 
 
 @dataclass(frozen=True)
-class _WindowEnd(UnitField):
+class _WindowEnd(DimensionedField):
     """Text such as ``2 mm``, ``3 deg`` or ``100 %`` of the travel; a plain number is a length."""
 
     def read(self, value: Any) -> tuple[float, str]:
@@ -59,19 +54,7 @@ class _WindowEnd(UnitField):
         return number, dimension
 
     def write(self, value: float) -> str:
-        return format_quantity(value, SHARE_DIMENSION, "%") if isinstance(value, TravelShare) else write_place(value)
-
-    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
-        """Build the validator and the serialiser."""
-
-        def read(value: Any) -> Place:
-            return value if isinstance(value, Place) else place_of(*self.read(value))
-
-        return plain_schema(read, self.write)
-
-    def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
-        """Describe the text that is expected."""
-        return self.json_schema({})
+        return format_quantity(value, SHARE_DIMENSION, "%") if isinstance(value, TravelShare) else super().write(value)
 
 
 def place_of(value: float, dimension: str) -> Place:
@@ -79,7 +62,8 @@ def place_of(value: float, dimension: str) -> Place:
     return TravelShare(value) if dimension == SHARE_DIMENSION else Place(value, dimension)
 
 
-WindowEnd = Annotated[float, _WindowEnd((*PLACE_DIMENSIONS, SHARE_DIMENSION))]
+_END_FIELD = _WindowEnd((*PLACE_DIMENSIONS, SHARE_DIMENSION), place_of)
+WindowEnd = Annotated[float, _END_FIELD]
 Ends = tuple[WindowEnd, WindowEnd]
 
 
@@ -112,6 +96,6 @@ def window_places(
     start, stop = travel
     places = [start + float(end) * (stop - start) if isinstance(end, TravelShare) else float(end) for end in ends]
     if places[0] == places[1]:
-        reported = " and ".join(_WindowEnd((*PLACE_DIMENSIONS, SHARE_DIMENSION)).write(end) for end in ends)
+        reported = " and ".join(_END_FIELD.write(end) for end in ends)
         raise InputError(f"a window from {reported} has no width on this travel")
     return min(places), max(places)

@@ -20,9 +20,7 @@ from cfmkit.specs.units.fields import (
     MAX_QUANTITY,
     MIN_QUANTITY,
     MOST_TURNS,
-    PLACE_FIELD,
     MetricValue,
-    Place,
     UnitField,
 )
 from cfmkit.specs.units.quantities import describe_dimensions, example
@@ -58,8 +56,6 @@ class Slot:
     @property
     def quantity(self) -> UnitField | None:
         """The quantity, if a number with a unit is meant."""
-        if self.kind is Place:
-            return PLACE_FIELD
         return next((item for item in self.metadata if isinstance(item, UnitField)), None)
 
     @property

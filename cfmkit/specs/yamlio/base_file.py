@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import SpecError, reason_of, visible
 from cfmkit.specs.yamlio.document import read_document
-from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES
+from cfmkit.specs.yamlio.tree_builder import MAX_FILE_BYTES
 
 if TYPE_CHECKING:
     from cfmkit.specs.yamlio.document import YamlDocument

@@ -20,8 +20,7 @@ from cfmkit.specs.units.fields import BareFloat, BareInt
 from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.specs.yamlio.explain_validation_errors import explain, not_among
 from cfmkit.specs.yamlio.path_notation import Path, parse_indices, to_dotted
-from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES, Fault
-from cfmkit.specs.yamlio.tree_builder import MAX_DEPTH, ParsedYaml, read_text
+from cfmkit.specs.yamlio.tree_builder import MAX_DEPTH, MAX_FILE_BYTES, Fault, ParsedYaml, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

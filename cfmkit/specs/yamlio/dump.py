@@ -13,28 +13,18 @@ from cfmkit.errors import QuantityError
 from cfmkit.specs.units.quantities import decimal_text
 from cfmkit.specs.units.strict_decimal_number import odd_character
 from cfmkit.specs.yamlio.allowed_at_path import Slot
-from cfmkit.specs.yamlio.scalars import read_plain
+from cfmkit.specs.yamlio.tree_builder import read_plain
 
 LINE_WIDTH = 100
 _PLAIN_PATTERN = re.compile(r"[\w.+(/][^:#\[\]{},\"'&*!|>%@`\\=?-]*(?:[-%=?'*](?! )[^:#\[\]{},\"&!|>@`\\]*)*")
 _OLD_WORDS = re.compile("(?i)(y|yes|n|no|on|off|=|<<|-|[-+]?[0-9]{1,4}-[0-9]{1,2}-[0-9]{1,2}.*)")
 
 
-def dump(spec: BaseModel, complete: bool = False) -> str:
-    """Return a specification as YAML, with units, keys in the model's order.
-
-    Parameters
-    ----------
-    spec : BaseModel
-        What to write.
-    complete : bool
-        Write every default too, not only what was set.
-
-    Returns
-    -------
-    str
-        Text that `read_document` and `bind` turn into an equal specification.
-    """
+def dump(
+    spec: BaseModel,  # what to write
+    complete: bool = False,  # write every default too, not only what was set
+) -> str:
+    """Return a specification as YAML that `read_document` and `bind` turn into an equal one; keys as in the model."""
     content = _content(spec, spec.model_dump(mode="json"), (), complete)
     # Lists of blocks, such as the requirements, read best at the end.
     ordered = dict(sorted(content.items(), key=lambda item: _holds_blocks(item[1])))

@@ -1,7 +1,10 @@
 """Strict reading of a YAML specification into plain Python values, with line and column of every key and value.
 
-PyYAML is used as scanner and parser only. Scalars are read by `cfmkit.specs.yamlio.scalars`; tags, anchors, merge keys
-and second documents are faults. Faults are collected, in plain words (`ParsedYaml.faults`).
+PyYAML is used as scanner and parser only. Tags, anchors, merge keys and second documents are faults. Faults are
+collected, in plain words (`ParsedYaml.faults`).
+
+An unquoted scalar is read as in YAML 1.2, minus what misleads. YAML 1.1 reads ``1:30`` as 90, ``010`` as 8 and ``no``
+as false; 1.2 does not, and people expect either. What two readers take differently is refused with a hint.
 """
 
 from __future__ import annotations
@@ -23,9 +26,14 @@ from yaml.events import (
 )
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.strict_decimal_number import quote
-from cfmkit.specs.yamlio.scalars import check_text, read_plain
-from cfmkit.specs.yamlio.text_decoding import Fault, Unreadable, decode, replace_odd_characters
+from cfmkit.specs.units.strict_decimal_number import (
+    MAX_NUMBER_LENGTH,
+    NUMBER_PATTERN,
+    number_complaint,
+    odd_character,
+    quote,
+    read_number,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,6 +41,75 @@ if TYPE_CHECKING:
     from yaml.error import Mark, YAMLError
 
     from cfmkit.specs.yamlio.path_notation import Path
+
+
+MAX_FILE_BYTES = 1_000_000
+MOST_KINDS = 20
+_FOREIGN_MARKS = {
+    b"\xff\xfe\x00\x00": "UTF-32",
+    b"\x00\x00\xfe\xff": "UTF-32",
+    b"\xff\xfe": "UTF-16",
+    b"\xfe\xff": "UTF-16",
+}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something wrong at a place of a source, before it is known whose source that is."""
+
+    line: int
+    column: int
+    path: tuple[str | int, ...]
+    message: str
+    makes_value_unusable: bool = True  # whether nothing more should be said about the value at `path`
+
+
+class Unreadable(Exception):
+    """The source cannot be read any further."""
+
+    def __init__(self, fault: Fault) -> None:
+        """Keep the fault that ended the reading."""
+        self.fault = fault
+        super().__init__(fault.message)
+
+
+def decode(data: bytes | str) -> str:
+    """Return the text of a source without its byte order mark.
+
+    Raises Unreadable if it is too large, or not UTF-8.
+    """
+    if len(data) > MAX_FILE_BYTES:
+        raise Unreadable(Fault(1, 1, (), f"the file is larger than {MAX_FILE_BYTES} bytes; put long data elsewhere"))
+    if isinstance(data, str):
+        return data.removeprefix("\ufeff")
+    for mark, name in _FOREIGN_MARKS.items():
+        if data.startswith(mark):
+            raise Unreadable(Fault(1, 1, (), f"the file is {name}; save it as UTF-8"))
+    try:
+        return data.decode("utf-8").removeprefix("\ufeff")
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8")
+        what = f"the byte 0x{data[error.start]:02x} at offset {error.start} is not UTF-8; save the file as UTF-8"
+        raise Unreadable(Fault(*_position(before, len(before)), (), what)) from None
+
+
+def replace_odd_characters(text: str) -> tuple[str, list[Fault]]:
+    """Return the text with a space for every character that is refused, and a fault for each kind of them."""
+    kinds = {char: found[1] for char in set(text) if (found := odd_character(char))}
+    first = sorted((text.index(char), char) for char in sorted(kinds)[:MOST_KINDS])
+    faults = [_odd(text, index, kinds[char], text.count(char)) for index, char in first]
+    return text.translate(dict.fromkeys(map(ord, kinds), " ")), faults
+
+
+def _odd(text: str, index: int, what: str, count: int) -> Fault:
+    more = f" ({count} in all)" if count > 1 else ""
+    return Fault(*_position(text, index), (), f"here is {what}{more}")
+
+
+def _position(text: str, index: int) -> tuple[int, int]:
+    """Return (line, column) of an index, both from 1; lines end with LF, CRLF or CR."""
+    before = text[:index].replace("\r\n", "\n").replace("\r", "\n")
+    return before.count("\n") + 1, len(before) - before.rfind("\n")
 
 
 _YAML_LOADERS: list[Any] = [*filter(None, [getattr(yaml, "CSafeLoader", None)]), yaml.SafeLoader]
@@ -249,6 +326,51 @@ def _place(event: Event) -> tuple[int, int]:
 
 def _fault(event: Event, path: Path, message: str) -> Fault:
     return Fault(*_place(event), path, message)
+
+
+_CONSTANT_WORDS: dict[str, bool | None] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+_CONTROL_PATTERN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+_INTEGER_PATTERN = re.compile("[-+]?[0-9]+")
+
+
+def read_plain(text: str) -> Any:
+    """Return what an unquoted scalar means: None, a bool, an int, a float, or the text itself.
+
+    Raises QuantityError if it looks like a number but is none that everybody reads the same way.
+    """
+    if text in _CONSTANT_WORDS:
+        return _CONSTANT_WORDS[text]
+    if NUMBER_PATTERN.fullmatch(text):
+        return _number(text)
+    if len(text) <= MAX_NUMBER_LENGTH and (complaint := number_complaint(text, only_traps=True)):
+        raise QuantityError(_or_quote(complaint))
+    return text
+
+
+def check_text(text: str) -> str:
+    """Return the text of a quoted scalar.
+
+    Raises QuantityError if an escape put a control character into it.
+    """
+    if match := _CONTROL_PATTERN.search(text):
+        raise QuantityError(f"the text holds the control character U+{ord(match[0]):04X}; remove it")
+    return text
+
+
+def _number(text: str) -> int | float:
+    try:
+        value = read_number(text)
+    except QuantityError as error:
+        raise QuantityError(_or_quote(str(error))) from None
+    return int(text) if _INTEGER_PATTERN.fullmatch(text) else value
+
+
+def _or_quote(complaint: str) -> str:
+    return f"{complaint} (or quote it, if text is meant)"
 
 
 _PLAIN_WORDS = (

@@ -67,6 +67,9 @@ MAX_YIELD_TRIES = 3
 MOST_ASKED = 0.9975
 """For a larger share the drawn parts of the search are too few."""
 
+RUBBING = ("pins", "guide", "bearings")
+"""Blocks of a mechanism of rigid parts that may state a friction."""
+
 MAX_CORRECTIONS = 2
 """How often a part is corrected by its finest model: what is still missed then is missed."""
 
@@ -404,14 +407,15 @@ def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> d
         values = [one.value for key, one in found.items() if key.partition("[")[0] == name and one.value is not None]
         return max(values) if values else None
 
-    lost = worst("hysteresis_area")
+    lost, mechanism = worst("hysteresis_area"), result.spec.get_value("mechanism")
+    rubs = not hasattr(mechanism, "pins") or any(_friction(mechanism, name) for name in RUBBING)
     means = {key: one.value for key, one in found.items() if key.partition("[")[0] == f"{kind}_mean"}
     each = [value for key, value in means.items() if value is not None and ("[" in key or len(means) == 1)]
     mean = float(np.mean(each)) if each else None
     return {
         "mean": mean,
         "ripple": worst(f"{kind}_ripple"),
-        "hysteresis": None if lost is None or not mean else lost / (mean * request.travel),
+        "hysteresis": None if lost is None or not mean or not rubs else lost / (mean * request.travel),
         "safety_factor": _least_factor(found),
         "across": None if space is None else space.across,
         "along": None if space is None else space.along,
@@ -443,11 +447,12 @@ def _notes(space: BoundingBox | None, result: Result) -> Iterator[str]:
     if space is not None and space.assumed:
         yield space.assumed
     mechanism = result.spec.get_value("mechanism")
-    rubs = [f"{name} {value:g}" for name in ("pins", "guide") if (value := _friction(mechanism, name))]
+    rubs = [f"{name} {value:g}" for name in RUBBING if (value := _friction(mechanism, name))]
     if rubs:
         yield f"friction assumed: {', '.join(rubs)}"
-    elif getattr(mechanism, "pins", None) is not None:
-        yield "friction of pins and guide is not counted: require 'hysteresis' to have it judged"
+    elif hasattr(mechanism, "pins"):
+        plain = ", of rollers on plain shafts" if hasattr(mechanism, "bearings") else ""
+        yield f"friction of pins and guide{plain} is not counted: require 'hysteresis' to have it judged"
     for finding in result.warnings:
         yield f"{finding.name}: {finding.message}"
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from cfmkit.arrays import FloatArray
 from cfmkit.curves import Column, Curve
-from cfmkit.families.findings import finder, mm, newton, rate
+from cfmkit.families.findings import Finder, mm, newton, rate
 from cfmkit.families.run_control import Run
 from cfmkit.results import Finding, Result, Status, quantities
 from cfmkit_oblique.spec import Mechanism, ObliqueSpec
@@ -41,7 +41,7 @@ FINDINGS = {
     "coils_touch": "a spring is compressed to its solid length within the travel: the curve ends there",
     "no_room": "the requested range needs a slider that starts higher above the anchors than is allowed",
 }
-finding = finder(FINDINGS)
+finding = Finder(FINDINGS)
 
 QUASI_ZERO = 0.01
 """A slope of less than this part of the vertical spring's is as good as zero: springs are not bought closer."""

@@ -23,6 +23,7 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScat
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task import BENDING_ONLY, STRESS_MARGIN, Coordinate, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.rows import with_values
 from cfmkit.results import Design, Finding, Status
 from cfmkit.specs.units import format_short
 
@@ -82,8 +83,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
     mechanism = spec.mechanism
     layers = mechanism.copies.layers if mechanism.copies else 1
     if layers > 1 and mechanism.copies:
-        single_layer = mechanism.copies.model_copy(update={"layers": 1})
-        spec = spec.model_copy(update={"mechanism": mechanism.model_copy(update={"copies": single_layer})})
+        spec = with_values(spec, {"mechanism.copies.layers": 1})
     assembly = assemble(spec)
     bends = assemble(spec.replace({"analysis.fidelity": BENDING_ONLY})).network
     curve = spec.design.target.curve() if spec.design is not None and spec.design.target is not None else None
@@ -229,9 +229,8 @@ def _report_search(task: Task, design: Judged, result: Explored) -> str:
     if task.objective == "paper":
         reached = f"F(a)/F(b) - 1 = {best.objective:.3f}"
     return (
-        f"{reached}; {len(feasible)} of {len(result.found)} starts meet all limits{refuted} "
-        f"({total} traces{reused}{left}); "
-        f"the last minimisation {best.ending}"
+        f"{reached}; {len(feasible)} of {len(result.found)} starts meet all limits{refuted} ({total} "
+        f"traces{reused}{left}); the last minimisation {best.ending}"
     )
 
 
@@ -258,11 +257,8 @@ def _warnings(task: Task, design: Judged, result: Explored) -> tuple[Finding, ..
     return tuple(out)
 
 
-MAX_NEAR_DESIGNS = 3
-"""Designs that are looked at, the ones that miss the limits least."""
-
-AT_BOUND = 1e-4
-"""A variable so near to its bound, in units of the size and in rad, is held by it."""
+MAX_NEAR_DESIGNS = 3  # designs that are looked at, the ones that miss the limits least
+AT_BOUND = 1e-4  # a variable so near to its bound, in units of the size and in rad, is held by it
 
 
 @dataclass(frozen=True)

@@ -188,22 +188,10 @@ SEARCH_DEFINITIONS = {
         "share of the travel in which (max - min) <= 5 % of max with beams that stretch and shear: "
         "`strict_range_fraction` of the same command",
     ),
-    "tolerance_half_band_median": (
-        "ratio",
-        "(max - min)/(max + min) of the median network drawn within tolerances",
-    ),
-    "tolerance_half_band_p90": (
-        "ratio",
-        "(max - min)/(max + min) that nine of ten such networks keep",
-    ),
-    "tolerance_strict_range_median": (
-        "ratio",
-        "share of the travel with (max - min) <= 5 % of max, median of them",
-    ),
-    "tolerance_strict_range_p10": (
-        "ratio",
-        "the same share that nine of ten of them reach",
-    ),
+    "tolerance_half_band_median": ("ratio", "(max - min)/(max + min) of the median network drawn within tolerances"),
+    "tolerance_half_band_p90": ("ratio", "(max - min)/(max + min) that nine of ten such networks keep"),
+    "tolerance_strict_range_median": ("ratio", "share of the travel with (max - min) <= 5 % of max, median of them"),
+    "tolerance_strict_range_p10": ("ratio", "the same share that nine of ten of them reach"),
     "tolerance_lost": ("count", "such networks that cannot be followed to the end of the window"),
 }
 """What only the search knows. What the analysis of the design knows, too, is not said a second time."""

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 
 _POSES_PER_REUSE = 8  # poses of the window for one before it
-
 _MIDDLE_SHARE = 0.7  # of the end: a pose under load that stays where it is while the window grows
 
 
@@ -279,9 +278,7 @@ class View:
         return self.response.variables.task.network.beams[beam].section
 
 
-MANY_POSES = 241
-"""From rest to the end of the window: of a travel of 13.6 mm one every 0.06 mm."""
-
+MANY_POSES = 241  # from rest to the end of the window: of a travel of 13.6 mm one every 0.06 mm
 _PLACES_PER_POSE = 8  # places of the interpolated force from pose to pose
 _CLOSE_CONTROL = Control(tolerance=1e-7, branch="stop")
 

@@ -35,12 +35,8 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.task import Task
 
 
-VIOLATION_TOL = 1e-4
-"""A limit missed by less than this share holds."""
-
-COORDINATE_DECIMALS, COEFFICIENT_DECIMALS = 7, 6
-"""Decimals of designed coordinates [m] and coefficients [rad]."""
-
+VIOLATION_TOL = 1e-4  # a limit missed by less than this share holds
+COORDINATE_DECIMALS, COEFFICIENT_DECIMALS = 7, 6  # decimals of designed coordinates [m] and coefficients [rad]
 _MAX_WIDENINGS = 3  # minimisations, each from the last
 _MIN_WINDOW_GAIN = 2e-3  # of the end of the window: a gain that is not worth another one
 _REPAIRABLE_VIOLATION = 2e-3  # a limit missed by less is repaired afterwards
@@ -138,11 +134,6 @@ def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found 
 
     It begins halfway between rest and the requested window. What is flat over that seldom is the flattest over the
     requested one: order by order a start ends in another family of shapes. None if nothing could be followed.
-
-    Parameters
-    ----------
-    task, seed, index, plan : Task, int, int, StartBudget
-        As of `search_start`.
     """
     task = replace(task, orders=task.orders[-1:], points=_N_WINDOW_POSES)
     first, far = task.first, _FAR_START * task.window[0]

@@ -27,9 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.variables import Variables
 
 N_AUDIT_POSES = 61
-STRICT_BAND = 0.05
-"""Of the largest force: the strict range is that of `cfmkit analyze`, (max - min) <= 5 % of max."""
-
+STRICT_BAND = 0.05  # of the largest force: the strict range is that of `cfmkit analyze`, (max - min) <= 5 % of max
 _JOINT_RTOL = 1e-4  # of the chords: lines that end in a joint meet within the error of the path
 
 

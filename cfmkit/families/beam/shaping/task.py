@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 Objective = Literal["ripple", "range", "paper"]
 
-BENDING_ONLY = "inextensible"
-"""The model of beams that bend only, as ``analysis.fidelity`` names it."""
+BENDING_ONLY = "inextensible"  # the model of beams that bend only, as ``analysis.fidelity`` names it
 
 STRESS_MARGIN = 2e-3
 """The search asks for so much less stress and slimmer beams: the stress peaks between its poses and places, too."""

@@ -98,8 +98,7 @@ _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = 0.5 * (_GAUSS_NODES + 1), 0.5 * _GAUSS_WEIGHTS
 
-_COMPLEX_STEP = 1e-30
-"""Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
+_COMPLEX_STEP = 1e-30  # of a complex step: nothing is subtracted, so that its square may vanish beside one
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import Mechanism
+
+
+class AxisGap(NamedTuple):
+    """Vector from the axis of the left roller to that of the right one, a complex number, and how fast it changes."""
+
+    vector: Any  # [m]
+    velocity: Any  # for laws that depend on speed [m/s]
+
+    @classmethod
+    def between_mirrored(cls, center: Any, velocity: Any) -> AxisGap:
+        """Return the gap between axes (2, n) that are given with x outwards: the left one as its mirror image."""
+        return cls(center[0] + center[1].conj(), velocity[0] + velocity[1].conj())
 
 
 @dataclass(frozen=True)
@@ -25,9 +37,11 @@ class AxisSprings:
         springs = mechanism.springs
         return cls(springs.total, 2.0 * mechanism.springs_rest, springs.tension_stretch)
 
-    def pull(self, distance: Any) -> Any:
-        """Return the force [N] with which they pull axes together that are so far apart [m]; they do not push."""
-        return self.stiffness * np.maximum(distance - self.rest_length, 0.0)
+    def force(self, gap: AxisGap) -> Any:
+        """Return the force on the right axis, a complex number [N], opposite on the left one; springs do not push."""
+        distance = np.abs(gap.vector)
+        pull = self.stiffness * np.maximum(distance - self.rest_length, 0.0)
+        return -pull / distance * gap.vector
 
     def elongation(self, distance: Any) -> Any:
         """Return by how much they are longer than closed [m]."""

@@ -29,18 +29,11 @@ if TYPE_CHECKING:
 
 
 TIME_SCALE = Scale("time", "time")
-SIDE_RTOL = 1e-9
-"""Sides whose values differ by less than this fraction of the largest are drawn as one line."""
+SIDE_RTOL = 1e-9  # sides whose values differ by less than this fraction of the largest are drawn as one line
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:
-    """Return what draws each picture of a motion, by file stem.
-
-    Parameters
-    ----------
-    result : Result
-        Of the dynamic model; its `state` is the `MotionSolution`.
-    """
+    """Return what draws each picture of a motion, by file stem."""
     makers = (motion, motion_force, motion_contact, motion_rollers)
     return {maker.__name__: partial(maker, result) for maker in makers}
 

@@ -26,10 +26,7 @@ if TYPE_CHECKING:
 ROLLER_SHARE = (0.25, 2.0)
 """Moment of inertia of a roller over that of a solid cylinder: below, its mass would lie within half the
 radius; above, outside of the roller (a thin ring has 2)."""
-BRACE_SHARE = (0.1, 3.0)
-"""The same for a brace over a slender rod: 3 has all its mass at the ends."""
-
-
+BRACE_SHARE = (0.1, 3.0)  # the same for a brace over a slender rod: 3 has all its mass at the ends
 INVERSE_OPTION = "analysis.dynamics.method=inverse"  # as ``--set`` takes it
 
 

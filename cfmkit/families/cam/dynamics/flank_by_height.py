@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw
 
 N_KNOTS = 65
-NEWTON_STEPS = 30
-"""Turned flanks of the tests take five from the estimates by 65 knots."""
+NEWTON_STEPS = 30  # turned flanks of the tests take five from the estimates by 65 knots
 
 
 def slope_second_derivative(law: SlopeLaw, x: Real) -> Real:

@@ -50,19 +50,8 @@ if TYPE_CHECKING:
 def analyze(spec: CamSpec, run: Run) -> Result:
     """Return the force that the motion in ``analysis.dynamics`` needs, and everything that is wrong with it.
 
-    Parameters
-    ----------
-    spec : CamSpec
-        With a motion and masses.
-    run : Run
-        Not needed here: there is nothing to search.
-
-    Returns
-    -------
-    Result
-        Branch ``load`` for a motion upwards, ``unload`` downwards. PARTIAL if the motion leaves
-        the profile, or becomes impossible (a roller lifts off); NO_EQUILIBRIUM if the mechanism
-        cannot exist, or the motion lies outside it.
+    Branch ``load`` for a motion upwards, ``unload`` downwards. PARTIAL if the motion leaves the profile, or becomes
+    impossible (a roller lifts off); NO_EQUILIBRIUM if the mechanism cannot exist, or the motion lies outside it.
     """
     try:
         parts = build(spec)
@@ -243,8 +232,7 @@ def multibody_history(
     )
 
 
-N_BISECTIONS = 60
-"""They leave 1e-18 of a step in time: less than rounding."""
+N_BISECTIONS = 60  # they leave 1e-18 of a step in time: less than rounding
 
 CONTACT_FORCE_RTOL = 1e-9
 """A contact force below zero by this part of the largest is rounding: springs at rest press with nothing."""

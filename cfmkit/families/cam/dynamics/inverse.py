@@ -31,6 +31,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cfmkit.families.cam.dynamics.axis_springs import AxisGap
 from cfmkit.families.cam.dynamics.roller_curves_and_motion import Moment
 
 if TYPE_CHECKING:
@@ -206,22 +207,14 @@ def _loads(machine: Machine, parts: Constants, at: Kinematics, moment: Moment) -
     roller = at.first * push + at.second * square + lift
     middle: ComplexArray = 0.5 * (roller + (1j * push + lift))
     along = at.way * push + at.bend * square
+    pull = machine.springs.force(AxisGap.between_mirrored(at.center, at.first * moment.speed))
     return MovingLoads(
         roller=roller,
         middle=middle,
         turning=at.swing * push + at.sway * square,
         rolling=parts.roller_inertia / parts.radius**2 * along,
-        springs=_springs(machine, at.center),
+        springs=np.array([pull, pull.conj()]),  # the left roller sees the opposite force in a mirror
     )
-
-
-def _springs(machine: Machine, center: ComplexArray) -> ComplexArray:
-    """Return the force of the springs on both rollers (2, n) [N]; springs do not push."""
-    gap = center[0] + center[1].conj()
-    distance = np.abs(gap)
-    pull = machine.springs.pull(distance) / distance * gap
-    # The left roller sees the opposite force in a mirror.
-    return np.array([-pull, -pull.conj()])
 
 
 def _cross(a: ComplexArray, b: ComplexArray) -> FloatArray:

@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cfmkit.families.cam.dynamics.axis_springs import AxisGap
 from cfmkit.families.cam.dynamics.flank_by_height import FlankLine
 from cfmkit.families.cam.dynamics.roller_curves_and_motion import Flank
 
@@ -170,13 +171,7 @@ class Trajectory:
 
 
 class NineCoordinates:
-    """The mechanism as five moving bodies on two flanks.
-
-    Parameters
-    ----------
-    machine : Machine
-        Its friction is not used.
-    """
+    """The mechanism as five moving bodies on two flanks, without friction."""
 
     def __init__(self, machine: Machine) -> None:
         """Describe each flank as a line x(y)."""
@@ -256,19 +251,22 @@ class NineCoordinates:
         """Return q(x, x'): weight, springs, and what the mass matrix owes to its dependence on the braces' angles."""
         machine, out = self.machine, np.zeros(x.shape)
         out[..., 0] = -machine.gravity * machine.slider_mass
-        right, left = (
-            side.parts.brace_length * (p.cos + 1j * p.sin) for side, p in zip(self.sides, postures, strict=True)
-        )
-        gap = right - left
-        distance = np.abs(gap)
-        pull = machine.springs.pull(distance) * gap / distance
-        for chain, posture, side, arm in zip(self.chains, postures, self.sides, (right, -left), strict=True):
+        spring = self.spring_force(x, velocity)
+        for chain, posture, side, pull in zip(self.chains, postures, self.sides, (spring, -spring), strict=True):
             parts, brace = side.parts, chain.columns.start
             first = parts.brace_length * (0.5 * parts.brace_mass + parts.roller_mass)
             out[..., 0] += first * posture.sin * velocity[..., brace] ** 2
             out[..., 0] -= machine.gravity * (parts.brace_mass + parts.roller_mass)
-            out[..., brace] = -machine.gravity * first * posture.cos - (np.conj(1j * arm) * pull).real
+            axis_by_angle = 1j * parts.brace_length * (posture.cos + 1j * posture.sin)
+            out[..., brace] = (np.conj(axis_by_angle) * pull).real - machine.gravity * first * posture.cos
         return out
+
+    def spring_force(self, x: FloatArray, velocity: FloatArray) -> Any:
+        """Return the force of the springs on the axis of the right roller, a complex number [N]."""
+        columns = [chain.columns.start for chain in self.chains]
+        arms = [chain.length * np.exp(1j * x[..., column]) for chain, column in zip(self.chains, columns, strict=True)]
+        swings = [1j * arm * velocity[..., column] for arm, column in zip(arms, columns, strict=True)]
+        return self.machine.springs.force(AxisGap(arms[0] - arms[1], swings[0] - swings[1]))
 
     @property
     def sides(self) -> tuple[Side, Side]:
@@ -374,12 +372,8 @@ class Reactions(NamedTuple):
 
 def reactions(model: NineCoordinates, found: Trajectory) -> tuple[Reactions, Reactions]:
     """Return the reactions on the right and on the left."""
-    machine, x = model.machine, found.coordinates
-    right, left = (chain.length * np.exp(1j * x[:, chain.columns.start]) for chain in model.chains)
-    distance = np.abs(right - left)
-    pull = machine.springs.pull(distance) * (right - left) / distance
-    first, second = (_side(model, found, index, spring) for index, spring in enumerate((-pull, -pull.conj())))
-    return first, second
+    pull = model.spring_force(found.coordinates, found.velocities)
+    return _side(model, found, 0, pull), _side(model, found, 1, pull.conj())
 
 
 def _side(model: NineCoordinates, found: Trajectory, index: int, springs: ComplexArray) -> Reactions:

@@ -10,7 +10,6 @@ from cfmkit.families.cam.dynamics.solution import Build
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.mechanism_from_spec import assemble_sides, cam_start_height, directions
 from cfmkit.families.cam.statics import STANDARD_GRAVITY
-from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.assembly import Assembly
@@ -104,10 +103,8 @@ def _check(name: str, side: Side) -> None:
     try:
         _ = side.span
     except NoRise:
-        raise CannotBuild(
-            finding(
-                "dead_point",
-                f"on the {name} side the slider does not rise as the roller moves out: the flank is turned too far "
-                "('mechanism.errors'), or the brace is too short for the profile ('mechanism.brace_length')",
-            )
+        raise finding.cannot_build(
+            "dead_point",
+            f"on the {name} side the slider does not rise as the roller moves out: the flank is turned too far "
+            "('mechanism.errors'), or the brace is too short for the profile ('mechanism.brace_length')",
         ) from None

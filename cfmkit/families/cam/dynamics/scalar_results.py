@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.solution import MotionSolution
 
-SLOW_DURATION = 1.0
-"""Duration of the motion that the paper compares with [s]."""
+SLOW_DURATION = 1.0  # duration of the motion that the paper compares with [s]
 
 
 def values_of(moved: MotionSolution) -> Mapping[str, Quantity]:

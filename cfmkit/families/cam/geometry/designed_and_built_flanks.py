@@ -56,7 +56,7 @@ class BuiltFlank:
     @property
     def ends(self) -> tuple[float, float]:
         """First and last arc length that was measured [m]."""
-        return self.error.low, self.error.high
+        return self.error.ends
 
     def frame(self, parameter: FloatArray) -> CurveFrame:
         """Return the built flank at arc lengths of the design."""

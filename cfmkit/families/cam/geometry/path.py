@@ -32,8 +32,7 @@ if TYPE_CHECKING:
 
 Method = Literal["quadrature", "ode"]
 
-CAMS_KEPT = 8
-"""Cams that are remembered: whoever builds other parts around one asks for the same again."""
+CAMS_KEPT = 8  # cams that are remembered: whoever builds other parts around one asks for the same again
 
 
 class RollerPath:

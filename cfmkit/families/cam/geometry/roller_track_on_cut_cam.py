@@ -12,7 +12,7 @@ A `Track` finds its ends when it is made; its formulas take numbers, or columns:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -48,7 +48,7 @@ class NoTrack(ValueError):
         super().__init__(reason)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TrackStates(ShortRepr):
     """Positions of the right roller, for each requested slider position."""
 
@@ -56,13 +56,28 @@ class TrackStates(ShortRepr):
     x: FloatArray
     y: FloatArray
     slope: FloatArray  # (n,) dy/dx of the centre's track there
-    bend: FloatArray  # (n,) d2y/dx2 of the centre's track there [1/m]
+    tangent: FloatArray  # (n,) tan(alpha) of the brace
     on_corner: NDArray[np.bool_]  # (n,) whether the roller pivots on the cam's corner
     parameter: FloatArray  # (n,) path coordinate of the contact on the flank [m]; that of the corner while on it
+    compute_bend: Callable[[], FloatArray]
+
+    @cached_property
+    def bend(self) -> FloatArray:
+        """d2y/dx2 of the centre's track, (n,) [1/m]; it is wanted at dead points alone."""
+        return self.compute_bend()
 
     def fields(self) -> tuple[NDArray[Any], ...]:
         """Return the arrays in the order in which the class takes them."""
-        return self.x, self.y, self.slope, self.bend, self.on_corner, self.parameter
+        return self.x, self.y, self.slope, self.tangent, self.on_corner, self.parameter
+
+    def combine(self, function: Callable[..., Any], *others: TrackStates) -> TrackStates:
+        """Return states whose arrays are a function of the arrays of these and of others."""
+        states = self, *others
+        arrays = (function(*fields) for fields in zip(*(state.fields() for state in states), strict=True))
+        x, y, slope, tangent, on_corner, parameter = arrays
+        return TrackStates(
+            x, y, slope, tangent, on_corner, parameter, lambda: function(*(state.bend for state in states))
+        )
 
 
 @dataclass(frozen=True)
@@ -248,29 +263,35 @@ class Track:
             return self._flank_states(slider)
         corner = self._corner_states(slider[on_corner])
         if on_corner.all():
-            return TrackStates(*(field.reshape(slider.shape) for field in corner.fields()))
-        return _join_states(on_corner, corner, self._flank_states(slider[~on_corner]))
+            return corner.combine(lambda field: field.reshape(slider.shape))
+        return corner.combine(partial(_join, on_corner), self._flank_states(slider[~on_corner]))
 
     def _flank_states(self, slider: FloatArray) -> TrackStates:
         law, u = self.profile.path.law, self._flank_parameter(slider)
-        x, bend = u, law.slope_derivative(u)
-        if self._is_shifted:
-            x = u + self.shift * self.profile.normal(u)[0]
-            bend = bend / (1.0 + self.shift / law.curvature_radius(u))
+        x = u + self.shift * self.profile.normal(u)[0] if self._is_shifted else u
+        height = self._slider(x, 0.0)
         # Where the path is nearly vertical y follows from the slider far better than from x.
-        y = slider - self._slider(x, 0.0)
-        return TrackStates(x, y, law.slope(u), bend, np.zeros(slider.shape, dtype=bool), u)
+        y, tangent = slider - height, x / height
+        slope = law.slope(u, tangent if self._follows_law else None)
+        return TrackStates(x, y, slope, tangent, np.zeros(slider.shape, dtype=bool), u, partial(self._flank_bend, u))
 
-    def _corner_states(self, slider: FloatArray) -> TrackStates:
-        """Return states on the corner: with the centre and the slider's pin it is a triangle of known sides."""
-        xc, yc = self._corner_point
-        radius = self.radius
-        first = (slider <= self.start) & (self.dead_point == self.start)
-        turn = np.where(first, self._pivots[0], pivot_angle(slider, self.pivot))
+    def _flank_bend(self, u: FloatArray) -> FloatArray:
+        law = self.profile.path.law
+        bend: FloatArray = law.slope_derivative(u)
+        return bend / (1.0 + self.shift / law.curvature_radius(u)) if self._is_shifted else bend
+
+    def _corner_states(self, slider: FloatArray, rows: Any = None) -> TrackStates:
+        """Return states on the corner, of some rows: with the centre and the slider's pin it is a triangle."""
+        lengths = *self.pivot, self.start, self.dead_point, self.profile.start
+        *sides, start, dead_point, contact = lengths if rows is None else rows_of(lengths, rows)
+        pivot = Pivot(*sides)
+        first = (slider <= start) & (dead_point == start)
+        turn = np.where(first, pivot.low, pivot_angle(slider, pivot))
         sin, cos = np.sin(turn), np.cos(turn)
-        bend, always = 1.0 / (radius * cos * cos * cos), np.ones(slider.shape, dtype=bool)
-        contact = np.full(slider.shape, self.profile.start)
-        return TrackStates(xc + radius * sin, yc - radius * cos, sin / cos, bend, always, contact)
+        x, y = pivot.x + pivot.radius * sin, pivot.y - pivot.radius * cos
+        always, tangent = np.ones(slider.shape, dtype=bool), brace_tangent(x, pivot.brace)
+        contacts = np.broadcast_to(contact, slider.shape)
+        return TrackStates(x, y, sin / cos, tangent, always, contacts, lambda: 1.0 / (pivot.radius * cos * cos * cos))
 
     @property
     def pivot(self) -> Pivot:
@@ -371,18 +392,15 @@ def _flat(values: NDArray[Any]) -> Any:
     return values if values.ndim > 1 else values[0].item()
 
 
-def _join_states(on_corner: NDArray[np.bool_], corner: TrackStates, flank: TrackStates) -> TrackStates:
-    """Return states of which some are on the corner; those on the flank are given where the others are not, or all."""
-    found = []
-    for some, rest in zip(corner.fields(), flank.fields(), strict=True):
-        if rest.ndim > 1:
-            joined = np.array(np.broadcast_to(rest, on_corner.shape), dtype=some.dtype)
-        else:
-            joined = np.empty(on_corner.shape, dtype=some.dtype)
-            joined[~on_corner] = rest
-        joined[on_corner] = some.ravel()
-        found.append(joined)
-    return TrackStates(*found)
+def _join(on_corner: NDArray[np.bool_], corner: NDArray[Any], flank: NDArray[Any]) -> NDArray[Any]:
+    """Return values of which some are on the corner; those on the flank are given where the others are not, or all."""
+    if flank.ndim > 1:
+        joined = np.array(np.broadcast_to(flank, on_corner.shape))
+    else:
+        joined = np.empty(on_corner.shape, dtype=flank.dtype)
+        joined[~on_corner] = flank
+    joined[on_corner] = corner.ravel()
+    return joined
 
 
 class TrackRows(Track):
@@ -402,8 +420,8 @@ class TrackRows(Track):
         on_corner = slider < self.corner_end
         if not on_corner.any():
             return self._flank_states(slider)
-        few = self.of_rows(np.nonzero(on_corner)[0])._corner_states(slider[on_corner][:, None])
-        return _join_states(on_corner, few, self._flank_states(np.maximum(slider, self.corner_end)))
+        few = self._corner_states(slider[on_corner][:, None], np.nonzero(on_corner)[0])
+        return few.combine(partial(_join, on_corner), self._flank_states(np.maximum(slider, self.corner_end)))
 
     @staticmethod
     def _interpolate(at: FloatArray, places: FloatArray, values: FloatArray) -> FloatArray:

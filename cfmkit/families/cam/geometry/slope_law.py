@@ -103,15 +103,18 @@ class SlopeLaw:
         """Return whether the path is curved more tightly at its start than a roller [m]."""
         return not agree(self.curvature_radius(self.rest_half_width) >= roller_radius)
 
-    def frictionless(self, x: Real) -> Real:
-        """Return p(x), the slope before the contact normal is turned by friction [SS, eq. 3]."""
-        stretch = (x - self.rest_half_width + self.preload) / self.force_constant
-        return self.slope_factor * (stretch + brace_tangent(x, self.brace_length))
+    def frictionless(self, x: Real, tangent: Real | None = None) -> Real:
+        """Return p(x), the slope before the contact normal is turned by friction [SS, eq. 3].
 
-    def slope(self, x: Real) -> Real:
+        `tangent`: tan(alpha) of its brace, where that is known.
+        """
+        stretch = (x - self.rest_half_width + self.preload) / self.force_constant
+        return self.slope_factor * (stretch + (brace_tangent(x, self.brace_length) if tangent is None else tangent))
+
+    def slope(self, x: Real, tangent: Real | None = None) -> Real:
         """Return dy/dx of the roller-centre path [SS, eq. 2]."""
-        p = self.frictionless(x)
-        return (p + self.friction) / (1.0 - self.friction * p)
+        p = self.frictionless(x, tangent)
+        return (p + self.friction) / (1.0 - self.friction * p) if np.any(self.friction) else p
 
     def slope_derivative(self, x: Real) -> Real:
         """Return d2y/dx2 of the path [1/m]."""

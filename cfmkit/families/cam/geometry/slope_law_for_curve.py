@@ -190,7 +190,7 @@ class CurveSlopeLaw(SlopeLaw):
         bend = (1.0 / self.force_constant + self.carried * turn) / left - rate * self.shape.slope(travel) * along / left
         return rate + brace_tangent(x, self.brace_length), bend + turn
 
-    def frictionless(self, x: Real) -> Real:
+    def frictionless(self, x: Real, tangent: Real | None = None) -> Real:
         """Return p(x), the slope before the contact normal is turned by friction."""
         slope: Any = self._slope_and_rise(x)[0]
         return slope

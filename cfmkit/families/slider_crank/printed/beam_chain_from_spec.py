@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.printed.spec import Printed, StripSpec
 
 
-FLEXURE_SHARE = 0.2
-"""Length of a flexure where none is given, in crank lengths: that of [B, Table 2]."""
+FLEXURE_SHARE = 0.2  # length of a flexure where none is given, in crank lengths: that of [B, Table 2]
 
 
 def elasticity(printed: Printed) -> Elasticity:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,9 +21,10 @@ from cfmkit.designing.reported_values_of_finished_design import measure_metrics,
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, mpa, newton, percent
-from cfmkit.families.no_mechanism import CannotBuild, no_design
+from cfmkit.families.no_mechanism import no_design, refusals_answered
+from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, elasticity, pins_of, travel_direction
 from cfmkit.families.slider_crank.printed.flexure_sizing import design_flexures
@@ -67,31 +68,19 @@ MAX_NAMED_LIMITS = 4
 FORM_DECIMALS, LENGTH_DECIMALS = 6, 9
 """Of the numbers of a form, mostly millimetres, and of lengths in metres: both nanometres."""
 
-DEFAULT_THICKNESS = (0.5e-3, 2e-3)
-"""Range where none is given [m]: what printing makes."""
-
-DEFAULT_WIDTH = (5e-3, 8e-3)
-"""Range where none is given [m], as of the strip of [B, Table 3]."""
+DEFAULT_THICKNESS = (0.5e-3, 2e-3)  # range where none is given [m]: what printing makes
+DEFAULT_WIDTH = (5e-3, 8e-3)  # range where none is given [m], as of the strip of [B, Table 3]
 
 THICKER_BY = 3.0
 """Times the thickest strip beyond which no thickness from the stress is stated: rubber may bear any curvature of the
 motion, and what grows without end by corrections is no dimension."""
 
 
+@refusals_answered
 def design(spec: SliderCrankSpec, run: Run) -> Design:
     """Return a specification with the strip, or the flexures, that the `design` block asks for.
 
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        With `design.beam` or `design.flexures`.
-    run : Run
-        Seed of the random starts, and progress.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE, with the reason and the nearest, where the targets contradict the ranges.
+    INFEASIBLE, with the reason and the nearest, where the targets contradict the ranges.
     """
     wanted = spec.design
     if wanted is None or wanted.drive != "force" or (wanted.force is None and wanted.beam is None):
@@ -103,8 +92,6 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         if wanted.beam is None:
             return design_flexures(spec, linkage, unloaded)
         return _strip(spec, linkage, unloaded, run)
-    except CannotBuild as problem:
-        return no_design(problem.finding)
     except InputError as problem:
         return Design(None, Status.INVALID, str(problem))
 
@@ -211,7 +198,7 @@ def _not_pressed(found: FoundStrip) -> Design:
 def _search_of(found: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
     """Return what only the search knows."""
     numbers: dict[str, tuple[float | None, str, str]] = {
-        "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed"),
+        "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed")
     }
     if _has_uniform_strip(found):
         text = "longest travel that a strip of one thickness reaches within the band and the stress"
@@ -393,8 +380,7 @@ def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: flo
 def _analyse_strip(spec: SliderCrankSpec, task: StripTask, text: str, run: Run) -> Design:
     """Return a uniform strip as a design, if its analysis keeps the stress, too."""
     window, limits = (task.start, task.stroke), _limits(spec)
-    quick = {"points": min(spec.analysis.points, MAX_ANALYSIS_POINTS)}
-    plain = spec.model_copy(update={"analysis": spec.analysis.model_copy(update=quick)})
+    plain = with_values(spec, {"analysis.points": min(spec.analysis.points, MAX_ANALYSIS_POINTS)})
     reported = _report(plain, window, run)
     return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _not_kept(reported, window, limits)
 
@@ -413,14 +399,14 @@ def _part(spec: SliderCrankSpec, changes: dict[str, object]) -> StripSpec:
 
 
 def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, float]) -> SliderCrankSpec:
-    analysis = spec.analysis.model_copy(
-        update={"travel": (0.0, window[1]), "window": window, "fidelity": None, "drive": "force"}
-    )
-    mechanism = spec.mechanism.model_copy(update={"beam": part})
+    analysis = {"travel": (0.0, window[1]), "window": window, "fidelity": None, "drive": "force"}
+    changes: dict[str, Any] = {
+        "mechanism.beam": part,
+        **{f"analysis.{name}": value for name, value in analysis.items()},
+    }
     if spec.design is not None and spec.design.target is not None:
-        target = spec.design.target.written_out(spec.design.force)
-        spec = spec.model_copy(update={"design": spec.design.model_copy(update={"target": target, "force": None})})
-    return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
+        changes |= {"design.target": spec.design.target.written_out(spec.design.force), "design.force": None}
+    return with_values(spec, changes)
 
 
 def _write_strip(spec: SliderCrankSpec, judged: FinishedStrip, wanted: StripDesign) -> SliderCrankSpec:

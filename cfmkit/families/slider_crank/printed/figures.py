@@ -43,11 +43,8 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 
-N_DRAWN_POSES = 4
-"""Poses drawn, evenly over the travel."""
-
-DRAWING_MARGIN = 0.08
-"""Room around the part in pictures, in parts of its longer side."""
+N_DRAWN_POSES = 4  # poses drawn, evenly over the travel
+DRAWING_MARGIN = 0.08  # room around the part in pictures, in parts of its longer side
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:

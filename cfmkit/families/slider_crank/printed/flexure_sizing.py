@@ -21,8 +21,9 @@ from cfmkit.designing.reported_values_of_finished_design import search_values
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import no_design
+from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import side_of
+from cfmkit.families.slider_crank.linkage import side_of
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
     FLEXURE_SHARE,
     chain_of_flexures,
@@ -91,8 +92,7 @@ def rotations(linkage: Linkage, unloaded: float, travel: FloatArray, side: int =
     return curves_along_slider(linkage, unloaded, bent, np.asarray(travel)).turn[:3]
 
 
-_MAX_ROUNDS = 8
-"""`configs/slider_crank_lumped.yaml` needs four; a fixed width may take four times as many."""
+_MAX_ROUNDS = 8  # `configs/slider_crank_lumped.yaml` needs four; a fixed width may take four times as many
 
 _N_POINTS = 40
 
@@ -275,8 +275,7 @@ FACTOR_PHRASES = (
 )
 """What is said of the factors of force and stress."""
 
-PER_METRE = 1e8
-"""Thicknesses are whole parts of it, rounded down: the stress is that of the written one."""
+PER_METRE = 1e8  # thicknesses are whole parts of it, rounded down: the stress is that of the written one
 
 
 def _write_flexures(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: float) -> SliderCrankSpec:
@@ -290,10 +289,9 @@ def _write_flexures(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: flo
         for one in parts
     ]
     flexures = Flexures(pivot=blocks[0], crank_pin=blocks[1], slider_pin=blocks[2])
-    mechanism = spec.mechanism.model_copy(update={"flexures": flexures})
-    changes = {"travel": (0.0, stroke), "fidelity": None if mechanism.beam is None else "lumped", "drive": "force"}
-    analysis = spec.analysis.model_copy(update=changes)
-    return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
+    fidelity = None if spec.mechanism.beam is None else "lumped"
+    analysis = {"analysis.travel": (0.0, stroke), "analysis.fidelity": fidelity, "analysis.drive": "force"}
+    return with_values(spec, {"mechanism.flexures": flexures, **analysis})
 
 
 def _message(found: Sized, exact: bool) -> str:

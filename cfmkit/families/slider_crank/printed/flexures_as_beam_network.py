@@ -64,13 +64,11 @@ class Flexure:
         return 2.0 * stress * self.length / (youngs_modulus * self.thickness)
 
 
-SLIDER_NODE = "slider"
-"""Name of the node that moves along the way."""
+SLIDER_NODE = "slider"  # name of the node that moves along the way
 
 FLEXURE_BEAMS = ("pivot", "crank_pin", "slider_pin")
 
-STRIP_BEAM = "strip"
-"""Names of the beams."""
+STRIP_BEAM = "strip"  # names of the beams
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from cfmkit.curves import Column, Curve
 from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.errors import InputError
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import findings_of_one, values_of_one
+from cfmkit.families.rows import findings_of_one, values_of_one, with_values
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, side_of, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, resolve, side_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
     elasticity,
     lumped_chain,
@@ -62,16 +62,7 @@ _ENDING_NAMES = {
 def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     """Return the force of a printed slider-crank over its slider's travel, with everything that is wrong with it.
 
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        With `mechanism.flexures` or `mechanism.beam`.
-
-    Returns
-    -------
-    Result
-        One branch, ``load``. PARTIAL if equilibrium ends within the travel, NO_EQUILIBRIUM if
-        nothing was found that is on the requested branch.
+    PARTIAL if equilibrium ends within the travel, NO_EQUILIBRIUM if nothing was found that is on the requested branch.
     """
     try:
         spec = resolve(spec)
@@ -160,8 +151,7 @@ def slider_reach(linkage: Linkage, unloaded: float) -> float:
 def as_run(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> SliderCrankSpec:
     """Return the spec with the defaults of the analysis made explicit."""
     travel = spec.analysis.travel or (0.0, DEFAULT_SHARE * slider_reach(linkage, unloaded))
-    written = {"travel": travel, "fidelity": spec.fidelity}
-    return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=written)})
+    return with_values(spec, {"analysis.travel": travel, "analysis.fidelity": spec.fidelity})
 
 
 def _curve(solution: Solution) -> Curve:

@@ -13,6 +13,7 @@ from cfmkit.export.drawn_as_specified import check_outline
 from cfmkit.export.fillets import round_inside_corners, sharp_notes
 from cfmkit.export.fixing_holes import add_fixing_holes, remove_screws
 from cfmkit.export.posed_part import PosedBody, swept
+from cfmkit.families.fem_results import remove_frame
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP_BEAM
 from cfmkit.families.slider_crank.printed.part import STRAIGHT_SINE, Leg, bodies, choose_points
 from cfmkit.specs.units import format_short
@@ -23,11 +24,9 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
-    from cfmkit.stock.material_and_part_spec import PaddedPart
 
 
-N_SWEPT_POSES = 25
-"""Poses at which what moves must be clear of the frame."""
+N_SWEPT_POSES = 25  # poses at which what moves must be clear of the frame
 
 
 def drawing(spec: SliderCrankSpec) -> Drawing:
@@ -112,23 +111,10 @@ def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:
     frame: tuple[FloatArray, ...] = ()
     if part is not None and part.frame is not None and part.frame.ground is not None:
         frame = _frame(spec, Leg.from_spec(spec))
-        spec = _remove_frame(spec, part, leg.pads, frame)
+        spec = remove_frame(spec, frame, leg.pads)
     drawn = _draw_leg(spec, leg)
     outline, *others = (contour for contour in drawn.contours if contour.layer == "cut")
     return SolvedPiece(outline, tuple(others), leg.pads, drawn.sheet, leg.thinnest, drawn.sections, frame, drawn.notes)
-
-
-def _remove_frame(
-    spec: SliderCrankSpec, part: PaddedPart, pads: tuple[FloatArray, ...], frame: tuple[FloatArray, ...]
-) -> SliderCrankSpec:
-    """Return what bends: without the frame, which stands, and the holes in it."""
-    from cfmkit.export.ground_frame import find_outside
-
-    kept = find_outside([one.at for one in part.holes], frame, pads)
-    holes = tuple(one for one, keep in zip(part.holes, kept, strict=True) if keep)
-    around = part.frame and part.frame.model_copy(update={"ground": None})
-    alone = part.model_copy(update={"frame": around, "holes": holes})
-    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update={"part": alone})})
 
 
 def _frame(spec: SliderCrankSpec, leg: Leg) -> tuple[FloatArray, ...]:

@@ -16,7 +16,7 @@ from cfmkit.export.beam_sections import BeamSection
 from cfmkit.export.contours import Contour, Line, polygon
 from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.posed_part import PosedBody, PosedPart
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, flexures_of, strip_of, travel_direction
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, STRIP_BEAM
 
@@ -30,23 +30,15 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Result
 
-PAD_SIZE = (0.012, 0.010)
-"""Length and width of the pads [m]."""
+PAD_SIZE = (0.012, 0.010)  # length and width of the pads [m]
 
 STRAIGHT_SINE, MITRE_LIMIT = 1e-9, 2.0
 """Sine of an angle that is no corner; reach of the edges at a sharp corner, in half widths."""
 
-SAME_PLACE = 1e-9
-"""Points nearer to each other than this are one, in lengths of the centre line."""
-
-COMPLEX_AXES = np.array([1.0, 1j])
-"""From x and y to x + iy."""
-
-LINK_RATIO = 5.0
-"""Width of a rigid link in flexure thicknesses."""
-
-N_POSES = 13
-"""Places of the motion that a box counts."""
+SAME_PLACE = 1e-9  # points nearer to each other than this are one, in lengths of the centre line
+COMPLEX_AXES = np.array([1.0, 1j])  # from x and y to x + iy
+LINK_RATIO = 5.0  # width of a rigid link in flexure thicknesses
+N_POSES = 13  # places of the motion that a box counts
 
 
 @dataclass(frozen=True)

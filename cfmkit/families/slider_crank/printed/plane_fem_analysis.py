@@ -1,7 +1,8 @@
 """A printed slider-crank as it is drawn, as a planar solid: flexures with their fillets, links that bend, or a strip.
 
 The pad at the ground is held and that at the slider moved from their faces on; widths are those of the flexures where
-they are. Poses stand close where the travel begins: a nearly straight chain yields within a thousandth of it.
+they are. Poses stand close where the travel begins: a nearly straight chain yields within a thousandth of it. Nominal
+stresses of fillets are those of the flexures between rigid links, or of the strip.
 
 Assumes: plane stress. No contact, no plasticity.
 """
@@ -15,17 +16,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
-from cfmkit.curves import Column, Curve
+from cfmkit.curves import Curve
 from cfmkit.errors import GeometryError, InputError
-from cfmkit.families.fem_results import fillet_table, largest_concentration
-from cfmkit.families.findings import bracket, sharp_inside
+from cfmkit.families.fem_results import (
+    PATH_TOLERANCE,
+    FilletRow,
+    columns_of_solid,
+    fillet_table,
+    findings_of_mesh,
+    largest_concentration,
+    nominal_stresses,
+    not_meshed,
+    stable_between_poses,
+    stress_between_poses,
+    with_nominal,
+    with_steps,
+    without_repeats,
+)
+from cfmkit.families.findings import sharp_inside
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction
-from cfmkit.families.slider_crank.printed.fem_stress_in_each_fillet import fillets
 from cfmkit.families.slider_crank.printed.findings import left_out_friction
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, kink
 from cfmkit.families.slider_crank.printed.model import as_run, chain_of
 from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS
@@ -39,7 +53,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
-    from cfmkit.families.fem_results import FilletRow
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -47,10 +60,9 @@ if TYPE_CHECKING:
     from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart, MeshError
     from cfmkit.solid.meshed_part import MeshSolution, Part
 
-POSE_EXPONENT = 3.0
-"""Poses stand at (k/n) to this power of the travel, and where the stiffness leaps."""
-LINK_ELEMENT_RATIO = 4.0
-"""Sides of elements in links, in those of flexures: links are stiff, and hardly bend."""
+
+POSE_EXPONENT = 3.0  # poses stand at (k/n) to this power of the travel, and where the stiffness leaps
+LINK_ELEMENT_RATIO = 4.0  # sides of elements in links, in those of flexures: links are stiff, and hardly bend
 NOT_COMPUTED_TEXT = "the model of the part as a solid does not compute it"
 
 
@@ -70,11 +82,8 @@ class SolidSolution(ShortRepr):
 
     @cached_property
     def stress(self) -> FloatArray:
-        """Largest along a free edge [Pa]; between poses by cubics that stay between their values."""
-        from scipy.interpolate import PchipInterpolator
-
-        found = PchipInterpolator(self.fine.course.travel, self.fine.peaks[0])(self.travel)
-        return read_only(np.maximum(found, 0.0))
+        """Largest along a free edge [Pa]."""
+        return stress_between_poses(self.fine, self.travel)
 
     @property
     def fine(self) -> MeshSolution:
@@ -121,8 +130,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     except GeometryError as error:
-        message = f"the part cannot be meshed: {error}; check mechanism.part"
-        return Result(spec, Status.NO_EQUILIBRIUM, message)
+        return not_meshed(spec, error)
     except InputError as problem:
         return Result(spec, Status.INVALID, str(problem))
     low, high = spec.analysis.travel or (0.0, 0.0)
@@ -212,20 +220,14 @@ def _stops(spec: SliderCrankSpec) -> list[float]:
     own = high * np.linspace(0.0, 1.0, spec.analysis.solid.poses) ** POSE_EXPONENT
     windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
     ends = [low, *(place for window in windows if window is not None for place in window_places(window, (low, high)))]
-    found = np.unique(np.concatenate([own, [place for place in ends if 0.0 < place < high]]))
-    return [float(place) for place in np.delete(found, np.flatnonzero(np.diff(found) < 1e-9 * high) + 1)]
+    inside = [place for place in ends if 0.0 < place < high]
+    return without_repeats(np.concatenate([own, inside]), high).tolist()  # type: ignore[no-any-return]
 
 
 def _curve(solution: SolidSolution) -> Curve:
     course, travel = solution.fine.course, solution.travel
-    solved = np.isclose(travel[:, None], course.solved_travel, rtol=0, atol=1e-9 * travel[-1]).any(axis=1)
-    stable = np.array([pose.unstable == 0 for pose in course.poses])
-    before = np.clip(np.searchsorted(course.travel, travel * (1 + 1e-12)) - 1, 0, None)
-    extra = {
-        "max_stress": Column(solution.stress, "stress"),
-        "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),
-    }
-    return Curve(travel, solution.force, stable=stable[before], extra=extra)
+    extra = columns_of_solid(course, travel, solution.stress, travel[-1])
+    return Curve(travel, solution.force, stable=stable_between_poses(course, travel), extra=extra)
 
 
 def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
@@ -257,11 +259,8 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     piece, made_of = solved_piece(solution.spec), elasticity(solution.spec.mechanism)
     if reported := sharp_inside(solution.spec.mechanism.fillet, piece.sharp):
         yield finding("sharp_corners", reported, usual_fillet(solution.spec.mechanism.thinnest))
-    for name, reported in solution.error.too_large():
-        yield finding(name, reported)
-    wide = made_of.wide
-    if reported := bracket(piece.sheet.thickness or 0.0, piece.thinnest, made_of.poisson_ratio, wide):
-        yield finding("wide_beam", reported)
+    section = piece.sheet.thickness or 0.0, piece.thinnest
+    yield from findings_of_mesh(finding, solution.error, [section], made_of.poisson_ratio, made_of.wide)
     limit = made_of.allowable_stress
     peaks, places = solution.fine.peaks
     if limit is not None and peaks.max() > limit:
@@ -277,3 +276,29 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         )
     if reported := left_out_friction(solution.spec):
         yield finding("friction_left_out", reported)
+
+
+def fillets(
+    spec: SliderCrankSpec, chain: Chain, solved: MeshSolution, window: tuple[float, float]
+) -> tuple[FilletRow, ...]:
+    """Return the fillets of a leg with their largest stress in a window [m], named by pad or flexure.
+
+    chain: the leg as beams, unloaded.
+    """
+    from cfmkit.solid.stress_along_fillets import stressed_fillets
+
+    pads = {place.name: place.shapes for place in solved.part.places}
+    rows = []
+    for one in stressed_fillets(solved, spec.mechanism.fillet):
+        nearest = FLEXURE_BEAMS[int(np.hypot(*(chain.pins - one.arc.middle).T).argmin())]
+        names = [] if spec.piece == "beam" else [nearest]
+        names += one.arc.find_touched(pads) or ([] if names else ["strip"])
+        if (found := one.largest(*window)) is not None:
+            rows.append(FilletRow(": ".join(names), one.arc, *found))
+    stresses = nominal_stresses(
+        rows,
+        np.array([row.motion for row in rows]),
+        lambda travel: [chain.press(with_steps(travel), tolerance=PATH_TOLERANCE).path],
+        lambda points: points,
+    )
+    return with_nominal(rows, stresses)

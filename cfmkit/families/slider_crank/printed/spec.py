@@ -123,8 +123,7 @@ class Printed(RoundedCorners, Model):
     )
     part: PaddedPart | None = Field(None, description="how it is cut: inside corners, sheet, pads, holes")
     stops: dict[str, EndStop] = Field(
-        {},
-        description="stops of the slider of flexures or a strip, by name: {end: {gap: 6 mm, stiffness: 80 N/mm}}",
+        {}, description="stops of the slider of flexures or a strip, by name: {end: {gap: 6 mm, stiffness: 80 N/mm}}"
     )
 
     @property

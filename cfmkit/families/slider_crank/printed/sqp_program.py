@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-MILLIMETRE = 1e-3
-"""Thicknesses and widths are counted in mm."""
+MILLIMETRE = 1e-3  # thicknesses and widths are counted in mm
 
 Goal = Literal["stroke", "ripple", "rms"]
 
@@ -119,8 +118,7 @@ class Form:
         return Strip(corners, self.width_of(x), thickness, self.places(x, corners))
 
 
-N_FORCE_POINTS, N_BAND_POINTS = 12, 81
-"""Where the force is computed, and where its band is kept."""
+N_FORCE_POINTS, N_BAND_POINTS = 12, 81  # where the force is computed, and where its band is kept
 
 RMS_POINTS = 10
 """Points of the root mean square, even in the travel, its start left out [B, eq. 14]."""
@@ -360,8 +358,7 @@ def _trace(network: Network, drive: Displacement) -> Path | None:
 N_STRESS_POINTS, N_STRESS_PLACES = 4, 13
 """Points at which the stress is computed, the last ones, and places from the first to the last of them."""
 
-N_STENCIL_POINTS = 9
-"""Samples of a polynomial: more of them, evenly spaced, swing beyond its ends."""
+N_STENCIL_POINTS = 9  # samples of a polynomial: more of them, evenly spaced, swing beyond its ends
 
 _STENCIL_NODES = np.arange(float(N_STENCIL_POINTS))
 

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.printed.sqp_program import State, StripTask
 
 
-VIOLATION_TOL = 5e-3
-"""Of a constraint that counts as none: 0.005 % of the force, 0.05 % of the stress allowed."""
+VIOLATION_TOL = 5e-3  # of a constraint that counts as none: 0.005 % of the force, 0.05 % of the stress allowed
 
 
 def descend(
@@ -48,26 +47,16 @@ def descend(
 MAX_IDLE_EVALUATIONS = 20
 """Evaluations without a smaller violation after which a search is stuck: two of the solver's line searches."""
 
-N_COARSE_THICKNESSES = 5
-"""Thicknesses of the first tapered strip; then twice as many intervals each time."""
-
-COARSE_RIPPLE = 0.01
-"""Ripple within which the coarse strip is sought: few thicknesses cannot keep less."""
-
-START_DEVIATION = 0.15
-"""Standard deviation of the logarithm of the thicknesses that other starts begin with."""
-
-MIN_BAND_LENGTH = 2e-3
-"""Length of the band that is sought at least [m]."""
-
-MOST_RIPPLE = 100.0
-"""Largest deviation from the force that a search for the smallest one considers [%]."""
+N_COARSE_THICKNESSES = 5  # thicknesses of the first tapered strip; then twice as many intervals each time
+COARSE_RIPPLE = 0.01  # ripple within which the coarse strip is sought: few thicknesses cannot keep less
+START_DEVIATION = 0.15  # standard deviation of the logarithm of the thicknesses that other starts begin with
+MIN_BAND_LENGTH = 2e-3  # length of the band that is sought at least [m]
+MOST_RIPPLE = 100.0  # largest deviation from the force that a search for the smallest one considers [%]
 
 MAX_BAND_WIDENING, N_NARROWING_STEPS = 0.1, 5
 """Largest share of the force by which a band is widened at first where it is out of reach, and steps back to it."""
 
-INITIAL_THICKNESS = 1e-3
-"""Thickness of one that is searched, at first [m]."""
+INITIAL_THICKNESS = 1e-3  # thickness of one that is searched, at first [m]
 
 _MAX_ROUNDS, _STEP_RTOL = 12, 1e-10
 """Steps at most, of which strips of the shipped specifications need four to six, and how near the last two lie."""
@@ -223,34 +212,14 @@ def search(
     task: StripTask,
     form: Form,
     ranges: Ranges,
-    starts: int,
+    starts: int,  # how many, the uniform strip included
     run: Run,
-    identity: str = "",
-    clock: Clock = UNLIMITED_CLOCK,
+    identity: str = "",  # of everything that decides the outcome of a start but its number
+    clock: Clock = UNLIMITED_CLOCK,  # when it is late, no more is tried
 ) -> FoundStrip | Design:
     """Return the best strip found, from the uniform one coarse to fine, and from random ones where asked.
 
-    Parameters
-    ----------
-    task : StripTask
-        What the strip is to do.
-    form : Form
-        How it is described.
-    ranges : Ranges
-        Of its numbers.
-    starts : int
-        How many, the uniform strip included.
-    run : Run
-        Seed of the random ones, progress, processes, notes.
-    identity : str
-        Of everything that decides the outcome of a start but its number.
-    clock : Clock
-        When it is late, no more is tried.
-
-    Returns
-    -------
-    FoundStrip or Design
-        Why there is none, where no start was completed.
+    A `Design` says why there is none, where no start was completed.
     """
 
     def tell(records: Mapping[int, Any]) -> None:

@@ -48,8 +48,7 @@ POSITIVE_CLASS, ZERO_CLASS, NEGATIVE_CLASS, SNAP_THROUGH_CLASS, BISTABLE_CLASS, 
 EFFORT_RTOL = 1e-11
 """An effort so small, as a fraction of the largest, is zero; a fall so small, as a fraction of the peak, none."""
 
-DROP_TOL = 1e-3
-"""A drop so near to 1 may be on either side of it in a mechanism that is made."""
+DROP_TOL = 1e-3  # a drop so near to 1 may be on either side of it in a mechanism that is made
 
 
 @dataclass(frozen=True, repr=False)
@@ -140,8 +139,7 @@ def _fill_zeros(sign: NDArray[np.int8]) -> NDArray[np.int8]:
     return np.where(filled == 0, opening, filled)
 
 
-N_SAMPLES, N_CLOSER_SAMPLES = 1001, 101
-"""Places of the first look, and of each closer one around the highest of them."""
+N_SAMPLES, N_CLOSER_SAMPLES = 1001, 101  # places of the first look, and of each closer one around the highest of them
 
 
 def scale_factors(

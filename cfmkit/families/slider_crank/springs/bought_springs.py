@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.families.findings import percent
-from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import minimax, ranges
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
@@ -39,29 +38,15 @@ if TYPE_CHECKING:
     from cfmkit.stock.material_and_part_spec import Pins
 
 
-N_BOUND_PLACES = 41
-"""Places of the window that bounds are taken from; sets themselves are judged at all places."""
-
-BOUND_RTOL = 1e-9
-"""Bounds are wider by this share: rounding must not leave a set out."""
+N_BOUND_PLACES = 41  # places of the window that bounds are taken from; sets themselves are judged at all places
+BOUND_RTOL = 1e-9  # bounds are wider by this share: rounding must not leave a set out
 
 
 def best_sets(goal: RateGoal, offered: Sequence[FloatArray], count: int = 1) -> list[tuple[float, FloatArray]]:
-    """Return the sets with the smallest largest deviation, the best first.
+    """Return the sets with the smallest largest deviation, the best first: deviation, and rates (m,) of m joints.
 
-    Parameters
-    ----------
-    goal : RateGoal
-        Over m joints.
-    offered : sequence of m arrays
-        Rates that each joint may have, increasing; zero among them where it may have no spring.
-    count : int
-        How many sets.
-
-    Returns
-    -------
-    list of (float, (m,) array)
-        The deviation and the rates; empty if no set keeps what the goal requires beside the deviation.
+    `offered`: rates that each joint may have, increasing; zero among them where it may have no spring. Empty if no set
+    keeps what the goal requires beside the deviation.
     """
     if any(not len(rates) for rates in offered):
         return []
@@ -126,7 +111,7 @@ def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> Cho
     options, refused = _options(task, window)
     if not options:
         reported = nearest(refused) if refused else "it lists none of the kind that 'design.springs' needs"
-        raise Infeasible(finding("no_spring_fits", f"no spring of the catalogue fits: {reported} ('design.catalogue')"))
+        raise finding.infeasible("no_spring_fits", f"no spring of the catalogue fits: {reported} ('design.catalogue')")
     tolerance = task.wanted.tolerance
     best = _sets(goal, options, 1)
     if best and (tolerance is None or best[0].deviation <= tolerance * (1 + 1e-9)):
@@ -134,7 +119,7 @@ def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> Cho
     misses = [_miss_of(chosen) for chosen in (_sets(goal, options, 3) if best else [])]
     reported = nearest(misses) if misses else _none_together(task, refused)
     allowed = f", 'design.tolerance' allows {percent(tolerance)}" if tolerance and misses else ""
-    raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue keep the target: {reported}{allowed}"))
+    raise finding.infeasible("no_spring_fits", f"no springs of the catalogue keep the target: {reported}{allowed}")
 
 
 def next_sets(task: SpringTask, goal: RateGoal, window: tuple[float, float], count: int) -> list[Chosen]:

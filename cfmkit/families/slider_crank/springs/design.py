@@ -20,8 +20,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design, refusals_answered
+from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import resolve
+from cfmkit.families.slider_crank.linkage import resolve
 from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation, next_sets
 from cfmkit.families.slider_crank.springs.design_outcome import (
     Solved,
@@ -56,11 +57,8 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
-MAX_DEVIATION = 0.5
-"""Springs that miss the target by more are no design, even where no tolerance is stated."""
-
-N_NEXT_SETS = 4
-"""Sets of bought springs that are tried where the best one does not have the yield."""
+MAX_DEVIATION = 0.5  # springs that miss the target by more are no design, even where no tolerance is stated
+N_NEXT_SETS = 4  # sets of bought springs that are tried where the best one does not have the yield
 
 GRID_SIZES = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
 """Values of each free length on the grid, and around its best: a least-squares problem costs the least."""
@@ -70,17 +68,7 @@ GRID_SIZES = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
 def design(spec: SliderCrankSpec, run: Run) -> Design:
     """Return a complete specification with the springs, and the lengths left free, that meet the `design` block best.
 
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        With a `design` block.
-    run : Run
-        Only its progress is used: the search is deterministic.
-
-    Returns
-    -------
-    Design
-        INFEASIBLE, with the reason and what would be feasible, if nothing keeps the tolerance.
+    INFEASIBLE, with the reason and what would be feasible, if nothing keeps the tolerance.
     """
     wanted = spec.design
     if wanted is None:
@@ -122,8 +110,7 @@ def _make_design(solved: Solved, search: Lowest | None) -> Design:
     )
 
 
-MAX_ROUNDS = 40
-"""Rounds in which springs and the friction that they cause are fitted to each other; some 10 are enough."""
+MAX_ROUNDS = 40  # rounds in which springs and the friction that they cause are fitted to each other; some 10 are enough
 
 
 def _compensate_friction(solved: Solved) -> Solved:
@@ -181,7 +168,7 @@ def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tup
     if not math.isfinite(found.value):
         names = " or ".join(f"'design.{name}'" for name in axes)
         text = f"no lengths in the ranges given reach the window within the limits of the joints; widen {names}"
-        raise Infeasible(finding("infeasible_targets", text))
+        raise finding.infeasible("infeasible_targets", text)
     place = even_best(spec, tuple(axes), found) if wanted.slack else found.place
     return solve(task_of(with_lengths(spec, dict(zip(axes, place, strict=True))))), found
 
@@ -240,7 +227,7 @@ def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
     if goal is None:
         text = "in the window the force or torque is unbounded: it contains a dead point or the stretched position"
         text += f"; change 'design.{task.assembly.motion_name}'"
-        raise Infeasible(finding("infeasible_targets", text))
+        raise finding.infeasible("infeasible_targets", text)
     if wanted.catalogue:
         picked = choose(task, goal, window)
         if picked.deviation > MAX_DEVIATION and wanted.tolerance is None:
@@ -272,9 +259,7 @@ def _write_springs(solved: Solved) -> SliderCrankSpec:
     mechanism = spec.mechanism.model_copy(update={"springs": springs})
     if wanted.target is not None:
         reported = wanted.target.written_out(wanted.torque or wanted.force)
-        spec = spec.model_copy(
-            update={"design": wanted.model_copy(update={"target": reported, "torque": None, "force": None})}
-        )
+        spec = with_values(spec, {"design.target": reported, "design.torque": None, "design.force": None})
     if any(getattr(wanted, name) is not None for name in ("crank_length", "offset")):
         mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
     assembly = solved.task.assembly
@@ -332,8 +317,7 @@ TOLERANCE_RESERVE = 1e-3
 """Share of the tolerance that preferred rates keep in reserve: between the places of the search they deviate more, by
 some 1e-5 of the tolerance."""
 
-N_PROGRAMME_PLACES = 60
-"""Places of the window for the programmes that say how far the rates may move."""
+N_PROGRAMME_PLACES = 60  # places of the window for the programmes that say how far the rates may move
 
 
 def chosen_rates(goal: RateGoal, best: FloatArray, wanted: CrankDesign, tolerance: float | None) -> FloatArray:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from cfmkit.designing.reported_values_of_finished_design import measure_metrics, search_values
 from cfmkit.families.findings import percent
-from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.model import analyze
@@ -83,7 +82,7 @@ def check_reach(task: SpringTask, window: tuple[float, float]) -> None:
         f"the window {ends[0]} to {ends[1]} is not reached: linkage and limits of the joints allow {ends[2]} to "
         f"{ends[3]}; change 'design.{task.assembly.motion_name}', the lengths, or 'mechanism.limits'"
     )
-    raise Infeasible(finding("infeasible_targets", text))
+    raise finding.infeasible("infeasible_targets", text)
 
 
 def cannot_hold(task: SpringTask) -> Finding:
@@ -192,7 +191,7 @@ def describe_springs(solved: Solved) -> tuple[Finding, ...]:
         found.append(
             finding(
                 "spring_at_bound", f"{' and '.join(at_cap)} limits the design: a larger value would give a better one"
-            ),
+            )
         )
     return tuple(found)
 

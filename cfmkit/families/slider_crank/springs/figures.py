@@ -11,9 +11,9 @@ import numpy as np
 
 from cfmkit.families.slider_crank.springs.bistability_class import NEGATIVE_CLASS
 from cfmkit.families.slider_crank.springs.hardware import hardware
+from cfmkit.families.slider_crank.springs.hardware import joints as joints_at
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.part import bodies
-from cfmkit.families.slider_crank.springs.part import joints as joints_at
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.plots import parts
 from cfmkit.plots.assembly import assembly_figure
@@ -52,8 +52,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 
-KEY_ROOM = 42.0
-"""Room for the small curve above the linkages [mm of print]."""
+KEY_ROOM = 42.0  # room for the small curve above the linkages [mm of print]
 
 Point = tuple[float, float]
 
@@ -159,8 +158,7 @@ def torsion_spring(joint: Point, direction: float, radius: float) -> FloatArray:
 STACK_BELOW = 0.55
 """Mechanisms less high than this fraction of their width are drawn below each other, not side by side."""
 
-SPRING_COLOURS = (LINE_BLUE, LINE_VERMILLION, LINE_PURPLE, LINE_BROWN)
-"""Of the springs, in the order of the joints."""
+SPRING_COLOURS = (LINE_BLUE, LINE_VERMILLION, LINE_PURPLE, LINE_BROWN)  # of the springs, in the order of the joints
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:

@@ -35,11 +35,8 @@ if TYPE_CHECKING:
     Rule = FindingRule[Solution]
 
 
-RUN_IN = 0.02
-"""An unloaded position nearer than this to the stretched one [rad] is meant to be stretched, nearly."""
-
-ON_LIMIT = 1 + 1e-9
-"""A deflection that is beyond its limit by less than this share is on it."""
+RUN_IN = 0.02  # an unloaded position nearer than this to the stretched one [rad] is meant to be stretched, nearly
+ON_LIMIT = 1 + 1e-9  # a deflection that is beyond its limit by less than this share is on it
 
 
 def place(solution: Solution, motion: float) -> str:
@@ -364,14 +361,10 @@ FINDING_RULES: tuple[Rule, ...] = (
     FindingRule("same_position_twice", _rests_again, _again),
     FindingRule("stretched_start", _starts_stretched, _column),
     FindingRule(
-        "two_positions",
-        lambda solution: _starts_stretched(solution) & (solution.spec.analysis.side is None),
-        _sides,
+        "two_positions", lambda solution: _starts_stretched(solution) & (solution.spec.analysis.side is None), _sides
     ),
     FindingRule(
-        "force_unbounded",
-        lambda solution: _is_nearly_stretched(solution) & np.isnan(solution.rest[:, 0]),
-        _far_side,
+        "force_unbounded", lambda solution: _is_nearly_stretched(solution) & np.isnan(solution.rest[:, 0]), _far_side
     ),
     FindingRule(
         "run_in",

@@ -195,14 +195,7 @@ def _solve_programme(
         row, least = _normalise_row(goal.least[0] / scales, goal.least[1])
         rows = np.vstack([rows, np.append(-row, 0.0)[None]])
         limits = np.append(limits, -least)
-    found = linprog(
-        cost,
-        A_ub=rows,
-        b_ub=limits,
-        bounds=[*bounds, (0.0, worst)],
-        method="highs",
-        **equal,
-    )
+    found = linprog(cost, A_ub=rows, b_ub=limits, bounds=[*bounds, (0.0, worst)], method="highs", **equal)
     lowest = np.array([*(low for low, _ in bounds), 0.0])
     return None if found.status != 0 or found.x is None else np.maximum(found.x, lowest)
 

@@ -26,6 +26,7 @@ from cfmkit.families.slider_crank.springs.sprung_linkage import coupler_angle
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
+    from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
 
 @dataclass(frozen=True)
@@ -38,24 +39,12 @@ class FrictionBranch:
     lost: dict[str, FloatArray]  # what ``pins`` and ``guide`` take from the effort [N m or N]
 
 
-def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch:
-    """Return the efforts with friction.
+def branch(assembly: Assembly, units: UnitCurves, way: float) -> FrictionBranch:
+    """Return efforts, forces inside and friction's share at the places of unit curves, of one mechanism or of m.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        With its springs' rates and its `rubbing`.
-    motion : (n,) array, or (m, n) of m mechanisms
-        Crank angles [rad] or slider travels [m].
-    way : float
-        1 while the motion grows, -1 on the way back.
-
-    Returns
-    -------
-    FrictionBranch
-        Efforts, forces inside, and what friction takes.
+    `way`: 1 while the motion grows, -1 on the way back.
     """
-    units, link = assembly.units(motion), assembly.linkage
+    link = assembly.linkage
     angle, beta = units.angle, coupler_angle(link, units)
     turns = assembly.rates_over(units.turn) * units.turn
     on_coupler, on_crank = -turns[1] - turns[2], turns[1] - turns[0]

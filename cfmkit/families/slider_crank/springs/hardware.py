@@ -1,7 +1,8 @@
 """Links, pins, guide, ground and screws of a slider-crank with springs, dimensioned for the loads of its motion.
 
-Links are as they are drawn; their pins, the guide's rod and the screws of the ground bear what they take. Crank and
-coupler lie a sheet apart, and so do the crank and the ground that carries its pivot.
+Links are as they are drawn; their pins, the guide's rods and the screws of the ground bear what they take. Ground,
+crank and coupler lie on each other; the slider lies below the coupler and may be thicker than a link. Heads of screws
+stand beside what moves; where there is no place for them, they are sunk into the ground.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from cfmkit.families.findings import mm as length_in_words
 from cfmkit.families.findings import newton
 from cfmkit.families.hardware import (
     DEFAULT_MATERIAL,
+    GuideRods,
     Hardware,
     PartStrength,
     guide_part,
-    guide_rod,
+    guide_rods,
     in_sentences,
     mm,
     pin_for,
@@ -40,19 +42,16 @@ from cfmkit.stock.stock_series import hole_with_fit, series_of
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.link_strength import LinkLoads
     from cfmkit.families.slider_crank.springs.solution import Solution
+    from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
-N_LOADS = 201
-"""Places of the motion at which loads are computed."""
-
-N_SCREWS = 4
-"""Of the ground."""
-
-
-LEAST_GROUND = 4.0
-"""Least width of the ground, in heads of its screws: two of them, each a head from the edge."""
+N_LOADS = 201  # places of the motion at which loads are computed
+N_SCREWS = 4  # of the ground
+GROUND_SCREWS = "ground to its base"  # place of these screws
+LEAST_GROUND = 4.0  # least width of the ground, in heads of its screws: two of them, each a head from the edge
 
 
 def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
@@ -72,21 +71,27 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
         cure = f"use at least {length_in_words(least)} ('mechanism.pins.diameter')" if bears else "use thicker links"
         faults["joints"] = f"too weak for {newton(load)} in links of {length_in_words(sheet)}: {cure}"
     across, force, travel, rod_at = _guide_loads(spec, solution)
-    rod = guide_rod(across, force, travel, 2.0 * eye, mechanism.guide, system, strength)
+    rods = guide_rods(across, force, travel, 2.0 * eye, pin, mechanism.guide, system, strength)
     screw = screw_for(load * legs, sheet, N_SCREWS, strength)
-    ends = rod_at + np.array([[-0.5 * rod.bush, 0.0], [0.5 * rod.bush, 0.0]])
-    low, high = np.minimum(ends.min(axis=0), 0.0) - eye, np.maximum(ends.max(axis=0), 0.0) + eye
+    ends = rod_at + np.array([[-0.5 * rods.bush, 0.0], [0.5 * rods.bush, 0.0]])
+    margin = np.array([eye, max(eye, 0.5 * rods.slider_width)])
+    low, high = np.minimum(ends.min(axis=0) - margin, -eye), np.maximum(ends.max(axis=0) + margin, eye)
     spare = 0.5 * np.maximum(LEAST_GROUND * screw.head - (high - low), 0.0)
     low, high = low - spare, high + spare
     ground, moving = rectangle(*low, *high), tuple(_drawn_bodies(spec, solution, eye, pin))
-    places = screw_positions(ground, moving, screw.head)
+    places, reached = screw_positions(ground, moving, screw.head)
+    if not reached and sheet < screw.countersunk_height:
+        faults[GROUND_SCREWS] = (
+            f"below what moves, and a ground of {length_in_words(sheet)} is too thin for countersunk heads: use links "
+            f"of {length_in_words(screw.countersunk_height)} ('mechanism.part.sheet')"
+        )
     bodies = (
         PosedBody.polygon("ground", "held", ground),
-        PosedBody.line("guide", "held", ends, 0.5 * rod.diameter),
+        *rods.bodies(ends),
         *(PosedBody.line("screw", "held", at[None], 0.5 * screw.diameter) for at in places),
     )
     parts = (
-        *_parts(spec, solution, strength, (sheet, 2.0 * eye, pin), load),
+        *_parts(spec, solution, strength, (sheet, 2.0 * eye, pin), load, rods),
         ListedPart(
             "carries pivot and guide",
             "ground",
@@ -97,32 +102,34 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
             "",
             "ground",
         ),
-        guide_part(rod, 1, mechanism.guide is None),
-        screw_part("ground to its base, countersunk", len(places), screw, sheet, "screw"),
+        guide_part(rods, 1, mechanism.guide is None),
+        screw_part(GROUND_SCREWS, len(places), screw, sheet, "screw", countersunk=not reached),
     )
-    return Hardware(with_faults(parts, faults), bodies, (*bodies, *moving), pin, in_sentences(faults))
+    rubbing = {"pins": {"diameter": pin}, "guide": {}}
+    heads, thicker = screw.head_height if reached else 0.0, max(rods.slider_thickness - sheet, 0.0)
+    drawn = (*bodies, *moving)
+    return Hardware(with_faults(parts, faults), bodies, drawn, rubbing, in_sentences(faults), heads, thicker)
 
 
 def _drawn_bodies(spec: SliderCrankSpec, solution: Solution, eye: float, pin: float) -> Iterator[PosedBody]:
     """Yield links, slider, springs and pins as the assembly shows them, the lowest first."""
-    rates, joints = solution.assembly.rates, _joints(solution)
+    rates, pins = solution.assembly.rates, joints(solution, solution.unit_spring_curves)
     for name, k in (("crank", 0), ("coupler", 1)):
-        yield PosedBody.line(name, "free", np.stack(joints[k : k + 2], axis=1), eye, round=True)
+        yield PosedBody.line(name, "free", np.stack(pins[k : k + 2], axis=1), eye, round=True)
     corners = eye * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    yield PosedBody.polygon("slider", "driven", joints[2][:, None] + corners)
-    for joint, name, rate in zip(joints, JOINT_NAMES, rates[:3], strict=False):
+    yield PosedBody.polygon("slider", "driven", pins[2][:, None] + corners)
+    for joint, name, rate in zip(pins, JOINT_NAMES, rates[:3], strict=False):
         if np.any(rate > 0.0):
             coils = [0.5 * coil.outer_diameter for coil in spec.mechanism.springs.coils_at(name)]
             yield PosedBody.line(f"spring-{name}", "free", joint[:, None], max(coils, default=0.8 * eye))
         yield PosedBody.line("joint", "free", joint[:, None], 0.5 * pin)
 
 
-def _joints(solution: Solution) -> list[Any]:
+def joints(solution: Solution, units: UnitCurves) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return pivot, crank pin and slider pin in all poses, (p, 2) each [m]."""
-    link, angle = solution.assembly.linkage, np.atleast_2d(solution.unit_spring_curves.angle)[0]
-    slid = np.atleast_2d(solution.unit_spring_curves.position)[0]
-    crank = link.crank * np.column_stack([np.cos(angle), np.sin(angle)])
-    return [np.zeros_like(crank), crank, np.column_stack([slid, np.full(slid.size, link.offset)])]
+    link, angle, slid = solution.assembly.linkage, np.atleast_2d(units.angle)[0], np.atleast_2d(units.position)[0]
+    pin = link.crank * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.zeros_like(pin), pin, np.column_stack([slid, np.full(slid.size, link.offset)])
 
 
 def _sheet(loads: LinkLoads, width: float, hole: float, strength: PartStrength, system: Any) -> float:
@@ -160,11 +167,17 @@ def _tallest_spring(spec: SliderCrankSpec, solution: Solution) -> float:
 
 
 def _parts(
-    spec: SliderCrankSpec, solution: Solution, strength: PartStrength, sizes: tuple[float, float, float], load: float
+    spec: SliderCrankSpec,
+    solution: Solution,
+    strength: PartStrength,
+    sizes: tuple[float, float, float],
+    load: float,
+    rods: GuideRods,
 ) -> Iterator[ListedPart]:
     """Yield links, slider, pins and springs."""
     mechanism, legs, link = spec.mechanism, spec.mechanism.sets, solution.assembly.linkage
     sheet, width, pin = sizes
+    thick = max(sheet, rods.slider_thickness)
     for name, length in (("crank", link.crank), ("coupler", link.coupler)):
         holes = f"{mm(float(length))} between holes of {hole_with_fit(pin, 8)}"
         data = f"{_describe_strength(strength)}; {holes}; geometry/slider-crank.dxf"
@@ -173,13 +186,13 @@ def _parts(
         "on its guide",
         "slider",
         1,
-        f"with a hole of {hole_with_fit(pin, 8)}",
+        f"with a hole of {hole_with_fit(pin, 8)} between those of its guide",
         "make",
-        mm(width, width, sheet),
+        mm(width, max(width, rods.slider_width), thick),
         "",
         "slider",
     )
-    long = 2.0 * sheet + _tallest_spring(spec, solution)
+    long = sheet + thick + _tallest_spring(spec, solution)
     yield pin_part("joints", 3 * legs, pin, long, load, "joint")
     for entry in mechanism.springs.bought:
         value = getattr(mechanism.springs, entry.at)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
+from cfmkit.families.largest_next_to_samples import finite_samples
 from cfmkit.families.slider_crank.springs.sprung_linkage import reactions
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 
@@ -25,11 +26,8 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
 
-GRID_SIZES, TURN_NODES = 129, 385
-"""Places of the grid for less and for more than a quarter turn."""
-
-Ends = tuple["FloatArray", "FloatArray"]
-"""Largest and smallest values."""
+GRID_SIZES, TURN_NODES = 129, 385  # places of the grid for less and for more than a quarter turn
+Ends = tuple["FloatArray", "FloatArray"]  # largest and smallest values
 
 
 def is_wide(assembly: Assembly, low: Any, high: Any) -> bool:
@@ -117,22 +115,3 @@ class MotionExtremes(ShortRepr):
         values = function(self.units)
         motion, values, last = finite_samples(self.places, values, self.last)
         return extremes(lambda at: function(self.assembly.units(at)), motion, values, uneven=True, last=last)
-
-
-def finite_samples(
-    places: FloatArray, values: FloatArray, last: NDArray[np.intp] | int
-) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
-    """Return the samples of each row whose values are finite, up to its last one, and the index of the last of these.
-
-    What follows repeats that sample; a row without any has NaN.
-    """
-    places = np.broadcast_to(places, values.shape)
-    count = np.arange(values.shape[1])
-    good = np.isfinite(values) & (count <= np.reshape(last, (-1, 1)))
-    end = good.sum(axis=1) - 1
-    if good.all():
-        return places, values, end
-    order = np.argsort(~good, axis=1, kind="stable")
-    order = np.take_along_axis(order, np.minimum(count, np.maximum(end, 0)[:, None]), 1)
-    places, values = (np.take_along_axis(one, order, 1) for one in (places, values))
-    return places, np.where((end >= 0)[:, None], values, np.nan), end

@@ -8,9 +8,8 @@ linearly between its ends, where the torsion springs take hold. Counted are, per
   von Mises, the allowable stress over sqrt(3);
 - bearing of a pin: R/(d s);
 - Euler's load out of the plane, the pins as hinges: pi^2 E w s^3/(12 L^2);
-- the turn of one end of a link against the other under the moment k q of a torsion spring, all along the link: k L/(E
-  I)
-  times the spring's own turn q, I = s w^3/12. The true moment is smaller everywhere but at that end.
+- the turn of one end of a link against the other under the moment k q of a torsion spring, all along the link:
+  k L/(E I) times the spring's own turn q, I = s w^3/12. The true moment is smaller everywhere but at that end.
 
 Assumes: both links of one sheet, equal pins; no load out of the plane (links lie beside each other, a sheet apart).
 """
@@ -25,14 +24,7 @@ import numpy as np
 
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.sprung_linkage import coupler_angle
-from cfmkit.stock.joint_strength import (
-    SHEAR_SHARE,
-    bearing_pressure,
-    euler_load,
-    link_stress,
-    pin_bending,
-    shear_out,
-)
+from cfmkit.stock.joint_strength import SHEAR_SHARE, bearing_pressure, euler_load, link_stress, pin_bending, shear_out
 from cfmkit.stock.stock_series import ALL_SERIES
 
 if TYPE_CHECKING:
@@ -161,14 +153,12 @@ PIN_DIAMETERS = tuple(
 )
 """Pins of links [m]: the diameters of ISO 2338 from 1 mm on."""
 
-LARGEST_TURN_SHARE = 0.01
-"""Turn of a link over that of its spring up to which links count as rigid."""
+LARGEST_TURN_SHARE = 0.01  # turn of a link over that of its spring up to which links count as rigid
 
 WIDEST_SHARE = 0.5
 """Largest width of a link over the length of the shorter one: wider ones are plates, and bend as plates do."""
 
-SIZE_MARGIN = 1.001
-"""Sizes are larger by this share than just enough."""
+SIZE_MARGIN = 1.001  # sizes are larger by this share than just enough
 
 
 def links_that_bear(

@@ -25,9 +25,16 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import SolvedRows, columns_of_absent_values, drop_numbers, findings_of_one, values_of_one
+from cfmkit.families.rows import (
+    SolvedRows,
+    columns_of_absent_values,
+    drop_numbers,
+    findings_of_one,
+    values_of_one,
+    with_values,
+)
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage_from_spec import resolve
+from cfmkit.families.slider_crank.linkage import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.springs.findings import rules_of
 from cfmkit.families.slider_crank.springs.hardware import hardware
@@ -60,7 +67,7 @@ Ends = tuple[float, float]
 RATE_KEYS = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINT_NAMES)}
 """Where a specification has the rates, and the rows of the springs."""
 
-ROWS_TOGETHER = 32
+ROWS_TOGETHER = 64
 """Mechanisms that are solved together: few enough for their grids to stay in a processor's cache."""
 
 ROW_COLUMNS = columns_of_absent_values(OF_PARTS | OF_STOPS) | dict(SCALAR_QUANTITIES)
@@ -70,11 +77,7 @@ ROW_COLUMNS = columns_of_absent_values(OF_PARTS | OF_STOPS) | dict(SCALAR_QUANTI
 def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     """Return the torque or force curve of a slider-crank, with everything that is wrong with it.
 
-    Returns
-    -------
-    Result
-        One branch, ``load``; with friction ``unload``, too. NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if
-        the linkage does not reach all of the requested motion.
+    NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if the linkage does not reach all of the requested motion.
     """
     try:
         spec = resolve(spec)
@@ -238,8 +241,8 @@ def find_unbounded(poles: Sequence[tuple[float, float]]) -> Finding:
 
 def _as_run(spec: SliderCrankSpec, assembly: Assembly) -> SliderCrankSpec:
     """Return the spec with the defaults of the analysis made explicit."""
-    written = {assembly.motion_name: asked_motion(spec, assembly), "fidelity": "prb"}
-    return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=written)})
+    written = {f"analysis.{assembly.motion_name}": asked_motion(spec, assembly), "analysis.fidelity": "prb"}
+    return with_values(spec, written)
 
 
 def _curve(solution: Solution) -> Curve:
@@ -287,12 +290,7 @@ def _describe_locked(solution: Solution) -> str:
 def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str, float]]:
     """Return derivatives [SI] of metrics over the window of the analysis by the rates of springs of one leg.
 
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        The nominal mechanism.
-    paths : sequence of str
-        Those that are no rate of a spring are left out.
+    Paths that are no rate of a spring are left out.
     """
     if spec.fidelity != "prb" or spec.mechanism.pins or spec.mechanism.guide:
         return {}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.contours import Arc, Contour, Drawing, DrawnDimension, Line, Sheet, circle
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.linkage import linkage_of
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
 from cfmkit.stock.stock_series import hole_with_fit, series_of
@@ -26,8 +26,7 @@ stated."""
 PIN_IN_COIL = 0.8
 """Diameter of a pin that is not stated over the inside of the relaxed spring around it: wound up that is narrower."""
 
-EYE_OF_HOLE = 2.0
-"""Least radius of an eye in those of its hole: a wall as thick as the hole's radius."""
+EYE_OF_HOLE = 2.0  # least radius of an eye in those of its hole: a wall as thick as the hole's radius
 
 
 def pin_within(largest: float) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.export.posed_part import PosedBody, PosedPart
-from cfmkit.families.slider_crank.springs.hardware import hardware
+from cfmkit.families.slider_crank.springs.hardware import hardware, joints
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.hardware import Hardware
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.solution import Solution
     from cfmkit.families.slider_crank.springs.spec import Springs
@@ -22,8 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
-N_SHEETS = 3
-"""Sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's path."""
+N_SHEETS = 3  # sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's path
 
 
 def part_over_motion(result: Result) -> PosedPart:
@@ -31,15 +31,15 @@ def part_over_motion(result: Result) -> PosedPart:
     spec: Any = result.spec
     solution: Solution = result.state
     rates = solution.assembly.rates
-    depth, why = _depth(spec, rates, solution.extremes.largest_turns[:, 0])
     joining = hardware(spec, solution)
+    depth, why = _depth(spec, rates, solution.extremes.largest_turns[:, 0], joining)
     return PosedPart(
         (*bodies(spec, solution, solution.unit_spring_curves), *joining.bodies),
         direction=0.0,
         depth=depth,
         pieces=3 + _count_springs(spec.mechanism.springs, rates),
         assumed=f"links {2e3 * eye_and_hole(spec)[0]:.3g} mm wide; {_sizes(spec.mechanism.springs)}{why}",
-        pin=joining.pin,
+        rubbing=joining.rubbing,
         faults=joining.faults,
     )
 
@@ -60,18 +60,12 @@ def bodies(spec: SliderCrankSpec, solution: Solution, units: UnitCurves) -> Iter
         yield PosedBody.line("spring", "free", pin[:, None], max([half, *sizes]))
 
 
-def joints(solution: Solution, units: UnitCurves) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return pivot, crank pin and slider pin in all poses, (p, 2) each [m]."""
-    link, angle, slid = solution.assembly.linkage, np.atleast_2d(units.angle)[0], np.atleast_2d(units.position)[0]
-    pin = link.crank * np.column_stack([np.cos(angle), np.sin(angle)])
-    return np.zeros_like(pin), pin, np.column_stack([slid, np.full(slid.size, link.offset)])
-
-
-def _depth(spec: SliderCrankSpec, rates: FloatArray, turns: FloatArray) -> tuple[float | None, str]:
+def _depth(spec: SliderCrankSpec, rates: FloatArray, turns: FloatArray, joining: Hardware) -> tuple[float | None, str]:
     """Return the depth of links and springs [m], and what of it is taken; None, and why, where a part has no size.
 
-    Crank and coupler lie above each other, the crank on the ground. The pivot's spring is below, all others are above:
-    they stand beside each other. Several springs of a joint lie above each other.
+    Crank and coupler lie above each other, the crank on the ground, and the slider, which may be thicker, below the
+    coupler. The pivot's spring is below, all others are above: they stand beside each other and the heads of screws.
+    Several springs of a joint lie above each other.
     """
     springs, part = spec.mechanism.springs, spec.mechanism.part
     if part is None or part.sheet is None:
@@ -83,7 +77,9 @@ def _depth(spec: SliderCrankSpec, rates: FloatArray, turns: FloatArray) -> tuple
             return None, f"; the spring at the {name.replace('_', ' ')} has no size"
         high[name] = sum(count * height_of(name, coil, float(turn)) for coil, count in wound)
     below, above = high.pop("pivot", 0.0), max(high.values(), default=0.0)
-    return N_SHEETS * part.sheet + below + above, f"; {N_SHEETS} sheets and the springs on both sides of them"
+    links = (N_SHEETS - 1) * part.sheet + joining.slider_excess
+    why = f"; {N_SHEETS} sheets and the springs on both sides of them"
+    return below + part.sheet + max(links + above, joining.heads), why
 
 
 def height_of(name: str, coil: HelicalSpring, turn: float) -> float:

@@ -108,7 +108,7 @@ class SpringTask:
     def _travels(self, angle: FloatArray, last: float) -> FloatArray:
         """Return the travels at crank angles, of the two that each allows: those that lead up to a last one."""
         link = self.assembly.linkage
-        start, own = float(link.slider_position(np.asarray(self.assembly.unloaded))), link.slider_position(angle)
+        start, own = link.place(self.assembly.unloaded), link.slider_position(angle)
         away: FloatArray = link.branch * (start - own)
         other: FloatArray = link.branch * (start - (2.0 * link.crank * np.cos(angle) - own))
         return away if abs(away[-1] - last) <= abs(other[-1] - last) else other
@@ -133,16 +133,17 @@ class SpringTask:
 
     def _evaluate_friction(self, places: FloatArray) -> FloatArray | float:
         """Return what friction adds to the effort with the springs of the last round, over the target."""
-        way = self.wanted.branch
-        if self.rates is None or way is None or not self.assembly.rubbing.there:
+        wanted = self.wanted.branch
+        if self.rates is None or wanted is None or not self.assembly.rubbing.there:
             return 0.0
         rubbed = replace(self.assembly, rates=self.rates * self.spec.mechanism.sets)
-        ways = {"load": (1.0,), "unload": (-1.0,), "mean": (1.0, -1.0)}[way]
-        free = rubbed.rates @ rubbed.units(places).effort
-        added = sum(branch(rubbed, places, one).effort - free for one in ways) / len(ways)
+        ways = {"load": (1.0,), "unload": (-1.0,), "mean": (1.0, -1.0)}[wanted]
+        units = rubbed.units(places)
+        free = rubbed.rates @ units.effort
+        added = sum(branch(rubbed, units, way).effort - free for way in ways) / len(ways)
         if not np.isfinite(added).all():
             text = "friction holds the mechanism within the window: the line of force runs through its pins"
-            raise Infeasible(finding("self_locks", f"{text}; use thinner pins ('mechanism.pins'), or another window"))
+            raise finding.infeasible("self_locks", f"{text}; use thinner pins ('mechanism.pins'), or another window")
         return np.asarray(added / self.wanted.size)
 
     def _lower(self) -> FloatArray | None:

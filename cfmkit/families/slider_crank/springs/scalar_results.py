@@ -5,11 +5,12 @@ A quantity is a dimension, a definition, and a function of the solution of any n
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.rows import ScalarQuantity
+from cfmkit.families.rows import ScalarQuantity, quantity_of_each
 from cfmkit.families.slider_crank.springs.bistability_class import CLASS_NAMES, small_angle_number
 from cfmkit.families.slider_crank.springs.link_strength import STRENGTH_DEFINITIONS as LINK_DEFINITIONS
 from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, allowable_of, link_loads, link_of
@@ -24,10 +25,11 @@ from cfmkit.stock.springs.stress_and_life import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.solution import Solution
+    from cfmkit.results import Quantity
 
     Function = Callable[[Solution], Any]
 
@@ -48,6 +50,24 @@ def _of_drive(drive: str, dimension: str, definition: str, function: Function, r
     return ScalarQuantity(dimension, definition, function, reason, lambda solution: solution.drive == drive)
 
 
+def _of_next_equilibrium(name: str, words: str, stable: bool) -> dict[str, ScalarQuantity[Solution]]:
+    """Return where the next equilibrium of a kind is, over the motion of either drive."""
+    reason = NO_SECOND if stable else NO_UNSTABLE
+    return {
+        f"{name}_{motion}": _of_drive(
+            drive,
+            dimension,
+            f"{motion_words} of the {words} equilibrium from the unloaded position",
+            lambda solution: solution.nearest(stable)[0],
+            reason,
+        )
+        for drive, motion, dimension, motion_words in (
+            ("torque", "angle", "angle", "crank angle"),
+            ("force", "travel", "length", "slider travel"),
+        )
+    }
+
+
 def _of_band(drive: str, motion: str, dimension: str) -> dict[str, ScalarQuantity[Solution]]:
     """Return width, start and end of the constant band over the motion of one kind of drive."""
     reason = f"the reference is outside the motion, or the {drive} there is zero"
@@ -60,19 +80,9 @@ def _of_band(drive: str, motion: str, dimension: str) -> dict[str, ScalarQuantit
     }
 
 
-def _of_wire(name: str) -> ScalarQuantity[Solution]:
-    """Return the largest stress in the wire of bought springs, or their shortest life."""
-
-    def read(solution: Solution) -> FloatArray:
-        found = [wire_quantities(_in_use(solution, number)).get(name) for number in range(len(solution))]
-        return np.array([np.nan if one is None or one.value is None else one.value for one in found])
-
-    return ScalarQuantity(
-        *WIRE_DEFINITIONS[name],
-        read,
-        lambda solution: wire_quantities(_in_use(solution, 0))[name].reason,
-        lambda solution: name in wire_quantities(_in_use(solution, 0)),
-    )
+def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
+    """Yield the largest stress in the wire of bought springs, and their shortest life, of each mechanism."""
+    return (wire_quantities(_in_use(solution, number)) for number in range(len(solution)))
 
 
 def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
@@ -124,18 +134,25 @@ def _lost_energy(solution: Solution, kind: str) -> FloatArray:
     return np.array(found)
 
 
-def _of_loop(what: str, kind: str) -> Function:
-    def read(solution: Solution) -> FloatArray:
-        lost = {name: _lost_energy(solution, name) for name in ("pins", "guide")}
+def _of_loop(name: str, dimension: str, definition: str) -> dict[str, ScalarQuantity[Solution]]:
+    """Return what pins and guide take, as an energy or as shares of it."""
+
+    def read(kind: str, solution: Solution) -> FloatArray:
+        lost = {part: _lost_energy(solution, part) for part in ("pins", "guide")}
         area = lost["pins"] + lost["guide"]
         share = np.where(area > 0, lost[kind] / area, np.nan)
-        return np.where(np.isfinite(area), lost[kind] if what == "energy" else share, np.nan)
+        return np.where(np.isfinite(area), lost[kind] if dimension == "energy" else share, np.nan)
 
-    return read
-
-
-def _rubs(solution: Solution) -> bool:
-    return solution.friction_branches is not None
+    return {
+        f"{name}_{kind}": ScalarQuantity(
+            dimension,
+            definition.format(words),
+            partial(read, kind),
+            "friction holds the mechanism in a part of its motion",
+            lambda solution: solution.friction_branches is not None,
+        )
+        for kind, words in (("pins", "the pins dissipate"), ("guide", "the slider's guide dissipates"))
+    }
 
 
 def _force_per_degree(solution: Solution) -> FloatArray:
@@ -193,34 +210,8 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "unstable equilibria in the motion; beyond each the mechanism snaps through",
         lambda solution: solution.classified.unstable,
     ),
-    "snap_through_angle": _of_drive(
-        "torque",
-        "angle",
-        "crank angle of the first unstable equilibrium from the unloaded position",
-        lambda solution: solution.nearest(stable=False)[0],
-        NO_UNSTABLE,
-    ),
-    "snap_through_travel": _of_drive(
-        "force",
-        "length",
-        "slider travel of the first unstable equilibrium from the unloaded position",
-        lambda solution: solution.nearest(stable=False)[0],
-        NO_UNSTABLE,
-    ),
-    "second_stable_angle": _of_drive(
-        "torque",
-        "angle",
-        "crank angle of the next stable equilibrium from the unloaded position",
-        lambda solution: solution.nearest(stable=True)[0],
-        NO_SECOND,
-    ),
-    "second_stable_travel": _of_drive(
-        "force",
-        "length",
-        "slider travel of the next stable equilibrium from the unloaded position",
-        lambda solution: solution.nearest(stable=True)[0],
-        NO_SECOND,
-    ),
+    **_of_next_equilibrium("snap_through", "first unstable", stable=False),
+    **_of_next_equilibrium("second_stable", "next stable", stable=True),
     "energy_barrier": ScalarQuantity(
         "energy",
         "energy at the first unstable equilibrium",
@@ -229,20 +220,16 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     ),
     **_of_band("torque", "angle", "angle"),
     **_of_band("force", "travel", "length"),
-    "reference_torque": _of_drive(
-        "torque",
-        "torque",
-        f"torque at {_REFERENCE_TEXT}",
-        lambda solution: solution.level,
-        "the reference is outside the motion",
-    ),
-    "reference_force": _of_drive(
-        "force",
-        "force",
-        f"force at {_REFERENCE_TEXT}",
-        lambda solution: solution.level,
-        "the reference is outside the motion",
-    ),
+    **{
+        f"reference_{drive}": _of_drive(
+            drive,
+            drive,
+            f"{drive} at {_REFERENCE_TEXT}",
+            lambda solution: solution.level,
+            "the reference is outside the motion",
+        )
+        for drive in ("torque", "force")
+    },
     "start_force": _of_drive(
         "force",
         "force",
@@ -284,34 +271,8 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         lambda solution: solution.column(small_angle_number),
         "the unloaded position is the stretched one, or there is no torsion spring",
     ),
-    "loop_energy_pins": ScalarQuantity(
-        "energy",
-        "energy that the pins dissipate over the window, back and forth",
-        _of_loop("energy", "pins"),
-        "friction holds the mechanism in a part of its motion",
-        _rubs,
-    ),
-    "loop_energy_guide": ScalarQuantity(
-        "energy",
-        "energy that the slider's guide dissipates over the window, back and forth",
-        _of_loop("energy", "guide"),
-        "friction holds the mechanism in a part of its motion",
-        _rubs,
-    ),
-    "loop_share_pins": ScalarQuantity(
-        "ratio",
-        "share of the loop's area that the pins dissipate",
-        _of_loop("share", "pins"),
-        "friction holds the mechanism in a part of its motion",
-        _rubs,
-    ),
-    "loop_share_guide": ScalarQuantity(
-        "ratio",
-        "share of the loop's area that the slider's guide dissipates",
-        _of_loop("share", "guide"),
-        "friction holds the mechanism in a part of its motion",
-        _rubs,
-    ),
+    **_of_loop("loop_energy", "energy", "energy that {} over the window, back and forth"),
+    **_of_loop("loop_share", "ratio", "share of the loop's area that {}"),
     "force_per_anchor": ScalarQuantity(
         "stiffness",
         "increase of the force per travel of the anchor of the slider's spring; the same over the whole motion, so "
@@ -363,7 +324,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "guide_force_max": ScalarQuantity(
         "force", "largest transverse force of the slider of one leg on its guide", _guide_force, HELD_TEXT
     ),
-    **{name: _of_wire(name) for name in WIRE_DEFINITIONS},
+    **{name: quantity_of_each(name, about, _wires) for name, about in WIRE_DEFINITIONS.items()},
     "link_stress_max": _of_link("link_stress_max", lambda bar, loads, _allowable: bar.stress(loads)),
     "pin_bearing_max": _of_link("pin_bearing_max", lambda bar, loads, _allowable: bar.bearing(loads)),
     "link_safety_factor": _of_link("link_safety_factor", LinkBar.safety),

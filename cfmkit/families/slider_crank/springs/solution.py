@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import Several, ShortRepr
-from cfmkit.families.rows import rows_of, stack
+from cfmkit.families.largest_next_to_samples import finite_samples
+from cfmkit.families.rows import PlacesKept, rows_of, stack
 from cfmkit.families.slider_crank.springs.bistability_class import (
     CLASS_NAMES,
     Classified,
@@ -32,7 +33,7 @@ from cfmkit.families.slider_crank.springs.bistability_class import (
     signs,
 )
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
-from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes, finite_samples
+from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.sprung_linkage import reactions, reference_motion, window_of
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples
@@ -215,7 +216,7 @@ class Solution(ShortRepr):
     @cached_property
     def unit_spring_curves(self) -> UnitCurves:
         """Turns, efforts and stiffnesses of springs of rate 1, and positions of the links, along the motion."""
-        return self.assembly.units(self.motion)
+        return self._units_at(self.motion)
 
     @cached_property
     def unit_efforts(self) -> FloatArray:
@@ -253,7 +254,12 @@ class Solution(ShortRepr):
         """The curves with friction, forth and back; None if nothing rubs."""
         if not self.assemblies[0].rubbing.there:
             return None
-        return branch(self.assembly, self.motion, 1.0), branch(self.assembly, self.motion, -1.0)
+        units = self.unit_spring_curves
+        return branch(self.assembly, units, 1.0), branch(self.assembly, units, -1.0)
+
+    @cached_property
+    def _units_at(self) -> PlacesKept[UnitCurves]:
+        return PlacesKept(self.assembly.units)
 
     @cached_property
     def reactions(self) -> Ends:
@@ -274,7 +280,8 @@ class Solution(ShortRepr):
             return self.curve.value
         assembly = self.assembly if rows is None else rows_of(self.assembly, rows)
         if self.friction_branches is not None:
-            return branch(assembly, places, -1.0 if name == "unload" else 1.0).effort
+            units = self._units_at(places) if rows is None else assembly.units(places)
+            return branch(assembly, units, -1.0 if name == "unload" else 1.0).effort
         return assembly.efforts(places)
 
     def frictionless(self, place: FloatArray) -> FloatArray:
@@ -351,8 +358,7 @@ class Solution(ShortRepr):
 
         NaN where that effort is zero, or the reference outside the motion.
         """
-        place, value = self.curve.place, self.curve.value
-        known = self.has_level
+        place, value, known = self.curve.place, self.curve.value, self.has_level
         level, limit = np.where(known, self.level, 1.0)[:, None], self.tolerance * BAND_EDGE_FACTOR
         outside, inner, beyond = np.abs(value / level - 1.0) > limit, [], []
         for sign in (-1.0, 1.0):  # towards the low end, and towards the high one
@@ -388,10 +394,8 @@ class Solution(ShortRepr):
         NaN where none is known. With friction they are those of both branches.
         """
         legs = self.legs[:, 0]
-        if self.friction_branches is not None:
-            coupler, guide = self._rubbed_extremes("coupler"), self._rubbed_extremes("guide")
-        else:
-            coupler, guide = self.extremes.coupler, self.extremes.guide
+        read = partial(getattr, self.extremes) if self.friction_branches is None else self._rubbed_extremes
+        coupler, guide = read("coupler"), read("guide")
         size = (0.0 if self._is_mirrored else 1.0) / legs
         return Several((coupler[0] / legs, coupler[1] / legs)), Several((size * guide[0], size * guide[1]))
 
@@ -403,14 +407,13 @@ class Solution(ShortRepr):
         for direction in (1.0, -1.0):
 
             def force(at: FloatArray, direction: float = direction) -> FloatArray:
-                return np.asarray(getattr(branch(self.assembly, at, direction), part))
+                return np.asarray(getattr(branch(self.assembly, self._units_at(at), direction), part))
 
             values = force(places)
             high, low = extremes(force, places, values, uneven=True, last=np.broadcast_to(last, len(values)))
             held = ~np.isfinite(values).all(axis=1)
             found.append((np.where(held, np.nan, high), np.where(held, np.nan, low)))
-        (high, low), (other_high, other_low) = found
-        return np.maximum(high, other_high), np.minimum(low, other_low)
+        return np.max([top for top, _ in found], axis=0), np.min([bottom for _, bottom in found], axis=0)
 
     # --- rows for metrics ---------------------------------------------------------------------------------------------
 
@@ -426,7 +429,7 @@ class Solution(ShortRepr):
         return {
             name: CurveRows(
                 RowSamples(motion, effort, full),
-                self.curve.place,
+                lambda: self.curve.place,
                 partial(self.effort_at, name=name),
                 self.effort_error,
                 self.target[:, 0],

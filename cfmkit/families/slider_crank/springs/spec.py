@@ -171,8 +171,7 @@ class SpringDesign(DesignBlock):
     )
     force: PositiveForce | None = Field(None, description="target at the slider, all legs together")
     target: Target | None = Field(
-        None,
-        description="a curve instead of a constant torque or force: torque over crank angle, or force over travel",
+        None, description="a curve instead of a constant torque or force: torque over crank angle, or force over travel"
     )
     angle: tuple[Angle, Angle] | None = Field(None, description="crank angles over which the torque is to be constant")
     travel: tuple[Length, Length] | None = Field(
@@ -187,8 +186,7 @@ class SpringDesign(DesignBlock):
         None, description="slider travel within which the widest window is sought; default: all that can be reached"
     )
     tolerance: Annotated[Ratio, Field(ge=1e-8, lt=1)] | None = Field(
-        None,
-        description="largest deviation allowed, as a fraction of the target; at least 1e-6 % (rounding)",
+        None, description="largest deviation allowed, as a fraction of the target; at least 1e-6 % (rounding)"
     )
     objective: Literal["minimax", "least-squares"] = Field(
         "minimax", description="minimise the largest deviation, or the root mean square"

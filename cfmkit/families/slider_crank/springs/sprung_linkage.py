@@ -25,14 +25,8 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.guide_friction import FRICTIONLESS_GUIDE, GuideFriction
 from cfmkit.families.rows import stack
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
-from cfmkit.families.slider_crank.unit_springs import (
-    SliderPath,
-    UnitCurves,
-    crank_efforts,
-    curves_along_crank,
-    path_of,
-)
+from cfmkit.families.slider_crank.linkage import linkage_of, side_of, unloaded_angle
+from cfmkit.families.slider_crank.unit_springs import SliderPath, UnitCurves, crank_efforts, curves_along_crank, path_of
 from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
@@ -46,8 +40,7 @@ if TYPE_CHECKING:
 
 FULL_TURN = 2.0 * math.pi
 
-SHORT_OF_END = 1e-3
-"""Share of an arc that a motion stays away from its ends, where efforts are unbounded."""
+SHORT_OF_END = 1e-3  # share of an arc that a motion stays away from its ends, where efforts are unbounded
 
 MIN_END_SHARE = 1e-6
 """Nearer to such an end, as a share of the way to it, the last digits of the motion decide the effort's."""
@@ -195,7 +188,7 @@ class Assembly(ShortRepr):
     def _relaxed_ends(self) -> tuple[bool, bool]:
         """Whether the springs are relaxed at the first, and at the last place that a driven slider can reach."""
         stretched, folded = (self.knee == knee for knee in (0.0, math.pi))
-        past = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded))) < 0.0
+        past = self.linkage.branch * self.linkage.place(self.unloaded) < 0.0
         return (folded, stretched) if past else (stretched, folded)
 
     @property
@@ -323,22 +316,10 @@ def reference_motion(spec: SliderCrankSpec, assembly: Assembly) -> float:
 
 
 def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the force along the coupler and that of the slider on its guide.
+    """Return the tension in the coupler, and the force on the guide across the slider's path (positive upwards) [N].
 
-    Parameters
-    ----------
-    assembly : Assembly
-        The mechanism; rates of all legs.
-    units : UnitCurves
-        Along the motion, n places.
-    drive : (n,) array
-        Force that drives the slider towards the pivot [N]; zero where a torque drives the crank.
-
-    Returns
-    -------
-    coupler, guide : (n,) array
-        Tension in the coupler, and force on the guide across the slider's path (positive
-        upwards) [N]; for the rates and the drive given, so of all legs together or of one.
+    `drive`: force that drives the slider towards the pivot, (n,) [N]; zero where a torque drives the crank. Both are
+    (n,), for the rates and the drive given, so of all legs together or of one.
     """
     link, turn, rates = assembly.linkage, units.turn, assembly.rates_over(units.turn)
     beta = coupler_angle(link, units)
@@ -367,8 +348,7 @@ def coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
 DIFFERENCE_STEP = 1e-5
 """Of the angle [rad]: the effort is a quadratic of q at most, so that central differences are off by rounding alone."""
 
-N_WINDOW_PLACES = 201
-"""Of the window, over which the change of the effort is averaged."""
+N_WINDOW_PLACES = 201  # of the window, over which the change of the effort is averaged
 
 
 def turn_unloaded(assembly: Assembly, angle: float) -> tuple[Assembly, float]:
@@ -381,7 +361,7 @@ def turn_unloaded(assembly: Assembly, angle: float) -> tuple[Assembly, float]:
     if assembly.drive == "torque":
         return other, 0.0
     link = assembly.linkage
-    before, after = (float(link.slider_position(np.asarray(one.unloaded))) for one in (assembly, other))
+    before, after = (link.place(one.unloaded) for one in (assembly, other))
     return other, link.branch * (before - after)
 
 

@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaves.bent_centre_line import N_LINE_POINTS, line_between
 from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, ProposedStructure
-from cfmkit.families.vcfm.leaves.s_form import BUCKLING_LOAD, POLE_LOAD
+from cfmkit.families.vcfm.leaves.s_form import BUCKLING_LOAD, N_LINE_POINTS, POLE_LOAD, line_between
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -28,14 +27,12 @@ if TYPE_CHECKING:
 
 _MAX_TENSION = 1e5  # tension down to z = -1e5: strains beyond anything that bends
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(24)
-_POSITIVE_NODES, _POSITIVE_WEIGHTS = _GAUSS_NODES[12:], _GAUSS_WEIGHTS[12:]
-"""What is integrated is even."""
+_POSITIVE_NODES, _POSITIVE_WEIGHTS = _GAUSS_NODES[12:], _GAUSS_WEIGHTS[12:]  # what is integrated is even
 
 _ROUNDING_ERROR = 4.0 * float(np.finfo(float).eps)
 _BRACKET_PLACES = np.linspace(-1.0, 1.0, 41)
 
-N_EDGE_POINTS = 201
-"""Points of the unloaded centre line, from which edges are drawn."""
+N_EDGE_POINTS = 201  # points of the unloaded centre line, from which edges are drawn
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-SHEAR_FACTOR = 5.0 / 6.0
-"""Share of a rectangle's area that carries shear."""
+SHEAR_FACTOR = 5.0 / 6.0  # share of a rectangle's area that carries shear
 
 
 @dataclass(frozen=True)

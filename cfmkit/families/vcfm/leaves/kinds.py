@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaves.bent_centre_line import bent_leaf
+from cfmkit.families.vcfm.leaves.s_form import bent_leaf
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

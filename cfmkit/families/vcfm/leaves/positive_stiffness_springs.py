@@ -24,9 +24,8 @@ import numpy as np
 
 from cfmkit.errors import GeometryError
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.leaves.bent_centre_line import bent_leaf
 from cfmkit.families.vcfm.leaves.kinds import LeafSpring, ProposedStructure, SpringChain, SpringKind
-from cfmkit.families.vcfm.leaves.s_form import s_force
+from cfmkit.families.vcfm.leaves.s_form import bent_leaf, s_force
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -36,11 +35,8 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.leaves.kinds import Edge, Edges
 
 
-BLOCK_HEIGHT_RATIO = 0.75
-"""Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
-
-FILLET_MARGIN = 1.02
-"""Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
+BLOCK_HEIGHT_RATIO = 0.75  # half height of rigid blocks beyond the middle of a leaf, in its thicknesses
+FILLET_MARGIN = 1.02  # height of rigid blocks beyond a leaf's edge, in what a fillet there takes
 
 
 def leaf_compliance(strip: LeafStrip) -> Any:

@@ -1,19 +1,50 @@
-"""Specification of springs that are bought in place of a structure of leaves."""
+"""Specification of what stands around leaves: their cut with its frame, and springs that are bought."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from cfmkit.specs.spec import PositiveLength
+from cfmkit.specs.spec import NonNegativeLength, PositiveLength
 from cfmkit.specs.units import Stiffness
+from cfmkit.stock.material_and_part_spec import CutPart, PartFrame, RoundedCorners
 from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
 from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire, settle_rate
 from cfmkit.stock.springs.support_spec import SpringSupport
 
 if TYPE_CHECKING:
     from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
+
+
+class StandingFrame(PartFrame):
+    """Frame: it joins the walls, stops the shuttle and holds the preload of the spring."""
+
+    stop: PositiveLength | None = Field(
+        None, description="travel at which a bar across the shuttle's top lands on the walls; default: no stop"
+    )
+    seat: NonNegativeLength | None = Field(
+        None, description="preload of the spring when seated on the ground below the shuttle; default: no seat"
+    )
+
+
+class VcfmPart(CutPart):
+    """Cut of both parts, and what of them stands."""
+
+    frame: StandingFrame | None = Field(
+        None, description="{wall, shuttle, ground, stop, seat}: thicknesses, a stop of the travel, a seat of the spring"
+    )
+
+
+class CutLeaves(RoundedCorners):
+    """Part of a mechanism of `bistable` leaves and, unless it is bought, a `positive` spring."""
+
+    default_part = VcfmPart
+
+    @property
+    def thinnest(self: Any) -> float:
+        """Smallest thickness of all leaves that are cut [m]."""
+        return min(float(one.thickness) for one in (self.bistable, self.positive) if one is not None)
 
 
 class BoughtSprings(SpringSupport):

@@ -1,0 +1,148 @@
+/* Equilibria of networks of plain beams beside those with a higher degree, by which the error of a path is estimated.
+ *
+ * Python's way, for all networks: `raise_degree`, `embed` and `compare_states` of tracing/error_estimate.py. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "march.h"
+
+#define N_COMPARED 7 /* numbers of a state, see `compare` */
+
+static Int n_ends(const Model *m) { return m->size - m->elements * (m->degree + 1); } /* unknowns that move ends */
+
+/* Tables of the elements of plain beams at other points: what is even along an element has its first value there. */
+static void raise_tables(const Model *m, Model *fine, const double *laws, Int powers, double *room) {
+    const Int q = fine->points, all = m->elements * q, triangle = (fine->degree + 1) * (fine->degree + 2) / 2;
+    double *const table[6] = {room, room + all, room + 2 * all, room + 3 * all, room + 4 * all, room + 5 * all};
+    double *bend = room + 6 * all;
+    const double *places = fine->rule, *weights = fine->rule + q;
+    for (Int e = 0; e < m->elements; e++, laws += powers + 2) {
+        const Int from = e * m->points, first = e * q;
+        const double rigidity = m->rigidity[from], length = m->length[e];
+        for (Int k = first; k < first + q; k++) {
+            const double t = laws[0] + laws[1] * places[k - first];
+            double angle = 0.0;
+            for (Int power = powers - 1; power >= 0; power--) angle = angle * t + laws[2 + power];
+            table[0][k] = angle;
+            table[1][k] = length * weights[k - first];
+            table[2][k] = rigidity;
+            table[3][k] = m->axial[from];
+            table[4][k] = m->shear[from];
+            table[5][k] = length * (1.0 - places[k - first]);
+        }
+        for (Int k = 0; k < triangle; k++) bend[e * triangle + k] = length * rigidity * fine->unit_bend[k];
+    }
+    fine->angle = table[0]; fine->weight = table[1]; fine->rigidity = table[2];
+    fine->axial = table[3]; fine->shear = table[4]; fine->ahead = table[5]; fine->bend = bend;
+}
+
+/* Numbers of unknowns, as those of numbering.py: ends, bubbles of every element, forces. Every bubble and force is free. */
+static void raise_numbers(const Model *m, Model *fine, Int *unknowns, Int *slot, Int *leaves, double *base, double *rate,
+                          double *unit) {
+    const Int ends = n_ends(m), each = fine->degree - 1, forces = ends + m->elements * each, wide = fine->degree + 9;
+    const Int free_ends = m->free - m->elements * (m->degree + 1);
+    for (Int e = 0; e < m->elements; e++) {
+        Int *own = unknowns + e * wide;
+        memcpy(own, m->unknowns + e * (m->degree + 9), 8 * sizeof(Int));
+        for (Int k = 0; k < each; k++) own[8 + k] = ends + e * each + k;
+        for (Int k = 0; k < 2; k++) own[8 + each + k] = forces + 2 * e + k;
+        for (Int k = 8; k < wide; k++) leaves[free_ends + own[k] - ends] = e;
+    }
+    for (Int i = 0; i < fine->size; i++) slot[i] = i < ends ? m->slot[i] : free_ends + i - ends;
+    memcpy(leaves, m->leaves, (size_t)free_ends * sizeof(Int));
+    memcpy(base, m->base, (size_t)ends * sizeof(double));
+    memcpy(rate, m->rate, (size_t)ends * sizeof(double));
+    for (Int k = 0; k < fine->free; k++) unit[k] = HUGE_VAL;
+    for (Int k = 1; k <= 2 * m->elements; k++) unit[fine->free - k] = m->unit[m->free - k];
+    fine->unknowns = unknowns; fine->slot = slot; fine->leaves = leaves;
+    fine->base = base; fine->rate = rate; fine->unit = unit;
+}
+
+/* The same network with the degree of `shapes`, which has the tables of its shape functions; memory to free, NULL if none.
+ * `laws` (elements, 2 + powers): where an element begins on the shape of its beam, its width, the shape's coefficients. */
+static void *raise_model(const Model *m, const Model *shapes, const double *laws, Int powers, Model *fine) {
+    const Int e = m->elements, degree = shapes->degree, q = shapes->points, more = e * (degree - m->degree);
+    const Int size = m->size + more, free = m->free + more, tables = e * (6 * q + (degree + 1) * (degree + 2) / 2);
+    double *room = calloc((size_t)(tables + 3 * size + 2 * free + e * (degree + 9)), sizeof(double));
+    if (!room) return NULL;
+    double *base = room + tables, *rate = base + size, *unit = rate + size;
+    Int *unknowns = (Int *)(unit + free), *slot = unknowns + e * (degree + 9), *leaves = slot + size;
+    *fine = *m;
+    fine->degree = degree; fine->points = q; fine->size = size; fine->free = free;
+    fine->values = shapes->values; fine->slopes = shapes->slopes;
+    fine->values_by_shape = shapes->values_by_shape; fine->slopes_by_shape = shapes->slopes_by_shape;
+    fine->products = shapes->products; fine->rule = shapes->rule; fine->unit_bend = shapes->unit_bend;
+    raise_tables(m, fine, laws, powers, room);
+    raise_numbers(m, fine, unknowns, slot, leaves, base, rate, unit);
+    return room;
+}
+
+/* A state in the unknowns of a higher degree: shapes are hierarchical. */
+static void embed(const Model *m, const Model *fine, const double *z, double *out) {
+    const Int ends = n_ends(m), old = m->degree - 1, new = fine->degree - 1, e = m->elements;
+    memset(out, 0, (size_t)fine->size * sizeof(double));
+    memcpy(out, z, (size_t)ends * sizeof(double));
+    for (Int k = 0; k < e; k++) memcpy(out + ends + k * new, z + ends + k * old, (size_t)old * sizeof(double));
+    memcpy(out + ends + e * new, z + ends + e * old, (size_t)(2 * e) * sizeof(double));
+}
+
+/* The largest force or moment in a beam. */
+static double largest_force(const Model *m, const double *z) {
+    double largest = 0.0;
+    for (Int e = 0; e < m->elements; e++) {
+        const Int *own = m->unknowns + e * (m->degree + 9);
+        for (Int k = 0; k < m->points; k++) {
+            double curvature = 0.0;
+            for (Int i = 0; i <= m->degree; i++) curvature += z[own[local_shape(i)]] * m->slopes[k * (m->degree + 1) + i];
+            largest = larger(largest, fabs(m->rigidity[e * m->points + k] * m->length[e] * curvature));
+        }
+        for (Int k = 1; k <= 2; k++) largest = larger(largest, fabs(z[own[m->degree + 9 - k]]));
+    }
+    return largest;
+}
+
+/* Compare states (designs, count, size) with equilibria of a higher degree near them, or what they are there if none is.
+ * To `ends` the unknowns that move ends (designs, count, ends), to `found` (designs, count, 7): 0 if there is one,
+ * unstable directions, how far it is, change of the gradient by those unknowns, effort of the drive, largest force, change
+ * of those unknowns. */
+int compare(const Model *models, Int designs, const Model *shapes, const double *laws, Int powers, const double *z,
+            const double *drive, Int count, double tolerance, double *ends, double *found) {
+    const Goal goal = {NULL, 0.0, NULL, tolerance, 1};
+    for (const Model *m = models; m < models + designs; m++, laws += m->elements * (powers + 2)) {
+        Model fine;
+        const Int same = n_ends(m);
+        void *room = raise_model(m, shapes, laws, powers, &fine);
+        Work *w = room ? work_open(&fine) : NULL;
+        double *state = w ? malloc((size_t)(3 * fine.size + fine.free) * sizeof(double)) : NULL;
+        int good = state != NULL;
+        for (Int k = 0; good && k < count; k++, z += m->size, ends += same, found += N_COMPARED) {
+            double *gradient = state + fine.size, *coarse = gradient + fine.size, *x = coarse + fine.size;
+            double way = drive[k], moved = 0.0, force = 0.0, effort = 0.0, motion = 0.0;
+            Found end = {0, 0, 0.0};
+            embed(m, &fine, z, state);
+            for (Int i = 0; i < fine.size; i++) if (fine.slot[i] >= 0) x[fine.slot[i]] = state[i];
+            const int code = newton(&fine, w, x, &way, &goal, &end);
+            for (Int i = 0; i < fine.size && code == CONVERGED; i++) {
+                const Int a = fine.slot[i];
+                if (a >= 0 && fine.unit[a] == HUGE_VAL) moved = larger(moved, fabs(x[a] - state[i]));
+                if (a >= 0) state[i] = x[a];
+            }
+            good = evaluate(&fine, state, &way, 1.0, 1, gradient, NULL) == CONVERGED
+                   && evaluate(m, z, &way, 1.0, 1, coarse, NULL) == CONVERGED;
+            for (Int i = 0; i < same; i++) {
+                force = larger(force, fabs(gradient[i] - coarse[i]));
+                motion = larger(motion, fabs(state[i] - z[i]));
+                effort += gradient[i] * m->rate[i];
+            }
+            memcpy(ends, state, (size_t)same * sizeof(double));
+            const double row[N_COMPARED] = {code, (double)end.told, moved, force, effort, largest_force(&fine, state), motion};
+            memcpy(found, row, sizeof(row));
+        }
+        free(state);
+        work_close(w);
+        free(room);
+        if (!good) return 0;
+    }
+    return 1;
+}

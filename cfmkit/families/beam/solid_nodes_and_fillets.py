@@ -1,0 +1,126 @@
+"""What a beam mechanism's part does as a solid at its nodes, and in its fillets.
+
+Motions and reactions of nodes are those of the half described: a node that is held or driven is a rigid piece, any
+other goes with the material there. A fillet has its largest stress, with the node and the beams that it joins; nominal
+stresses are those of the network that the part is drawn from, with stretching and shear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.beam.drawn_pieces import both_halves
+from cfmkit.families.beam.network_from_spec import constant_load, is_on_axis, mirror_axis
+from cfmkit.families.beam.part import POINT_TOLERANCE_FACTOR, strips_of
+from cfmkit.families.beam.strips_and_gaps import mirror_points
+from cfmkit.families.fem_results import FilletRow, both_images, nominal_stresses, with_nominal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.beam.network_from_spec import Assembly
+    from cfmkit.solid.meshed_part import MeshSolution
+
+
+@dataclass(frozen=True, eq=False)
+class SolidNodes:
+    """Nodes of a solved part."""
+
+    assembly: Assembly  # the network that the part is drawn from
+    solved: MeshSolution
+
+    def motion(self, name: str) -> Callable[[FloatArray], FloatArray]:
+        """Return x, y [m] and rotation [rad] as a function of travels (n,), (n, 3); NaN where there is no material."""
+        from cfmkit.solid.point_motions_and_reactions import motion
+
+        return motion(self.solved, self._place(name), name)
+
+    def reaction(self, name: str) -> Callable[[FloatArray], FloatArray]:
+        """Return the force x, y [N] and the moment [N m] that support and drive exert on a node, of one half, (n, 3).
+
+        At a node on the mirror axis both halves press on each other beside it, in the fillets: what holds one half
+        there follows from its equilibrium. NaN where two nodes are on the axis.
+        """
+        from cfmkit.solid.point_motions_and_reactions import reaction
+
+        if not is_on_axis(self.assembly, name):
+            return reaction(self.solved, name, self._described)
+        others = [
+            place.name
+            for place in self.solved.part.places
+            if place.name in self.assembly.network.nodes and place.name != name
+        ]
+        if any(is_on_axis(self.assembly, other) for other in others):
+            return lambda travel: np.full((len(travel), 3), np.nan)
+        load = constant_load(self.assembly, name)
+        return lambda travel: -np.sum([self._transfer_reaction(name, other, travel) for other in others], axis=0) - load
+
+    def _transfer_reaction(self, name: str, other: str, travel: FloatArray) -> FloatArray:
+        """Return the reaction at another node with its moment about this one, (n, 3)."""
+        found = self.reaction(other)(travel) + constant_load(self.assembly, other)
+        here, there = ((self._place(node) + self.motion(node)(travel)[:, :2]).T for node in (name, other))
+        arm = there - here
+        return np.asarray(found + np.outer(arm[0] * found[:, 1] - arm[1] * found[:, 0], [0.0, 0.0, 1.0]))
+
+    def _place(self, name: str) -> FloatArray:
+        about = self.assembly.network.nodes[name]
+        return np.array([about.x, about.y])
+
+    @cached_property
+    def _described(self) -> NDArray[np.bool_] | None:
+        """Which elements are of the half that is described: on its side of the mirror axis; None without one."""
+        axis = mirror_axis(self.assembly)
+        if axis is None:
+            return None
+        grid, back = self.solved.problem.elements.mesh, np.exp(-1j * axis[1])
+        middles = grid.nodes[grid.triangles[:, :3]].mean(axis=1) @ [1.0, 1.0j]
+        side = sum(((complex(*self._place(name)) - axis[0]) * back).imag for name in self.assembly.network.nodes)
+        return np.asarray(((middles - axis[0]) * back).imag * side > 0.0)
+
+
+EDGE_TOLERANCE = 1e-3
+"""Lines between points of a beam are no farther from its edges than this, in thicknesses of the thinnest one."""
+
+
+def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float]) -> tuple[FilletRow, ...]:
+    """Return the fillets with their largest stress in a window [m or rad]; those of a mirrored half with a prime."""
+    from cfmkit.solid.stress_along_fillets import stressed_fillets
+
+    spec = assembly.spec
+    beams, nodes = _name_polygons(assembly)
+    rows = []
+    for one in stressed_fillets(solved, spec.mechanism.fillet):
+        joined = one.arc.find_touched(beams)
+        node = min(nodes, key=lambda name: float(np.hypot(*(nodes[name] - one.arc.middle))))
+        if (found := one.largest(*window)) is not None:
+            rows.append(FilletRow(f"{node}: {', '.join(joined)}" if joined else node, one.arc, *found))
+    travel = np.array([row.motion for row in rows])
+    drive: Any = assembly.drive()  # through a displacement or a rotation: a solid has no other
+    paths = partial(both_images, assembly.network, lambda points: replace(drive, points=points))
+    return with_nominal(rows, nominal_stresses(rows, travel, paths, partial(_described_half, assembly)))
+
+
+def _described_half(assembly: Assembly, points: FloatArray) -> FloatArray:
+    """Return points of the part (m, 2), and where in the half that is described they are if they are mirrored [m]."""
+    axis = mirror_axis(assembly)
+    return points if axis is None else np.concatenate([points, mirror_points(points, *axis)])
+
+
+def _name_polygons(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, FloatArray]]:
+    """Return the polygons of the beams and the places of the nodes, of both halves, by name [m]."""
+    network, axis = assembly.network, mirror_axis(assembly)
+    exact = EDGE_TOLERANCE * min(beam.section.thinnest for beam in network.beams.values())
+    halves = both_halves(assembly, strips_of(assembly, exact / POINT_TOLERANCE_FACTOR))
+    beams = {name: [polygon for strip in found for polygon in strip.polygons] for name, found in halves.items()}
+    nodes = {name: np.array([node.x, node.y]) for name, node in network.nodes.items()}
+    if axis is not None:
+        others = {name: mirror_points(place[None], *axis)[0] for name, place in nodes.items()}
+        nodes |= {f"{name}'": place for name, place in others.items() if np.hypot(*(place - nodes[name])) > exact}
+    return beams, nodes

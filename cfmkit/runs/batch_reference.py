@@ -1,0 +1,70 @@
+"""Reference of a batch: the folder of an earlier one, with which it is compared or whose results it replaces."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import UsageError, visible
+from cfmkit.metrics.compare import COMPARISON_RTOL
+from cfmkit.store import RunFolder
+from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, changes, list_gone, read_earlier_batch
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from cfmkit.studies.batch_sources_and_outcomes import Entry
+    from cfmkit.studies.metric_changes_since_earlier_batch import Earlier
+
+
+@dataclass(frozen=True)
+class BatchReference:
+    """Earlier results, and what is to be done with them."""
+
+    folder: str
+    tolerance: float  # relative change up to which a metric counts as the same
+    accept: bool  # whether it gets the results of the batch
+    earlier: Mapping[str, Earlier] | None  # None if there are none yet
+
+    @classmethod
+    def read(
+        cls, folder: str | os.PathLike[str] | None, tolerance: float | None, accept: bool, out: str
+    ) -> BatchReference | None:
+        """Return the reference that is named; None if none is.
+
+        Raises UsageError if it is not the folder of a batch, or the options do not fit.
+        """
+        tolerance = COMPARISON_RTOL if tolerance is None else tolerance
+        if not 0 <= tolerance < 1:
+            meant = f"; did you mean '{tolerance:g} %'?" if 1 <= tolerance < 100 else ""
+            raise UsageError(f"--compare-tolerance: {tolerance:g} is not allowed: must be >= 0 and < 1{meant}")
+        name = "" if folder is None else os.fspath(folder)
+        if accept and not name:
+            raise UsageError("--accept replaces a reference: name its folder with --compare")
+        if accept and os.path.realpath(name) == os.path.realpath(out):
+            raise UsageError(f"--accept: {visible(name)} is the output folder itself, which has the current results")
+        if folder is None:
+            return None
+        begins = accept and not os.path.lexists(name)
+        return cls(name, tolerance, accept, None if begins else read_earlier_batch(name))
+
+    def compare(self, entries: Sequence[Entry], out: str) -> BatchComparison | None:
+        """Return the changes since the earlier batch; None if there was none."""
+        if self.earlier is None:
+            return None
+        changed = changes(self.earlier, entries, out, self.tolerance)
+        return BatchComparison(self.folder, self.tolerance, changed, list_gone(self.earlier, entries))
+
+    def replace_results(self, out: str, entries: Sequence[Entry], arguments: Sequence[str]) -> None:
+        """Replace its results by those of a batch: the files that a comparison reads, and nothing else.
+
+        Raises OutputError if the folder cannot be written, or has a file of those names that cfmkit did not write.
+        """
+        named = ("metrics.json", *(f"{entry.folder}/metrics.json" for entry in entries if entry.written))
+        with RunFolder(self.folder) as target:
+            target.check(*named)
+            for name in named:
+                target.write(name, Path(out, name).read_bytes())
+            target.commit({"command": "batch", "arguments": list(arguments), "status": "complete", "exit_code": 0})
