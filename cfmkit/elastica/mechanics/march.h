@@ -160,6 +160,9 @@ int solve(const Model *m, double *x, double *way, const double *border, double l
 int solve_many(const Model *models, Int designs, double *x, double *way, Int count, double tolerance, int quick, double *rate,
                double *found);
 double soften(const Model *m, const double *x, double way, Int rounds, double *vector);
+void beam_tables(const Model *shapes, Int elements, const Int *row, const double *cuts, const double *coefficients, Int powers,
+                 const double *length, const double *rigidities, Int beams, double unit_length, double unit_force,
+                 double *tables, double *lengths);
 int compare(const Model *models, Int designs, const Model *shapes, const double *laws, Int powers, const double *z,
             const double *drive, Int count, double tolerance, double *ends, double *found);
 

@@ -142,7 +142,21 @@ static PyObject *py_compare(PyObject *self, PyObject *arguments) {
     return PyLong_FromLong(good);
 }
 
-/* place(row, first, arrays): put the addresses of arrays, 0 for None, into a row of int64 from a place on. */
+/* tables(shapes, row, cuts, coefficients, length, rigidities, tables, lengths, unit_length, unit_force) */
+static PyObject *py_tables(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    double length, force;
+    (void)self;
+    if (!number(arguments, 8, &length) || !number(arguments, 9, &force) || !take(arguments, 0, 8, &b)) return NULL;
+    const Int wide = (Int)sizeof(double), elements = b.view[1].len / wide, beams = b.view[4].len / wide;
+    beam_tables(at(&b, 0), elements, at(&b, 1), at(&b, 2), at(&b, 3), b.view[3].len / (wide * beams), at(&b, 4), at(&b, 5),
+                beams, length, force, at(&b, 6), at(&b, 7));
+    release(&b);
+    Py_INCREF(Py_None);
+    return Py_None;
+}
+
+/* place(row, first, arrays): put the addresses of arrays, but for None, into a row of int64 from a place on. */
 static PyObject *py_place(PyObject *self, PyObject *arguments) {
     Buffers row, one;
     double first;
@@ -154,7 +168,6 @@ static PyObject *py_place(PyObject *self, PyObject *arguments) {
     int good = count >= 0;
     for (Py_ssize_t k = 0; good && k < count; k++) {
         PyObject *array = PyTuple_GetItem(arrays, k);
-        cell[k] = 0;
         if (array == Py_None) continue;
         good = take(arrays, k, k + 1, &one);
         if (good) { cell[k] = (Int)(intptr_t)at(&one, 0); release(&one); }
@@ -262,6 +275,7 @@ static PyMethodDef methods[] = {
     {"resolve", py_resolve, METH_VARARGS, NULL},   {"solve", py_solve, METH_VARARGS, NULL},
     {"solve_many", py_solve_many, METH_VARARGS, NULL}, {"soften", py_soften, METH_VARARGS, NULL},
     {"place", py_place, METH_VARARGS, NULL},       {"compare", py_compare, METH_VARARGS, NULL},
+    {"tables", py_tables, METH_VARARGS, NULL},
     {"contact_gaps", py_contact_gaps, METH_VARARGS, NULL}, {"side_gaps", py_side_gaps, METH_VARARGS, NULL},
     {"side_places", py_side_places, METH_VARARGS, NULL}, {"side_curvatures", py_side_curvatures, METH_VARARGS, NULL},
     {"march", py_march, METH_VARARGS, NULL},       {"march_many", py_march_many, METH_VARARGS, NULL},
