@@ -29,9 +29,9 @@ static void fill(const Model *shapes, Int elements, Int k, const double *law, co
     }
 }
 
-void beam_tables(const Model *shapes, Int elements, const Int *row, const double *cuts, const double *coefficients, Int powers,
-                 const double *length, const double *rigidities, Int beams, double unit_length, double unit_force,
-                 double *tables, double *lengths) {
+int beam_tables(const Model *shapes, Int elements, const Int *row, const double *cuts, const double *coefficients, Int powers,
+                const double *length, const double *rigidities, Int beams, double unit_length, double unit_force,
+                double *tables, double *lengths) {
     for (Int k = 0; k < elements; k++) {
         const Int b = row[k];
         const double law[2] = {cuts[2 * k], cuts[2 * k + 1] - cuts[2 * k]}, speed = length[b] / unit_length * law[1];
@@ -40,6 +40,7 @@ void beam_tables(const Model *shapes, Int elements, const Int *row, const double
              rigidities[2 * beams + b] * unit_force, tables);
         lengths[k] = speed;
     }
+    return CONVERGED;
 }
 
 /* The tables at other points: what is even along an element is its first value there. */

@@ -222,7 +222,7 @@ class CompiledEquations(NumpyEquations):
         """Return the equilibria near k guesses."""
         x, ways = np.array(free, float, order="C"), np.array(way, float)
         rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
-        if self.code.solve_many(self.row, x, ways, rate, outcomes, tolerance, quick):
+        if self.code.solve_each(self.row, x, ways, rate, outcomes, tolerance, quick):
             raise MemoryError
         converged, unstable = outcomes[:, 0] == 0, outcomes[:, 1].astype(np.int64)
         for k in np.flatnonzero(converged & (unstable < 0)):
