@@ -107,7 +107,7 @@ def _locks() -> Record:
 
 def _solver() -> Record:
     """Return what the beam engine runs on: "C" or "numpy"."""
-    from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE
+    from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE
     from cfmkit.elastica.mechanics.march import engine
 
     return {"engine": engine(), "switched_off": WITHOUT_C_VARIABLE in os.environ}
