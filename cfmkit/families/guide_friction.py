@@ -36,7 +36,7 @@ class GuideFriction:
     def there(self) -> bool:
         """Whether anything rubs."""
         numbers = self.friction, self.drag
-        return any(bool(value.any() if isinstance(value, np.ndarray) else value) for value in numbers)
+        return any(bool(np.any(value) if np.ndim(value) else value) for value in numbers)
 
     def force(self, free: FloatArray, across: FloatArray, off_plane: float, way: float) -> FloatArray:
         """Return the force that moves the slider against the friction of its guide.
