@@ -167,23 +167,10 @@ def ideal_position(law: SlopeLaw, travel: Real) -> Real:
 
 
 def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[RollerPath, float]:
-    """Return the path up to a slider travel, and the x at its end.
+    """Return the path up to a slider travel with the profile's own brace [m], and the x at its end.
 
-    Parameters
-    ----------
-    law : SlopeLaw
-        The slope.
-    travel : float
-        Slider travel wanted, with the profile's own brace [m].
-    method : {"quadrature", "ode"}
-        How to integrate.
-
-    Returns
-    -------
-    path, end : RollerPath, float
-        The path reaches at least `end` [m]. If the geometry cannot give the travel
-        (the brace turns horizontal, the path vertical, or the slider stops rising first),
-        `end` is short of it: compare ``path.travel(end)``.
+    The path reaches at least that end. If the geometry cannot give the travel (the brace turns horizontal, the path
+    vertical, or the slider stops rising first), the end is short of it: compare ``path.travel(end)``.
     """
     x0, ideal = law.rest_half_width, ideal_position(law, travel)
     if law.is_ideal:
