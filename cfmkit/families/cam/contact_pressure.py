@@ -5,8 +5,6 @@ with rho the radius of the cam where they touch. The material yields first below
 largest shear stress is 0.30 p0: at p0 = 1.67 times the yield strength (Tresca). So the stress that is compared
 with the allowable one is p0 / 1.67.
 
-Reference
----------
 [J] K. L. Johnson, Contact Mechanics (1985), sec. 4.2 and 6.2.
 """
 

@@ -16,8 +16,6 @@ leaves, h rise of a leaf, t its thickness, Q = h/t.
    (`leaf_sizing`).
 3. Lengths are increased if the exact stress is too large.
 
-Reference
----------
 [D] B. Ding, X. Li, Y. Li, Robotica (2022), variable constant-force compliant mechanism; the theory is in
     docs/theory_vcfm.md.
 """

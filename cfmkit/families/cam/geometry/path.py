@@ -8,8 +8,6 @@ With x as the independent variable the height is one integral of the slope
 and the slider's travel is (D^2 - d0^2) / 2A if c = 1: the energy of the springs over the force; d0 is half of what
 the springs are stretched by at the start.
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
 """
 
