@@ -254,3 +254,11 @@ def test_a_part_that_cannot_be_drawn_within_its_tolerance_is_refused(tmp_path, c
     large = [source, "--set", "mechanism.nodes.n3.at.1=1.877e10 mm", "-q", "-o", str(tmp_path / "out")]
     assert main(["export", *large]) == 3
     assert "coarser --tolerance" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_a_line_without_its_end_keeps_all_other_points(end):
+    line = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [4.0, 2.0]])
+    kept = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [3.5, 2.0]] if end else [[0.5, 0.0], *line[1:].tolist()]
+    assert strip_module._away(line, end, 0.5).tolist() == kept
+    assert len(strip_module._away(line, end, 6.0)) == 0
