@@ -15,7 +15,6 @@ from cfmkit.documents.run_outcome import worst
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.runs import batch_output_files
-from cfmkit.runs.batch_reference import BatchReference
 from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, run_analysis, run_design, spec_of
 from cfmkit.runs.run import carry_out as carry_out_run
 from cfmkit.studies.batch_sources_and_outcomes import SKIPPED_MESSAGE, Entry
@@ -373,6 +372,7 @@ def batch(
     """
     from cfmkit.documents.junit import junit as junit_of
     from cfmkit.documents.junit import prepare_file
+    from cfmkit.runs.batch_reference import BatchReference
     from cfmkit.store import RunFolder
     from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 

@@ -10,9 +10,9 @@ import time
 
 import pytest
 
-from cfmkit import Run
 from cfmkit.cli.failures import Stopped
 from cfmkit.cli.verbs.design import long_run
+from cfmkit.families.run_control import Run
 from cfmkit.store import RunFolder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")

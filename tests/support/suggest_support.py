@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from cfmkit import Run
 from cfmkit.families import family
+from cfmkit.families.run_control import Run
 from cfmkit.runs.read_suggest_file import read_request
 
 POM = {  # 10 N of POM over 3 mm
