@@ -396,17 +396,14 @@ def batch(
         code = exit_code(entries, interrupted, None if accept else compared)
         about = batch_output_files.describe_batch(work.arguments, seed, named, code)
         written = batch_output_files.write(folder, entries, about, page, compared)
-    accepted = ""
-    if reference is not None and reference.accept and not interrupted:
-        reference.replace_results(place, entries, work.arguments)
-        accepted = reference.folder
+    accepted = reference is not None and not interrupted and reference.accept_results(place, entries, work.arguments)
     if write_junit is not None:
         write_junit(junit_of(entries))
     if write_summary is not None:
         from cfmkit.documents.markdown import summary as in_markdown
 
         write_summary(in_markdown(entries, compared))
-    return BatchResult(entries, code, place, written, compared, accepted)
+    return BatchResult(entries, code, place, written, compared, reference.folder if reference and accepted else "")
 
 
 def _check_options(out: str, verb: str | None, changes: Iterable[str]) -> None:
