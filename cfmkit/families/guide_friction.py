@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class GuideFriction:
     @property
     def there(self) -> bool:
         """Whether anything rubs."""
-        numbers = self.friction, self.drag
+        numbers: tuple[Any, ...] = (self.friction, self.drag)
         return any(bool(np.any(value) if np.ndim(value) else value) for value in numbers)
 
     def force(

@@ -11,11 +11,11 @@ import pytest
 from suggest_support import POM, request
 
 import cfmkit
-from cfmkit import Run
 from cfmkit.documents.suggestion_document import document_of
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.end_stops_spec import BEFORE_STOP
+from cfmkit.families.run_control import Run
 from cfmkit.families.suggestion_request import STOP_MARGIN_SHARE
 from cfmkit.runs.suggest_api import read_request
 from cfmkit.runs.suggestion_record import as_json, exit_code
