@@ -224,6 +224,20 @@ def test_loops_of_springs_go_over_the_ends_of_shafts_or_are_a_fault():
             assert end in rows["shafts of the rollers"]["data"]
 
 
+def test_ends_of_braces_and_loops_of_springs_are_in_the_box_of_a_cam():
+    plain, wide, loops = (
+        cfmkit.families.family("cam").envelope(cfmkit.analyze(cfmkit.load("configs/cam.yaml", changes))).across
+        for changes in (
+            [],
+            ["mechanism.envelope={brace_width: 60 mm}"],
+            ["mechanism.springs={wound: {wire: 2 mm, coil: 40 mm, turns: 20}, count: 2}"],
+        )
+    )
+    radius = 1e-3 * 16.0
+    assert wide - plain == pytest.approx(2.0 * (30e-3 - radius))
+    assert loops - plain == pytest.approx(2.0 * (21e-3 - radius))
+
+
 def test_heads_of_screws_count_in_the_depth_of_a_cam():
     flat = cfmkit.load("configs/cam.yaml", ["mechanism.plate.hole_diameter=17.5 mm"])  # heads of M16 are 16 mm high
     result = cfmkit.analyze(flat)

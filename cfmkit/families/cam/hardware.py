@@ -142,7 +142,8 @@ def hardware(solution: Solution) -> Hardware:
     if bearing is None and mechanism.bearings is None:
         rubbing["bearings"] = {"bore": shaft}
     heads = screw.head_height if holes else 0.0
-    return Hardware(with_faults(parts, faults), standing, drawn, rubbing, in_sentences(faults), heads)
+    around = *(body for body in drawn if body.name == "brace"), *_box_of_springs(solution, hooks, bar)
+    return Hardware(with_faults(parts, faults), (*standing, *around), drawn, rubbing, in_sentences(faults), heads)
 
 
 def _slider_pin(mechanism: Mechanism, loads: _Loads, faults: dict[str, str]) -> float:
@@ -340,6 +341,15 @@ def _standing(solution: Solution, rods: GuideRods, holes: list[Arc], screw: Scre
     ends = np.array([[0.0, float(heights.min()) - 0.5 * rods.bush], [0.0, float(heights.max()) + 0.5 * rods.bush]])
     yield from rods.bodies(ends)
     yield from (PosedBody.line("screw", "held", np.array([hole.center]), 0.5 * screw.head) for hole in holes)
+
+
+def _box_of_springs(solution: Solution, hooks: _Hooks, bar: float) -> Iterator[PosedBody]:
+    """Yield the box of the springs, as high as those on one side above each other, with their loops or hook bars."""
+    if hooks.outer:
+        beyond, half = 0.5 * (bar or hooks.outer), 0.5 * max(hooks.height, hooks.outer)
+        x, y = roller_path(solution).T + np.array([[beyond], [0.0]])
+        corners = np.stack([[-x, y - half], [x, y - half], [x, y + half], [-x, y + half]])
+        yield PosedBody.polygon("springs", "free", corners.transpose(2, 0, 1))
 
 
 def _drawn_bodies(

@@ -15,18 +15,15 @@ from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.part_sizes import (
     BRACE_WIDTH,
     PLATE_THICKNESS,
-    coil_diameter,
     count_of,
     depth_of,
     pin_path,
     roller_path,
-    stack_height,
 )
 from cfmkit.families.cam.statics import forces
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.export.contours import Contour
@@ -62,9 +59,13 @@ def part_over_motion(result: Result) -> PosedPart | None:
     pieces = 8 + count_of(mechanism.springs)
     joining = hardware(solution)
     depth = None if depth is None else 0.5 * depth + max(0.5 * depth, 0.5 * thick + joining.heads)
-    all_bodies = (*bodies(solution), *joining.bodies, *_stacked_springs(solution, stretch))
     return PosedPart(
-        all_bodies, depth=depth, pieces=pieces, assumed=reported, rubbing=joining.rubbing, faults=joining.faults
+        (*bodies(solution), *joining.bodies),
+        depth=depth,
+        pieces=pieces,
+        assumed=reported,
+        rubbing=joining.rubbing,
+        faults=joining.faults,
     )
 
 
@@ -74,18 +75,6 @@ def bodies(solution: Solution) -> tuple[PosedBody, ...]:
     plate = [PosedBody.polygon("plate", "held", rectangle(*contour.extents)) for contour in _plate(solution)]
     right = PosedBody.line("roller", "contact", roller_path(solution)[:, None], radius)
     return (*plate, right, right.mirror(), PosedBody.line("slider", "driven", pin_path(solution)[:, None], radius))
-
-
-def _stacked_springs(solution: Solution, stretch: float) -> Iterator[PosedBody]:
-    """Yield the box of the springs between the rollers' axes, as high as those on one side above each other."""
-    mechanism = solution.assembly.spec.mechanism
-    outer = coil_diameter(mechanism.springs, stretch, mechanism.rest_half_width)
-    if outer is None:
-        return
-    half = 0.5 * stack_height(outer, count_of(mechanism.springs))
-    x, y = roller_path(solution).T
-    corners = np.stack([[-x, y - half], [x, y - half], [x, y + half], [-x, y + half]])
-    yield PosedBody.polygon("springs", "free", corners.transpose(2, 0, 1))
 
 
 def _plate(solution: Solution) -> tuple[Contour, ...]:
