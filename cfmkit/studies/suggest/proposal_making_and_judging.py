@@ -386,7 +386,7 @@ def judge_proposal(
     return Proposal(
         name, variant, text,
         missed=tuple(text for _, text in misses), fails=tuple(topic for topic, _ in misses), numbers=numbers,
-        notes=(*note_end_stop(request, result), *too_thin(written), *_notes(space, result)),
+        notes=(*note_end_stop(request, result, numbers["depth"]), *too_thin(written), *_notes(space, result)),
         movable=movable, unjudged=tuple(list_unjudged(request, result)),
         model=model_of(name, written), pending=pending, warnings=tuple(warnings.values()), seconds=seconds,
         own=near.model if near else "",
