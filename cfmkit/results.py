@@ -142,20 +142,16 @@ class ClosedForm(Protocol):
     @property
     def places(self) -> FloatArray:
         """Increasing places over the motion, (n,), so dense that the effort hides nothing between two [m or rad]."""
-        ...
 
     @property
     def peaks(self) -> FloatArray:
         """Places next to which an extreme of the effort may stand that the samples of a curve miss, (m,) [m or rad]."""
-        ...
 
     def effort(self, branch: str, places: FloatArray, /) -> FloatArray:
         """Return the effort of a branch at places of any shape [N or N m]; NaN where there is no equilibrium."""
-        ...
 
     def stress(self, branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress [Pa] at places of any shape; NaN where it is unbounded."""
-        ...
 
 
 @runtime_checkable
@@ -164,7 +160,6 @@ class LargestStress(Protocol):
 
     def largest_stress(self, branch: str, low: float, high: float, /) -> float | None:
         """Return the largest stress of a branch between two places [Pa]; None: look for it at the points."""
-        ...
 
 
 @runtime_checkable
@@ -173,7 +168,6 @@ class OwnStress(Protocol):
 
     def own_stress(self, branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress [Pa] at places of any shape in the load case of the curve."""
-        ...
 
 
 class WindingPath(Protocol):
@@ -182,15 +176,12 @@ class WindingPath(Protocol):
     @property
     def ways(self) -> FloatArray:
         """Increasing places of the way, (n,): neither motion nor effort nor stress turns between two of them."""
-        ...
 
     def states(self, ways: FloatArray, /) -> tuple[FloatArray, FloatArray]:
         """Return motion [m or rad] and effort [N or N m] at places of the way of any shape."""
-        ...
 
     def stress(self, ways: FloatArray, /) -> FloatArray:
         """Return the largest stress [Pa] at places of the way of any shape."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -62,10 +62,9 @@ class Verbs(TyperGroup):
 
 
 def _unknown(name: str) -> str:
-    from difflib import get_close_matches
+    from cfmkit.specs.yamlio import did_you_mean
 
-    near = get_close_matches(name, names(), n=1)
-    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(sorted(names()))}"
+    hint = did_you_mean(name, names()) or f"there are {', '.join(sorted(names()))}"
     return f"there is no command {name!r}; {hint}"
 
 
@@ -90,7 +89,8 @@ def _command(name: str) -> Any:
     callback.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     callback.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     app = typer.Typer(**_TYPER_OPTIONS)
-    app.command(name, help=_unwrap_paragraphs(inspect.getdoc(module.run) or ""), epilog=_example(module))(callback)
+    example = f"Example: {module.HELP_EXAMPLE}" if hasattr(module, "HELP_EXAMPLE") else None
+    app.command(name, help=_unwrap_paragraphs(inspect.getdoc(module.run) or ""), epilog=example)(callback)
     return _plain(typer.main.get_command(app))
 
 
@@ -103,12 +103,6 @@ def _unwrap_paragraphs(text: str) -> str:
     'What it does.\\n\\nMore of it, and the end.'
     """
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
-
-
-def _example(module: ModuleType) -> str | None:
-    """Return what a verb's help ends with: a command that can be tried."""
-    command = getattr(module, "HELP_EXAMPLE", None)
-    return None if command is None else f"Example: {command}"
 
 
 def _plain(command: Any) -> Any:

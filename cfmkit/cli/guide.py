@@ -6,7 +6,6 @@ docs/glossary.md: word and meaning; synonym and the words used here.
 
 from __future__ import annotations
 
-import difflib
 import re
 from dataclasses import dataclass
 from functools import cache
@@ -62,8 +61,9 @@ def page(name: str) -> GuidePage:
     wanted = name.removeprefix("docs/").partition("#")[0].removesuffix(".md").replace("-", "_")
     if wanted in by_name:
         return by_name[wanted]
-    similar = difflib.get_close_matches(wanted, by_name, n=1)
-    hint = f"did you mean {similar[0]!r}?" if similar else f"`cfmkit docs --search {wanted}` searches them"
+    from cfmkit.specs.yamlio import did_you_mean
+
+    hint = did_you_mean(wanted, list(by_name)) or f"`cfmkit docs --search {wanted}` searches them"
     raise UsageError(f"there is no page {visible(name)!r}; {hint}")
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import folder_of
-from cfmkit.documents.document import BAD_TONE, Document, Note, Written
+from cfmkit.documents.document import Document, Note, Tone, Written
 from cfmkit.documents.run_document import complaints_of, data_of, document_of
 from cfmkit.runs.run import RunTask, carry_out
 
@@ -56,7 +56,7 @@ def _document(run: FinishedRun) -> Document:
     written = Written(run.command.folder, (*run.manifest.files, "manifest.json"), run.seconds)
     document = document_of(run.report, run.command, written)
     kept = tuple(
-        Note("kept", f"{name} was edited since the last run; the edited version is kept as {spare}", "", BAD_TONE, True)
+        Note("kept", f"{name} was edited since the last run; the edited version is kept as {spare}", "", Tone.BAD, True)
         for name, spare in run.kept.items()
     )
     data = data_of(run.report) | written.data | ({"kept": run.kept} if run.kept else {})

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli.options import folder_of
 from cfmkit.documents.document import Written
@@ -113,34 +113,26 @@ class StudyFolder:
             page = html_of_study.page(found, study.spec, varied, tables, command, shown, point)
             self.folder.write(html_of_study.REPORT_NAME, page)
 
-    def commit(self, found: Document, study: Study, seed: int, pieces: Sequence[Records]) -> Written:
-        """Put the files in place with a manifest that says what was run; make the journal of a finished study small."""
-        from cfmkit.runs.run import family_package
-        from cfmkit.store import stable_hash
+    def commit(
+        self, found: Document, study: Study, seed: int, pieces: Sequence[Records], data: Mapping[str, Any]
+    ) -> Document:
+        """Put the files in place, make the journal of a finished study small, and return the document with its data."""
+        from cfmkit.runs.run import provenance
         from cfmkit.studies.engine import compact
 
-        spec = study.spec
-        manifest = self.folder.commit(
-            {
-                "command": self.verb,
-                "arguments": list(self.terminal.arguments),
-                "seed": seed,
-                "spec": {
-                    "source": self.options.spec,
-                    "sha256": stable_hash(spec.model_dump(mode="json")),
-                    **family_package(spec.family),
-                },
-                "points": sum(map(len, pieces)),
-                "status": found.exit_code.name.lower(),
-                "exit_code": int(found.exit_code),
-            }
-        )
+        spec, code = study.spec, found.exit_code
+        ending = {"points": sum(map(len, pieces)), "status": code.name.lower(), "exit_code": int(code)}
+        about = provenance(self.verb, spec, self.options.spec, self.terminal.arguments) | {"seed": seed} | ending
+        files = (*self.folder.commit(about).files, "manifest.json")
         if all(piece.finished == len(piece) for piece in pieces):
             compact(self.journal, pieces)
-        files = (*manifest.files, "manifest.json")
-        return Written(
-            folder_of(self.options.out, self.options.spec, self.verb), files, time.perf_counter() - self.start
-        )
+        out = folder_of(self.options.out, self.options.spec, self.verb)
+        written = Written(out, files, time.perf_counter() - self.start)
+        record = dict(data) | {"family": spec.family, "name": spec.name} | written.data
+        record["reused"] = sum(piece.reused for piece in pieces)
+        bugs = sum(piece.bugs for piece in pieces)
+        complaints = (f"error    {bugs} points hit a bug in cfmkit; -vv shows the first",) if bugs else ()
+        return replace(found, data=record, files=written, complaints=complaints)
 
 
 @contextmanager

@@ -13,11 +13,11 @@ from cfmkit import families
 from cfmkit.cli.guide import read_terms
 from cfmkit.cli.show_materials import materials_page_parts, properties
 from cfmkit.documents.document import (
-    LABEL_TONE,
     Document,
     Field,
     Span,
     TextLine,
+    Tone,
     Verbatim,
     field,
     line,
@@ -70,7 +70,7 @@ def list_skipped_families(name: str | None) -> tuple[str, ...]:
 
 def _page(title: str, text: str, sections: Iterable[Section], data: Mapping[str, Sequence[Record]]) -> Document:
     def blocks() -> Iterator[Block]:
-        yield TextLine((Span(title, LABEL_TONE), Span(f"  {text}")))
+        yield TextLine((Span(title, Tone.LABEL), Span(f"  {text}")))
         for section in sections:
             yield from record_table(*section)
 

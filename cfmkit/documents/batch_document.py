@@ -6,17 +6,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from cfmkit.documents.document import (
-    BAD_TONE,
-    FAINT_TONE,
-    GOOD_TONE,
-    Document,
-    GridColumn,
-    Note,
-    PageTable,
-    Span,
-    Written,
-)
+from cfmkit.documents.document import Document, GridColumn, Note, PageTable, Span, Tone, Written
 from cfmkit.errors import ExitCode, visible
 from cfmkit.studies.batch_sources_and_outcomes import message, outcome
 
@@ -66,26 +56,26 @@ def _missed_notes(entries: Sequence[Entry]) -> Iterator[Note]:
     for one in entries:
         for requirement in one.missed if one.verb and not one.errors else ():
             reported = requirement["sentence"].removesuffix(": missed")
-            yield Note("missed", f"{visible(one.spec)}: {reported}", tone=BAD_TONE, whole=True)
+            yield Note("missed", f"{visible(one.spec)}: {reported}", tone=Tone.BAD, whole=True)
 
 
 def _changes(compared: BatchComparison) -> Iterator[Note]:
     """Yield what has changed since an earlier batch, those values first that changed beyond the tolerance."""
     beyond = compared.changes_beyond_tolerance
     text = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
-    yield Note("compared", text, tone=BAD_TONE if beyond else GOOD_TONE, whole=True)
+    yield Note("compared", text, tone=Tone.BAD if beyond else Tone.GOOD, whole=True)
     for one in beyond[:MAX_CHANGES]:
-        yield Note("changed", f"{visible(one.spec)}: {one.sentence}", tone=BAD_TONE, whole=True)
+        yield Note("changed", f"{visible(one.spec)}: {one.sentence}", tone=Tone.BAD, whole=True)
     if len(beyond) > MAX_CHANGES:
-        yield Note("changed", f"{len(beyond) - MAX_CHANGES} more values in changes.csv", tone=FAINT_TONE)
+        yield Note("changed", f"{len(beyond) - MAX_CHANGES} more values in changes.csv", tone=Tone.FAINT)
     if compared.gone:
-        yield Note("missing", f"not in this batch: {', '.join(map(visible, compared.gone))}", tone=BAD_TONE, whole=True)
+        yield Note("missing", f"not in this batch: {', '.join(map(visible, compared.gone))}", tone=Tone.BAD, whole=True)
 
 
 def _row(one: Entry) -> tuple[str | Span, ...]:
     word = outcome(one)
     good = word == "ok"
-    tone = GOOD_TONE if good else FAINT_TONE if one.skipped else BAD_TONE
+    tone = Tone.GOOD if good else Tone.FAINT if one.skipped else Tone.BAD
     link = quote(str(PurePosixPath(one.folder) / "report.html")) if one.written else ""
     spec = Span(visible(one.spec), link=link)
     return spec, one.verb, Span(word if good or one.skipped else word.upper(), tone), detail(one)

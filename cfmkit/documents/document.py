@@ -11,6 +11,7 @@ import re
 from collections import defaultdict
 from dataclasses import dataclass, replace
 from dataclasses import field as attribute
+from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cfmkit.errors import ExitCode, visible
@@ -22,8 +23,16 @@ if TYPE_CHECKING:
 
     Record = Mapping[str, Any]
 
-PLAIN_TONE, GOOD_TONE, BAD_TONE, LABEL_TONE, FAINT_TONE = "", "cyan", "bold yellow", "bold", "dim"
-"""Tones. Colours only repeat what a word says, and blue stands against yellow, which everybody can tell apart."""
+
+class Tone(StrEnum):
+    """Styles. Colours only repeat what a word says, and blue stands against yellow, which everybody can tell apart."""
+
+    PLAIN = ""
+    GOOD = "cyan"
+    BAD = "bold yellow"
+    LABEL = "bold"
+    FAINT = "dim"
+
 
 LABEL_COLUMNS = 11
 """Columns of the words that begin a paragraph: ``test plan`` and two blanks."""
@@ -33,7 +42,7 @@ class Span(NamedTuple):
     """A piece of text and its tone."""
 
     text: str
-    tone: str = PLAIN_TONE
+    tone: str = Tone.PLAIN
     link: str = ""  # where it leads on a page that has links
 
 
@@ -52,7 +61,7 @@ class Paragraph(NamedTuple):
 
     word: str
     text: str
-    tone: str = LABEL_TONE
+    tone: str = Tone.LABEL
 
 
 class GridColumn(NamedTuple):
@@ -89,7 +98,7 @@ class JsonText(NamedTuple):
 Block = TextLine | Paragraph | CellGrid | Verbatim | JsonText
 
 
-def line(text: str, tone: str = PLAIN_TONE) -> TextLine:
+def line(text: str, tone: str = Tone.PLAIN) -> TextLine:
     """Return a line of one tone."""
     return TextLine((Span(text, tone),))
 
@@ -101,7 +110,7 @@ def whole_line(*spans: str | Span) -> TextLine:
 
 def verdict(ok: bool | None) -> Span:
     """Return how a requirement ended: nothing where there was none."""
-    return Span("") if ok is None else Span("ok", GOOD_TONE) if ok else Span("MISSED", BAD_TONE)
+    return Span("") if ok is None else Span("ok", Tone.GOOD) if ok else Span("MISSED", Tone.BAD)
 
 
 def format_bounds(bounds: Mapping[str, Any]) -> str:
@@ -137,7 +146,7 @@ def record_table(heading: str, records: Iterable[Record], fields: Sequence[Field
         return
     yield BLANK_LINE
     if heading:
-        yield line(heading, LABEL_TONE)
+        yield line(heading, Tone.LABEL)
     yield CellGrid(tuple(GridColumn(one.head, one.wraps) for one in fields), rows, gap=2, indented=True)
 
 
@@ -173,7 +182,7 @@ class Written(NamedTuple):
 
 def next_command(*words: str) -> TextLine:
     """Return the line that says which command follows, never broken: it is copied."""
-    return whole_line(Span(f"{'next':<{LABEL_COLUMNS}}", GOOD_TONE), command_line(*words))
+    return whole_line(Span(f"{'next':<{LABEL_COLUMNS}}", Tone.GOOD), command_line(*words))
 
 
 def command_line(*words: str) -> str:
@@ -221,7 +230,7 @@ class Note(NamedTuple):
     word: str
     text: str
     remedy: str = ""  # what changes it, as an option that can be pasted
-    tone: str = LABEL_TONE
+    tone: str = Tone.LABEL
     whole: bool = False  # whether a short page has all of it, too: how a run ended
     short: str = ""  # what a short page has instead; empty: the clauses of the text that fit
     is_command: bool = False  # whether the text is a command: it is copied, and never broken

@@ -11,7 +11,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.documents.document import BAD_TONE, GOOD_TONE
+from cfmkit.documents.document import Tone
 from cfmkit.errors import visible
 
 if TYPE_CHECKING:
@@ -46,8 +46,8 @@ def page(
         texts=texts,
         metrics=metrics,
         style=part("report.css"),
-        GOOD=GOOD_TONE,
-        BAD=BAD_TONE,
+        GOOD=Tone.GOOD,
+        BAD=Tone.BAD,
         **more,
     )
     return text.encode()

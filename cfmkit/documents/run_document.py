@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.documents.document import (
-    BAD_TONE,
-    GOOD_TONE,
     MAX_WARNING_LENGTH,
     Document,
     GridColumn,
     Note,
     PageTable,
     Span,
+    Tone,
     ValueRow,
     WarningEntry,
     Written,
@@ -155,7 +154,7 @@ def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
     """Yield how the run ended where that is not as requested, what the design decided, and what the verb adds."""
     status, design = report.status, report.design
     if status.exit_code is not ExitCode.OK:
-        yield Note("partial" if status.usable else "failed", report.message, tone=BAD_TONE, whole=True)
+        yield Note("partial" if status.usable else "failed", report.message, tone=Tone.BAD, whole=True)
         cures = dict.fromkeys(cure for item in _reasons(report) for cure in item.cures)
         for cure in cures:
             text = command.with_remedy(cure) if command else command_line(*_settings(cure))
@@ -304,7 +303,7 @@ def requirements_table(outcomes: Iterable[Outcome]) -> PageTable:
         (
             words(outcome.metric),
             *value_and_bounds(outcome),
-            Span("ok", GOOD_TONE) if outcome.ok else Span("MISSED", BAD_TONE),
+            Span("ok", Tone.GOOD) if outcome.ok else Span("MISSED", Tone.BAD),
         )
         for outcome in outcomes
     )

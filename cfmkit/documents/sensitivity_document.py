@@ -6,7 +6,7 @@ from collections import defaultdict
 from functools import partial
 from typing import TYPE_CHECKING
 
-from cfmkit.documents.document import BAD_TONE, Document, GridColumn, Note, PageTable, ValueRow, Written, name_in_words
+from cfmkit.documents.document import Document, GridColumn, Note, PageTable, Tone, ValueRow, Written, name_in_words
 from cfmkit.documents.run_document import value_and_bounds, warning_of
 from cfmkit.metrics.metric_definitions import words
 from cfmkit.studies.sensitivity.monte_carlo_yield import VARIANCE_DROP, YIELD_GAIN
@@ -64,9 +64,9 @@ def _verdict(found: Findings) -> str:
 def _notes(found: Findings) -> Iterator[Note]:
     for outcome in found.setup.nominal.outcomes:
         if not outcome.ok:
-            yield Note("missed", f"by the nominal values: {outcome.sentence}", tone=BAD_TONE)
+            yield Note("missed", f"by the nominal values: {outcome.sentence}", tone=Tone.BAD)
     if found.interrupted:
-        yield Note("stopped", message(found), tone=BAD_TONE, whole=True)
+        yield Note("stopped", message(found), tone=Tone.BAD, whole=True)
     if by_interval(found):
         yield Note("yield", "its 95 % interval reaches the one that is required: not missed", whole=True)
     if found.evaluator.failed:

@@ -13,13 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.documents.document import (
-    BAD_TONE,
     BLANK_LINE,
     DOTS,
-    FAINT_TONE,
-    GOOD_TONE,
     LABEL_COLUMNS,
-    LABEL_TONE,
     MIN_CLAUSE_LENGTH,
     NUMBER_START,
     CellGrid,
@@ -29,6 +25,7 @@ from cfmkit.documents.document import (
     Paragraph,
     Span,
     TextLine,
+    Tone,
     ValueRow,
     Verbatim,
     WarningEntry,
@@ -71,7 +68,7 @@ MIN_FACTS = 4
 MORE_TEXT = "-v: all"
 """What stands at the end of a short page."""
 
-TONE_STYLES = {"good": GOOD_TONE, "warn": BAD_TONE, "bad": BAD_TONE}
+TONE_STYLES = {"good": Tone.GOOD, "warn": Tone.BAD, "bad": Tone.BAD}
 
 
 def page(document: Document, width: int, everything: bool = False) -> Iterator[Block]:
@@ -90,7 +87,7 @@ def page(document: Document, width: int, everything: bool = False) -> Iterator[B
 
 def _title(document: Document, width: int) -> Iterator[TextLine]:
     """Yield what it is, its main value and the window, and at the far end the verdict; below where there is no room."""
-    name, summary = Span(document.title, LABEL_TONE), f"   {document.summary}" if document.summary else ""
+    name, summary = Span(document.title, Tone.LABEL), f"   {document.summary}" if document.summary else ""
     end = Span(document.verdict, TONE_STYLES[document.tone])
     left = len(document.title) + len(summary)
     if left + LEAST_GAP + len(document.verdict) <= width:
@@ -114,7 +111,7 @@ def _short_page(document: Document, width: int, spare: int) -> Iterator[TextLine
     tables = [text for table in document.tables if table.most != 0 for text in _table_lines(table, width)]
     follow = _file_lines(document.files, width)
     if document.next:
-        follow.append(whole_line(_word("next", GOOD_TONE), document.next))
+        follow.append(whole_line(_word("next", Tone.GOOD), document.next))
     needed = _most_of_headline(document.headline)
     spare -= len(notes) + len(tables) + len(follow)
     warnings = _warning_lines(document.warnings, width, max(spare - needed, min(len(document.warnings), 2)))
@@ -128,7 +125,7 @@ def _most_of_headline(rows: Sequence[ValueRow]) -> int:
     return max(required, min(MIN_FACTS, -(-len(rows) // 2)))
 
 
-def _word(word: str, tone: str = LABEL_TONE) -> Span:
+def _word(word: str, tone: str = Tone.LABEL) -> Span:
     return Span(f"{' ' * INDENT_COLUMNS}{word:<{WORD_COLUMNS}}" + ("" if len(word) < WORD_COLUMNS else " "), tone)
 
 
@@ -165,11 +162,11 @@ def _warning_lines(warnings: Sequence[WarningEntry], width: int, most: int) -> l
     for at, one in enumerate(shown):
         word = f"{'warning' if len(warnings) == 1 else f'warnings {len(warnings)}'}" if not at else ""
         remedy = one.options[0] if one.options else ""
-        lines.append(_with_remedy(_word(word, BAD_TONE), f"{one.name}: ", one.short, remedy, room))
+        lines.append(_with_remedy(_word(word, Tone.BAD), f"{one.name}: ", one.short, remedy, room))
     if rest := warnings[len(shown) :]:
         names = ", ".join(dict.fromkeys(one.name for one in rest))
         text = shortened_to_clause(f"and {len(rest)} more (-v): {names}", room)
-        lines.append(whole_line(_word("" if shown else f"warnings {len(warnings)}", BAD_TONE), text))
+        lines.append(whole_line(_word("" if shown else f"warnings {len(warnings)}", Tone.BAD), text))
     return lines
 
 
@@ -278,7 +275,7 @@ def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
     if not top and sum(wide) - wide[0] + max(wide[0], len(heads[0])) > room:  # a long head takes a line of its own
         top, heads[0] = heads[0], ""
     wide = [max(columns, len(head)) for columns, head in zip(wide, heads, strict=True)]
-    lines: list[TextLine | CellGrid] = [line(f"  {top}", LABEL_TONE)] if top else []
+    lines: list[TextLine | CellGrid] = [line(f"  {top}", Tone.LABEL)] if top else []
     while sum(wide) > room:  # texts give way, words and numbers do not
         able = [at for at, column in enumerate(table.columns) if column.wraps and wide[at] > least[at]]
         if not able:  # cells take several lines
@@ -288,14 +285,14 @@ def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
         wide[widest] = max(wide[widest] - (sum(wide) - room), least[widest])
     cells = [[one if isinstance(one, Span) else Span(one) for one in row] for row in rows]
     if any(heads):
-        cells.insert(0, [Span(head, FAINT_TONE) for head in heads])
+        cells.insert(0, [Span(head, Tone.FAINT) for head in heads])
     for row in cells:
         spans = [
             Span(f"{shortened_to_clause(one.text, wide[at]):<{wide[at] + 2}}", one.tone) for at, one in enumerate(row)
         ]
         lines.append(whole_line(" " * INDENT_COLUMNS, *spans))
     if more > 0:
-        lines.append(line(f"  and {more} more (-v)", FAINT_TONE))
+        lines.append(line(f"  and {more} more (-v)", Tone.FAINT))
     return lines
 
 
@@ -315,7 +312,7 @@ def _file_lines(files: Written | None, width: int) -> list[TextLine]:
         if len(text) + GAP_COLUMNS + len(MORE_TEXT) <= room
         else ""
     )
-    return [whole_line(_word("files", GOOD_TONE), text, Span(more, FAINT_TONE))]
+    return [whole_line(_word("files", Tone.GOOD), text, Span(more, Tone.FAINT))]
 
 
 # --- everything -------------------------------------------------------------------------------------------------------
@@ -331,7 +328,7 @@ def _whole_page(document: Document) -> Iterator[Block]:
         yield BLANK_LINE
     for table in document.tables:
         if table.heading:
-            yield line(f"  {table.heading}", LABEL_TONE)
+            yield line(f"  {table.heading}", Tone.LABEL)
         yield CellGrid(table.columns, table.rows, gap=2, indented=True)
         yield BLANK_LINE
     for note in document.notes:
@@ -340,14 +337,14 @@ def _whole_page(document: Document) -> Iterator[Block]:
         else:
             yield Paragraph(note.word, note.text + (f": {note.remedy}" if note.remedy else ""), note.tone)
     for one in document.warnings:
-        yield Paragraph("warning", f"{one.name}: {one.text}" + (":" if one.commands else ""), BAD_TONE)
+        yield Paragraph("warning", f"{one.name}: {one.text}" + (":" if one.commands else ""), Tone.BAD)
         yield from (whole_line(" " * LABEL_COLUMNS + command) for command in one.commands)
     if document.files is not None:
-        yield Paragraph("files", f"{document.files.place}  {' '.join(document.files.files)}", GOOD_TONE)
+        yield Paragraph("files", f"{document.files.place}  {' '.join(document.files.files)}", Tone.GOOD)
         if document.files.seconds:
             yield Paragraph("time", f"{document.files.seconds:.2f} s")
     if document.next:
-        yield whole_line(Span(f"{'next':<{LABEL_COLUMNS}}", GOOD_TONE), document.next)
+        yield whole_line(Span(f"{'next':<{LABEL_COLUMNS}}", Tone.GOOD), document.next)
 
 
 # --- characters -------------------------------------------------------------------------------------------------------
@@ -415,7 +412,7 @@ def _table(block: CellGrid, width: int) -> RichTable:
     from rich.table import Table
 
     headed = any(column.head for column in block.columns)
-    table = Table(box=None, show_header=headed, header_style=FAINT_TONE, padding=(0, block.gap, 0, 0), pad_edge=False)
+    table = Table(box=None, show_header=headed, header_style=Tone.FAINT, padding=(0, block.gap, 0, 0), pad_edge=False)
     if block.indented:
         table.add_column("", width=0)
     rows = [[_text(cell if isinstance(cell, Span) else Span(cell)) for cell in row] for row in block.rows]

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.solid.stress_along_fillets import FilletArc
     from cfmkit.specs.spec import Spec
 
-S = TypeVar("S", bound="Spec")
+SpecT = TypeVar("SpecT", bound="Spec")
 
 
 FEM_DEFINITIONS = {
@@ -98,7 +98,7 @@ class FilletRow:
         return abs(self.stress / self.nominal)
 
 
-def remove_frame(spec: S, frame: Sequence[FloatArray], pads: Sequence[FloatArray]) -> S:
+def remove_frame(spec: SpecT, frame: Sequence[FloatArray], pads: Sequence[FloatArray]) -> SpecT:
     """Return what bends of a part: without the frame around it, which stands, and the holes in that."""
     from cfmkit.export.ground_frame import find_outside
 
@@ -108,7 +108,7 @@ def remove_frame(spec: S, frame: Sequence[FloatArray], pads: Sequence[FloatArray
     return with_values(spec, {"mechanism.part.frame.ground": None, "mechanism.part.holes": left})
 
 
-def without_repeats(travels: FloatArray, end: float) -> FloatArray:
+def drop_repeats(travels: FloatArray, end: float) -> FloatArray:
     """Return travels in increasing order, without those that are the one before but for rounding."""
     found = np.unique(travels)
     return np.delete(found, np.flatnonzero(np.diff(found) < 1e-9 * abs(end)) + 1)
@@ -207,29 +207,17 @@ are off."""
 
 
 def nominal_stresses(
-    rows: Sequence[FilletRow],
-    travel: FloatArray,
+    rows: Sequence[FilletRow],  # the fillets with the solid's stress
+    travel: FloatArray,  # (n,): where the drive of the beams is then [m or rad]
+    # from travels of one sign to the paths of the beams through them: two where beams may bend to either side
     images: Callable[[FloatArray], Iterable[Path]],
+    # from points of the drawing (m, 2) to the network that was solved; a mirrored half may give twice as many [m]
     placed: Callable[[FloatArray], FloatArray],
 ) -> FloatArray:
     """Return the nominal stress of some fillets, (n,) [Pa], tension positive.
 
-    Parameters
-    ----------
-    rows : sequence of FilletRow
-        The fillets with the solid's stress.
-    travel : (n,) array
-        Where the drive of the beams is then [m or rad].
-    images : callable
-        From travels of one sign to the paths of the beams through them: two where beams may bend to either side.
-    placed : callable
-        From points of the drawing (m, 2) to the network that was solved; a mirrored half may give twice as many [m].
-
-    Returns
-    -------
-    (n,) array
-        NaN where no beam carries the fillet, the beams have no path, or the stress is negligible. Of two paths that
-        one counts whose stresses have the solid's signs.
+    NaN where no beam carries the fillet, the beams have no path, or the stress is negligible. Of two paths that one
+    counts whose stresses have the solid's signs.
     """
     found = np.full(len(rows), np.nan)
     for sense in (1.0, -1.0):

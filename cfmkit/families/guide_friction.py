@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -35,33 +35,24 @@ class GuideFriction:
     @property
     def there(self) -> bool:
         """Whether anything rubs."""
-        numbers = self.friction, self.drag
-        return any(bool(value.any() if isinstance(value, np.ndarray) else value) for value in numbers)
+        numbers: tuple[Any, ...] = (self.friction, self.drag)
+        return any(bool(np.any(value) if np.ndim(value) else value) for value in numbers)
 
-    def force(self, free: FloatArray, across: FloatArray, off_plane: float, way: float) -> FloatArray:
-        """Return the force that moves the slider against the friction of its guide.
+    def force(
+        self,
+        free: FloatArray,  # (n,): force on the slider without its guide's friction [N]
+        # across, off_plane: load across the way in the plane of the mechanism, (n,), and out of that plane [N]
+        across: FloatArray,
+        off_plane: float,
+        way: float,  # 1 while the slider moves against the force, -1 on the way back
+    ) -> FloatArray:
+        """Return the force that moves the slider against the friction of its guide, (n,) [N].
 
         Each end carries half of what acts across the way, half of what acts out of the plane, and the couple of the
         force beside the middle line, which is itself F:
         F = free + way (drag + mu (|(across + tilt F, off)| + |(across - tilt F, off)|) / 2).
         The right side is convex in F (way = 1) or concave (-1), with a slope below 1 in size: the root is the only one,
         and Newton's steps lead to it.
-
-        Parameters
-        ----------
-        free : (n,) array
-            Force on the slider without its guide's friction [N].
-        across : (n,) array
-            Load across the way in the plane of the mechanism [N].
-        off_plane : float
-            Load out of that plane [N].
-        way : float
-            1 while the slider moves against the force, -1 on the way back.
-
-        Returns
-        -------
-        (n,) array
-            [N]; NaN where `free` or `across` is.
         """
         numbers = (free, self.drag, self.friction, self.tilt, off_plane)
         shape = np.broadcast_shapes(*(np.shape(number) for number in numbers))

@@ -101,27 +101,14 @@ def read_time(time: str | float | None, name: str = "time_budget") -> float | No
 
 @dataclass(frozen=True)
 class Run:
-    """Options of one run of a function.
+    """Options of one run of a function."""
 
-    Attributes
-    ----------
-    seed : int
-        Random seed.
-    progress : callable
-        Progress callback: takes a fraction in [0, 1], which never falls, and a short text.
-    time_budget : float, optional
-        In seconds, a text with its unit is read; None: no limit.
-    executor : Executor
-        Does independent jobs, in this process or in others.
-    notes : Notes
-        Keeps what is finished.
-    """
-
-    seed: int = 0
+    seed: int = 0  # random seed
+    # progress callback: takes a fraction in [0, 1], which never falls, and a short text
     progress: Callable[[float, str], None] = silent
-    time_budget: float | None = None
-    executor: Executor = _one_by_one
-    notes: Notes = field(default_factory=_Forgotten)
+    time_budget: float | None = None  # in seconds, a text with its unit is read; None: no limit
+    executor: Executor = _one_by_one  # does independent jobs, in this process or in others
+    notes: Notes = field(default_factory=_Forgotten)  # keeps what is finished
 
     def __post_init__(self) -> None:
         """Let no search that looks again take its progress back."""

@@ -16,6 +16,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
+ZERO_END_RATIO = 1e-6
+"""A logarithmic axis that ends at zero goes on to this fraction of its other end, and then to zero itself."""
+MAX_VALUE_RATIO = 10.0
+"""On the grid of the first variable the others are not refined where they are so many times worse than the best."""
+
+
 @dataclass(frozen=True)
 class BoxAxis:
     """A variable: its bounds, and whether its size matters rather than its difference."""
@@ -36,10 +42,6 @@ class BoxAxis:
             math.copysign(max(abs(end), ZERO_END_RATIO * far), self.low + self.high) for end in (self.low, self.high)
         )
         return float(first * (last / first) ** share)
-
-
-ZERO_END_RATIO = 1e-6
-"""A logarithmic axis that ends at zero goes on to this fraction of its other end, and then to zero itself."""
 
 
 @dataclass(frozen=True)
@@ -67,49 +69,36 @@ def lowest(
     >>> [round(value, 5) for value in found.place]
     [0.3, 3.33333]
     """
-    return _lowest(_BoxSearch(function, axes, grid, fine), ())
+    lowest_value, is_rough = math.inf, True  # until the grid of the first variable is known
 
+    def search(outer: tuple[float, ...]) -> Lowest:
+        """Return the smallest value for some outer variables."""
+        nonlocal lowest_value, is_rough
+        if len(outer) == len(axes):
+            value = function(outer)
+            lowest_value = min(lowest_value, value)
+            return Lowest(outer, value)
+        axis, seen = axes[len(outer)], dict[float, Lowest]()
 
-MAX_VALUE_RATIO = 10.0
-"""On the grid of the first variable the others are not refined where they are so many times worse than the best."""
+        def search_share(share: float) -> float:
+            seen[share] = search((*outer, axis.value(share)))
+            return seen[share].value
 
+        shares = np.linspace(0.0, 1.0, grid).tolist()
+        heights = [search_share(share) for share in shares]
+        profile = tuple((seen[share].place, seen[share].value) for share in shares)
+        best = int(np.argmin(heights))
+        is_rough &= bool(outer)
+        if math.isfinite(heights[best]) and (not is_rough or heights[best] <= MAX_VALUE_RATIO * lowest_value):
+            from scipy.optimize import minimize_scalar
 
-@dataclass
-class _BoxSearch:
-    """A search under way: what is minimised, with how much effort, and the smallest value so far."""
+            minimize_scalar(
+                lambda share: min(search_share(float(share)), 1e300),
+                bounds=(shares[max(best - 1, 0)], shares[min(best + 1, len(shares) - 1)]),
+                method="bounded",
+                options={"xatol": 1e-7, "maxiter": fine},
+            )
+        smallest = min(seen.values(), key=lambda item: item.value)
+        return Lowest(smallest.place, smallest.value, profile)
 
-    function: Callable[[tuple[float, ...]], float]
-    axes: tuple[BoxAxis, ...]
-    grid: int
-    fine: int
-    best: float = math.inf
-    rough: bool = True  # until the grid of the first variable is known
-
-
-def _lowest(search: _BoxSearch, outer: tuple[float, ...]) -> Lowest:
-    if len(outer) == len(search.axes):
-        value = search.function(outer)
-        search.best = min(search.best, value)
-        return Lowest(outer, value)
-    axis, seen = search.axes[len(outer)], dict[float, Lowest]()
-
-    def search_share(share: float) -> float:
-        seen[share] = _lowest(search, (*outer, axis.value(share)))
-        return seen[share].value
-
-    shares = np.linspace(0.0, 1.0, search.grid).tolist()
-    heights = [search_share(share) for share in shares]
-    grid = [seen[share] for share in shares]
-    best = int(np.argmin(heights))
-    search.rough &= bool(outer)
-    if math.isfinite(heights[best]) and (not search.rough or heights[best] <= MAX_VALUE_RATIO * search.best):
-        from scipy.optimize import minimize_scalar
-
-        minimize_scalar(
-            lambda share: min(search_share(float(share)), 1e300),
-            bounds=(shares[max(best - 1, 0)], shares[min(best + 1, len(shares) - 1)]),
-            method="bounded",
-            options={"xatol": 1e-7, "maxiter": search.fine},
-        )
-    found = min(seen.values(), key=lambda item: item.value)
-    return Lowest(found.place, found.value, tuple((item.place, item.value) for item in grid))
+    return search(())

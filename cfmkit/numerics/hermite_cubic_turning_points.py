@@ -18,8 +18,6 @@ from cfmkit.arrays import ShortRepr
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from cfmkit.arrays import FloatArray
 
 
@@ -58,7 +56,11 @@ def monotone(
     product = 3.0 * a * left
     twice = (product > 0.0) & (b * b > product) & ((a > 0.0) != (b > 0.0)) & (np.abs(b) < 3.0 * np.abs(a))
     row, cell = np.nonzero(((left > 0.0) != (right > 0.0)) | twice)
-    share, inside = _turns(left[row, cell], right[row, cell], rise[row, cell])
+    # with s the share of a cell, the cubic is s (left + s (b + s a)); its derivative is 3 a s^2 + 2 b s + left
+    a, b, left = a[row, cell], b[row, cell], left[row, cell]
+    big = -(b + np.copysign(np.sqrt(b * b - 3.0 * a * left), b))
+    share = np.sort(np.stack([big / (3.0 * a), left / big]), axis=0)
+    inside = (share > 0.0) & (share < 1.0)
     order = np.argsort(np.stack([row, row])[inside], kind="stable")
     turns = (place[row, cell] + share * step[row, cell])[inside][order]
     row = np.stack([row, row])[inside][order]
@@ -71,14 +73,3 @@ def monotone(
     both, values = np.hstack([place, more]), np.hstack([value, known])
     order = np.argsort(both, axis=1, kind="stable")
     return Monotone(np.take_along_axis(both, order, 1), np.take_along_axis(values, order, 1))
-
-
-def _turns(left: FloatArray, right: FloatArray, rise: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return where Hermite cubics turn as shares of their cells, increasing, (2, ...), and which lie inside.
-
-    With s the share, a cubic is s (left + s (b + s a)); its derivative is 3 a s^2 + 2 b s + left.
-    """
-    a, b = left + right - 2.0 * rise, 3.0 * rise - 2.0 * left - right
-    big = -(b + np.copysign(np.sqrt(b * b - 3.0 * a * left), b))
-    share = np.sort(np.stack([big / (3.0 * a), left / big]), axis=0)
-    return share, (share > 0.0) & (share < 1.0)

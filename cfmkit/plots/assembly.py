@@ -69,7 +69,9 @@ def assembly_figure(
         subject = "assembly"  # no more stands beside a name of usual length
         scale = (width - 2.0 * EDGE_MARGIN) / (high[0] - low[0])
         room = (width, min(scale * (high[1] - low[1]) + 2.0 * EDGE_MARGIN, MAX_HEIGHT_SHARE * width))
-        list_box = (0.0, BOTTOM_ROOM, width, _list_height(parts, width))
+        n_lines = sum(len(_list_lines(part, width)) for part in parts)
+        list_height = LINE_HEIGHT * n_lines + ITEM_GAP * len(parts) + LIST_TOP + KEY_ROOM
+        list_box = (0.0, BOTTOM_ROOM, width, list_height)
         figure = new_figure(width, room[1] + list_box[3] + top + BOTTOM_ROOM)
     write_heading(figure, Heading(title, subject))
     ax = _blank_axes(figure, (0.0, size_mm(figure)[1] - top - room[1], *room))
@@ -179,12 +181,6 @@ def _list_lines(part: ListedPart, width: float) -> list[str]:
     standard = f" ({part.standard})" if part.standard else ""
     text = f"{part.count} x {name}{where}" + (f": {part.size}" if part.size else "") + standard
     return textwrap.wrap(text, round(LETTERS_PER_MM * (width - 8.0)))
-
-
-def _list_height(parts: Sequence[ListedPart], width: float) -> float:
-    """Return the height of the parts list [mm]."""
-    n_lines = sum(len(_list_lines(part, width)) for part in parts)
-    return LINE_HEIGHT * n_lines + ITEM_GAP * len(parts) + LIST_TOP + KEY_ROOM
 
 
 def _write_list(ax: Axes, parts: Sequence[ListedPart], size: tuple[float, float]) -> None:

@@ -16,7 +16,7 @@ from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, write_h
 from cfmkit.plots.bands_from_requirements import bands_of
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.style import TEXT_GREY, apply_style, axes_mm, is_plain, new_figure
-from cfmkit.specs.units import to_border
+from cfmkit.specs.units import from_border, to_border
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,16 +57,9 @@ def curve_figure(
     upper.set_xlabel("")
     upper.tick_params(labelbottom=False)
     _frame_of_detail(upper, curve, detail)
-    plot_curve(result, lower, replace(look, window=(_motion_range(upper, curve), detail[1])))
+    low, high = (float(from_border(end, curve.motion_dimension)) for end in upper.get_xlim())
+    plot_curve(result, lower, replace(look, window=((low, high), detail[1])))
     return figure
-
-
-def _motion_range(upper: Axes, curve: Curve) -> Interval:
-    """Return the motion that the upper panel shows, in SI."""
-    from cfmkit.specs.units import from_border
-
-    low, high = upper.get_xlim()
-    return float(from_border(low, curve.motion_dimension)), float(from_border(high, curve.motion_dimension))
 
 
 def choose_enlarged_range(result: Result, look: CurveLook) -> tuple[Interval, Interval] | None:

@@ -40,6 +40,7 @@ than a line is thick."""
 NAME_ROOM = 0.2
 """Where several curves are named at their ends, the axes are longer by this fraction: room for a value with its unit,
 chosen by eye on the shipped studies."""
+MOST_NAMED = 7  # curves that have their names beside them
 USUAL_AXES_WIDTH = 120.0
 """Width of axes for which `NAME_ROOM` was chosen [mm]; in narrower ones names, whose letters keep their size, take a
 larger share."""
@@ -97,7 +98,9 @@ def plot_curve(
         ax.plot(*line.points.T, color=line.color, linewidth=1.0, dashes=(3, 1.5), zorder=2.8, gid="earlier")
     _limit(ax, [*lines, *earlier, *([] if wanted is None else [wanted])], bands, look, kind)
     if len(curves) > 1 and look.names and look.window is None:
-        ax.set_xlim(right=ax.get_xlim()[1] + _name_room(ax) * float(np.ptp(ax.get_xlim())))
+        narrow = USUAL_AXES_WIDTH / (ax.get_position().width * size_mm(ax.figure)[0])
+        room = NAME_ROOM * min(max(narrow, 1.0), 2.0)
+        ax.set_xlim(right=ax.get_xlim()[1] + room * float(np.ptp(ax.get_xlim())))
     region_names = [shade(ax, region, _motion(kind)) for region in look.regions]
     level_names = [level(ax, float(to_border(item.value, kind)), item.text) for item in look.levels]
     band_names = [_draw_band(ax, band, curves[0]) for band in bands]
@@ -126,12 +129,6 @@ def _draw_events(ax: Axes, curve: Curve) -> None:
         ax.plot(*at, linestyle="", marker="|", markersize=8.0, color=TEXT_GREY, zorder=3.5, gid="events")
 
 
-def _name_room(ax: Axes) -> float:
-    """Return the share of the axes by which they are longer for the names at the ends of curves."""
-    width = ax.get_position().width * size_mm(ax.figure)[0]
-    return NAME_ROOM * min(max(USUAL_AXES_WIDTH / width, 1.0), 2.0)
-
-
 def _curves(source: Result | Curve | Sequence[Curve]) -> tuple[Curve, ...]:
     if isinstance(source, Result):
         return source.curves
@@ -147,7 +144,8 @@ def _lines(curves: tuple[Curve, ...]) -> list[_Line]:
             _line(curves[0], name, LINE_COLOURS[i % len(LINE_COLOURS)], name if several else "")
             for i, name in enumerate(names)
         ]
-    colors, named = _colors(len(curves)), _choose_named(len(curves))
+    count = len(curves)  # of many, the first, the last and some between are named
+    colors, named = _colors(count), np.linspace(0, count - 1, min(count, MOST_NAMED)).astype(int)
     found = []
     for index, curve in enumerate(curves):
         first, *others = curve.branches
@@ -170,11 +168,6 @@ def _colors(count: int) -> list[str]:
     from matplotlib.colors import to_hex
 
     return [to_hex(colormaps["viridis"](share)) for share in np.linspace(0.0, 0.75, count)]
-
-
-def _choose_named(count: int, most: int = 7) -> set[int]:
-    """Return which of many curves are named: the first, the last and some between."""
-    return set(np.unique(np.linspace(0, count - 1, min(count, most)).astype(int)).tolist())
 
 
 def _curve_name(curve: Curve, index: int) -> str:

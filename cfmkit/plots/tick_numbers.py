@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-MAX_NUMBER_WIDTH = 6.5  # width of a number at a tick, in digits: what the margins of the figures have room for
+MAX_NUMBER_WIDTH = 6.5  # in digits, a point half of one, of a number at a tick: margins of figures have room for it
 MIN_RANGE_SHARE = 2e-5
 """Share of the size of its values that an axis shows at least: below it their ticks would need more than seven
 digits."""
@@ -30,13 +30,8 @@ class WholeNumbers(ScalarFormatter):
         """Return the texts of all ticks of an axis."""
         texts = super().format_ticks(values)
         short = [self.fix_minus(brief(value)) for value in values]
-        too_long = max(map(_width, texts), default=0.0) > MAX_NUMBER_WIDTH
+        too_long = max((len(text) - 0.5 * text.count(".") for text in texts), default=0.0) > MAX_NUMBER_WIDTH
         return short if too_long and len(set(short)) >= len(set(texts)) else texts
-
-
-def _width(text: str) -> float:
-    """Return how wide a number is, in digits: a point is half of one."""
-    return len(text) - 0.5 * text.count(".")
 
 
 def brief(value: float) -> str:

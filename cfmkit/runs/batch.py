@@ -15,7 +15,6 @@ from cfmkit.documents.run_outcome import worst
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.runs import batch_output_files
-from cfmkit.runs.batch_reference import BatchReference
 from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, read, run_analysis, run_design
 from cfmkit.runs.run import carry_out as carry_out_run
 from cfmkit.studies.batch_sources_and_outcomes import SKIPPED_MESSAGE, Entry
@@ -373,6 +372,7 @@ def batch(
     """
     from cfmkit.documents.junit import junit as junit_of
     from cfmkit.documents.junit import prepare_file
+    from cfmkit.runs.batch_reference import BatchReference
     from cfmkit.store import RunFolder
     from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 
@@ -396,17 +396,14 @@ def batch(
         code = exit_code(entries, interrupted, None if accept else compared)
         about = batch_output_files.describe_batch(work.arguments, seed, named, code)
         written = batch_output_files.write(folder, entries, about, page, compared)
-    accepted = ""
-    if reference is not None and reference.accept and not interrupted:
-        reference.replace_results(place, entries, work.arguments)
-        accepted = reference.folder
+    accepted = reference is not None and not interrupted and reference.accept_results(place, entries, work.arguments)
     if write_junit is not None:
         write_junit(junit_of(entries))
     if write_summary is not None:
         from cfmkit.documents.markdown import summary as in_markdown
 
         write_summary(in_markdown(entries, compared))
-    return BatchResult(entries, code, place, written, compared, accepted)
+    return BatchResult(entries, code, place, written, compared, reference.folder if reference and accepted else "")
 
 
 def _check_options(out: str, verb: str | None, changes: Iterable[str]) -> None:

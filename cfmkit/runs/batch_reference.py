@@ -57,14 +57,18 @@ class BatchReference:
         changed = changes(self.earlier, entries, out, self.tolerance)
         return BatchComparison(self.folder, self.tolerance, changed, list_gone(self.earlier, entries))
 
-    def replace_results(self, out: str, entries: Sequence[Entry], arguments: Sequence[str]) -> None:
-        """Replace its results by those of a batch: the files that a comparison reads, and nothing else.
+    def accept_results(self, out: str, entries: Sequence[Entry], arguments: Sequence[str]) -> bool:
+        """Replace its results by those of a batch if it is to get them: the files that a comparison reads.
 
-        Raises OutputError if the folder cannot be written, or has a file of those names that cfmkit did not write.
+        Return True if it has them now. Raises OutputError if the folder cannot be written, or has a file of those names
+        that cfmkit did not write.
         """
+        if not self.accept:
+            return False
         named = ("metrics.json", *(f"{entry.folder}/metrics.json" for entry in entries if entry.written))
         with RunFolder(self.folder) as target:
             target.check(*named)
             for name in named:
                 target.write(name, Path(out, name).read_bytes())
             target.commit({"command": "batch", "arguments": list(arguments), "status": "complete", "exit_code": 0})
+        return True

@@ -5,7 +5,6 @@ In the tree they are the folder `configs`; a wheel has the same files as the pac
 
 from __future__ import annotations
 
-import difflib
 import re
 from dataclasses import dataclass
 from itertools import takewhile
@@ -112,9 +111,10 @@ def example(name: str) -> Example:
     wanted = name.removesuffix(".yaml")
     if wanted in known:
         return known[wanted]
-    near = difflib.get_close_matches(wanted, known, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else "; `cfmkit examples` lists them"
-    raise UsageError(f"there is no example {visible(name)!r}{hint}")
+    from cfmkit.specs.yamlio import did_you_mean
+
+    hint = did_you_mean(wanted, list(known)) or "`cfmkit examples` lists them"
+    raise UsageError(f"there is no example {visible(name)!r}; {hint}")
 
 
 def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> tuple[Path, ...]:

@@ -280,6 +280,9 @@ def _page_data(result: Result) -> dict[str, Any]:
     from cfmkit.plots.bands_from_requirements import bands_of
     from cfmkit.specs.units import border_unit, to_border
 
+    def border(value: float | None, dimension: str) -> float | None:
+        return None if value is None else float(to_border(value, dimension))
+
     report = report_on(result)
     document = document_of(report)
     found: dict[str, Any] = {
@@ -302,16 +305,11 @@ def _page_data(result: Result) -> dict[str, Any]:
             "x": f"{curve.motion_name} [{border_unit(motion)}]",
             "y": f"{curve.kind} [{border_unit(curve.kind)}]",
             "branches": dict(_branches(curve)),
-            "window": None if window is None else [float(to_border(end, motion)) for end in (window.lo, window.hi)],
+            "window": None if window is None else [border(end, motion) for end in (window.lo, window.hi)],
             "bands": [
-                {
-                    "low": None if band.low is None else float(to_border(band.low, curve.kind)),
-                    "high": None if band.high is None else float(to_border(band.high, curve.kind)),
-                    "from": float(to_border(band.start, motion)),
-                    "to": float(to_border(band.stop, motion)),
-                    "text": band.text,
-                    "ok": band.met,
-                }
+                {name: border(end, curve.kind) for name, end in (("low", band.low), ("high", band.high))}
+                | {"from": border(band.start, motion), "to": border(band.stop, motion)}
+                | {"text": band.text, "ok": band.met}
                 for band in bands_of(result)
             ],
         }

@@ -108,7 +108,7 @@ def choose_rows(name: str | None) -> tuple[PrintedRow, ...]:
 
     Raises UsageError if there is no such paper or family.
     """
-    from difflib import get_close_matches
+    from cfmkit.specs.yamlio import did_you_mean
 
     every = rows()
     if name is None:
@@ -116,8 +116,7 @@ def choose_rows(name: str | None) -> tuple[PrintedRow, ...]:
     if wanted := tuple(row for row in every if name.lower() in (row.paper, row.family)):
         return wanted
     known = dict.fromkeys([*(row.paper for row in every), *(row.family for row in every)])
-    near = get_close_matches(name.lower(), known, n=1)
-    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+    hint = did_you_mean(name, list(known)) or f"there are {', '.join(known)}"
     raise UsageError(f"there is no paper {visible(name)!r}; {hint}")
 
 

@@ -204,19 +204,12 @@ def _text_at(content: Any, path: str) -> str:
     return f"{float(number):.6g}{space}{unit}"
 
 
-def family_package(name: str) -> dict[str, Any]:
-    """Return what a manifest says about a family of another package; nothing about those of this one."""
-    from cfmkit.families import origin
-
-    found = origin(name)
-    return {"family": found} if found else {}
-
-
 def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) -> dict[str, Any]:
     """Return what every manifest says about its run: the command line and the content of the spec."""
-    from cfmkit.families import family
+    from cfmkit.families import family, origin
 
-    content = {"source": source, "sha256": stable_hash(spec.model_dump(mode="json")), **family_package(spec.family)}
+    content: dict[str, Any] = {"source": source, "sha256": stable_hash(spec.model_dump(mode="json"))}
+    content |= {"family": package} if (package := origin(spec.family)) else {}  # of another package
     cited = {"bibtex": text} if (text := family(spec.family).bibtex) else {}
     march = sys.modules.get("cfmkit.elastica.mechanics.march")  # of beams that bend only
     engine = {} if march is None else {"beam_engine": march.engine()}

@@ -220,11 +220,7 @@ class Elements:
 def _strain_change(f: FloatArray, df: FloatArray) -> FloatArray:
     """Return the change of Green's strain (3, k) of gradients (2, 2, k) that change so."""
     return np.stack(
-        [
-            (f[:, 0] * df[:, 0]).sum(0),
-            (f[:, 1] * df[:, 1]).sum(0),
-            (f[:, 0] * df[:, 1] + f[:, 1] * df[:, 0]).sum(0),
-        ]
+        [(f[:, 0] * df[:, 0]).sum(0), (f[:, 1] * df[:, 1]).sum(0), (f[:, 0] * df[:, 1] + f[:, 1] * df[:, 0]).sum(0)]
     )
 
 

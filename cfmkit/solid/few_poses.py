@@ -161,13 +161,8 @@ class Correction:
 
 
 def _difference(pose: Balance, other: Balance) -> Balance:
-    return replace(
-        pose,
-        unknowns=pose.unknowns - other.unknowns,
-        effort=pose.effort - other.effort,
-        stiffness=pose.stiffness - other.stiffness,
-        slope=pose.slope - other.slope,
-    )
+    fields = ("unknowns", "effort", "stiffness", "slope")
+    return replace(pose, **{name: getattr(pose, name) - getattr(other, name) for name in fields})
 
 
 def solve_some(guide: PoseGuide, travels: Sequence[float]) -> tuple[Balance, ...]:

@@ -29,6 +29,7 @@ from cfmkit.specs.units import (
     ends_increase,
 )
 from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
+from cfmkit.specs.yamlio.path_notation import with_value
 
 
 class Requirement(Model):
@@ -312,7 +313,7 @@ class Spec(Model):
         """
         data = {**keys_of(self), "family": self.family}
         for path, value in changes.items():
-            data = _set_value(data, path.split("."), value, path)
+            data = with_value(data, path.split("."), frozen(value))
         try:
             return type(self).model_validate(data, context={AS_MADE: as_made})
         except ValidationError as error:
@@ -320,7 +321,7 @@ class Spec(Model):
 
             whole = self.model_dump(exclude_unset=True) | {"family": self.family}
             for path, value in changes.items():
-                whole = _set_value(whole, path.split("."), value, path)
+                whole = with_value(whole, path.split("."), frozen(value))
             raise spec_error(error, type(self), whole) from None
 
     def leaves(self) -> Iterator[tuple[str, float | int]]:
@@ -361,24 +362,6 @@ def _child(value: Any, part: str, path: str) -> Any:
     if isinstance(value, BaseModel) and part in type(value).model_fields:
         return getattr(value, part)
     raise KeyError(f"there is no {part!r} on the way to {path!r}")
-
-
-def _set_value(data: Any, parts: list[str], value: Any, path: str) -> Any:
-    """Return `data` with `value` at `parts`; blocks on the way are made where they are missing."""
-    head, rest = parts[0], parts[1:]
-    if isinstance(data, tuple | list):
-        if not head.isdigit() or int(head) >= len(data):
-            raise KeyError(f"{head!r} is not an index from 0 to {len(data) - 1} on the way to {path!r}")
-        items = list(data)
-        items[int(head)] = _set_value(items[int(head)], rest, value, path) if rest else frozen(value)
-        return tuple(items)
-    if isinstance(data, Model):
-        data = keys_of(data)
-    if data is not None and not isinstance(data, Mapping):
-        raise KeyError(f"{head!r} of {path!r} is below a value; only blocks and lists have something below them")
-    block = dict(data or {})
-    block[head] = _set_value(block.get(head), rest, value, path) if rest else frozen(value)
-    return block
 
 
 def frozen(value: Any) -> Any:

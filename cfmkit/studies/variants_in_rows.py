@@ -261,13 +261,18 @@ def _parts(
     parts: list[tuple[NDArray[np.intp], ResultRows, NDArray[np.bool_]]] = []
     if solve is None:
         return members, parts
+
+    def read(group: tuple[NDArray[np.intp], SolvedRows[Any]]) -> None:
+        """Read the columns of a group, which ends before the next one begins."""
+        part = SolvedVariants(study, variants, *group)
+        if part.known:
+            usable = part.usable
+            parts.append((part.members, part.rows(), usable))
+            members.update(part.members[usable].tolist())
+
     try:
-        for indices, solved in solve(variants):
-            part = SolvedVariants(study, variants, indices, solved)
-            if part.known:
-                usable = part.usable
-                parts.append((indices, part.rows(), usable))
-                members |= set(indices[usable].tolist())
+        for _ in map(read, solve(variants)):
+            pass
     except CfmError:  # of a window without a width, say: each point says so by itself
         return set(), []
     return members, parts

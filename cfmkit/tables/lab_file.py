@@ -49,11 +49,7 @@ HEADER_LINES = 5  # so many lines above the numbers are searched for their names
 UNIT_LINES = 40  # so many lines above the numbers are searched for a line of units that says so: LabVIEW's are far up
 FEWEST_ROWS = 8  # a shorter run of lines with numbers is a part of some preamble where there is a longer one
 _N_SAMPLE_LINES = 40
-_BYTE_ORDER_MARKS = (
-    (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
-)
+_BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _DIGITS_PATTERN = (
     r"([-+]? ?(?:[0-9]+(?:{0}[0-9]+)?{1}|{0}[0-9]+)(?:[eE][-+]?[0-9]+)?)(?:\s*([^\s\d.,;:+-]\S*(?: \S+)?))?"
 )
@@ -120,10 +116,6 @@ class RowPattern:
         cells = self.row(line)
         full = len(self.dialect.cells(line)) == self.width and self.numbers_in(line) == len(self.numeric)
         return full and not any(cells[column] for column in self.blank)
-
-    def labels_itself(self, line: str) -> bool:
-        """Return whether a word stands where the first number is to be, as in ``Rate; 20`` above a table."""
-        return self.row(line)[self.numeric[0]][:1].isalpha()
 
 
 @dataclass(frozen=True, eq=False)
@@ -323,7 +315,8 @@ def _runs(lines: list[str], filled: list[int], shape: RowPattern) -> list[list[i
         count = shape.numbers_in(lines[index])
         if count and runs and runs[-1][-1] == before and (before == index - 1 or count == len(shape.numeric)):
             runs[-1].append(index)
-        elif count and not (count < 2 and shape.labels_itself(lines[index])):
+        # a word where the first number is to be labels the line, as in ``Rate; 20`` above a table
+        elif count and not (count < 2 and shape.row(lines[index])[shape.numeric[0]][:1].isalpha()):
             runs.append([index])
         before = index
     return runs
@@ -376,9 +369,11 @@ def _header(
         if len(cells) > shape.width and not any(split_header(cell)[1] for cell in cells[shape.width :])
     ]
     if not fitting:
-        if near and shape.dialect.separator == "," and _has_half_header(near[0][1], shape.width):
+        titles = near[0][1] if near and shape.dialect.separator == "," else []
+        # half the cells of the numbers below it, and not just a title
+        if shape.width == 2 * len(titles) and (len(titles) > 1 or split_header(titles[0])[1]):
             raise DataError(
-                f"{name}: line {first_line} has {shape.width} cells but the header {len(near[0][1])}: comma seems to "
+                f"{name}: line {first_line} has {shape.width} cells but the header {len(titles)}: comma seems to "
                 "be both separator and decimal sign; export with another separator"
             )
         return [""] * shape.width, [""] * shape.width, None
@@ -389,11 +384,6 @@ def _header(
         units = [cells for index, cells in rows if index != header and len(cells) == shape.width and is_unit_row(cells)]
         unit_row = ["", *units[0][1:]] if units else unit_row
     return names, unit_row, header
-
-
-def _has_half_header(header: Sequence[str], width: int) -> bool:
-    """Return whether a header has half the cells of the numbers below it, and is not just a title."""
-    return width == 2 * len(header) and (len(header) > 1 or bool(split_header(header[0])[1]))
 
 
 def _header_cells(line: str, shape: RowPattern) -> list[str]:

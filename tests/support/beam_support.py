@@ -70,6 +70,11 @@ def value(result, name):
     return cfmkit.evaluate(result, [name])[name].value
 
 
+def warned(result):
+    """Return the messages of the warnings of a result, or of a design, by name."""
+    return {item.name: item.message for item in result.warnings}
+
+
 def at(result, displacements, column=None):
     """Return force or another column at samples of the nominal curve [SI]."""
     curve = result.curve

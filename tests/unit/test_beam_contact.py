@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from beam_support import CANTILEVER, CONFIGS, config, solved
+from beam_support import CANTILEVER, CONFIGS, config, solved, warned
 
 import cfmkit
 from cfmkit.errors import InputError, SpecError
@@ -82,9 +82,9 @@ def test_findings_say_where_contacts_begin_and_what_passes_through():
     result = cfmkit.analyze(
         with_floor("work: {kind: disc, centre: [320 mm, -60 mm], radius: 20 mm, nodes: {tip: 1 mm}}")
     )
-    said = {finding.name: finding.message for finding in result.warnings}
+    said = warned(result)
     assert said["side_in_obstacle"].startswith("the side of beam 'beam' passes through 'work' from 40 mm on")
-    said = {finding.name: finding.message for finding in cfmkit.analyze(with_floor()).warnings}
+    said = warned(cfmkit.analyze(with_floor()))
     assert said["contact_begins"] == "contact begins at 38 mm between 'tip' and 'work'"
 
 
@@ -296,7 +296,7 @@ def test_the_side_of_a_leaf_has_columns_of_its_force_and_place_and_a_sentence():
     assert (np.diff(first[row + 1 :]) > 0).all()  # it slides outwards
     assert cfmkit.evaluate(result)["contact_force[pin]"].value > 0
     assert result.values["contact_force_max"].value == pytest.approx(force.max(), rel=1e-9)
-    said = {warning.name: warning.message for warning in result.warnings}
+    said = warned(result)
     assert "contact begins at" in said["contact_begins"]
     assert "'leaf' and 'pin'" in said["contact_begins"]
     assert "side_in_obstacle" not in said
@@ -309,7 +309,7 @@ def test_a_leaf_that_is_clamped_on_a_drum_wraps_around_it_and_its_stress_stays()
     assert 0.05 < last[-1] < 0.9
     bent = 0.5 * 0.5e-3 / 150.25e-3 * result.spec.mechanism.of_beams("material")["leaf"].youngs_modulus
     assert result.curve.extra["max_stress"].values[-1] == pytest.approx(bent, rel=1e-6)
-    assert "lies along 'drum'" in {one.name: one.message for one in result.warnings}["contact_begins"]
+    assert "lies along 'drum'" in warned(result)["contact_begins"]
 
 
 def test_a_leaf_that_lies_in_an_obstacle_before_any_load_is_refused_with_depth_and_place():
@@ -319,7 +319,7 @@ def test_a_leaf_that_lies_in_an_obstacle_before_any_load_is_refused_with_depth_a
 
 def test_pads_alone_leave_the_side_of_a_leaf_out_and_say_so():
     result = cfmkit.analyze(over("pin: {kind: disc, centre: [50 mm, -10 mm], radius: 4.75 mm, nodes: {tip: 1 mm}}"))
-    said = {warning.name: warning.message for warning in result.warnings}
+    said = warned(result)
     assert "list it in 'beams'" in said["side_in_obstacle"]
     assert "pin_leaf_force" not in result.curve.extra
 
@@ -327,7 +327,7 @@ def test_pads_alone_leave_the_side_of_a_leaf_out_and_say_so():
 def test_a_side_that_touches_one_obstacle_is_seen_to_pass_through_another():
     more = "pin: {kind: disc, centre: [50 mm, -10 mm], radius: 4.75 mm, beams: [leaf]}\n"
     more += "    bore: {kind: hole, centre: [99 mm, 0 mm], radius: 30 mm, nodes: {tip: 1 mm}}"
-    said = {warning.name: warning.message for warning in cfmkit.analyze(over(more)).warnings}
+    said = warned(cfmkit.analyze(over(more)))
     assert "passes through 'bore' from 0 mm on, at 0% of its length" in said["side_in_obstacle"]
     assert "'leaf' and 'pin'" in said["contact_begins"]
 

@@ -15,8 +15,10 @@ from cfmkit.export import files
 from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.contours import Drawing
 from cfmkit.export.union import OutlinePiece, merge_pieces
+from cfmkit.families import family
 from cfmkit.families.beam import strips_and_gaps as strip_module
 from cfmkit.families.beam.network_from_spec import assemble, is_on_axis
+from cfmkit.families.beam.part import strips_of
 from cfmkit.families.beam.strips_and_gaps import mirror_points, smallest_gap
 from cfmkit.numerics.arc_chain import points_on
 
@@ -254,3 +256,26 @@ def test_a_part_that_cannot_be_drawn_within_its_tolerance_is_refused(tmp_path, c
     large = [source, "--set", "mechanism.nodes.n3.at.1=1.877e10 mm", "-q", "-o", str(tmp_path / "out")]
     assert main(["export", *large]) == 3
     assert "coarser --tolerance" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_a_line_without_its_end_keeps_all_other_points(end):
+    line = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [4.0, 2.0]])
+    kept = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [3.5, 2.0]] if end else [[0.5, 0.0], *line[1:].tolist()]
+    assert strip_module._away(line, end, 0.5).tolist() == kept
+    assert len(strip_module._away(line, end, 6.0)) == 0
+
+
+def test_a_strip_is_as_curved_as_its_beam():
+    """An arc of 60 deg over 400 mm: its radius is 400 mm."""
+    text = CANTILEVER.replace("end: tip}", "end: tip, shape: {kind: arc, sweep: 60 deg}}")
+    (strip,) = strips_of(assemble(cfmkit.loads(text)))["beam"]
+    np.testing.assert_allclose(np.abs(strip.curvature), 2.5, rtol=1e-9)
+    np.testing.assert_allclose(np.diff(strip.angle).sum(), np.sign(strip.curvature[0]) * np.pi / 3, rtol=1e-9)
+
+
+def test_what_is_driven_moves_as_the_drive_does():
+    result = cfmkit.analyze(config("beam_end_effector", "analysis.points=11"))
+    pads = {body.role: body.core.mean(axis=1) for body in family("beam").part(result).bodies if body.name == "pad"}
+    assert pads.keys() == {"held", "driven"}
+    assert np.hypot(*(pads["driven"][-1] - pads["driven"][0])) == pytest.approx(np.ptp(result.curve.motion), rel=1e-9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from beam_support import warned
 
 import cfmkit
 from cfmkit.errors import InputError, SpecError
@@ -76,14 +77,11 @@ def test_the_order_of_node_and_beam_is_free_and_a_free_end_has_the_radius_of_hal
 
 
 def test_beams_in_a_stated_contact_do_not_count_as_touching(result):
-    said = {warning.name: warning.message for warning in result.warnings}
+    said = warned(result)
     assert said["contact_begins"] == "contact begins at 8.75 mm between 'tip' and 'lower'"
     assert "beams_touch" not in said
     plain = cfmkit.analyze(cfmkit.loads(TWO_LEAVES.replace(f"  contacts:\n    - {PAIR}\n", "")))
-    assert (
-        "state it in 'mechanism.contacts'"
-        in {warning.name: warning.message for warning in plain.warnings}["beams_touch"]
-    )
+    assert "state it in 'mechanism.contacts'" in warned(plain)["beams_touch"]
 
 
 def test_beams_that_pass_through_each_other_beside_the_pad_are_reported():
@@ -182,7 +180,7 @@ def test_two_beams_that_begin_to_nest_give_a_partial_result_with_the_reason():
     result = cfmkit.analyze(cfmkit.loads(BULGE))
     force, upper, lower = (result.curve.extra[f"upper_lower_{end}"].values for end in ("force", "at_upper", "at_lower"))
     assert result.status is Status.PARTIAL
-    said = {warning.name: warning.message for warning in result.warnings}
+    said = warned(result)
     assert "contact of 'upper' on 'lower' spreads along a length" in said["contact_spreads_between_beams"]
     assert "contact begins at" in said["contact_begins"]
     assert force[-1] > 0

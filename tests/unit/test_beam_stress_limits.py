@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from beam_support import TOGGLE, cantilever, config, value
+from beam_support import TOGGLE, cantilever, config, value, warned
 
 import cfmkit
 from cfmkit import Run
@@ -65,7 +65,7 @@ def test_too_much_stress_is_reported_of_the_beams_whose_strength_is_known():
 def test_a_rescaled_part_that_is_overstressed_before_the_end_of_its_window_is_reported():
     """A toggle: its stress is largest half way. Before, only the stress at the end was looked at."""
     text = TOGGLE + "design: {rescale: {width: 12 mm}}\nanalysis: {travel: 8.5 mm, points: 21}\n"
-    reported = {one.name: one.message for one in design(cfmkit.loads(text), Run()).warnings}
+    reported = warned(design(cfmkit.loads(text), Run()))
     assert "the stress at the end of the window is 23.81 MPa" in reported["rescale_stress"]
     assert "28 MPa, is reached at 2.58" in reported["rescale_stress"]
     calm = design(cfmkit.loads(text.replace("28 MPa", "35 MPa")), Run())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from beam_support import cantilever, solved, value
+from beam_support import cantilever, solved, value, warned
 
 import cfmkit
 from cfmkit.errors import SpecError
@@ -30,10 +30,6 @@ mechanism:
   drive: {kind: force, node: tip, direction: 180 deg, follows: true}
 analysis: {force: 2.6 N, points: 53}
 """
-
-
-def warned(result):
-    return {item.name: item.message for item in result.warnings}
 
 
 def test_frequencies_are_columns_held_and_free():

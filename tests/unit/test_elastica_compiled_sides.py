@@ -28,7 +28,8 @@ from cfmkit.elastica import (
 from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.pair_gaps import make_gaps
 from cfmkit.elastica.contact.side_gaps import NEAR_GAP, LoadStage
-from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE, CompiledEquations, load_compiled
+from cfmkit.elastica.mechanics.compiled import CompiledEquations
+from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE, load_compiled
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import CompiledSides, equations
 from cfmkit.elastica.model.contact import (

@@ -23,8 +23,9 @@ import cfmkit.elastica as el
 from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
 from cfmkit.elastica.contact.terms import gaps
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE, CompiledEquations, load_compiled
+from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.compiled_batch import CompiledBatch
+from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE, load_compiled
 from cfmkit.elastica.mechanics.designs import set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations, begin
@@ -180,7 +181,7 @@ def test_an_element_that_buckles_between_its_ends_waits_for_its_neighbours() -> 
         own = equations(network)
         state = own.solve(np.zeros(own.n), factor * alone)
         assert state is not None
-        tangent = own.linearise(state.free, state.way).tangent
+        tangent = own.linearise(state.x, state.drive).tangent
         assert state.unstable == int((np.linalg.eigvalsh(tangent) < 0).sum()) - 2 * 4
 
 
@@ -215,15 +216,16 @@ def test_marches_of_c_and_numpy_are_equal(seed: int, number: int) -> None:
     for kind in (equations, NumpyEquations):
         ramp, own = kind(network, True), kind(network)
         loaded = ramp.march(begin(ramp), np.array([1.0]), MarchPlan(0.5, 1.0)).states[-1]
-        start, goals = begin(own, loaded.free), beam_networks.drives(net, seed)[number].points / network.scales.drive
+        start, goals = begin(own, loaded.x), beam_networks.drives(net, seed)[number].points / network.scales.drive
         ends.append(own.march(start, goals, MarchPlan(0.3 * abs(goals[0]), abs(goals[-1]), on_branch=True)))
     one, other = ends
     assert one.code is other.code is MarchCode.DONE
     assert len(one.states) == len(other.states)
     assert one.step == pytest.approx(other.step)
+    assert (one.target == other.target).all()
     for mine, its in zip(one.states, other.states, strict=True):
-        assert (mine.target, mine.unstable) == (its.target, its.unstable)
-        assert mine.free == pytest.approx(its.free, rel=1e-8, abs=1e-8)
+        assert mine.unstable == its.unstable
+        assert mine.x == pytest.approx(its.x, rel=1e-8, abs=1e-8)
         assert mine.effort == pytest.approx(its.effort, rel=1e-8, abs=1e-6)
 
 
@@ -234,8 +236,8 @@ def test_several_solutions_and_softest_modes_of_c_and_numpy_are_equal(seed: int,
     network = discretise(net, beam_networks.drives(net, seed)[number], 6)
     c, reference = equations(network), NumpyEquations(network)
     start = begin(c)
-    ways = start.way + np.array([1e-3, 3e-3, 50.0]) * np.sign(beam_networks.drives(net, seed)[number].points[-1])
-    found = [own.solve_each(np.tile(start.free, (3, 1)), ways) for own in (c, reference)]
+    ways = start.drive + np.array([1e-3, 3e-3, 50.0]) * np.sign(beam_networks.drives(net, seed)[number].points[-1])
+    found = [own.solve_each(np.tile(start.x, (3, 1)), ways) for own in (c, reference)]
     assert (found[0].converged == found[1].converged).all()
     good = found[1].converged
     assert good[:2].all()
@@ -244,7 +246,7 @@ def test_several_solutions_and_softest_modes_of_c_and_numpy_are_equal(seed: int,
         np.testing.assert_allclose(mine, its, rtol=0, atol=1e-7 * np.abs(its).max())
     assert (found[0].unstable == found[1].unstable)[good].all()
     vector = np.cos(np.arange(c.n) ** 1.5)
-    flexibilities, modes = zip(*(own.soften(start.free, start.way, vector, 4) for own in (c, reference)), strict=True)
+    flexibilities, modes = zip(*(own.soften(start.x, start.drive, vector, 4) for own in (c, reference)), strict=True)
     assert flexibilities[0] == pytest.approx(flexibilities[1], rel=1e-8)
     assert modes[0] == pytest.approx(modes[1], abs=1e-7 * np.abs(modes[1]).max())
 
@@ -259,9 +261,9 @@ def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
     border = np.zeros(own.n + 1)
     border[np.flatnonzero(own.mesh.free == own.mesh.bodies["b"][2])] = 1.0
     state = own.solve(np.zeros(own.n), 0.0, border, 0.8)
-    assert state.free @ border[:-1] == pytest.approx(0.8, rel=1e-9)
-    again = own.solve(state.free, state.way)
-    assert again.free == pytest.approx(state.free, rel=1e-8, abs=1e-8)
+    assert state.x @ border[:-1] == pytest.approx(0.8, rel=1e-9)
+    again = own.solve(state.x, state.drive)
+    assert again.x == pytest.approx(state.x, rel=1e-8, abs=1e-8)
 
 
 @pytest.mark.parametrize("kind", [equations, NumpyEquations])
@@ -274,7 +276,7 @@ def test_a_march_stops_before_a_step_that_is_less_stable(kind: Any) -> None:
     own = kind(discretise(net, el.Displacement("b", np.pi, np.array([1.2 * critical])), 8))
     march = own.march(begin(own), np.array([1.2 * critical]) / 0.1, MarchPlan(0.01 * critical / 0.1, critical / 0.1))
     assert march.code is MarchCode.STABILITY_CHANGES
-    assert 0.5 * critical < march.states[-1].way * 0.1 < critical
+    assert 0.5 * critical < march.states[-1].drive * 0.1 < critical
 
 
 TARGETS = np.linspace(0, 5e-3, 11)[1:]
@@ -299,7 +301,7 @@ def test_a_batch_has_the_efforts_of_single_marches() -> None:
         own = NumpyEquations(discretise(*leaf(thickness), 8))
         goals = TARGETS / own.mesh.scales.drive
         march = own.march(begin(own), goals, MarchPlan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
-        known = [state.effort * own.effort_unit for state in march.states if state.target >= 0]
+        known = march.effort[march.target >= 0] * own.effort_unit
         assert row == pytest.approx(known, rel=1e-7)
 
 

@@ -29,7 +29,7 @@ from cfmkit.elastica import (
     slider_support,
     trace,
 )
-from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE
+from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, circle, line, polyline

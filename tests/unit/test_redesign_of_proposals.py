@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 import cfmkit
-from cfmkit import Run
 from cfmkit.errors import SpecError
 from cfmkit.families import family
+from cfmkit.families.run_control import Run
 from cfmkit.runs.suggest_api import read_request
 from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, make_proposal, spec_of
 from cfmkit.studies.suggest.search import offer_of

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from pydantic import ValidationError
 
 from cfmkit import SpecError
 from cfmkit.api import load
-from cfmkit.specs.spec import Spec, _set_value
+from cfmkit.specs.yamlio.path_notation import with_value
+
+if TYPE_CHECKING:
+    from cfmkit.specs.spec import Spec
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 FILES = sorted([*CONFIGS.glob("*.yaml"), *CONFIGS.glob("studies/*.yaml")])
@@ -26,7 +29,7 @@ SWITCHES = [
 
 def replaced_whole(spec: Spec, path: str, value: Any) -> Spec | None:
     """Return the specification read from everything that was given, changed at a path; None if it is invalid."""
-    data = _set_value(spec.model_dump(exclude_unset=True) | {"family": spec.family}, path.split("."), value, path)
+    data = with_value(spec.model_dump(exclude_unset=True) | {"family": spec.family}, path.split("."), value)
     try:
         return type(spec).model_validate(data, context={"as_made": False})
     except ValidationError:

@@ -11,12 +11,12 @@ import pytest
 from suggest_support import POM, request
 
 import cfmkit
-from cfmkit import Run
 from cfmkit.documents.suggestion_document import document_of
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.end_stops_spec import BEFORE_STOP
 from cfmkit.families.hardware import PIN_STRENGTH
+from cfmkit.families.run_control import Run
 from cfmkit.families.suggestion_request import STOP_MARGIN_SHARE
 from cfmkit.runs.part_on_paper import how_to_fasten, list_stops
 from cfmkit.runs.suggest_api import read_request

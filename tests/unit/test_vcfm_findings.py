@@ -265,6 +265,8 @@ def test_a_spring_that_closes_ends_the_curve_there():
         assert found.curves[0].motion[-1] == pytest.approx(6 * MM)
         assert room - 12 - 0.02 < found.curves[1].motion[-1] / MM <= room - 12
         (reported,) = [one for one in found.warnings if one.name == "spring_closed"]
+        place = re.search(r"with a preload of 12 mm at ([\d.]+) mm of the travel", reported.message)[1]
+        assert float(place) == pytest.approx(room - 12, rel=1e-3)
         assert analyzed(*reported.cures, preloads="[0 mm, 12 mm]").status is Status.COMPLETE
     closed = analyzed(preloads="[30 mm]")
     assert closed.status is Status.NO_EQUILIBRIUM

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.options import QUIET_FLAG, SpecOptions, argument
-from cfmkit.documents.document import BAD_TONE, GOOD_TONE, Document, Span, format_bounds, whole_line
+from cfmkit.documents.document import Document, Span, Tone, format_bounds, whole_line
 from cfmkit.errors import CfmError, ExitCode, visible
 
 if TYPE_CHECKING:
@@ -92,9 +92,9 @@ def _lines(found: list[Checked], everything: bool) -> Iterator[TextLine]:
         name = f"{visible(item.file).ljust(wide)}  "
         if item.spec is None:
             count = len(item.failure.errors)
-            yield whole_line(name, Span("INVALID", BAD_TONE), f"  {count} problem{'s' if count > 1 else ''}")
+            yield whole_line(name, Span("INVALID", Tone.BAD), f"  {count} problem{'s' if count > 1 else ''}")
             continue
         about = f"       {item.spec.family}  {' '.join(item.spec.name.split())}"
-        yield whole_line(name, Span("ok", GOOD_TONE), about)
+        yield whole_line(name, Span("ok", Tone.GOOD), about)
         for one in item.spec.requirements if everything else ():
             yield whole_line(f"    {one.metric} {format_bounds({'min': one.min, 'max': one.max})}")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit._version import __version__
 from cfmkit.cli.options import Common
-from cfmkit.documents.document import LABEL_TONE, Document, Field, Span, TextLine, Verbatim, field, record_table
+from cfmkit.documents.document import Document, Field, Span, TextLine, Tone, Verbatim, field, record_table
 from cfmkit.store.lock import SOFT_LOCK
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def _locks() -> Record:
 
 def _solver() -> Record:
     """Return what the beam engine runs on: "C" or "numpy"."""
-    from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE
+    from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE
     from cfmkit.elastica.mechanics.march import engine
 
     return {"engine": engine(), "switched_off": WITHOUT_C_VARIABLE in os.environ}
@@ -164,7 +164,7 @@ def _troubles(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
-    yield TextLine((Span("cfmkit doctor", LABEL_TONE), Span("  what this installation has")))
+    yield TextLine((Span("cfmkit doctor", Tone.LABEL), Span("  what this installation has")))
     versions = [{"name": name, "version": version} for name, version in found["versions"].items()]
     yield from record_table("versions", versions, (field("name"), field("version", wraps=True)))
     yield from record_table("packages", found["packages"], (field("name"), Field("version", _version)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import JOBS_OPTION, Common, argument, flag, option
-from cfmkit.documents.document import BAD_TONE, GOOD_TONE, Document, Paragraph, field, next_command, record_table
+from cfmkit.documents.document import Document, Paragraph, Tone, field, next_command, record_table
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Document:
         written = [str(path) for path in copy(options.name, options.out or ".", options.schema is not False)]
         verb = _verb(options.name, written[0])
         page = (
-            Paragraph("written", ", ".join(map(visible, written)), GOOD_TONE),
+            Paragraph("written", ", ".join(map(visible, written)), Tone.GOOD),
             next_command("cfmkit", verb, written[0]),
         )
         return Document({"files": written}, page)
@@ -111,6 +111,6 @@ def _check_examples(name: str, options: ExamplesOptions, terminal: Terminal) -> 
     reported = f"{len(records) - len(wrong)} of {len(records)} examples end as they should"
     page = (
         *record_table("examples", records, (field("name"), field("status"), field("message", wraps=True))),
-        Paragraph("verdict", reported, BAD_TONE if wrong else GOOD_TONE),
+        Paragraph("verdict", reported, Tone.BAD if wrong else Tone.GOOD),
     )
     return Document({"message": reported, "examples": records}, page, found.exit_code)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, flag, option
-from cfmkit.documents.document import GOOD_TONE, Document, Paragraph, Verbatim, next_command
+from cfmkit.documents.document import Document, Paragraph, Tone, Verbatim, next_command
 from cfmkit.errors import OutputError, UsageError, visible
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def run(options: NewOptions, terminal: Terminal) -> Document:
             discard(target)  # both or none: a second try would find it in its way
             raise
     verb = "design" if record.design else "analyze"
-    page = Paragraph("written", ", ".join(map(visible, names)), GOOD_TONE)
+    page = Paragraph("written", ", ".join(map(visible, names)), Tone.GOOD)
     follow = next_command("cfmkit", verb, name)
     return Document({"family": options.family, "file": name, "files": names}, (page, follow))
 

@@ -7,16 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli.options import QUIET_FLAG, Common, argument, flag
 from cfmkit.documents.document import (
-    BAD_TONE,
     BLANK_LINE,
-    FAINT_TONE,
-    GOOD_TONE,
-    LABEL_TONE,
     Document,
     Field,
     Paragraph,
     Span,
     TextLine,
+    Tone,
     field,
     line,
     record_table,
@@ -83,12 +80,12 @@ def _page(records: Sequence[Record], counts: Mapping[str, int], reported: str, v
     from cfmkit.cli.show_topics import references
 
     titles = {one["name"]: one["reference"] for one in references()}
-    yield TextLine((Span("cfmkit papers", LABEL_TONE), Span("  numbers of the papers, and the results here")))
+    yield TextLine((Span("cfmkit papers", Tone.LABEL), Span("  numbers of the papers, and the results here")))
     for paper in dict.fromkeys(one["paper"] for one in records):
         mine = [one for one in records if one["paper"] == paper]
         yield from _of_paper(f"{paper}: {titles.get(paper, '')}", mine, verbose)
     yield BLANK_LINE
-    yield Paragraph("verdict", reported, BAD_TONE if "do not hold" in reported else GOOD_TONE)
+    yield Paragraph("verdict", reported, Tone.BAD if "do not hold" in reported else Tone.GOOD)
     named = [
         {"count": str(n), "verdict": verdict, "meaning": VERDICT_MEANINGS[verdict]} for verdict, n in counts.items()
     ]
@@ -108,7 +105,7 @@ def _of_paper(title: str, records: Sequence[Record], verbose: bool) -> Iterator[
     yield from record_table(title, shown, fields)
     silent = sum(len(one["printed"]) for one in records) - sum(len(one["printed"]) for one in shown)
     if silent:
-        yield line(f"  and {silent} inputs, which are as printed (-v lists them)", FAINT_TONE)
+        yield line(f"  and {silent} inputs, which are as printed (-v lists them)", Tone.FAINT)
     reasons = [one for one in shown if one["why"] and (verbose or one["verdict"] in ("misprint", "disagrees"))]
     yield from record_table(
         "reasons", reasons, (field("place", ""), field("what", "", wraps=True), field("why", "", wraps=True))

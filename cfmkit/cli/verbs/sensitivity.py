@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.documents.document import Document, Written
+    from cfmkit.documents.document import Document
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.sensitivity.result_types import Findings
 
@@ -54,7 +54,7 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
     from cfmkit.cli.run_study_in_folder import open_study
     from cfmkit.documents.sensitivity_document import document_of
     from cfmkit.runs.run import RunTask, placing, read
-    from cfmkit.studies.sensitivity.output import outputs
+    from cfmkit.studies.sensitivity.output import as_json, outputs
     from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
     from cfmkit.studies.sensitivity.setup import prepare
 
@@ -68,8 +68,9 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
         tables = study.write_tables(outputs(found))
         page = document_of(found)
         study.write_pages(page, setup.study, found.setup.paths, tables, partial(_pictures, found))
-        written = study.commit(page, setup.study, setup.seed, [piece.records for piece in found.evaluator.pieces])
-    return _document(found, replace(page, files=written), written)
+        data, pieces = as_json(found), [piece.records for piece in found.evaluator.pieces]
+        finished = study.commit(page, setup.study, setup.seed, pieces, data)
+    return replace(finished, quiet_complaints=tuple(_quiet(found, data, page.exit_code)))
 
 
 def _pictures(found: Findings) -> Mapping[str, Callable[[], Figure]]:
@@ -126,19 +127,6 @@ def spread(option: str) -> tuple[str, Any]:
         reported = "write PATH=low:high, PATH=normal:DEVIATION or PATH=uniform:HALF-WIDTH, with units"
         raise UsageError(f"--vary {option!r}: {reported}")
     return path, {first: second} if first in ("normal", "uniform") else (first, second)
-
-
-def _document(found: Findings, page: Document, written: Written) -> Document:
-    from cfmkit.studies.sensitivity.output import as_json
-
-    spec = found.setup.study.spec
-    records = [piece.records for piece in found.evaluator.pieces]
-    data = as_json(found) | {"family": spec.family, "name": spec.name} | written.data
-    data |= {"reused": sum(one.reused for one in records)}
-    bugs = sum(one.bugs for one in records)
-    complaints = (f"error    {bugs} samples hit a bug in cfmkit; -vv shows the first",) if bugs else ()
-    quiet = tuple(_quiet(found, data, page.exit_code))
-    return replace(page, data=data, complaints=complaints, quiet_complaints=quiet)
 
 
 def _quiet(found: Findings, data: Mapping[str, Any], code: ExitCode) -> Iterator[str]:

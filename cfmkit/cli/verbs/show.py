@@ -7,15 +7,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.cli import shell_completion, verbs
 from cfmkit.cli.options import Common, argument, option
-from cfmkit.documents.document import (
-    BLANK_LINE,
-    GOOD_TONE,
-    Document,
-    Paragraph,
-    field,
-    record_table,
-    with_skipped_families,
-)
+from cfmkit.documents.document import BLANK_LINE, Document, Paragraph, Tone, field, record_table, with_skipped_families
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
@@ -82,6 +74,6 @@ def _copy_drawing(name: str | None, given: str) -> Document:
     page = (
         *record_table("", rows, (field("symbol"), field("key", wraps=True), field("meaning", wraps=True))),
         BLANK_LINE,
-        Paragraph("written", visible(str(path)), GOOD_TONE),
+        Paragraph("written", visible(str(path)), Tone.GOOD),
     )
     return Document({"show": name, "dimensions": rows, "file": str(path)}, page)

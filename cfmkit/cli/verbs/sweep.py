@@ -70,10 +70,8 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
         found = sweep_document.document_of(spec, reported, dimensions, code, reused=records.reused)
         varied = [item.path for item in work.plan.variables]
         study.write_pages(found, work.study, varied, tables, partial(_pictures, records, summary))
-        written = study.commit(found, work.study, options.seed, [records])
-    record = reported | {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
-    complaints = tuple(_complaints(records, code, options, document))
-    return replace(found, data=record, complaints=complaints, files=written)
+        finished = study.commit(found, work.study, options.seed, [records], reported)
+    return replace(finished, complaints=(*_complaints(records, code, options, document), *finished.complaints))
 
 
 def request(options: SweepOptions) -> SweepRequest:
@@ -123,12 +121,9 @@ def _complaints(records: Records, code: ExitCode, options: SweepOptions, documen
 
     if code is ExitCode.INVALID:
         yield from _refusal(records, document)
-
     if code is ExitCode.INTERRUPTED:
         missing = len(records) - records.finished
         yield f"interrupted  {missing} of {len(records)} points were not computed; {go_on(options.fresh)}"
-    if records.bugs:
-        yield f"error    {records.bugs} points hit a bug in cfmkit; -vv shows the first"
 
 
 def _refusal(records: Records, document: YamlDocument) -> tuple[str, ...]:

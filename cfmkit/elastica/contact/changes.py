@@ -353,8 +353,8 @@ class WatchedProblem(NetworkProblem):
     def march(self, walk: Walk) -> MarchedSteps:
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
         marched = super().march(walk)
-        if marched.states and self.piece is not None:
-            states = [walk.here, *(at for at, _ in marched.states)]
+        if len(marched.drive) and self.piece is not None:
+            states = [walk.here, *marched.states]
             together = SIDES_TOGETHER if self.piece.sides.all else NODES_TOGETHER
             for first in range(0, len(states) - 1, together):
                 some = states[first : first + together + 1]

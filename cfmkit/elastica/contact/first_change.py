@@ -119,9 +119,9 @@ def _locate(piece: PieceOfPath, step: StepBetween, row: int) -> ContactChange | 
     border[int(both.own_mask[: piece.slot(row)].sum())] = 1.0
     state = both.own.equations.solve(x, drive, border, 0.0)
     if state is not None and np.isfinite(state.rate).all():
-        free = both.expand_state(state.free)
+        free = both.expand_state(state.x)
         free[piece.slot(row)] = 0.0
-        at = step.first._replace(x=free, drive=float(state.way), effort=np.nan, stiffness=np.nan)
+        at = step.first._replace(x=free, drive=state.drive, effort=np.nan, stiffness=np.nan)
         if step.contains(at, guess):
             return ContactChange(kind, row, at, unstable, unstable, contact)
     bracketed = step.bisect(row)

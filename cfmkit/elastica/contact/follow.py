@@ -22,7 +22,7 @@ from cfmkit.elastica.contact.terms import slip_way
 from cfmkit.elastica.model.contact import FrictionState
 from cfmkit.numerics.continuation.arc import follow_arc, unit_tangent
 from cfmkit.numerics.continuation.folds import pass_fold
-from cfmkit.numerics.continuation.follow import LOCKED_MESSAGE, follow, follow_on
+from cfmkit.numerics.continuation.follow import LOCKED_MESSAGE, each_point, follow, follow_on
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 
 if TYPE_CHECKING:
@@ -209,7 +209,7 @@ def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> 
     start, step = part.shrink(at), max(walk.step, SHORTEST_STEP * options.span)
     walk = Walk(own, options, walk.targets, start, step, walk.number, trail=(start,), branch=walk.branch)
     if sense == walk.sense:
-        yield from follow_on(walk)
+        yield from each_point(follow_on(walk))
         return
     tangent = unit_tangent(own, start, sense * np.append(start.rate, 1.0), options.span)
     length = float(FIRST_ARC * step / max(abs(tangent[-1]), SHORTEST_STEP))
@@ -219,7 +219,7 @@ def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> 
         return
     outcome = yield from pass_fold(walk, move)
     if isinstance(outcome, Walk):
-        yield from follow_on(outcome)
+        yield from each_point(follow_on(outcome))
     elif outcome is not None:
         yield outcome
 

@@ -139,7 +139,7 @@ def _locate_touch(
             border[beyond.slot_in_own(number)] = 1.0
             state = beyond.own.equations.solve(begin_guess.x, begin_guess.drive, border, 0.0)
             if state is not None and np.isfinite(state.rate).all():
-                at = beyond.grow(begin_guess._replace(x=state.free, drive=float(state.way), rate=state.rate))
+                at = beyond.grow(begin_guess._replace(x=state.x, drive=state.drive, rate=state.rate))
                 if -BESIDE_SHARE <= step.share_of(at, beyond) <= 1 + BESIDE_SHARE:
                     return ContactChange("begins", number, at, step.first.unstable, step.first.unstable,
                                          condition.number, condition, beyond)  # fmt: skip
@@ -475,5 +475,5 @@ def _solve_at_level(piece: PieceOfPath, begin: PathEquilibrium, row: dict[int, f
     state = piece.own.equations.solve(begin_guess.x, begin_guess.drive, border, level)
     if state is None or not np.isfinite(state.rate).all():
         return None
-    return begin_guess._replace(x=state.free, drive=float(state.way), rate=state.rate, unstable=state.unstable,
+    return begin_guess._replace(x=state.x, drive=state.drive, rate=state.rate, unstable=state.unstable,
                          effort=state.effort)  # fmt: skip

@@ -1,6 +1,6 @@
-/* Equilibria of networks of plain beams beside those with a higher degree, by which the error of a path is estimated.
+/* Tables of plain beams, and their equilibria beside those with a higher degree, by which the error of a path is estimated.
  *
- * Python's way, for all networks: `raise_degree`, `embed` and `compare_states` of tracing/error_estimate.py. */
+ * numpy's way: `plain_tables` of element_tables.py; `raise_degree`, `embed` and `compare_states` of error_estimate.py. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,30 +11,50 @@
 
 static Int n_ends(const Model *m) { return m->size - m->elements * (m->degree + 1); } /* unknowns that move ends */
 
-/* Tables of the elements of plain beams at other points: what is even along an element has its first value there. */
+/* Row k of the tables (6, elements, q) of elements of plain beams: angle, weight, rigidity, axial, shear, ahead. `law` is
+ * where the element begins on the shape of its beam, its width there; `angle` the coefficients of the shape. */
+static void fill(const Model *shapes, Int elements, Int k, const double *law, const double *angle, Int powers, double length,
+                 double rigidity, double axial, double shear, double *tables) {
+    const Int q = shapes->points, next = elements * q;
+    for (Int i = 0; i < q; i++) {
+        const double place = shapes->rule[i], t = law[0] + law[1] * place;
+        double *cell = tables + k * q + i, value = 0.0;
+        for (Int power = powers - 1; power >= 0; power--) value = value * t + angle[power];
+        cell[0] = value;
+        cell[next] = length * shapes->rule[q + i];
+        cell[2 * next] = rigidity;
+        cell[3 * next] = axial;
+        cell[4 * next] = shear;
+        cell[5 * next] = length * (1.0 - place);
+    }
+}
+
+int beam_tables(const Model *shapes, Int elements, const Int *row, const double *cuts, const double *coefficients, Int powers,
+                const double *length, const double *rigidities, Int beams, double unit_length, double unit_force,
+                double *tables, double *lengths) {
+    for (Int k = 0; k < elements; k++) {
+        const Int b = row[k];
+        const double law[2] = {cuts[2 * k], cuts[2 * k + 1] - cuts[2 * k]}, speed = length[b] / unit_length * law[1];
+        const double rigidity = rigidities[b] / (unit_force * (unit_length * unit_length)) / (speed * speed);
+        fill(shapes, elements, k, law, coefficients + b * powers, powers, speed, rigidity, rigidities[beams + b] * unit_force,
+             rigidities[2 * beams + b] * unit_force, tables);
+        lengths[k] = speed;
+    }
+    return CONVERGED;
+}
+
+/* The tables at other points: what is even along an element is its first value there. */
 static void raise_tables(const Model *m, Model *fine, const double *laws, Int powers, double *room) {
-    const Int q = fine->points, all = m->elements * q, triangle = (fine->degree + 1) * (fine->degree + 2) / 2;
-    double *const table[6] = {room, room + all, room + 2 * all, room + 3 * all, room + 4 * all, room + 5 * all};
+    const Int all = m->elements * fine->points, triangle = (fine->degree + 1) * (fine->degree + 2) / 2;
     double *bend = room + 6 * all;
-    const double *places = fine->rule, *weights = fine->rule + q;
     for (Int e = 0; e < m->elements; e++, laws += powers + 2) {
-        const Int from = e * m->points, first = e * q;
+        const Int from = e * m->points;
         const double rigidity = m->rigidity[from], length = m->length[e];
-        for (Int k = first; k < first + q; k++) {
-            const double t = laws[0] + laws[1] * places[k - first];
-            double angle = 0.0;
-            for (Int power = powers - 1; power >= 0; power--) angle = angle * t + laws[2 + power];
-            table[0][k] = angle;
-            table[1][k] = length * weights[k - first];
-            table[2][k] = rigidity;
-            table[3][k] = m->axial[from];
-            table[4][k] = m->shear[from];
-            table[5][k] = length * (1.0 - places[k - first]);
-        }
+        fill(fine, m->elements, e, laws, laws + 2, powers, length, rigidity, m->axial[from], m->shear[from], room);
         for (Int k = 0; k < triangle; k++) bend[e * triangle + k] = length * rigidity * fine->unit_bend[k];
     }
-    fine->angle = table[0]; fine->weight = table[1]; fine->rigidity = table[2];
-    fine->axial = table[3]; fine->shear = table[4]; fine->ahead = table[5]; fine->bend = bend;
+    fine->angle = room; fine->weight = room + all; fine->rigidity = room + 2 * all;
+    fine->axial = room + 3 * all; fine->shear = room + 4 * all; fine->ahead = room + 5 * all; fine->bend = bend;
 }
 
 /* Numbers of unknowns, as those of numbering.py: ends, bubbles of every element, forces. Every bubble and force is free. */

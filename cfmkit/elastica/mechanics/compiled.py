@@ -1,22 +1,26 @@
-"""The equations of a network in compiled code, and the arrays that it takes.
-
-C takes a model as a row of 8-byte counts and addresses, so that an array of rows is many designs; what the addresses
-point to is kept with the row.
-"""
+"""The equations of a network in compiled code, and the arrays that it takes (see `compiled_module`)."""
 
 from __future__ import annotations
 
-import itertools
-import os
 from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.mechanics.compiled_sides import CLOSED_SIDE, IN_PLACE, N_LAW, N_SIDE_COLUMNS, side_arrays
+from cfmkit.elastica.mechanics.compiled_module import (
+    ADDRESS_FIELDS,
+    COUNT_FIELDS,
+    MAX_DEGREE,
+    N_LAW,
+    load_compiled,
+    make_row,
+    numbered_row,
+    shape_row,
+    slope_products,
+)
+from cfmkit.elastica.mechanics.compiled_sides import CLOSED_SIDE, IN_PLACE, side_arrays
 from cfmkit.elastica.mechanics.contact_arrays import (
     CLOSED_NODE,
     contact_arrays,
@@ -32,14 +36,13 @@ from cfmkit.elastica.mechanics.equations import (
     LineTables,
     MarchCode,
     MarchPlan,
-    MarchState,
     NaturalMarch,
     NumpyEquations,
     SideData,
     SolvedStates,
 )
-from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.network import LineSpring, SlideSpring
+from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -47,45 +50,13 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
 
-WITHOUT_C_VARIABLE = "CFMKIT_WITHOUT_C"
-"""Environment variable that keeps everything in numpy, whatever its value."""
-
-COUNT_FIELDS = (
-    "elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows", "contacts", "presses",
-    "sides", "moved", "coefficients",
-)  # fmt: skip
-ADDRESS_FIELDS = (
-    "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
-    "places", "arm", "origin", "frame", "values", "slopes", "values_by_shape", "slopes_by_shape", "products", "slot",
-    "leaves", "base", "rate", "unit", "spring_at", "spring", "load_at", "load", "rest", "curl", "hindrance",
-    "contact_at", "contact", "edge", "side_at", "side", "moved_at", "moved_fixed", "moved_shares", "moved_law", "rule",
-    "unit_bend",
-)  # fmt: skip
-"""Fields of `Model` in march.h, in its order."""
 NO_NUMBERS = read_only([])
-MAX_DEGREE = 40
-"""As in march.h: arrays of one element are on the stack."""
 N_COMPARED = 7
 """As in compare.c."""
-OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESS_FIELDS)
-WHOLE_NUMBERS = frozenset(
-    ("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at", "contact_at", "side_at", "moved_at")
+OF_ELEMENTS = tuple(
+    name for name in BeamElements._fields if name in ADDRESS_FIELDS and name not in ("ends", "unknowns")
 )
-
-
-@cache
-def _module() -> Any:
-    try:
-        from cfmkit.elastica.mechanics import _march  # type: ignore[attr-defined]
-    except ImportError:
-        return None
-    fields = len(COUNT_FIELDS) + len(ADDRESS_FIELDS) + N_SIDE_COLUMNS + N_LAW
-    return _march if getattr(_march, "FIELDS", 0) == fields else None
-
-
-def load_compiled() -> Any:
-    """Return the compiled module, None if it was not built, or for another version, or `WITHOUT_C_VARIABLE` is set."""
-    return None if WITHOUT_C_VARIABLE in os.environ else _module()
+WHOLE_NUMBERS = frozenset(("slot", "leaves", "spring_at", "load_at", "contact_at", "side_at", "moved_at"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,19 +65,31 @@ class CompiledEquations(NumpyEquations):
 
     arrays: Mapping[str, Any] = field(init=False)  # what the addresses point to
     row: Any = field(init=False)  # counts and addresses
-    code: Any = field(init=False, default_factory=_module)  # the compiled module
+    code: Any = field(init=False)  # the compiled module
 
     def __post_init__(self) -> None:
         """Collect the arrays."""
         super().__post_init__()
-        arrays = model_arrays(self)
-        row = np.zeros(len(COUNT_FIELDS) + len(ADDRESS_FIELDS), np.int64)
-        row[: len(COUNT_FIELDS)] = list(model_counts(self.mesh, self.ramp).values())
+        mesh, arrays = self.mesh, model_arrays(self)
+        free = mesh.free[mesh.free < mesh.numbering.size] if _has_more_unknowns(mesh) else mesh.free
+        numbered, fixed = numbered_row(mesh.numbering, free.tobytes())
+        row = make_row(arrays, self._counts(arrays), numbered)
+        vars(self).update(arrays=fixed | arrays, row=row, code=load_compiled())
+
+    def _counts(self, arrays: Mapping[str, Any]) -> dict[str, int]:
+        """Return the counts of a `Model` that depend on more than topology."""
+        mesh = self.mesh
+        counts = {"springs": len(mesh.springs), "loads": len(mesh.loads), "ramp": self.ramp, "follows": self.follows}
+        if _has_more_unknowns(mesh):
+            counts |= {"size": mesh.size, "free": len(mesh.free)}
+        if mesh.contacts:
+            nodes, sides = node_contacts(mesh), side_contacts(mesh)
+            presses = len({at.unknown for at in nodes}.intersection(mesh.free.tolist()))
+            counts |= {"contacts": len(nodes), "presses": presses, "sides": len(sides)}
         if "moved_law" in arrays:
-            row[len(COUNT_FIELDS) - 2 : len(COUNT_FIELDS)] = np.subtract(arrays["moved_law"].shape, (0, N_LAW))
-        self.code.place(row, len(COUNT_FIELDS), tuple(arrays.get(name) for name in ADDRESS_FIELDS))
-        object.__setattr__(self, "arrays", arrays)
-        object.__setattr__(self, "row", row)
+            moved, wide = arrays["moved_law"].shape
+            counts |= {"moved": moved, "coefficients": wide - N_LAW}
+        return counts
 
     def stiffen(self, mesh: Discretisation) -> CompiledEquations:
         """Return the equations of the same network with another flexibility along its beams."""
@@ -223,7 +206,7 @@ class CompiledEquations(NumpyEquations):
         push: FloatArray | None = None,
         tolerance: float = 1e-10,
         quick: bool = False,
-    ) -> MarchState | None:
+    ) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
         x, at, rate, outcome = np.array(free, float), np.array([way], float), np.empty(len(free)), np.empty(2)
         row = NO_NUMBERS if border is None else np.ascontiguousarray(border, float)
@@ -231,7 +214,7 @@ class CompiledEquations(NumpyEquations):
         if self.code.solve(self.row, x, at, row, force, rate, outcome, level, tolerance, quick):
             return None
         (way,), (unstable, effort) = at.tolist(), outcome.tolist()
-        return MarchState(x, way, rate, self._unstable(x, way, int(unstable)), effort)
+        return PathEquilibrium(x, way, rate, self._unstable(x, way, int(unstable)), effort)
 
     def solve_each(
         self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
@@ -239,7 +222,7 @@ class CompiledEquations(NumpyEquations):
         """Return the equilibria near k guesses."""
         x, ways = np.array(free, float, order="C"), np.array(way, float)
         rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
-        if self.code.solve_many(self.row, x, ways, rate, outcomes, tolerance, quick):
+        if self.code.solve_each(self.row, x, ways, rate, outcomes, tolerance, quick):
             raise MemoryError
         converged, unstable = outcomes[:, 0] == 0, outcomes[:, 1].astype(np.int64)
         for k in np.flatnonzero(converged & (unstable < 0)):
@@ -249,7 +232,7 @@ class CompiledEquations(NumpyEquations):
     def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
         """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""
         mesh, bundle = self.mesh, self.mesh.fits.bundle
-        if mesh.contacts or bundle.others or self.follows or degree > MAX_DEGREE or mesh.elements.line.any():
+        if _has_more_unknowns(mesh) or bundle.others or self.follows or degree > MAX_DEGREE or mesh.elements.line.any():
             return None
         laws = angle_laws(bundle.coefficients, mesh)
         return compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
@@ -259,33 +242,28 @@ class CompiledEquations(NumpyEquations):
         shape = np.array(vector, float)
         return self.code.soften(self.row, np.ascontiguousarray(free, float), shape, place, rounds), shape
 
-    def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
+    def march(self, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
         n, goals = self.n, np.ascontiguousarray(targets, float)
         rows, stored = np.empty((plan.room, 2 * n + 4)), np.zeros(2, np.int64)
         parity = start.unstable % 2 if self.follows else start.unstable
         plan_row = plan_row_of(plan, parity, False)
         before = plan.before
-        previous_row = NO_NUMBERS if before is None else np.concatenate([before.free, before.rate, [before.way]])
-        start_row = np.concatenate([start.free, start.rate, [start.way]])
+        previous_row = NO_NUMBERS if before is None else np.concatenate([before.x, before.rate, [before.drive]])
+        start_row = np.concatenate([start.x, start.rate, [start.drive]])
         code = self.code.march(self.row, plan_row, start_row, previous_row, goals, rows, stored)
         rows = rows[: stored[0]].copy()
-        places, effort, told, target = rows[:, 2 * n :].T.tolist()
-        given_states = zip(
-            rows[:, :n], places, rows[:, n : 2 * n], map(int, told), effort, map(int, target), strict=True
-        )
-        states = tuple(itertools.starmap(MarchState, given_states))
-        march = NaturalMarch(states, MarchCode(code), float(plan_row[0]))
+        drive, effort, told, target = rows[:, 2 * n :].T
+        unstable, at_targets = told.astype(np.int64), target.astype(np.int64)
+        x, rate, step = rows[:, :n], rows[:, n : 2 * n], float(plan_row[0])
+        march = NaturalMarch(x, drive, rate, unstable, effort, at_targets, step, MarchCode(code))
         return self._cut_at_stability_change(march, start.unstable) if self.follows else march
 
     def _cut_at_stability_change(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
         """Return a march with its unstable directions counted, as far as their number stays the same."""
-        states: list[MarchState] = []
-        for state in march.states:
-            if self._unstable(state.free, state.way, state.unstable) != unstable:
-                return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
-            states.append(state._replace(unstable=unstable))
-        return replace(march, states=tuple(states))
+        march.unstable[:] = [self._unstable(state.x, state.drive, state.unstable) for state in march.states]
+        changed = np.flatnonzero(march.unstable != unstable)
+        return replace(march.cut(int(changed[0])), code=MarchCode.STABILITY_CHANGES) if len(changed) else march
 
 
 def angle_laws(coefficients: Any, mesh: Discretisation) -> FloatArray:
@@ -308,7 +286,7 @@ def compare_rows(
     """Return how states of designs differ from equilibria of a higher degree."""
     ends, outcomes = np.empty((*z.shape[:-1], mesh.numbering.n_ends)), np.empty((*z.shape[:-1], N_COMPARED))
     drives = np.ascontiguousarray(drive, float)
-    if not _module().compare(rows, shape_row(degree)[0], laws, z, drives, ends, outcomes, tolerance):
+    if not load_compiled().compare(rows, shape_row(degree)[0], laws, z, drives, ends, outcomes, tolerance):
         raise MemoryError
     code, *numbers = np.moveaxis(outcomes, -1, 0)
     return ComparedStates._make((code == 0, *numbers, ends))
@@ -321,30 +299,23 @@ def plan_row_of(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
     )
 
 
-def model_counts(mesh: Discretisation, ramp: bool) -> dict[str, int]:
-    """Return the counts of a `Model`."""
-    elements, points = mesh.elements.weight.shape
-    follows = any(load.item.follows for load in mesh.loads)
-    nodes, sides = node_contacts(mesh), side_contacts(mesh)
-    presses = len({at.unknown for at in nodes}.intersection(mesh.free.tolist())) if nodes else 0
-    values = (elements, points, mesh.degree, mesh.size, len(mesh.free), len(mesh.springs))
-    more = (len(mesh.loads), int(ramp), int(follows), len(nodes), presses, len(sides))
-    return dict(zip(COUNT_FIELDS, (*values, *more, 0, 0), strict=True))
-
-
 def model_arrays(of: NumpyEquations) -> dict[str, Any]:
-    """Return the arrays of a `Model` in C order."""
+    """Return the arrays of a `Model` in C order, but for those that networks of one topology share."""
     mesh = of.mesh
     e, a = mesh.elements, mesh.attachments
-    bend = (e.weight * e.rigidity) @ slope_products(mesh.degree)
-    springs, loads = [spring_row(mesh, s) for s in mesh.springs], [load_row(mesh, load) for load in mesh.loads]
     arrays: dict[str, Any] = {name: getattr(e, name) for name in OF_ELEMENTS}
-    arrays |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
-    arrays |= _shape_tables(mesh.degree) | {"base": mesh.base, "rate": mesh.rate}
-    arrays |= {"bend": bend, "unit": of.unit} | free_arrays(mesh)
-    arrays |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
-    arrays |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
-    arrays |= contact_arrays(mesh) if mesh.contacts else {}
+    arrays |= {"arm": a.arm, "origin": a.origin, "frame": a.frame, "base": mesh.base, "rate": mesh.rate}
+    arrays |= {"bend": (e.weight * e.rigidity) @ slope_products(mesh.degree), "unit": of.unit}
+    for name, rows in (
+        ("spring", [spring_row(mesh, spring) for spring in mesh.springs]),
+        ("load", [load_row(mesh, load) for load in mesh.loads]),
+    ):
+        if rows:
+            arrays |= {f"{name}_at": [at for at, _ in rows], name: [values for _, values in rows]}
+    if _has_more_unknowns(mesh):
+        arrays |= free_arrays(mesh)
+    if mesh.contacts:
+        arrays |= contact_arrays(mesh)
     if mesh.moving is not None:
         sides, parts = side_arrays(mesh, len(arrays["edge"]))
         arrays |= sides | {"edge": np.concatenate([arrays["edge"], parts])}
@@ -356,36 +327,16 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     }
 
 
+def _has_more_unknowns(mesh: Discretisation) -> bool:
+    """Return True if there are unknowns of contacts, which may all be open."""
+    return mesh.size != mesh.numbering.size
+
+
 def free_arrays(mesh: Discretisation) -> dict[str, Any]:
     """Return the number of each unknown among the free ones, (size,), and the last element that holds it, (n,)."""
     slot = np.full(mesh.size, -1, np.int64)
     slot[mesh.free] = np.arange(len(mesh.free))
-    return {"slot": slot, "leaves": np.ascontiguousarray(last_elements(mesh)[mesh.free], np.int64)}
-
-
-@lru_cache(maxsize=64)
-def _shape_tables(degree: int) -> dict[str, Any]:
-    rule, (i, j) = basis(degree), np.tril_indices(degree + 1)
-    tables = {"values": rule.values, "slopes": rule.slopes, "values_by_shape": rule.values.T}
-    tables |= {"slopes_by_shape": rule.slopes.T, "products": rule.values[:, i] * rule.values[:, j]}
-    tables |= {"rule": np.stack([rule.places, rule.weights]), "unit_bend": rule.weights @ slope_products(degree)}
-    return {name: np.ascontiguousarray(table) for name, table in tables.items()}
-
-
-@lru_cache(maxsize=64)
-def shape_row(degree: int) -> tuple[Any, dict[str, Any]]:
-    """Return a `Model` with the tables of shape functions alone, and these."""
-    row, tables = np.zeros(len(COUNT_FIELDS) + len(ADDRESS_FIELDS), np.int64), _shape_tables(degree)
-    row[COUNT_FIELDS.index("points")], row[COUNT_FIELDS.index("degree")] = len(basis(degree).places), degree
-    _module().place(row, len(COUNT_FIELDS), tuple(tables.get(name) for name in ADDRESS_FIELDS))
-    return row, tables
-
-
-@lru_cache(maxsize=64)
-def slope_products(degree: int) -> FloatArray:
-    """Return the products of the slopes of two shape functions at the Gauss points, (q, triangle), by rows of it."""
-    slopes, (i, j) = basis(degree).slopes, np.tril_indices(degree + 1)
-    return read_only(slopes[:, i] * slopes[:, j])
+    return {"slot": slot, "leaves": last_elements(mesh)[mesh.free]}
 
 
 def spring_row(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:

@@ -6,16 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.compiled import (
-    ADDRESS_FIELDS,
-    COUNT_FIELDS,
-    CompiledEquations,
-    angle_laws,
-    compare_rows,
-    load_compiled,
-    plan_row_of,
-    slope_products,
-)
+from cfmkit.elastica.mechanics.compiled import CompiledEquations, angle_laws, compare_rows, plan_row_of
+from cfmkit.elastica.mechanics.compiled_module import ADDRESS_FIELDS, COUNT_FIELDS, load_compiled, slope_products
 from cfmkit.elastica.mechanics.equations import ComparedStates, MarchPlan
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import basis

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
-N_SIDE_COLUMNS, CLOSED_SIDE = 13, 5  # columns of `side_at`, and that which says what is closed
-N_LAW = 3  # numbers of an element that moves, before the coefficients of its angle
+CLOSED_SIDE = 5  # column of `side_at`
 IN_PLACE = ("angle", "weight", "rigidity", "ahead", "length", "bend", "rest", "curl")
 """Arrays of a `Model` that `sides.c` changes where elements move."""
 

@@ -107,10 +107,11 @@ void contact_term(const Model *m, Int number, const double *z, Term *t) {
 }
 
 /* Gaps of all contacts of nodes in states (n, size), (contacts, n). */
-void contact_gaps(const Model *m, const double *z, Int n, double *gaps) {
+int contact_gaps(const Model *m, const double *z, Int n, double *gaps) {
     Int at[3];
     double gradient[3], hessian[9];
     for (Int k = 0; k < n; k++, z += m->size)
         for (Int c = 0; c < m->contacts; c++)
             measure(m, m->contact_at + 8 * c, m->contact + 6 * c, z, gaps + c * n + k, at, gradient, hessian);
+    return CONVERGED;
 }

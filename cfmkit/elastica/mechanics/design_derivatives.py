@@ -33,7 +33,7 @@ from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
-from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, slopes_of
+from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, cos_sin, slopes_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -73,14 +73,14 @@ def partials(mesh: Discretisation, z: Any, drive: Any, names: Collection[str]) -
     By name those of `Elements`, and `origin`, `arm` and `frame` of the attachments that elements end at.
     """
     e, at, load = mesh.elements, energy.fields(mesh, z, drive), energy.line_load(mesh, drive)
-    last = z[..., e.unknowns[:, -2:]]
-    first = last + load * e.length[..., None]
     w, bent = e.weight, bending(e, at.curvature)
-    start = poses(mesh.attachments, z, e.ends[:, 0])
+
+    def places_of_starts() -> Any:
+        return poses(mesh.attachments, z, e.ends[:, 0]).place
 
     def by_line() -> Any:
         reach = np.stack([(w * e.ahead * slope).sum(axis=-1) for slope in (at.slope_x, at.slope_y)], axis=-1)
-        constant, grows = -(start.place * e.length[:, None] + reach), np.asarray(drive)[..., None, None]
+        constant, grows = -(places_of_starts() * e.length[:, None] + reach), np.asarray(drive)[..., None, None]
         return np.stack([constant + 0 * grows, constant * grows], axis=-2)
 
     by_elements: dict[str, Callable[[], Any]] = {
@@ -93,24 +93,33 @@ def partials(mesh: Discretisation, z: Any, drive: Any, names: Collection[str]) -
         "axial": lambda: -w * at.normal**2 / 2,
         "shear": lambda: -w * at.shear**2 / 2,
         "ahead": lambda: -w * (at.slope_x * load[..., :1] + at.slope_y * load[..., 1:]),
-        "length": lambda: -(load * start.place).sum(axis=-1),
+        "length": lambda: -(load * places_of_starts()).sum(axis=-1),
         "line": by_line,
     }
-    by_places = _by_attachments(mesh, z, first, last) if {"origin", "arm", "frame"} & {*names} else {}
-    return {name: by_places[name] if name in by_places else by_elements[name]() for name in names}
+    if {"origin", "arm", "frame"} & {*names}:
+        by_elements |= _by_attachments(mesh, z, load)
+    return {name: by_elements[name]() for name in names}
 
 
-def _by_attachments(mesh: Discretisation, z: Any, first: Any, last: Any) -> dict[str, Any]:
-    """Return the derivatives by origin, arm and frame, from the forces on both ends of every element."""
-    a, ends = mesh.attachments, mesh.elements.ends
-    force = np.zeros((*z.shape[:-1], *a.arm.shape), np.result_type(z, first, last))
-    by_place = np.moveaxis(force, -2, 0)  # a view
-    np.add.at(by_place, ends[:, 0], np.moveaxis(-first, -2, 0))
-    np.add.at(by_place, ends[:, 1], np.moveaxis(last, -2, 0))
+def _by_attachments(mesh: Discretisation, z: Any, load: Any) -> dict[str, Callable[[], Any]]:
+    """Return functions for the derivatives by origin, arm and frame, from the forces on both ends of every element."""
+    a, e = mesh.attachments, mesh.elements
+    last = z[..., e.unknowns[:, -2:]]
+    force = np.zeros((*z.shape[:-1], *a.arm.shape), np.result_type(z, load))
+    force[..., e.ends[:, 0], :] -= last + load * e.length[..., None]  # no two elements have one start, or one end
+    force[..., e.ends[:, 1], :] += last
     x, y, turn = (z[..., a.unknowns[:, k]] for k in range(3))
-    cos, sin, fx, fy = np.cos(turn), np.sin(turn), force[..., 0], force[..., 1]
-    arm = np.stack([cos * fx + sin * fy, cos * fy - sin * fx], axis=-1)
-    return {"origin": force, "arm": arm, "frame": np.stack([fx * x + fy * y, fy * x - fx * y], axis=-1)}
+    fx, fy = force[..., 0], force[..., 1]
+
+    def by_arm() -> Any:
+        cos, sin = cos_sin(turn)
+        return np.stack([cos * fx + sin * fy, cos * fy - sin * fx], axis=-1)
+
+    return {
+        "origin": lambda: force,
+        "arm": by_arm,
+        "frame": lambda: np.stack([fx * x + fy * y, fy * x - fx * y], axis=-1),
+    }
 
 
 def effort_motions(
@@ -145,7 +154,7 @@ def effort_slopes(
     changes = {
         name: table
         for name, table in (designs.tables | designs.places).items()
-        if np.iscomplexobj(table) and name not in idle
+        if np.iscomplexobj(table) and name not in idle and table.imag.any()
     }
     by_table = partials(mesh, stepped, at.drive, changes)
     total = np.zeros((len(at.z), designs.count))

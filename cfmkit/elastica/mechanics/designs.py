@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 TABLE_NAMES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap")
 
+NO_OFFSET = (0.0, 0.0)
 CURLING_TABLES = ("rest", "curl", "hindrance")  # of wide strips
 
 
@@ -108,16 +109,18 @@ def _plain(
     names, node, master, ends, inside = list(n.topology.nodes), n.node, n.master, n.beam_ends, n.inside
     spots = np.array([[(net.nodes[name].x, net.nodes[name].y) for name in names] for net, _ in pairs]) / scales.length
     beams = [list(net.beams.values()) for net, _ in pairs]
-    offsets = np.array([[(b.start_offset, b.end_offset) for b in each] for each in beams]) / scales.length
-    arm = spots[:, node] - spots[:, master]
-    arm[:, ends] += offsets
-    place = spots[:, master]
-    reach = (place + arm)[:, ends[:, 1]] - (place + arm)[:, ends[:, 0]]
     every = [beam for each in beams for beam in each]
     shape = len(beams), len(beams[0])
+    arm = spots[:, node] - spots[:, master]
+    if any(b.start_offset != NO_OFFSET or b.end_offset != NO_OFFSET for b in every):
+        offsets = np.array([(b.start_offset, b.end_offset) for b in every]).reshape(*shape, 2, 2)
+        arm = arm.astype(np.result_type(arm, offsets))
+        arm[:, ends] += offsets / scales.length
+    place = spots[:, master]
+    reach = (place + arm)[:, ends[:, 1]] - (place + arm)[:, ends[:, 0]]
     coefficients = coefficients_of(every).reshape(*shape, -1)
     drawn = chords(coefficients)
-    check_fits(every, np.hypot(*np.moveaxis(np.real(reach), -1, 0)).ravel(), np.hypot(*map(np.real, drawn)).ravel())
+    check_fits(every, np.hypot(reach[..., 0].real, reach[..., 1].real), np.hypot(*map(np.real, drawn)))
     rotation, length = fit_to_ends(*drawn, reach)
     turned = coefficients + rotation[..., None] * (np.arange(coefficients.shape[-1]) == 0)
     rigidities = rigidities_of(every).reshape(3, *shape)

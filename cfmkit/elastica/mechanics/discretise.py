@@ -375,12 +375,15 @@ class _ArrayBuilder:
             **tables, line=self._line_loads(beams), gap=np.zeros((len(beams), 2)), ends=numbering.ends,
             unknowns=numbering.unknowns, beam=beams, cuts=cuts,
         )  # fmt: skip
-        return elements._replace(gap=self._gaps(elements, attachments))
+        raw = [self.network.beams[name].closure == "raw" for name in beams]
+        return elements._replace(gap=self._gaps(elements, attachments, raw)) if any(raw) else elements
 
     def _line_loads(self, beams: tuple[str, ...]) -> Any:
         """Return the line loads of every element: constant and growing with the drive."""
         given = [(k, load) for k, loads in enumerate((self.network.loads, self.drive.loads)) for load in loads]
         lines = [(k, load) for k, load in given if isinstance(load, LineLoad)]
+        if not lines:
+            return np.zeros((len(beams), 2, 2))
         kind = np.result_type(float, *(value for _, load in lines for value in (load.wx, load.wy)))
         total = np.zeros((len(beams), 2, 2), kind)
         unit = self.scales.length / self.scales.force
@@ -389,11 +392,8 @@ class _ArrayBuilder:
             total[own, grows] += np.array([load.wx, load.wy]) * unit * (self.scales.drive if grows else 1.0)
         return total
 
-    def _gaps(self, elements: BeamElements, attachments: Attachments) -> Any:
+    def _gaps(self, elements: BeamElements, attachments: Attachments, raw: list[bool]) -> Any:
         """Return by how much the last element of each beam that is forced into place misses its node."""
-        raw = [self.network.beams[name].closure == "raw" for name in elements.beam]
-        if not any(raw):
-            return elements.gap
         place = attachments.origin + attachments.arm
         span = place[elements.ends[:, 1]] - place[elements.ends[:, 0]]
         reach = [(elements.weight * turn(elements.angle)).sum(axis=1) for turn in (np.cos, np.sin)]
@@ -416,8 +416,10 @@ class _ArrayBuilder:
             node, local, sense = self.driven
             unknown = numbering.bodies[node][local % FRAME_OF_DRIVE]
             rate[unknown], held[unknown] = sense, 0.0
-        base = np.zeros(numbering.size, np.result_type(float, *{type(value) for value in held.values()}))
-        base[list(held)] = list(held.values())
+        base = np.zeros(numbering.size)
+        if any(held.values()):
+            base = base.astype(np.result_type(float, *{type(value) for value in held.values()}))
+            base[list(held)] = list(held.values())
         arms = (attachments.arm != 0).any(axis=1).tobytes()
         acts = tuple((attached.places, *_acts_on(attached.item)) for attached in acting)
         return find_free(numbering, tuple(held), arms, acts), base, rate
@@ -443,7 +445,9 @@ def _sides(contacts: tuple[ContactAt, ...]) -> list[tuple[str, int]]:
 
 def _direction(angle: Any) -> Any:
     """Return cosine and sine in a last axis."""
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    both = np.empty((*angle.shape, 2), np.result_type(angle, float))
+    both[..., 0], both[..., 1] = np.cos(angle), np.sin(angle)
+    return both
 
 
 def _acts_on(item: Any) -> tuple[bool, bool]:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, slopes_at_points
+from cfmkit.elastica.mechanics.compiled_module import load_compiled, shape_row
+from cfmkit.elastica.mechanics.polynomials import N_EXTRA_POINTS, basis, integrals_to_points, slopes_at_points
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.beam import Beam, Fit
     from cfmkit.elastica.model.beam_fits import BeamFits
 
+TABLES_AT_POINTS = "angle", "weight", "rigidity", "axial", "shear", "ahead"
 SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
 
 
@@ -42,6 +44,8 @@ def element_tables(
         rows = np.isin(row, plain) if bundle.others else slice(None)
         number = np.searchsorted(plain, row[rows]) if bundle.others else row
         shapes = bundle.coefficients, bundle.length, bundle.rigidities
+        if not bundle.others and bundle.coefficients.dtype == bundle.rigidities.dtype == float and load_compiled():
+            return _compile_tables(*shapes, scales, degree, row, cuts)
         together = plain_tables(*shapes, scales, degree, number, cuts[rows])
         if not bundle.others:
             return together
@@ -84,6 +88,17 @@ def plain_tables(
         "ahead": speed * (1 - rule.places),
         "length": speed[..., 0],
     }
+
+
+def _compile_tables(
+    coefficients: FloatArray, length: FloatArray, rigidities: FloatArray, scales: MechanicsUnits, degree: int, row: Any,
+    cuts: FloatArray,
+) -> dict[str, Any]:  # fmt: skip
+    """Return the same of one network with real numbers in compiled code, (e, q) each."""
+    shapes, tables, lengths = shape_row(degree)[0], np.empty((6, len(row), degree + N_EXTRA_POINTS)), np.empty(len(row))
+    given = (np.ascontiguousarray(values, float) for values in (cuts, coefficients, length, rigidities))
+    load_compiled().tables(shapes, row, *given, tables, lengths, scales.length, scales.force)
+    return {**dict(zip(TABLES_AT_POINTS, tables, strict=True)), "length": lengths}
 
 
 def _smooth_tables(

@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics import energy
+from cfmkit.numerics.continuation.path import MarchedSteps
+from cfmkit.numerics.continuation.problem import PathEquilibrium
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
@@ -54,17 +56,6 @@ class LinearEquations(NamedTuple):
     residual: FloatArray
     tangent: FloatArray
     change: FloatArray
-
-
-class MarchState(NamedTuple):
-    """An equilibrium: free unknowns (n,) and their slopes along the way, all dimensionless."""
-
-    free: Any
-    way: float
-    rate: Any
-    unstable: int  # directions while the way is held
-    effort: float  # gradient of the functional by what the way moves, at held loads
-    target: int = -1  # number of the target it lies at, -1 if at none
 
 
 class LineTables(NamedTuple):
@@ -111,20 +102,23 @@ class MarchPlan:
 
     step: float  # first one, along the way
     span: float  # range of the way
-    before: MarchState | None = None  # the state before the first, for a better prediction
+    before: PathEquilibrium | None = None  # the state before the first, for a better prediction
     largest_turn: float = 0.35  # change of a motion in one step
     tolerance: float = 1e-10
     on_branch: bool = False  # check that every state leads back: a branch may end
     room: int = 2000  # states
 
 
-@dataclass(frozen=True)
-class NaturalMarch:
-    """States that were reached, why the march ended, and the step it would go on with."""
+@dataclass(frozen=True, eq=False)
+class NaturalMarch(MarchedSteps):
+    """Equilibria that were reached, and why the march ended; efforts are gradients by what the way moves."""
 
-    states: tuple[MarchState, ...]
     code: MarchCode
-    step: float
+
+    @property
+    def stuck(self) -> bool:
+        """True if too many steps in a row were rejected."""
+        return self.code is MarchCode.STEPS_FAIL
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +234,7 @@ class NumpyEquations:
         push: FloatArray | None = None,
         tolerance: float = 1e-10,
         quick: bool = False,
-    ) -> MarchState | None:
+    ) -> PathEquilibrium | None:
         """Return the equilibrium at a place of the way, or where border . (free, way) = level; None if there is none.
 
         Parameters
@@ -278,13 +272,13 @@ class NumpyEquations:
             old, old_way, free, place = free, place, free + change, place + along
             if quick and largest**2 < tolerance:
                 effort = self._effort(old, old_way) + float(at.change @ step)
-                return MarchState(free, place, rate, self.count_unstable(at), effort)
+                return PathEquilibrium(free, place, rate, self.count_unstable(at), effort)
             # a large force multiplies rounding: accept where motions stand and forces no longer come nearer
             rounds = (moved < SAME_EQUILIBRIUM and largest < 2e-5) or (moved < MOTION_RTOL and largest < 1e-3)
             stands = rounds and largest > 0.3 * last
             if stands or largest < tolerance * (1 + np.abs(free[moves]).max(initial=0.0)):
                 unstable = self.count_unstable(at)
-                return MarchState(free, place, rate, unstable, self._effort(free, place))
+                return PathEquilibrium(free, place, rate, unstable, self._effort(free, place))
             last = largest
         return None
 
@@ -300,13 +294,13 @@ class NumpyEquations:
             [self.solve(*pair, tolerance=tolerance, quick=quick) for pair in zip(free, places, strict=True)]
         )
 
-    def collect(self, solved: Sequence[MarchState | None]) -> SolvedStates:
+    def collect(self, solved: Sequence[PathEquilibrium | None]) -> SolvedStates:
         """Return single equilibria, None where there is none, as arrays."""
-        nothing = MarchState(np.full(self.n, np.nan), np.nan, np.full(self.n, np.nan), 0, np.nan)
+        nothing = PathEquilibrium(np.full(self.n, np.nan), np.nan, np.full(self.n, np.nan), 0, np.nan)
         states = [state or nothing for state in solved]
         return SolvedStates(
             np.array([state is not None for state in solved], bool),
-            np.array([state.free for state in states]).reshape(len(solved), self.n),
+            np.array([state.x for state in states]).reshape(len(solved), self.n),
             np.array([state.rate for state in states]).reshape(len(solved), self.n),
             np.array([state.unstable for state in states], np.int64),
             np.array([state.effort for state in states]),
@@ -333,7 +327,7 @@ class NumpyEquations:
         moved = self.mesh.base if self.ramp else self.mesh.rate
         return float(self.gradient(free, place) @ moved)
 
-    def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
+    def march(self, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens.
 
         A step is accepted if motions and forces change little, the prediction was good, and the chord agrees with the
@@ -364,30 +358,30 @@ class _Judgement(NamedTuple):
     agrees: bool  # the chord with the slopes at its ends: else it is another path
 
 
-def predict(states: Sequence[MarchState], goal: float) -> FloatArray:
+def predict(states: Sequence[PathEquilibrium], goal: float) -> FloatArray:
     """Return Hermite's polynomial through up to three states and their slopes at a place of the way.
 
     Of one it is the tangent, of two the cubic.
     """
     total: Any = 0.0
     for state in states:
-        others = [neighbour.way for neighbour in states if neighbour is not state]
-        share = float(np.prod([(goal - place) / (state.way - place) for place in others])) ** 2
-        slope = 2 * sum(1 / (state.way - place) for place in others)
-        ahead = goal - state.way
-        total = total + share * ((1 - slope * ahead) * state.free + ahead * state.rate)
+        others = [neighbour.drive for neighbour in states if neighbour is not state]
+        share = float(np.prod([(goal - place) / (state.drive - place) for place in others])) ** 2
+        slope = 2 * sum(1 / (state.drive - place) for place in others)
+        ahead = goal - state.drive
+        total = total + share * ((1 - slope * ahead) * state.x + ahead * state.rate)
     return np.asarray(total)
 
 
-def _judge(equations: NumpyEquations, current: MarchState, new: MarchState, guess: FloatArray) -> _Judgement:
+def _judge(equations: NumpyEquations, current: PathEquilibrium, new: PathEquilibrium, guess: FloatArray) -> _Judgement:
     moves = np.isinf(equations.unit)
-    chord = new.free - current.free
-    forces, ahead = ~moves, new.way - current.way
-    allowed = FORCE_CHANGE * equations.unit[forces] + 0.5 * np.abs(current.free[forces])
+    chord = new.x - current.x
+    forces, ahead = ~moves, new.drive - current.drive
+    allowed = FORCE_CHANGE * equations.unit[forces] + 0.5 * np.abs(current.x[forces])
     force = float((np.abs(chord[forces]) / allowed).max(initial=0.0))
     chord, old, rate = chord[moves], current.rate[moves], new.rate[moves]
     moved = float(np.abs(chord).max(initial=0.0))
-    missed = float(np.abs(new.free - guess)[moves].max(initial=0.0))
+    missed = float(np.abs(new.x - guess)[moves].max(initial=0.0))
     bend = float(np.abs(chord - 0.5 * ahead * (old + rate)).max(initial=0.0))
     sense, size = np.sign(ahead), np.linalg.norm(chord)
     along = all(sense * (chord @ t) >= 0.5 * size * np.linalg.norm(t) for t in (old, rate))
@@ -395,28 +389,38 @@ def _judge(equations: NumpyEquations, current: MarchState, new: MarchState, gues
 
 
 def _leads_back(
-    equations: NumpyEquations, current: MarchState, new: MarchState, moved: float, tolerance: float
+    equations: NumpyEquations, current: PathEquilibrium, new: PathEquilibrium, moved: float, tolerance: float
 ) -> bool:
     """Return True if going back from a new state along its slope leads to the last one: else the branch has ended."""
-    guess = new.free - (new.way - current.way) * new.rate
-    back = equations.solve(guess, current.way, tolerance=tolerance, quick=True)
+    guess = new.x - (new.drive - current.drive) * new.rate
+    back = equations.solve(guess, current.drive, tolerance=tolerance, quick=True)
     if back is None:
         return False
-    apart = np.abs(back.free - current.free)[np.isinf(equations.unit)].max(initial=0.0)
+    apart = np.abs(back.x - current.x)[np.isinf(equations.unit)].max(initial=0.0)
     return bool(apart < SAME_EQUILIBRIUM + 1e-3 * moved)
 
 
-def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
+def _march(equations: NumpyEquations, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
     current, step = start, plan.step
-    earlier = [] if plan.before is None or plan.before.way == start.way else [plan.before]  # on this way, latest first
-    states: list[MarchState] = []
+    earlier = (
+        [] if plan.before is None or plan.before.drive == start.drive else [plan.before]
+    )  # on this way, latest first
+    states, at_targets = list[PathEquilibrium](), list[int]()
+
+    def end(code: MarchCode) -> NaturalMarch:
+        shape = len(states), equations.n
+        x, rate = (np.array([state[k] for state in states]).reshape(shape) for k in (0, 2))
+        drive, effort = (np.array([state[k] for state in states], float) for k in (1, 4))
+        unstable = np.array([state.unstable for state in states], np.int64)
+        return NaturalMarch(x, drive, rate, unstable, effort, np.array(at_targets, np.int64), step, code)
+
     passed = rejected = 0
     while passed < len(targets) and len(states) < plan.room:
-        left = float(targets[passed] - current.way)
+        left = float(targets[passed] - current.drive)
         sense, lands = np.sign(left), abs(left) <= LAND_FROM * step
-        goal = float(targets[passed]) if lands else current.way + sense * step
-        ahead = goal - current.way
-        if earlier and (current.way - earlier[0].way) * sense < 0:
+        goal = float(targets[passed]) if lands else current.drive + sense * step
+        ahead = goal - current.drive
+        if earlier and (current.drive - earlier[0].drive) * sense < 0:
             earlier = []
         guess = predict((current, *earlier), goal)
         new = equations.solve(guess, goal, tolerance=plan.tolerance, quick=True)
@@ -430,12 +434,13 @@ def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, pl
         else:
             rejected = max(0, rejected - 1)
             if not same:
-                return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, step)
+                return end(MarchCode.STABILITY_CHANGES)
             if plan.on_branch and not _leads_back(equations, current, new, seen.moved, plan.tolerance):
-                return NaturalMarch(tuple(states), MarchCode.BRANCH_ENDS, step)
+                return end(MarchCode.BRANCH_ENDS)
             earlier = [current, *earlier[: N_PREDICTING - 2]]
-            current = new._replace(target=passed if lands else -1)
-            states.append(current)
+            current = new
+            states.append(new)
+            at_targets.append(passed if lands else -1)
             passed += lands
             quality = seen.missed / (seen.moved + 1e-8)
             if quality < 0.1:
@@ -443,13 +448,13 @@ def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, pl
             elif quality > 0.25:
                 step = 0.8 * abs(ahead)
             continue
-        if earlier and step < 0.25 * abs(current.way - earlier[0].way):
+        if earlier and step < 0.25 * abs(current.drive - earlier[0].drive):
             earlier = []
         if rejected > MAX_REJECTED or step < SHORTEST_STEP * plan.span:
-            return NaturalMarch(tuple(states), MarchCode.STEPS_FAIL, step)
-    return NaturalMarch(tuple(states), MarchCode.DONE if passed == len(targets) else MarchCode.FULL, step)
+            return end(MarchCode.STEPS_FAIL)
+    return end(MarchCode.DONE if passed == len(targets) else MarchCode.FULL)
 
 
-def begin(equations: NumpyEquations, free: FloatArray | None = None, place: float = 0.0) -> MarchState | None:
+def begin(equations: NumpyEquations, free: FloatArray | None = None, place: float = 0.0) -> PathEquilibrium | None:
     """Return the equilibrium at the start of a way: at rest, unless near some free unknowns."""
     return equations.solve(np.zeros(equations.n) if free is None else free, place)

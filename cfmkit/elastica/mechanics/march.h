@@ -57,6 +57,7 @@ typedef struct {
     const double *moved_law; /* (moved, 3 + coefficients): length, rigidity and curling of the beam, its unloaded angle by the parameter */
     const double *rule, *unit_bend; /* (2, q) Gauss points and weights; (triangle) int N_i' N_j' */
 } Model;
+#define N_FIELDS ((Int)(sizeof(Model) / sizeof(Int)))
 
 /* Where on the way: both factors and their change with what is followed. */
 typedef struct { double drive, share, by_drive, by_share; } Stage;
@@ -99,7 +100,7 @@ double bending_change(const Model *m, Int o, double curvature, double grows, dou
 Pose pose(const Model *m, const double *z, Int k);
 Distance outline_distance(const Outline *o, double x, double y);
 void contact_term(const Model *m, Int number, const double *z, Term *t);
-void contact_gaps(const Model *m, const double *z, Int n, double *gaps);
+int contact_gaps(const Model *m, const double *z, Int n, double *gaps);
 
 int sides_move(const Model *m, const double *z);
 int side_presses(const Model *m, Int number, const double *z);
@@ -157,9 +158,11 @@ int linearise(const Model *m, const double *x, double way, double *residual, dou
 int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable);
 int solve(const Model *m, double *x, double *way, const double *border, double level, const double *push, double tolerance,
           int quick, double *rate, double *found);
-int solve_many(const Model *models, Int designs, double *x, double *way, Int count, double tolerance, int quick, double *rate,
-               double *found);
+int solve_each(const Model *m, double *x, double *way, Int count, double tolerance, int quick, double *rate, double *found);
 double soften(const Model *m, const double *x, double way, Int rounds, double *vector);
+int beam_tables(const Model *shapes, Int elements, const Int *row, const double *cuts, const double *coefficients, Int powers,
+                const double *length, const double *rigidities, Int beams, double unit_length, double unit_force,
+                double *tables, double *lengths);
 int compare(const Model *models, Int designs, const Model *shapes, const double *laws, Int powers, const double *z,
             const double *drive, Int count, double tolerance, double *ends, double *found);
 

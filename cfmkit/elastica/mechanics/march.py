@@ -13,13 +13,13 @@ import numpy as np
 
 from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
 from cfmkit.elastica.contact.sliding import SlidingEquations
-from cfmkit.elastica.mechanics.compiled import MAX_DEGREE, CompiledEquations, load_compiled
+from cfmkit.elastica.mechanics.compiled import CompiledEquations
+from cfmkit.elastica.mechanics.compiled_module import MAX_DEGREE, load_compiled
 from cfmkit.elastica.mechanics.compiled_sides import are_sides_compiled
 from cfmkit.elastica.mechanics.contact_arrays import are_compiled, side_contacts
 from cfmkit.elastica.mechanics.equations import (
     LinearEquations,
     MarchPlan,
-    MarchState,
     NaturalMarch,
     NumpyEquations,
     SolvedStates,
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 COMPILED_TERMS = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
 """Springs and loads that march.c has; networks with others run on numpy."""
@@ -132,7 +133,7 @@ class CompiledSides(CompiledEquations):
         """Return flexibility and shape of the softest mode."""
         return self.reference.soften(free, place, vector, rounds)
 
-    def solve(self, free: FloatArray, *rest: Any, **named: Any) -> MarchState | None:
+    def solve(self, free: FloatArray, *rest: Any, **named: Any) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does."""
         if self._lies(free):
             return self.reference.solve(free, *rest, **named)
@@ -150,8 +151,8 @@ class CompiledSides(CompiledEquations):
                 total[lies] = some
         return solved
 
-    def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
+    def march(self, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
-        if self._lies(start.free):
+        if self._lies(start.x):
             return self.reference.march(start, targets, plan)
         return super().march(start, targets, plan)

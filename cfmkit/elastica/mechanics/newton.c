@@ -293,23 +293,20 @@ int solve(const Model *m, double *x, double *way, const double *border, double l
     return code;
 }
 
-/* Newton's method for each of several guesses (designs, count, n) at places (count) of the way: codes, unstable directions
- * and efforts to found (designs, count, 3), slopes to rate unless that is NULL. */
-int solve_many(const Model *models, Int designs, double *x, double *way, Int count, double tolerance, int quick, double *rate,
-               double *found) {
+/* Newton's method for each of several guesses (count, n) at places (count) of the way: codes, unstable directions and efforts
+ * to found (count, 3), slopes to rate. */
+int solve_each(const Model *m, double *x, double *way, Int count, double tolerance, int quick, double *rate, double *found) {
     const Goal goal = {NULL, 0.0, NULL, tolerance, quick};
-    for (const Model *m = models; m < models + designs; m++) {
-        Work *w = work_open(m);
-        if (!w) return DIVERGED;
-        for (Int k = 0; k < count; k++, x += m->free, found += 3) {
-            Found end = {0, 0, 0.0};
-            found[0] = newton(m, w, x, way + k, &goal, &end);
-            if (rate) { memcpy(rate, w->slope, (size_t)m->free * sizeof(double)); rate += m->free; }
-            found[1] = (double)end.told;
-            found[2] = end.effort;
-        }
-        work_close(w);
+    Work *w = work_open(m);
+    if (!w) return DIVERGED;
+    for (Int k = 0; k < count; k++, x += m->free, rate += m->free, found += 3) {
+        Found end = {0, 0, 0.0};
+        found[0] = newton(m, w, x, way + k, &goal, &end);
+        memcpy(rate, w->slope, (size_t)m->free * sizeof(double));
+        found[1] = (double)end.told;
+        found[2] = end.effort;
     }
+    work_close(w);
     return CONVERGED;
 }
 

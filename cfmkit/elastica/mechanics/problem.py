@@ -11,11 +11,10 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.compiled import CompiledEquations
-from cfmkit.elastica.mechanics.equations import MarchCode, MarchPlan, MarchState
+from cfmkit.elastica.mechanics.equations import MarchPlan
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import slopes_at_end
 from cfmkit.elastica.model.network import PointLoad
-from cfmkit.numerics.continuation.path import MarchedSteps
 from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace
     from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
-    from cfmkit.numerics.continuation.path import Walk
+    from cfmkit.numerics.continuation.path import MarchedSteps, Walk
     from cfmkit.numerics.continuation.problem import Border
 
 SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
@@ -81,8 +80,7 @@ class NetworkProblem:
     ) -> PathEquilibrium | None:
         """Return the equilibrium near a guess: Newton's method of the protocol, in compiled code."""
         row, level = (None, 0.0) if border is None else border
-        state = self.equations.solve(x, drive, row, level, push)
-        return None if state is None else _equilibrium(state)
+        return self.equations.solve(x, drive, row, level, push)
 
     def solve_each(self, guesses: Sequence[FloatArray], drives: Sequence[float]) -> list[PathEquilibrium | None]:
         """Return the equilibria near guesses at their drives, in compiled code."""
@@ -92,15 +90,13 @@ class NetworkProblem:
 
     def march(self, walk: Walk) -> MarchedSteps:
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
-        here, before, left = _state(walk.here), walk.before, walk.targets[walk.number :]
+        left = walk.targets[walk.number :]
         plan = MarchPlan(
-            walk.step, walk.options.span, _state(before) if before is not None else None, walk.options.largest_motion,
-            self.next_correction, on_branch=walk.branch is not None,
+            walk.step, walk.options.span, walk.before, walk.options.largest_motion, self.next_correction,
+            on_branch=walk.branch is not None,
             room=self._room_in_contact if self.mesh.contacts else 2 * len(left) + N_SPARE_STATES,
         )  # fmt: skip
-        marched = self.equations.march(here, left, plan)
-        states = tuple((_equilibrium(state), state.target >= 0) for state in marched.states)
-        return MarchedSteps(states, marched.step, marched.code is MarchCode.STEPS_FAIL)
+        return self.equations.march(walk.here, left, plan)
 
     @property
     def _room_in_contact(self) -> int:
@@ -198,14 +194,6 @@ class NetworkProblem:
 def _any_vector(count: int) -> FloatArray:
     vector = np.cos(np.arange(count) * np.arange(1, count + 1))
     return read_only(vector / np.linalg.norm(vector))
-
-
-def _state(at: PathEquilibrium) -> MarchState:
-    return MarchState(*at[:5])
-
-
-def _equilibrium(state: MarchState) -> PathEquilibrium:
-    return PathEquilibrium(*state[:5])
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,8 +29,8 @@ class BeamFits(Mapping[str, Fit]):
 
     def __init__(self, network: Network) -> None:
         """Fit the plain beams, all at once."""
-        ends = np.array([[beam_end_at(network, name, side) for side in (0, 1)] for name in network.beams])
-        self.network, self.bundle = network, Bundle(network, ends)
+        places = [at for name in network.beams for side in (0, 1) for at in beam_end_at(network, name, side)]
+        self.network, self.bundle = network, Bundle(network, np.array(places).reshape(-1, 2, 2))
         self._known: dict[str, Fit] = {}
         self.known: dict[Any, Any] = {}  # what else was found of the unloaded network, by its maker
 

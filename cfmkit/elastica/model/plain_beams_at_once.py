@@ -95,7 +95,7 @@ class Bundle:
 
 def check_fits(
     beams: Sequence[Beam],  # plain ones
-    # distance, own: (b,): between the ends of each [m], and between those of its shape, over its length [1]
+    # distance, own: (b,) in all: between the ends of each [m], and between those of its shape, over its length [1]
     distance: Any,
     own: Any,
 ) -> None:
@@ -103,9 +103,9 @@ def check_fits(
 
     Raises InputError if one cannot be fitted.
     """
-    if min(distance.real.tolist()) > 0 and min(own.real.tolist()) > 1e-9:
+    if distance.real.min() > 0 and own.real.min() > 1e-9:
         return
-    for beam, far, reach in zip(beams, np.real(distance), np.real(own), strict=True):
+    for beam, far, reach in zip(beams, np.real(distance).ravel(), np.real(own).ravel(), strict=True):
         if not far > 0:
             raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
         if not reach > 1e-9:
@@ -119,11 +119,11 @@ def is_plain(beam: Beam) -> bool:
 
 def has_polynomial_angle(beam: Beam) -> bool:
     """Return True if a beam has a polynomial angle, no coil of many turns, and one thickness."""
-    return isinstance(beam.shape, Polynomial) and not isinstance(beam.section.thickness, Taper) and not coils(beam)
+    return isinstance(beam.shape, Polynomial) and not (isinstance(beam.section.thickness, Taper) or coils(beam))
 
 
 def coils(beam: Beam) -> bool:
-    """Return True if the angle of a beam, a polynomial, may turn by more than COILED."""
+    """Return True if the angle of a beam, a polynomial, may turn by more than `MAX_BEAM_TURN`."""
     return isinstance(beam.shape, Polynomial) and sum(map(abs, beam.shape.coefficients[1:])) > MAX_BEAM_TURN
 
 

@@ -16,8 +16,9 @@ from cfmkit.elastica.results.between_points import MIN_PATH_POINTS, PLACE_RTOL, 
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.equations import MarchState, SolvedStates
+    from cfmkit.elastica.mechanics.equations import SolvedStates
     from cfmkit.elastica.results.path import EquilibriumPath
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +43,13 @@ class BetweenLoads(BetweenPoints):
     def _spots(self, y: FloatArray, wanted: FloatArray, near: FloatArray) -> tuple[SolvedStates, FloatArray]:
         goals = wanted - self.rest / self.unit_of_motion
         each = [self._spot(*guess) for guess in zip(y, near, goals, strict=True)]
-        ways = np.array([np.nan if spot is None else spot.way for spot in each])
+        ways = np.array([np.nan if spot is None else spot.drive for spot in each])
         return self._equations.collect(each), ways
 
-    def _spot(self, y: FloatArray, near: float, goal: float) -> MarchState | None:
+    def _spot(self, y: FloatArray, near: float, goal: float) -> PathEquilibrium | None:
         first = self._equations.solve(y, near, self.row, goal)
         # the solver watches poses and forces: once more, so that the load is as exact as they are
-        return None if first is None else self._equations.solve(first.free, first.way, self.row, goal)
+        return None if first is None else self._equations.solve(first.x, first.drive, self.row, goal)
 
     def _counts(self, near: Any, left: Any) -> Any:
         return np.stack([self._unstable[left], self._unstable[left + 1]], axis=1)  # a largest load: two of each kind

@@ -61,9 +61,9 @@ def solve_near_known_path(
         state = own.solve(guess, way)
         if state is None or state.unstable > int(path.unstable[known[number]]):
             continue
-        if float(np.abs((state.free - guess)[moves]).max(initial=0.0)) <= largest_turn:
+        if float(np.abs((state.x - guess)[moves]).max(initial=0.0)) <= largest_turn:
             kept.append(number)
-            states.append(state.free)
+            states.append(state.x)
     status, message = PathStatus.COMPLETE, PathStatus.COMPLETE.value
     missing = sorted({*range(len(wanted))} - {*kept})
     if missing:
@@ -105,6 +105,6 @@ def drive_slope(
         state = own.solve(path.free[index], drive)
         if state is None:
             raise InputError("the slope of the effort needs converged points")
-        moved = state.free + 1j * COMPLEX_STEP * state.rate
+        moved = state.x + 1j * COMPLEX_STEP * state.rate
         slopes.append(float(own.gradient(moved, drive + 1j * COMPLEX_STEP).imag @ mesh.rate) / COMPLEX_STEP)
     return read_only(np.array(slopes) * unit)

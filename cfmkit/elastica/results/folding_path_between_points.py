@@ -121,9 +121,9 @@ class AlongTheWay:
             spot = own.solve(y[number], float(drive[number]), border, goal)
             if spot is None or spot.unstable not in path.unstable[at : at + 2].tolist():
                 continue
-            moved = _largest(path, spot.free - y[number])
+            moved = _largest(path, spot.x - y[number])
             if moved <= max(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * _largest(path, known_y[at + 1] - known_y[at])):
-                y[number], drive[number], found[number] = spot.free, spot.way, True
+                y[number], drive[number], found[number] = spot.x, spot.drive, True
         return path.with_states(near, y, drive, found)
 
     @cached_property

@@ -14,7 +14,7 @@ from cfmkit.elastica.mechanics.similar_arrays import make_inextensible
 from cfmkit.elastica.results.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
-from cfmkit.numerics.continuation.follow import follow
+from cfmkit.numerics.continuation.follow import each_point, follow_together
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.contact.path_items import PathItem
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.drive import Control
+    from cfmkit.numerics.continuation.path import MarchedPoints
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
     Remesh = Callable[[tuple[FlankPlace, ...]], Discretisation]
@@ -74,7 +75,7 @@ def find_start(mesh: Discretisation, control: Control, remesh: Remesh | None = N
         begin = correct(ramp, at.x, 0.0)
         if begin is None:
             return DriveStart(problem, None, tuple(events), branch, first, (what, PathStop(WhyStopped.LOST, 0.0)))
-        for item in follow_network(ramp, begin, np.ones(1), options, branch):
+        for item in each_point(follow_network(ramp, begin, np.ones(1), options, branch)):
             if isinstance(item, ContactChange):
                 continue
             if isinstance(item, Remeshed):
@@ -200,13 +201,13 @@ def follow_network(
     targets: FloatArray,
     options: Options,
     branch: PathBranch | None = None,
-) -> Iterator[PathItem]:
-    """Yield points, events and changes of contacts of a path in order, and its ending at last; see `follow`.
+) -> Iterator[PathItem | MarchedPoints]:
+    """Yield points, events and changes of contacts of a path in order, and its ending at last; see `follow_together`.
 
     Every change comes behind a point that lies at it.
     """
     if not problem.mesh.fits.network.contacts:
-        return follow(problem, start, targets, options, branch)
+        return follow_together(problem, start, targets, options, branch)
     from cfmkit.elastica.contact.follow import follow_in_contact
 
     return follow_in_contact(problem, start, targets, options, branch)

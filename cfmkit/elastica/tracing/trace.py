@@ -24,7 +24,16 @@ from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import DriveStart, find_start, follow_network, is_stretched
 from cfmkit.elastica.tracing.taut_beams import drop_locked_points, find_tension
 from cfmkit.numerics.continuation.events import relocate
-from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
+from cfmkit.numerics.continuation.path import (
+    MarchedPoints,
+    Options,
+    PathBranch,
+    PathEvent,
+    PathStop,
+    Point,
+    PointColumns,
+    WhyStopped,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -309,7 +318,7 @@ def trace_on(
         return resolution.arrays(network, drive, arrays.fits, flanks)
 
     start = find_start(arrays, control, remesh if sides else None)
-    events, first, points = list[PathEvent](), start.first, list[Point]()
+    events, first, points = list[PathEvent](), start.first, list[Point | MarchedPoints]()
     meshes = [(0, start.problem.mesh)]  # number of the first point of each piece, and its arrays
     changes: dict[int, list[ContactChange]] = {}  # by the points they are at
     ending = PathStop(WhyStopped.LOST, 0.0)
@@ -317,14 +326,14 @@ def trace_on(
     if start.at is not None and limit != 0 and not (first_only and first):
         options = _options(drive, control, unit)
         for item in follow_network(start.problem, start.at, drive.points / unit, options, start.branch):
-            if isinstance(item, Point):
+            if isinstance(item, Point | MarchedPoints):
                 points.append(item)
             elif isinstance(item, Remeshed):
                 meshes.append((len(points), item.problem.mesh))
             elif isinstance(item, ContactChange):
                 changes.setdefault(len(points) - 1, []).append(item)
-                stabler = points[-1].at._replace(unstable=min(item.before, item.after))
-                points[-1] = points[-1]._replace(at=stabler)
+                last: Any = points[-1]
+                points[-1] = last._replace(at=last.at._replace(unstable=min(item.before, item.after)))
             elif isinstance(item, PathEvent):
                 events.append(item)
                 if first is None and item.modes is not None:
@@ -333,25 +342,23 @@ def trace_on(
                         break
             else:
                 ending = item
-    while ending.end is WhyStopped.COMPLETE and points and points[-1].target < 0:
+    while ending.end is WhyStopped.COMPLETE and points and isinstance(points[-1], Point) and points[-1].target < 0:
         points.pop()
     status, message = _explain(start, ending, unit)
-    if events:
-        near = SAME_PLACE * _range(drive) / unit
-        points = [_settle_event(point, events, near) for point in points]
+    columns = PointColumns.of(points)
+    _settle_events(columns, events, SAME_PLACE * _range(drive) / unit)
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
-    path = _path(network, drive, _states(start, meshes, points), points, told, status, message)
+    path = _path(network, drive, _states(start, meshes, columns), columns, told, status, message)
     if changes:
         touched = tuple(
             ContactEvent(one.kind, one.contact, one.at.drive * unit, one.before, one.after, one.states)
             for found in changes.values()
             for one in found
         )
-        marked = read_only(np.isin(np.arange(len(points)), list(changes)), np.bool_)
+        marked = read_only(np.isin(np.arange(len(path)), list(changes)), np.bool_)
         path = replace(path, contact_events=touched, at_contact=marked)
     path = drop_locked_points(path)
-    branches = tuple(point.branch for point in points[: len(path)])
-    return TraceAttempt(path, resolution, start, first, tuple(events), branches)
+    return TraceAttempt(path, resolution, start, first, tuple(events), columns.branches[: len(path)])
 
 
 def _options(drive: Drive, control: Control, unit: float) -> Options:
@@ -364,14 +371,15 @@ def _options(drive: Drive, control: Control, unit: float) -> Options:
     )  # fmt: skip
 
 
-def _states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points: list[Point]) -> Equilibria:
+def _states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points: PointColumns) -> Equilibria:
     """Return the states of all points on one network of elements."""
     pieces = []
-    ends = [first for first, _ in meshes[1:]] + [len(points)]
-    for (first, arrays), end in zip(meshes, ends, strict=True):
-        drives = np.array([point.at.drive for point in points[first:end]])
+    ends = [first for first, _ in meshes[1:]] + [len(points.x)]
+    for (first, arrays), end in zip(meshes, ends, strict=True):  # without contacts there is one
+        drives = points.drive if len(meshes) == 1 else points.drive[first:end]
         z: Any = arrays.base + drives[:, None] * arrays.rate
-        z[:, arrays.free] = np.array([point.at.x for point in points[first:end]]).reshape(len(drives), len(arrays.free))
+        if len(drives):
+            z[:, arrays.free] = np.concatenate(points.x[first:end])
         pieces.append(StatesOfPiece(arrays, z, drives))
     if len(pieces) == 1 or start.problem.remesh is None:
         return Equilibria(*pieces[0])
@@ -382,20 +390,18 @@ def _states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points:
 
 
 def _path(
-    network: Network, drive: Drive, states: Equilibria, points: list[Point], events: tuple[Event, ...],
+    network: Network, drive: Drive, states: Equilibria, points: PointColumns, events: tuple[Event, ...],
     status: PathStatus, message: str,
 ) -> Path:  # fmt: skip
     path = Path(
         network, drive, states,
-        unstable=read_only([point.at.unstable for point in points], np.int64),
-        requested=read_only([point.target for point in points], np.int64),
-        branch=_name_branches([point.branch for point in points], states.mesh.scales.drive),
+        unstable=read_only(points.unstable, np.int64), requested=read_only(points.target, np.int64),
+        branch=_name_branches(points.branches, states.mesh.scales.drive),
         status=status, message=message, events=events, error=float("inf"),
-        accurate=read_only(np.ones(len(points)), np.bool_),
+        accurate=read_only(np.ones(len(points.drive)), np.bool_),
     )  # fmt: skip
-    efforts = np.array([point.at.effort for point in points])
-    if not isinstance(drive, Loading) and np.isfinite(efforts).all():  # the solver has them already
-        vars(path)["effort"] = read_only(efforts * (states.mesh.scales.moment / states.mesh.scales.drive))
+    if not isinstance(drive, Loading) and np.isfinite(points.effort).all():  # the solver has them already
+        vars(path)["effort"] = read_only(points.effort * (states.mesh.scales.moment / states.mesh.scales.drive))
     return path
 
 
@@ -403,19 +409,20 @@ def _tell(event: PathEvent, unit: float) -> Event:
     return Event(event.kind, event.drive * unit, event.before, event.after)
 
 
-def _settle_event(point: Point, events: list[PathEvent], near: float) -> Point:
-    """Return a point, which if it lies at a bifurcation is as stable as the path is on the better side of it.
+def _settle_events(points: PointColumns, events: list[PathEvent], near: float) -> None:
+    """Let points at a bifurcation be as stable as the path is on the better side of it.
 
     There, as `near` as that in the drive, the number of unstable directions is rounding.
     """
-    for event in events:
-        if event.kind == "bifurcation" and abs(point.at.drive - event.drive) <= near:
-            return point._replace(at=point.at._replace(unstable=min(event.before, event.after)))
-    return point
+    for event in reversed(events):  # of several the first counts
+        if event.kind == "bifurcation":
+            points.unstable[np.abs(points.drive - event.drive) <= near] = min(event.before, event.after)
 
 
 def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
     names = {branch: _name_branch(branch, unit) for branch in set(branches)}
+    if len(names) == 1:
+        return read_only(np.full(len(branches), names[branches[0]]), np.str_)
     return read_only([names[branch] for branch in branches], np.str_)
 
 

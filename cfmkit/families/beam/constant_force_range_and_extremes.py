@@ -7,8 +7,6 @@ hold against the motion are positive, and one definition serves both directions.
 A traced mechanism has a model between the points of its curve: there results are refined by equilibria that are solved
 at them. Of other models cubics through the points decide.
 
-Reference
----------
 [Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010), sec. 2.
 """
 

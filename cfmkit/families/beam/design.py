@@ -6,8 +6,6 @@ bend without stretching, at the same displacement per size. Stretching breaks th
 (thickness / size)^2. The value that is free is therefore found by Eq. 6 and corrected with the model of the
 specification until the force is the one wanted.
 
-Reference
----------
 [Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010), eq. 6 and sec. 2.3.
 """
 

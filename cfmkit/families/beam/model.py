@@ -4,8 +4,6 @@ Beams bend without stretching unless the specification says otherwise [Lan]; wit
 Reissner. The force is that of all copies together; the forces of single beams are those of one copy. A curve with
 hysteresis has branch `load` of the forward travel and branch `unload` of the return.
 
-Reference
----------
 [Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism for adaptive robot end-effector
 operations (2010), sec. 2.
 """

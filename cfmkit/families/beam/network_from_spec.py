@@ -9,8 +9,6 @@ Stages in series: each stands, with its supports, on the moving part of the one 
 same force and add their displacements. All of them are in the network, so that a stack in which one stage snaps ahead
 of the others is found like any other bifurcation.
 
-Reference
----------
 [Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010).
 """
 

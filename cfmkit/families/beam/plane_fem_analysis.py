@@ -30,6 +30,7 @@ from cfmkit.families.beam.tip_on_uneven_surface import N_PLACES, curve_of, findi
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.fem_results import (
     columns_of_solid,
+    drop_repeats,
     fillet_table,
     findings_of_mesh,
     largest_concentration,
@@ -37,7 +38,6 @@ from cfmkit.families.fem_results import (
     remove_frame,
     stable_between_poses,
     stress_between_poses,
-    without_repeats,
 )
 from cfmkit.families.findings import sharp_inside
 from cfmkit.results import Quantity, Result, Status, quantities
@@ -311,7 +311,7 @@ def _stops(spec: BeamSpec) -> list[float]:
     inside = [place for place in _ends_of_windows(spec, end) if 0.0 < place / end < 1.0]
     even = np.linspace(0.0, end, spec.analysis.solid.poses)
     # ends of windows that are an even pose but for rounding are that pose
-    return without_repeats(np.concatenate([even, inside]), end)[:: 1 if end > 0 else -1].tolist()  # type: ignore[no-any-return]
+    return drop_repeats(np.concatenate([even, inside]), end)[:: 1 if end > 0 else -1].tolist()  # type: ignore[no-any-return]
 
 
 def _ends_of_windows(spec: BeamSpec, end: float) -> list[float]:

@@ -1,4 +1,4 @@
-"""What a beam mechanism's part does as a solid at its nodes, and in its fillets.
+"""Motions, reactions and stresses of a beam mechanism's part as a solid: at its nodes, and in its fillets.
 
 Motions and reactions of nodes are those of the half described: a node that is held or driven is a rigid piece, any
 other goes with the material there. A fillet has its largest stress, with the node and the beams that it joins; nominal

@@ -11,8 +11,6 @@ extremes are those of everything between its ends.
 
 Assumes: slow motion, a sharp tip that stays on the surface, guides without friction.
 
-Reference
----------
 [Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010), sec. IV and Fig. 14.
 """
 

@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     Rows = NDArray[np.intp]
     Group = tuple[Rows, SolvedRows[Solution]]
 
-MAX_SAMPLES_AT_ONCE = 250_000
-"""Points that are worked on together: few enough to stay in a processor's cache, 512 curves of 481 points."""
+MAX_SAMPLES_AT_ONCE = 125_000
+"""Points that are worked on together: few enough to stay in a processor's cache, 260 curves of 481 points."""
 
 MIN_SHARED_CAMS = 8
 """Mechanisms around one cam from which on they are worth a solution of their own."""

@@ -5,8 +5,6 @@ with rho the radius of the cam where they touch. The material yields first below
 largest shear stress is 0.30 p0: at p0 = 1.67 times the yield strength (Tresca). So the stress that is compared
 with the allowable one is p0 / 1.67.
 
-Reference
----------
 [J] K. L. Johnson, Contact Mechanics (1985), sec. 4.2 and 6.2.
 """
 
@@ -51,16 +49,8 @@ def pressure_between(
 def flank_pressure(assembly: Assembly, states: TrackStates, force: FloatArray, rows: Any = None) -> FloatArray:
     """Return the pressure where contacts press on the flank as designed [Pa]; NaN on the corner, and without a contact.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        The parts.
-    states : TrackStates
-        Where the rollers are, (n,) or (k, n).
-    force : (n,) or (k, n) array
-        At a contact [N].
-    rows : (k,) array of int, optional
-        Which mechanisms of the assembly these are; default: all.
+    Of the rollers in some states, (n,) or (k, n), pressed by forces of that shape [N]; `rows`: which mechanisms of the
+    assembly these are, (k,); default: all.
     """
     mechanism, profile, contact = assembly.spec.mechanism, assembly.profile, assembly.spec.mechanism.contact
     if contact is None:

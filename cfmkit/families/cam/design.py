@@ -6,8 +6,6 @@ can follow: the smallest such preload is chosen where that is requested. A profi
 also carries weight is designed for the force that is left after the slider's own weight; its slope is steeper by
 c = F' / (F' - 2 w), w the weight that hangs on one roller.
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
 """
 

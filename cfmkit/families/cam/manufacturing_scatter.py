@@ -4,8 +4,6 @@ Waviness is a sum of waves of equal power between the stated wavelength and the 
 flank, with random phases. The roller is taken to touch every point of the flank, which holds
 for waves longer than its size makes it bridge.
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, fig. 13.
 """
 

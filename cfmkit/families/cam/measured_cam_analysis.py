@@ -11,8 +11,6 @@ larger than the waves of a cut edge: it rides on the crests and bridges hollows 
 the design's roller path, moved along the normal until the circle touches the built flank and cuts it nowhere; the
 direction of its track is perpendicular to the contact's normal.
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 2.3 and 3.
 """
 

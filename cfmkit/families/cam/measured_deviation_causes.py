@@ -8,8 +8,6 @@ profile need no fit: the model has them. What is left is unexplained.
 
 `calibrate` fits the same values with intervals, and others.
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 3.
 """
 

@@ -5,8 +5,6 @@ Friction opposes the motion, so the way up and the way down have different force
 the area between them is lost in one cycle. Where the cam is undercut the roller
 pivots on its corner, and the curve shows the force that really acts there.
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 2 and 3.
 """
 

@@ -21,8 +21,6 @@ linear in the loads, and solved as such.
 Assumes: the brace's centre of mass at mid-length, so that half of it hangs at each end; pins feel the axial force of
 their brace (V is some thousandth of it).
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
 """
 

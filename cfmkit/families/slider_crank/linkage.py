@@ -3,8 +3,6 @@
 The crank turns about A = (0, 0), carries the coupler at B = r1 (cos t, sin t), and the coupler
 ends in the slider C = (x, e), which moves along x.
 
-References
-----------
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 2 and 3.
 [B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519.
 """

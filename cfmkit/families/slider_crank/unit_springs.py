@@ -10,8 +10,6 @@ are (m, n), or (1, n) for all.
 
 Assumes: rigid massless links, no friction, linear springs.
 
-Reference
----------
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 2.
 [B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.1.
 """

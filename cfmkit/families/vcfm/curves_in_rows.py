@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.end_stops import NO_STOPS
-from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of
+from cfmkit.families.rows import rows_of
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.longest_interval_in_band import flat_window
 

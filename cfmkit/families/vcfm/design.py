@@ -16,8 +16,6 @@ leaves, h rise of a leaf, t its thickness, Q = h/t.
    (`leaf_sizing`).
 3. Lengths are increased if the exact stress is too large.
 
-Reference
----------
 [D] B. Ding, X. Li, Y. Li, Robotica (2022), variable constant-force compliant mechanism; the theory is in
     docs/theory_vcfm.md.
 """
@@ -165,9 +163,8 @@ def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
         width = float(sized_leaf(spec, target, leaf.thickness, leaf.length * LENGTH_STEP**steps).width)
         return width >= LENGTH_MARGIN * MIN_WIDTH_RATIO * float(leaf.thickness)
 
-    longer = leaf.length * LENGTH_STEP ** bisect_left(
-        range(MOST_STEPS), True, key=wide_enough
-    )  # widths grow with lengths
+    # widths grow with lengths
+    longer = leaf.length * LENGTH_STEP ** bisect_left(range(MOST_STEPS), True, key=wide_enough)
     raise finding.infeasible(
         "out_of_plane_buckling",
         f"leaves of {mm(leaf.length)} would be {mm(leaf.width)} wide and {mm(leaf.thickness)} thick: below twice the "

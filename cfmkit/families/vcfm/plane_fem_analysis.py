@@ -21,13 +21,13 @@ from cfmkit.export.arc_outlines import outlines
 from cfmkit.families.fem_results import (
     FilletRow,
     both_images,
+    drop_repeats,
     fillet_table,
     findings_of_mesh,
     largest_concentration,
     nominal_stresses,
     not_meshed,
     with_nominal,
-    without_repeats,
 )
 from cfmkit.families.findings import sharp_inside
 from cfmkit.families.vcfm.exact_model import DOWN_ANGLE, ExactSampler, leaf_network, problem_of, spring_chain
@@ -204,7 +204,7 @@ def _stops(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ())
     count = max(5, spec.analysis.solid.poses // fewer)
     shares = np.linspace(0.0, 1.0, count) ** POSE_EXPONENT
     more = [place / end for place in places if 0.0 < place / end < 1.0]
-    return tuple((end * without_repeats(np.concatenate([shares, more]), 1.0)).tolist())
+    return tuple((end * drop_repeats(np.concatenate([shares, more]), 1.0)).tolist())
 
 
 def _pull_back(spec: VcfmSpec, pushed: AdaptiveSolution, end: float, report: Callable[[float], None]) -> SolidPath:

@@ -159,7 +159,7 @@ def locate_loss(walk: Walk, new: PathEquilibrium) -> Located | None:
     directions is another there, the last equilibrium that is stable stands for it, where the path would be without it.
     """
     problem, here, widest = walk.problem, walk.here, walk.options.corner * walk.options.span or np.inf
-    begin = walk.trail[0].drive
+    begin = walk.origin.drive
     narrowest = min(ONE_LOSS * abs(new.drive - begin), 1e-3 * abs(here.drive - begin) + 1e-12 * walk.options.span)
     for _ in range(MAX_HALVINGS):
         width = abs(new.drive - here.drive)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,18 +12,28 @@ from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.corners import crosses_bend, mark_corners
 from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
-from cfmkit.numerics.continuation.path import AT_EVENT, PathEvent, PathStop, Point, Walk, WhyStopped
+from cfmkit.numerics.continuation.path import (
+    AT_EVENT,
+    MarchedPoints,
+    PathEvent,
+    PathStop,
+    Point,
+    Walk,
+    WhyStopped,
+)
 from cfmkit.numerics.continuation.problem import largest_motion
 from cfmkit.numerics.continuation.steps import advance
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator
+    from collections.abc import Callable, Generator, Iterable, Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.losses import Items
     from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathBranch
     from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
     from cfmkit.numerics.continuation.steps import Trial
+
+Item = Point | PathEvent | PathStop
 
 NEARLY_CRITICAL = 1e-5  # stiffness of a mode; one a hundred times as large says that no bifurcation is very near
 LANDING_STRETCH = 1.3  # steps by which a step may be stretched to land on a requested value
@@ -68,14 +78,44 @@ def follow(
     Point, PathEvent or PathStop
         Points at requested values and between them. A path that ends early ends with an `PathStop` that says why.
     """
-    between = 0
-    items = _items(problem, start, targets, options, branch)
-    for item in mark_corners(items, options) if options.corner else items:
-        yield item
-        between += isinstance(item, Point) and item.target < 0
-        if between > options.most_points:
-            yield PathStop(WhyStopped.FULL, item.at.drive, "more points than allowed at {place}")  # type: ignore[union-attr]
+    items = each_point(follow_together(problem, start, targets, options, branch))
+    return mark_corners(items, options) if options.corner else items
+
+
+def each_point(items: Iterable[Any]) -> Iterator[Any]:
+    """Yield items of a path, the points of marches one by one."""
+    for item in items:
+        if isinstance(item, MarchedPoints):
+            yield from item.each()
+        else:
+            yield item
+
+
+def follow_together(
+    problem: ContinuationProblem,
+    start: PathEquilibrium,
+    targets: FloatArray,
+    options: Options,
+    branch: PathBranch | None = None,
+) -> Iterator[Item | MarchedPoints]:
+    """Yield what `follow` does, but the points of every march together, and no corners that are rounded."""
+    left = options.most_points
+    for item in _items(problem, start, targets, options, branch):
+        if isinstance(item, Point):
+            last, between = item.at.drive, int(item.target < 0)
+        elif isinstance(item, MarchedPoints):
+            last, between = float(item.steps.drive[-1]), int((item.target < 0).sum())
+        else:
+            between = 0
+        if between > left:
+            if isinstance(item, MarchedPoints):
+                item = item.cut(int(np.flatnonzero(item.target < 0)[left]) + 1)
+                last = float(item.steps.drive[-1])
+            yield item
+            yield PathStop(WhyStopped.FULL, last, "more points than allowed at {place}")
             return
+        left -= between
+        yield item
 
 
 def _items(
@@ -84,7 +124,7 @@ def _items(
     targets: FloatArray,
     options: Options,
     branch: PathBranch | None,
-) -> Iterator[Point | PathEvent | PathStop]:
+) -> Iterator[Item | MarchedPoints]:
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
     step, steepest = options.first_step * options.span, max(0.0, abs(start.stiffness))
     walk = Walk(problem, options, targets, start, step, at_first, trail=(start,), branch=branch, steepest=steepest)
@@ -105,7 +145,7 @@ def _items(
     yield from follow_on(walk)
 
 
-def follow_on(walk: Walk) -> Iterator[Point | PathEvent | PathStop]:
+def follow_on(walk: Walk) -> Iterator[Item | MarchedPoints]:
     """Yield the points and events of a path from a state of its follower on, and its ending at last."""
     outcome = yield from _walk_on(walk)
     if isinstance(outcome, PathStop):
@@ -115,7 +155,7 @@ def follow_on(walk: Walk) -> Iterator[Point | PathEvent | PathStop]:
     yield PathStop(WhyStopped.COMPLETE, outcome.here.drive)
 
 
-def _walk_on(walk: Walk) -> Generator[Point | PathEvent, None, Walk | PathStop]:
+def _walk_on(walk: Walk) -> Generator[Point | PathEvent | MarchedPoints, None, Walk | PathStop]:
     """Yield the points and events up to the last requested value; return the walk there, or why it ended before."""
     march = getattr(walk.problem, "march", None)
     while not walk.done:
@@ -143,16 +183,16 @@ def _look_ahead(walk: Walk) -> Iterator[PathEvent]:
             yield item
 
 
-def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[Point, None, Walk]:
+def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[MarchedPoints, None, Walk]:
     """Yield the points of steps that a problem takes by itself, as far as nothing happens; return the walk there."""
-    marched, number = march(walk), walk.number
-    for at, reached in marched.states:
-        yield Point(at, number if reached else -1, walk.branch)
-        number += reached
-    if marched.states:
-        passed = (walk.here, *(at for at, _ in marched.states))
-        trail = (*walk.trail, *passed[1:])
-        walk = replace(walk, before=passed[-2], here=passed[-1], trail=trail, number=number)
+    marched = march(walk)
+    if len(marched.drive):
+        target = np.where(marched.target < 0, -1, walk.number + marched.target)
+        yield MarchedPoints(marched, target, walk.branch)
+        *before, here = marched.last_two
+        number = walk.number + int((marched.target >= 0).sum())
+        last = before[0] if before else walk.here
+        walk = replace(walk, before=last, here=here, trail=(*walk.trail, marched), number=number)
     return replace(walk, step=marched.step, rejections=ARC_AFTER if marched.stuck else 1)
 
 

@@ -59,8 +59,8 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
     far = next(
         (
             e
-            for e in reversed(walk.trail)
-            if abs(e.drive - found.drive) > FARTHER_BACK * abs(found.drive - walk.trail[0].drive)
+            for e in walk.look_back()
+            if abs(e.drive - found.drive) > FARTHER_BACK * abs(found.drive - walk.origin.drive)
         ),
         here,
     )
@@ -105,7 +105,7 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
 def _find_rounded_corner(walk: Walk, found: Located, onto: PathEquilibrium) -> PathEvent | None:
     """Return the bifurcation that an imperfection rounds, by the curve well before it and on the branch."""
     problem, width = walk.problem, walk.sense * walk.options.corner * walk.options.span
-    first, drive = _well_before(walk, found.drive, abs(width)) or walk.trail[0], found.drive - width
+    first, drive = _well_before(walk, found.drive, abs(width)) or walk.origin, found.drive - width
     if (drive - first.drive) * width > 0:
         near = correct(problem, first.x + (drive - first.drive) * first.rate, drive)
         first = first if near is None or near.unstable > walk.here.unstable else near
@@ -118,7 +118,7 @@ def _find_rounded_corner(walk: Walk, found: Located, onto: PathEquilibrium) -> P
 
 def _well_before(walk: Walk, drive: float, distance: float) -> PathEquilibrium | None:
     """Return the last equilibrium of this piece that is farther than a distance from a drive."""
-    return next((e for e in reversed(walk.trail) if abs(e.drive - drive) > distance), None)
+    return next((e for e in walk.look_back() if abs(e.drive - drive) > distance), None)
 
 
 def _cluster_widths(walk: Walk, found: Located) -> Iterator[tuple[tuple[float, ...], tuple[float, ...]]]:
@@ -127,7 +127,7 @@ def _cluster_widths(walk: Walk, found: Located) -> Iterator[tuple[tuple[float, .
     Nearly rigid structures reach many critical loads at once, measured by the drive's range, and not at all so measured
     by the way to the first.
     """
-    width, way = walk.options.cluster * walk.options.span, abs(found.drive - walk.trail[0].drive)
+    width, way = walk.options.cluster * walk.options.span, abs(found.drive - walk.origin.drive)
     yield tuple(min(factor * width, NEAR_SHARE * way) for factor in NEAR_CLUSTERS), MODE_AMPLITUDES + LAST_AMPLITUDES
     if way < NEARLY_RIGID * walk.options.span:
         yield tuple(factor * way for factor in RIGID_CLUSTERS), ()
@@ -186,7 +186,7 @@ def look_past(walk: Walk, goal: float) -> Items:
     """Go on behind a bifurcation that lies at here or at the goal, where no step succeeds; None if there is none."""
     problem, span, here = walk.problem, walk.options.span, walk.here
     far, primary = (
-        _well_before(walk, here.drive, LOOK_PAST_FROM * span) or walk.trail[0],
+        _well_before(walk, here.drive, LOOK_PAST_FROM * span) or walk.origin,
         walk.options.branch == "primary",
     )
     for share in LOOK_PAST_BY:

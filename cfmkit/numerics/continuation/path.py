@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
-from cfmkit.numerics.continuation.problem import largest_motion
+import numpy as np
+
+from cfmkit.numerics.continuation.problem import PathEquilibrium, largest_motion
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.arrays import FloatArray
-    from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
+    from cfmkit.numerics.continuation.problem import ContinuationProblem
 
 
 BEND_SHARE = 0.125  # of what a bifurcation may be rounded over: longest step over a bend of the curve
@@ -57,6 +62,36 @@ class Point(NamedTuple):
     branch: PathBranch | None = None  # None: the path from rest, not left so far
 
 
+class PointColumns(NamedTuple):
+    """The points of a path, one after the other."""
+
+    x: list[FloatArray]  # (k, n) each
+    drive: FloatArray  # (p,)
+    unstable: Any  # (p,)
+    effort: FloatArray  # (p,)
+    target: Any  # (p,)
+    branches: tuple[PathBranch | None, ...]
+
+    @classmethod
+    def of(cls, points: list[Point | MarchedPoints]) -> PointColumns:
+        """Return single points and those of marches as columns."""
+        x, rows, branches = list[Any](), list[Any](), list[PathBranch | None]()
+        for item in points:
+            if isinstance(item, MarchedPoints):
+                steps = item.steps
+                x.append(steps.x)
+                rows.append((steps.drive, steps.unstable, steps.effort, item.target))
+                branches += [item.branch] * len(steps.drive)
+            else:
+                x.append(item.at.x[None])
+                rows.append(([item.at.drive], [item.at.unstable], [item.at.effort], [item.target]))
+                branches.append(item.branch)
+        if not rows:
+            return cls([], np.empty(0), np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64), ())
+        drive, unstable, effort, target = (np.concatenate(parts) for parts in zip(*rows, strict=True))
+        return cls(x, drive, unstable, effort, target, tuple(branches))
+
+
 @dataclass(frozen=True, eq=False)
 class PathEvent:
     """A bifurcation or limit point; unstable directions before and after it on the path that it lies on.
@@ -94,12 +129,59 @@ class PathStop:
     message: str = ""  # why, with {place} for the drive there
 
 
-class MarchedSteps(NamedTuple):
-    """Equilibria that a problem's own steps came to, by the same rules as `steps.advance`."""
+@dataclass(frozen=True, eq=False)
+class MarchedSteps:
+    """Equilibria that a problem's own k steps came to, by the same rules as `steps.advance`."""
 
-    states: tuple[tuple[PathEquilibrium, bool], ...]  # with whether the next requested value is reached
+    x: FloatArray  # (k, n)
+    drive: FloatArray  # (k,)
+    rate: FloatArray  # (k, n)
+    unstable: Any  # (k,)
+    effort: FloatArray  # (k,)
+    target: Any  # (k,) number of the requested value that each is at, of those that were left; -1 if at none
     step: float  # with which to go on
-    stuck: bool  # whether steps failed, and not because something happens
+
+    @property
+    def stuck(self) -> bool:
+        """True if steps failed, and not because something happens."""
+        return False
+
+    @cached_property
+    def states(self) -> tuple[PathEquilibrium, ...]:
+        """The equilibria one by one."""
+        return self._list(slice(None))
+
+    @property
+    def last_two(self) -> tuple[PathEquilibrium, ...]:
+        """The last two of them, or the only one."""
+        return self._list(slice(-2, None))
+
+    def cut(self, count: int) -> Self:
+        """Return the first of them."""
+        names = ("x", "drive", "rate", "unstable", "effort", "target")
+        return replace(self, **{name: getattr(self, name)[:count] for name in names})
+
+    def _list(self, which: slice) -> tuple[PathEquilibrium, ...]:
+        lists = self.drive[which].tolist(), self.rate[which], self.unstable[which].tolist(), self.effort[which].tolist()
+        return tuple(map(PathEquilibrium, self.x[which], *lists))
+
+
+@dataclass(frozen=True, eq=False)
+class MarchedPoints:
+    """The points of a march."""
+
+    steps: MarchedSteps
+    target: Any  # (k,) number of the requested value that each is at, -1 if at none
+    branch: PathBranch | None
+
+    def each(self) -> Iterator[Point]:
+        """Yield them one by one."""
+        for at, target in zip(self.steps.states, self.target.tolist(), strict=True):
+            yield Point(at, target, self.branch)
+
+    def cut(self, count: int) -> MarchedPoints:
+        """Return the first of them."""
+        return replace(self, steps=self.steps.cut(count), target=self.target[:count])
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +195,7 @@ class Walk:
     step: float
     number: int = 0  # of the next requested value
     before: PathEquilibrium | None = None  # on the same smooth piece, for the predictor
-    trail: tuple[PathEquilibrium, ...] = ()  # this smooth piece
+    trail: tuple[PathEquilibrium | MarchedSteps, ...] = ()  # this smooth piece
     branch: PathBranch | None = None
     modes: int = 1  # critical where this branch began
     rejections: int = 0  # two for each, less one for each accepted step
@@ -124,6 +206,17 @@ class Walk:
     def sense(self) -> float:
         """Sign of the way to the next requested value."""
         return 1.0 if self.targets[self.number] >= self.here.drive else -1.0
+
+    @property
+    def origin(self) -> PathEquilibrium:
+        """The first equilibrium of this smooth piece."""
+        first = self.trail[0]
+        return first.states[0] if isinstance(first, MarchedSteps) else first
+
+    def look_back(self) -> Iterator[PathEquilibrium]:
+        """Yield the equilibria of this smooth piece, the last first."""
+        for part in reversed(self.trail):
+            yield from reversed(part.states) if isinstance(part, MarchedSteps) else (part,)
 
     @property
     def done(self) -> bool:

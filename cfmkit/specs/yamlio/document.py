@@ -19,7 +19,7 @@ from cfmkit.errors import Problem, SpecError, UsageError
 from cfmkit.specs.units.fields import BareFloat, BareInt
 from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.specs.yamlio.explain_validation_errors import explain, not_among
-from cfmkit.specs.yamlio.path_notation import Path, parse_indices, to_dotted
+from cfmkit.specs.yamlio.path_notation import NoSuchPlace, Path, parse_indices, to_dotted, with_value
 from cfmkit.specs.yamlio.tree_builder import MAX_DEPTH, MAX_FILE_BYTES, Fault, ParsedYaml, read_text
 
 if TYPE_CHECKING:
@@ -258,14 +258,6 @@ _PART_PATTERN = r"""(?:\s*"[^"]+"\s*|\s*'[^']+'\s*|[^."'=]+)"""
 _OPTION_PATTERN = re.compile(rf"({_PART_PATTERN}(?:\.{_PART_PATTERN})*)=(.*)", re.DOTALL)
 
 
-SHORT_FOR = {"material": "name"}
-"""Keys whose bare text is short for a block with that one key: ``material: pla`` is ``material: {name: pla}``."""
-
-
-class NoSuchPlace(Exception):
-    """There is no place in the tree where the value could go."""
-
-
 def parse_option(text: str) -> Option:
     """Return the option that ``a.b=value`` means.
 
@@ -295,30 +287,3 @@ def _read_value(path: tuple[str, ...], text: str) -> Option:
         )
         faults = (Fault(0, 0, (), f"{quote(text)} would be {what}"),)
     return Option(path, reading.tree, faults)
-
-
-def with_value(tree: Any, path: tuple[str, ...], value: Any) -> Any:
-    """Return a copy of the tree with a value at a path; missing blocks are made.
-
-    Raises NoSuchPlace if the path leads through a value, or out of a list.
-    """
-    head, rest = path[0], path[1:]
-    if isinstance(tree, tuple):
-        index = _index(head, tree)
-        new = with_value(tree[index], rest, value) if rest else value
-        return (*tree[:index], new, *tree[index + 1 :])
-    if tree is not None and not isinstance(tree, dict):
-        raise NoSuchPlace(f"{head!r} is below a value; only blocks and lists have something below them")
-    block = dict(tree or {})
-    below = block.get(head)
-    if rest and head in SHORT_FOR and isinstance(below, str):
-        below = {SHORT_FOR[head]: below}
-    block[head] = with_value(below, rest, value) if rest else value
-    return block
-
-
-def _index(text: str, items: tuple[Any, ...]) -> int:
-    if not re.fullmatch("[0-9]{1,9}", text) or int(text) >= len(items):
-        count = f"0 to {len(items) - 1}" if items else "none: the list is empty"
-        raise NoSuchPlace(f"{quote(text)} is not an index of this list; there are {count}")
-    return int(text)

@@ -1,10 +1,12 @@
-"""Paths into a specification: keys and indices, written ``requirements.0.max``."""
+"""Paths into a specification: keys and indices, written ``requirements.0.max``, and values that are set there."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from cfmkit.specs.block import Model, keys_of
 from cfmkit.specs.units.strict_decimal_number import quote
 
 Path = tuple[str | int, ...]
@@ -30,3 +32,44 @@ def to_dotted(path: Path) -> str:
 
 def _quote_key(part: str | int) -> str:
     return str(part) if isinstance(part, int) else quote(part)
+
+
+SHORT_FOR = {"material": "name"}
+"""Keys whose bare text is short for a block with that one key: ``material: pla`` is ``material: {name: pla}``."""
+
+
+class NoSuchPlace(KeyError):
+    """There is no place in a specification where a value could go."""
+
+    def __str__(self) -> str:
+        """Return the sentence without quotes."""
+        return str(self.args[0])
+
+
+def with_value(tree: Any, path: Sequence[str], value: Any) -> Any:
+    """Return a copy of a specification, read or not, with a value at a path; missing blocks are made.
+
+    Raises NoSuchPlace if the path leads through a value, or out of a list.
+    """
+    head, rest = path[0], path[1:]
+    if isinstance(tree, tuple | list):
+        index = _parse_index(head, tree)
+        new = with_value(tree[index], rest, value) if rest else value
+        return (*tree[:index], new, *tree[index + 1 :])
+    if isinstance(tree, Model):
+        tree = keys_of(tree)
+    if tree is not None and not isinstance(tree, Mapping):
+        raise NoSuchPlace(f"{head!r} is below a value; only blocks and lists have something below them")
+    block = dict(tree or {})
+    below = block.get(head)
+    if rest and head in SHORT_FOR and isinstance(below, str):
+        below = {SHORT_FOR[head]: below}
+    block[head] = with_value(below, rest, value) if rest else value
+    return block
+
+
+def _parse_index(text: str, items: Sequence[Any]) -> int:
+    if not re.fullmatch("[0-9]{1,9}", text) or int(text) >= len(items):
+        count = f"0 to {len(items) - 1}" if items else "none: the list is empty"
+        raise NoSuchPlace(f"{quote(text)} is not an index of this list; there are {count}")
+    return int(text)

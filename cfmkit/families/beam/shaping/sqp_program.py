@@ -6,8 +6,6 @@ displacements, F(a)/F(b) - 1. Nothing bounds that from below: a mechanism that s
 subject to r (1 - s) <= F <= r (1 + s). That is asked of the polynomial through the poses of the window, at three
 times as many places: a force that is out of the band between poses is out of the band.
 
-Reference
----------
 [Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010), eq. 1 and table 1.
 """
 

@@ -6,8 +6,6 @@ eta = c0 + c1 u + ... only c1, c2, ... vary, and none of the closure equations o
 Random variables put free nodes anywhere, with beams straight or bent at random, no chord crossing another, none too
 short.
 
-Reference
----------
 [Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010).
 """
 

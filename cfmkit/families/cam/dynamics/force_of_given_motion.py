@@ -8,8 +8,6 @@ Where a motion stops being one of this mechanism: rollers in each other's way, l
 condition is a margin over time, positive while it holds. The place at which the first of them is lost is found by
 bisection of the closed kinematics, so that it does not depend on the number of points.
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 4 and 5.
 """
 

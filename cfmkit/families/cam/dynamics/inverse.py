@@ -18,8 +18,6 @@ rate of the energy (`MotionResponse.energy`), which the tests use as a check.
 Rolling resistance, which the multibody model of [SS] lacks, is that of the quasi-static
 model: a force mu N against the motion of the roller's centre.
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 4.
 """
 

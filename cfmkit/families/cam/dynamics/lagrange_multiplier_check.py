@@ -21,8 +21,6 @@ no rolling resistance, like the paper's model, and starts beyond the corner of a
 
 Everything works for one vector of coordinates and for many, (..., 9).
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 4.
 """
 

@@ -8,8 +8,6 @@ With x as the independent variable the height is one integral of the slope
 and the slider's travel is (D^2 - d0^2) / 2A if c = 1: the energy of the springs over the force; d0 is half of what
 the springs are stretched by at the start.
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
 """
 
@@ -167,23 +165,10 @@ def ideal_position(law: SlopeLaw, travel: Real) -> Real:
 
 
 def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[RollerPath, float]:
-    """Return the path up to a slider travel, and the x at its end.
+    """Return the path up to a slider travel with the profile's own brace [m], and the x at its end.
 
-    Parameters
-    ----------
-    law : SlopeLaw
-        The slope.
-    travel : float
-        Slider travel wanted, with the profile's own brace [m].
-    method : {"quadrature", "ode"}
-        How to integrate.
-
-    Returns
-    -------
-    path, end : RollerPath, float
-        The path reaches at least `end` [m]. If the geometry cannot give the travel
-        (the brace turns horizontal, the path vertical, or the slider stops rising first),
-        `end` is short of it: compare ``path.travel(end)``.
+    The path reaches at least that end. If the geometry cannot give the travel (the brace turns horizontal, the path
+    vertical, or the slider stops rising first), the end is short of it: compare ``path.travel(end)``.
     """
     x0, ideal = law.rest_half_width, ideal_position(law, travel)
     if law.is_ideal:

@@ -15,8 +15,6 @@ Assumes: massless parts but for dead weight, linear springs, point contact, one
 rolling resistance. The paper's Delta x is half the spring's elongation and its A
 contains it: A has the unit of a length.
 
-Reference
----------
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
 """
 

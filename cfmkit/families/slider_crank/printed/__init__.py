@@ -2,8 +2,6 @@
 
 Both are planar beam networks: what the springs of the rigid-link model stand for, bent exactly, with its stresses.
 
-References
-----------
 [B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.2 and 3.
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 7.
 """

@@ -3,8 +3,6 @@
 The strip is searched with a little of the band and of the stress in reserve, rounded, pressed again at many places, and
 its stroke is where the first limit is met. Independent elements then compute force and stress once more.
 
-Reference
----------
 [B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.2 and 3.
 """
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
-    from cfmkit.elastica.mechanics.equations import MarchState
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 
 FIRST_STEP = 1e-5  # of the travel
@@ -251,7 +251,7 @@ def _from_its_limit(
     found = _followed_back(path)
     if not found:
         return path
-    free, drive = np.array([spot.free for spot in found[::-1]]), np.array([spot.way for spot in found[::-1]])
+    free, drive = np.array([spot.x for spot in found[::-1]]), np.array([spot.drive for spot in found[::-1]])
     back = path.with_states(np.zeros(len(found), np.int64), free, drive)
     longer = back.append(path)
     between, places = interpolate_path(longer), missing[missing > longer.drive[0]]
@@ -266,22 +266,22 @@ def _from_its_limit(
     return before.take(np.argsort(before.at.drive, kind="stable")).append(path)
 
 
-def _followed_back(path: Path) -> list[MarchState]:
+def _followed_back(path: Path) -> list[PathEquilibrium]:
     """Return equilibria from the first point of a path back to a limit point of its travel, in this order."""
     own, y, drive = equations(path.mesh), path.free[0], float(path.at.drive[0])
     beside = own.solve(y, drive * (1.0 + SLOPE_STEP))  # tells the slope
     if beside is None:
         return []
-    before, last, step = beside.free, beside.way, SLOPE_STEP * drive
+    before, last, step = beside.x, beside.drive, SLOPE_STEP * drive
     unstable, found, moves = int(path.unstable[0]), [], np.isinf(own.unit)
     while step > NEAR_LIMIT * path.at.drive[0]:
         guess = y + (y - before) * (step / (last - drive))
         spot = own.solve(guess, drive - step)
-        off = np.inf if spot is None else np.abs(spot.free - guess)[moves].max()
+        off = np.inf if spot is None else np.abs(spot.x - guess)[moves].max()
         if spot is None or spot.unstable > unstable or off > MAX_PREDICTION_ERROR * np.abs(guess - y)[moves].max():
             step *= 0.5
             continue
-        y, before, drive, last = spot.free, y, spot.way, drive
+        y, before, drive, last = spot.x, y, spot.drive, drive
         found.append(spot)
         step = min(2.0 * step, 0.5 * drive)
     return found

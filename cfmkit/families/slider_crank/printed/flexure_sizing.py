@@ -5,8 +5,6 @@ and its stress sigma = E h psi / (2 L). Solved for the section: h from the stres
 One of finite length pushes harder, and its stress is higher where the moment is larger than on average: the beams say
 by how much, and force and stress follow from width and thickness in proportion, so that a few corrections are enough.
 
-Reference
----------
 [B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.2; its Table 2 contains such a factor, 1.099.
 """
 

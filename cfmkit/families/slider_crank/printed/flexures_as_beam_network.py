@@ -4,8 +4,6 @@ The chain begins clamped to the ground at the far end of the pivot's flexure and
 moves along its way without turning. Each flexure is straight between its ends; the one at the crank pin is the
 chord across the small kink [B, sec. 2.2].
 
-Reference
----------
 [B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519.
 """
 

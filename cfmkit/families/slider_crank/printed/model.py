@@ -1,7 +1,5 @@
 """Analysis of a printed slider-crank: the force of flexures or of a strip over the slider's travel.
 
-Reference
----------
 [B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.2 and 3.
 """
 

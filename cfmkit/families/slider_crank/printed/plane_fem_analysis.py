@@ -22,6 +22,7 @@ from cfmkit.families.fem_results import (
     PATH_TOLERANCE,
     FilletRow,
     columns_of_solid,
+    drop_repeats,
     fillet_table,
     findings_of_mesh,
     largest_concentration,
@@ -31,7 +32,6 @@ from cfmkit.families.fem_results import (
     stress_between_poses,
     with_nominal,
     with_steps,
-    without_repeats,
 )
 from cfmkit.families.findings import sharp_inside
 from cfmkit.families.no_mechanism import CannotBuild, no_result
@@ -221,7 +221,7 @@ def _stops(spec: SliderCrankSpec) -> list[float]:
     windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
     ends = [low, *(place for window in windows if window is not None for place in window_places(window, (low, high)))]
     inside = [place for place in ends if 0.0 < place < high]
-    return without_repeats(np.concatenate([own, inside]), high).tolist()  # type: ignore[no-any-return]
+    return drop_repeats(np.concatenate([own, inside]), high).tolist()  # type: ignore[no-any-return]
 
 
 def _curve(solution: SolidSolution) -> Curve:

@@ -11,8 +11,6 @@ Below k1 the mechanism is bistable, between k1 and k2 its stiffness is locally n
 For small angles there is a law without geometry: with s = (t - t2)/(t2 - t0) the torque is
 k phi (1 + s)(1 + p s (s - 1)); p > 4 is bistable, 1 < p < 4 local negative, p = 1 zero, p < 1 positive.
 
-Reference
----------
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 3.
 """
 

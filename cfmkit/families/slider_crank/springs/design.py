@@ -4,8 +4,6 @@ The effort is linear in the springs' rates: with the lengths given, the best rat
 programme or of a least-squares problem. Lengths are searched outside of that, on a grid
 and then inside its best cell, the unloaded position's lead on a logarithmic scale.
 
-Reference
----------
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 6.
 [B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.1.
 """

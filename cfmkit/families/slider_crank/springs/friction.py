@@ -9,8 +9,6 @@ does next to the stretched position.
 
 Assumes: Coulomb friction, massless links, all pins alike, guide pressed in its middle.
 
-Reference
----------
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 2 (the linkage).
 """
 

@@ -6,8 +6,6 @@ by the slider's travel: what the slider pushes back with while it is moved towar
 Efforts and energies are linear in the springs' rates, so their derivatives by the rates are exact. A largest or
 smallest value changes with the rate as the value does in its place: that the place itself moves is of second order.
 
-Reference
----------
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z.
 [B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519.
 """

@@ -9,8 +9,6 @@ form, so that they do not depend on the points of the curve.
 Places of the motion: `start` is the unloaded position; `rest`, where all springs are relaxed, is the same or none;
 `stretched` is the nearest with crank and coupler in line; around `reference` the band is measured, of effort `level`.
 
-Reference
----------
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 3, 4.2 and 6.
 """
 

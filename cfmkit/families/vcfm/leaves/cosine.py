@@ -5,8 +5,6 @@ that of a beam-column; what it is shortened by gives z, and the force is the con
 slope that rides on the buckling waves. At z = pi^2 the next mode of the constrained arch appears, and from there on the
 force is the straight line P_cr (4 h/3 - d)/X: 64 pi^2 (4/3 - D) for the pair in units of E I h/(2X)^3.
 
-Reference
----------
 [Q] J. Qiu, J. Lang, A. Slocum, J. Microelectromech. Syst. 13 (2004) 137.
 """
 

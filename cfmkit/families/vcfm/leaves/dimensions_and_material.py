@@ -15,28 +15,15 @@ SHEAR_FACTOR = 5.0 / 6.0  # share of a rectangle's area that carries shear
 
 @dataclass(frozen=True)
 class LeafStrip:
-    """One leaf, clamped at one end, `angle` from the direction across the motion.
+    """One leaf, clamped at one end, `angle` from the direction across the motion; numbers or arrays."""
 
-    Parameters
-    ----------
-    length : float or array
-        Between its ends [m].
-    angle : float or array
-        Between the leaf and the direction across the shuttle's motion [rad].
-    thickness, width : float or array
-        In the plane of bending and out of it [m].
-    youngs_modulus : float or array
-        [Pa].
-    poisson_ratio : float or array
-        [1].
-    """
-
-    length: Any
-    angle: Any
+    length: Any  # between its ends [m]
+    angle: Any  # between the leaf and the direction across the shuttle's motion [rad]
+    # thickness, width: in the plane of bending and out of it [m]
     thickness: Any
     width: Any
-    youngs_modulus: Any
-    poisson_ratio: Any = 0.3
+    youngs_modulus: Any  # [Pa]
+    poisson_ratio: Any = 0.3  # [1]
 
     @property
     def reach(self) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -11,6 +10,8 @@ import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
 
@@ -30,34 +31,25 @@ def stack_laws(laws: Sequence[T]) -> T:
     if len(laws) == 1:
         return laws[0]
     if getattr(first, "one_by_one", False):  # its tables and searches are not arrays over leaves
-        return LawsOneByOne(tuple(laws))  # type: ignore[return-value]
+        column = np.empty((len(laws), 1), dtype=object)
+        column[:, 0] = laws
+        return LawsOneByOne(column)  # type: ignore[return-value]
     if not is_dataclass(first):
         return np.array(laws, dtype=float)[:, None]  # type: ignore[return-value]
     columns = {item.name: stack_laws([getattr(law, item.name) for law in laws]) for item in fields(first)}
     return type(laws[0])(**columns)
 
 
-def rows_of(law: T, rows: Any) -> T:
-    """Return the law of some rows; a law of plain numbers holds for every row."""
-    found: Any = law
-    if isinstance(law, np.ndarray):
-        found = law[rows] if law.ndim == 2 else law
-    elif isinstance(law, tuple):
-        found = tuple(rows_of(item, rows) for item in law)
-    elif isinstance(law, LawsOneByOne):
-        found = LawsOneByOne(tuple(law.laws[row] for row in np.arange(len(law.laws))[rows]))
-    elif is_dataclass(law):
-        found = copy(law)
-        for name, value in vars(law).items():  # with what was computed already
-            object.__setattr__(found, name, rows_of(value, rows))
-    return found  # type: ignore[no-any-return]
-
-
 @dataclass(frozen=True)
 class LawsOneByOne:
     """Laws that are asked one after the other, each for its row of travels (r, n)."""
 
-    laws: tuple[Any, ...]
+    column: NDArray[np.object_]  # (r, 1)
+
+    @property
+    def laws(self) -> list[Any]:
+        """The law of each row."""
+        return list(self.column[:, 0])
 
     @cached_property
     def strip(self) -> Any:

@@ -9,8 +9,6 @@ belongs into the bending term, and the force F_1 inside its bracket is a misprin
 [D] takes the force to rise by K_p dr (eq. 3), and the shuttle to move back by K_p dr/(K_p + K_b1) (eq. 6). The first is
 exact where K_p = K_n and both are constant; the second is not: pulled back, the leaves are in tension and stiffen.
 
-Reference
----------
 [D] B. Ding, X. Li, Y. Li, Robotica (2022), eq. 1-6, eq. 7-15 and Table II.
 """
 

@@ -10,8 +10,6 @@ z = P L^2/(4 E I), says everything: with C = cos q, S = sin(q)/q, q^2 = z,
 All arguments here are dimensionless: lengths over L, forces over E I/L^2. Against the geometrically exact beam of Ding,
 Li and Li (2022), Table I, the force is off by 0.004 N of 2.2 before buckling, and by 0.009 N up to 6 mm.
 
-Reference
----------
 [A] S. Awtar, A. Slocum, ASME J. Mech. Des. 129 (2007) 625: the beam constraint model, here without truncation.
 
 The deformed centre line of a leaf by the closed forms, for pictures.

@@ -9,8 +9,6 @@ the leaves count that are there. It ignores buckling and clamping and is nowhere
 peak is 36 % too high and at twice the travel, and its steepest slope is 2.8 times that of the real leaf. Its
 K_n = 33 E I/L^3 [D, eq. 17] is 17 % low: the factor is 4 pi^2/cos(theta).
 
-Reference
----------
 [D] B. Ding, X. Li, Y. Li, Robotica (2022), variable constant-force compliant mechanism.
 """
 
