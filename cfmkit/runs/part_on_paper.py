@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import GeometryError
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,6 +25,7 @@ def part_on_paper(drawing: Drawing, spec: Spec) -> Figure:
     stated, assumed = stated_tolerances(spec), assumed_tolerances(spec)
     reported = (*assumed[:1], *stated, *assumed[-1:]) if stated else assumed  # stated ones replace those of the process
     reported = (*reported, *how_to_print(drawing, spec))
+    drawing = replace(drawing, notes=(*drawing.notes, *list_stops(spec), *how_to_fasten(spec)))
     # a date would make other bytes of the same part; the revision changes with any value of the mechanism
     revision = stable_hash(spec.model_dump(mode="json", include={"family", "mechanism"}))[:8]
     block = TitleBlock(revision, weight_in_words(drawing, spec), decimals_of(accuracy_of(spec)))
@@ -45,6 +48,29 @@ def how_to_print(drawing: Drawing, spec: Spec) -> tuple[str, ...]:
     else:
         laid = "print lying flat: layers in the plane of this sheet" + (", strands along the leaves" if sizes else "")
     return (laid, *(strands_in_words(size, accuracy.least_feature) for size in list(sizes)[:3]))
+
+
+def list_stops(spec: Spec) -> tuple[str, ...]:
+    """Return where rigid end stops have to stand, which are no part of what is cut."""
+    stops: Any = getattr(getattr(spec, "mechanism", None), "stops", None) or {}
+    if hasattr(stops, "upper"):
+        ends = {"lower": stops.lower, "upper": stops.upper}
+    else:
+        rigid = {name: stop.gap for name, stop in stops.items() if stop.stiffness is None}
+        ends = {name: gap[-1] if isinstance(gap, tuple) else gap for name, gap in rigid.items()}
+    return tuple(
+        f"stop '{name}': {format_short(end, 'length', 6)} along the motion from the unloaded pose; not drawn"
+        for name, end in ends.items()
+        if end
+    )
+
+
+def how_to_fasten(spec: Spec) -> tuple[str, ...]:
+    """Return how a part that bends is held if it has no holes for screws; nothing if it has some."""
+    part: Any = getattr(getattr(spec, "mechanism", None), "part", None)
+    if getattr(part, "screws", None) is not None or not spec.out_of_plane_widths:
+        return ()
+    return ("no screw holes: clamp or bond what stands, or state 'part.screws'",)
 
 
 def weight_in_words(drawing: Drawing, spec: Spec) -> str:

@@ -173,6 +173,11 @@ def test_shafts_and_hook_bars_of_a_cam_bear_the_springs_beyond_the_braces():
     assert (bar["count"], height, thick) == (4, pytest.approx(2e3 * outer), 8.0)
     section = 1e-9 * thick * (width**3 - 8.0**3) / (6.0 * width)
     assert side * 0.125 * 2.0 * outer / section <= 235e6 / 1.5
+    drawn = cam_hardware(result.state).drawn
+    bars = [np.ptp(body.outline(), axis=0) for body in drawn if body.name == "hook bar"]
+    assert np.allclose(bars, [[1e-3 * width, 2.0 * outer]] * 2)  # those in front hide those behind
+    rows_of_springs = [body.outline()[:, 1].mean() for body in drawn if body.name == "spring"]
+    assert np.allclose(np.diff(sorted(rows_of_springs)), outer)
 
 
 def test_pins_are_bought_in_lengths_of_their_standard_and_cut_or_made_of_a_rod():

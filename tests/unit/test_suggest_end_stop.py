@@ -15,8 +15,10 @@ from cfmkit.documents.suggestion_document import document_of
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.end_stops_spec import BEFORE_STOP
+from cfmkit.families.hardware import PIN_STRENGTH
 from cfmkit.families.run_control import Run
 from cfmkit.families.suggestion_request import STOP_MARGIN_SHARE
+from cfmkit.runs.part_on_paper import how_to_fasten, list_stops
 from cfmkit.runs.suggest_api import read_request
 from cfmkit.runs.suggestion_record import as_json, exit_code
 from cfmkit.studies.suggest.end_stop_of_proposal import NO_END_STOP
@@ -135,3 +137,26 @@ def test_an_overload_goes_with_a_force_only():
     keys = {"torque": "1 N*m", "angle": "20 deg", "envelope": "[80 mm, 60 mm]", "overload": "60 N"}
     with pytest.raises(SpecError, match="goes with 'force' only"):
         read_request(None, keys)
+
+
+def test_a_stop_up_to_which_the_travel_goes_is_no_near_contact():
+    _, made = propose_first("beam")
+    assert not {"near_contact", "closure_adjusted"} & {name.partition(" ")[0] for name in made.warnings}
+
+
+def test_the_pin_that_is_named_for_a_stop_bears_it_in_bending_by_hand(proposal):
+    asked, made = proposal
+    number, pin = re.search(r"carries (\S+) N of 60 N: a steel pin of (\S+) mm", made.notes[0]).groups()
+    moment = float(number) * 0.5 * made.numbers["depth"]
+    stress = 32.0 * moment / (np.pi * (1e-3 * float(pin)) ** 3)
+    assert stress <= PIN_STRENGTH / max(asked.safety, 1.5)
+
+
+def test_the_drawing_says_where_the_stop_stands_and_that_there_are_no_holes(proposal):
+    spec = cfmkit.loads(proposal[1].text)
+    words = f"{1e3 * end_of(spec):.6g} mm along the motion from the unloaded pose; not drawn"
+    assert any(line.endswith(words) for line in list_stops(spec))
+    assert list_stops(spec.replace({"mechanism.stops": None if spec.family == "cam" else {}})) == ()
+    assert bool(how_to_fasten(spec)) == (spec.family != "cam")
+    if spec.family != "cam":
+        assert how_to_fasten(spec.replace({"mechanism.part.screws": "M3"})) == ()

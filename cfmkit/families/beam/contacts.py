@@ -20,6 +20,7 @@ from cfmkit.families.beam.contact_spec import MAX_OVERLAP_SHARE, column_names, f
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.end_stops import DEFINITIONS, LARGEST_FORCE
+from cfmkit.families.end_stops_spec import BEFORE_STOP
 from cfmkit.numerics.quadrature import clenshaw_curtis
 from cfmkit.results import Quantity
 from cfmkit.specs.units import format_short
@@ -382,7 +383,9 @@ def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
         elif not isinstance(contact, BeamOnObstacle):
             moved += float(np.hypot(*path.motion(contact.node)[:, :2].T).max())
         least = float(gap.min())
-        if ROUNDING_OF_GAP * path.mesh.scales.length < least < NEAR_GAP * thin:
+        # a travel up to a rigid stop ends so near to it
+        closed = 1.001 * BEFORE_STOP if isinstance(contact, Stop) else 0.0
+        if max(ROUNDING_OF_GAP * path.mesh.scales.length, closed) < least < NEAR_GAP * thin:
             where = f"the gap of {describe(contact)} closes to {format_short(least, 'length')} and stays open"
             yield "near_contact", f"{where}: tolerances of that size decide whether they touch"
         elif not isinstance(contact, Stop) and least > OUT_OF_REACH * moved:

@@ -66,6 +66,9 @@ def _early_ending(solution: Solution) -> Sentence:
     return (why.message, *why.cures)
 
 
+ROUNDED_CLOSURE = 2e-6
+"""Misfit that whole micrometres and thousandths of a degree leave in beams of some centimetres [m]."""
+
 # --- closure --------------------------------------------------------------------------------------------------------
 
 
@@ -105,6 +108,11 @@ def _misfits(solution: Solution) -> dict[str, Fit]:
 
 def _is_raw(solution: Solution) -> bool:
     return solution.spec.mechanism.closure == "raw"
+
+
+def _is_adjusted(solution: Solution) -> bool:
+    """Return True if a beam was fitted to nodes that it missed by more than lengths are rounded to."""
+    return not _is_raw(solution) and any(fit.gap > ROUNDED_CLOSURE for fit in _misfits(solution).values())
 
 
 def _forced_beams(solution: Solution) -> Sentence:
@@ -369,7 +377,7 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
         lambda solution: _is_raw(solution) and len(solution.keep) > 0 and bool(_misfits(solution)),
         _forced_beams,
     ),
-    FindingRule("closure_adjusted", lambda solution: not _is_raw(solution) and bool(_misfits(solution)), _fitted_beams),
+    FindingRule("closure_adjusted", _is_adjusted, _fitted_beams),
     _events("limit_point", "limit point"),
     _events("bifurcation", "bifurcation"),
     _bifurcations_under("prestress"),

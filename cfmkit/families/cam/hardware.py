@@ -137,7 +137,7 @@ def hardware(solution: Solution) -> Hardware:
     if holes:
         parts = (*parts, screw_part("plate to its base", len(holes), screw, thick, "screw"))
     standing = tuple(_standing(solution, rods, holes, screw))
-    drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft), bearing))
+    drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft), bearing, (hooks, bar)))
     rubbing: dict[str, dict[str, float]] = {"pins": {"diameter": pin}, "guide": {}}
     if bearing is None and mechanism.bearings is None:
         rubbing["bearings"] = {"bore": shaft}
@@ -190,6 +190,12 @@ class _Hooks:
         """Return the diameter of the shafts' ends where springs hook on them [m]: as thick as goes into the loops."""
         return shaft if self.height or self.loop >= shaft else 1e-4 * math.floor(1e4 * self.loop + 1e-6)
 
+    def places(self, count: int) -> FloatArray:
+        """Return how far above the shaft each spring of one side hooks, of so many in all (n,) [m]."""
+        rows = (count + 1) // 2 if self.height else 1
+        half = 0.5 * max(self.height - self.outer, 0.0)
+        return np.linspace(-half, half, rows) if rows > 1 else np.zeros(1)
+
     def bar_width(self, hole: float, strength: PartStrength) -> float:
         """Return the width of a bar around a shaft's hole that bears the upper and lower springs [m]; zero for none.
 
@@ -219,7 +225,15 @@ def _hook_bars(hooks: _Hooks, width: float, shaft: float, strength: PartStrength
     if hooks.height:
         of = strength.name + (", assumed" if strength.assumed else "")
         data = f"{of}; a hole of {mm(shaft)} in its middle and one for each hook, bears {newton(hooks.pull)}"
-        yield ListedPart("springs to the shafts", "hook bar", 4, data, "make", mm(hooks.height, width, hooks.thickness))
+        yield ListedPart(
+            "springs to the shafts",
+            "hook bar",
+            4,
+            data,
+            "make",
+            mm(hooks.height, width, hooks.thickness),
+            body="hook bar",
+        )
 
 
 def _largest(solution: Solution, name: str) -> float:
@@ -353,22 +367,32 @@ def _box_of_springs(solution: Solution, hooks: _Hooks, bar: float) -> Iterator[P
 
 
 def _drawn_bodies(
-    solution: Solution, standing: tuple[PosedBody, ...], sizes: tuple[float, float, float], bearing: Bearing | None
+    solution: Solution,
+    standing: tuple[PosedBody, ...],
+    sizes: tuple[float, float, float],  # widths of braces, slider pin and shafts [m]
+    bearing: Bearing | None,
+    hooked: tuple[_Hooks, float],  # springs, and the width of the bars that carry them [m]
 ) -> Iterator[PosedBody]:
-    """Yield all parts as the assembly shows them, the lowest first: for braces, slider pin and shafts their widths."""
-    width, pin, shaft = sizes
+    """Yield all parts as the assembly shows them, the lowest first."""
+    (width, pin, shaft), (hooks, bar) = sizes, hooked
     rollers, pins, radius = roller_path(solution), pin_path(solution), solution.assembly.spec.mechanism.roller_radius
     mirror = np.array([-1.0, 1.0])
     yield from (body for body in standing if body.name == "guide")
     yield PosedBody.polygon("plate", "held", _plate(solution)[0].points(OUTLINE_TOLERANCE))
     yield from (body for body in standing if body.name == "screw")
-    yield PosedBody.line("spring", "free", np.stack([rollers, rollers * mirror], axis=1), 0.35 * width)
+    thick = min(0.35 * width, 0.5 * hooks.outer)
+    for place in hooks.places(count_of(solution.assembly.spec.mechanism.springs)):
+        hook = rollers + np.array([0.0, place])
+        yield PosedBody.line("spring", "free", np.stack([hook, hook * mirror], axis=1), thick)
     for side in (np.ones(2), mirror):
         yield PosedBody.line("roller", "contact", (rollers * side)[:, None], radius)
         if bearing is not None:
             yield PosedBody.line("bearing", "free", (rollers * side)[:, None], 0.5 * bearing.outer)
         ends: FloatArray = np.stack([rollers * side, pins], axis=1)
         yield PosedBody.line("brace", "free", ends, 0.5 * width, round=True)
+        if hooks.height:
+            tall = np.array([[0.0, -0.5], [0.0, 0.5]]) * hooks.height
+            yield PosedBody.line("hook bar", "free", (rollers * side)[:, None] + tall, 0.5 * bar)
         yield PosedBody.line("shaft", "free", (rollers * side)[:, None], 0.5 * shaft)
     corners = radius * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     yield PosedBody.polygon("slider", "driven", pins[:, None] + corners)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import SolutionError
+from cfmkit.families.hardware import PartStrength, pin_for
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -38,11 +39,22 @@ def remove_end_stop(spec: Spec, request: Request) -> Spec:
     return spec if request.overload is None else spec.replace({"mechanism.stops": {}})
 
 
-def note_end_stop(request: Request, result: Result) -> tuple[str, ...]:
-    """Return what the end stop of an analysed mechanism carries, in a sentence; empty without one."""
+def note_end_stop(request: Request, result: Result, depth: float | None) -> tuple[str, ...]:
+    """Return what the end stop of an analysed mechanism of a depth [m] carries, in a sentence; empty without one.
+
+    With it comes the pin that bears it, standing out of what holds the mechanism over all of its depth.
+    """
     if request.overload is None:
         return ()
     curve = result.curve
     carried = max(request.overload - float(curve.effort[curve.motion.argmax()]), 0.0)
     place, load = format_short(request.stop_margin, "length"), format_short(request.overload, "force")
-    return (f"end stop, rigid, {place} behind the travel: it carries {format_short(carried, 'force', 3)} of {load}",)
+    said = f"end stop, rigid, {place} behind the travel: it carries {format_short(carried, 'force', 3)} of {load}"
+    if depth is None:
+        return (f"{said}; its strength is not judged: the depth is not known",)
+    mechanism = result.spec.get_value("mechanism")
+    material = getattr(mechanism, "material", None) or getattr(getattr(mechanism, "contact", None), "material", None)
+    strength = PartStrength.from_material(material, request.safety)
+    pin, bears = pin_for(carried, 0.5 * depth, depth, strength, "metric")
+    words = f"a steel pin of {format_short(pin, 'length')} that stands out by the depth"
+    return (f"{said}: {words} bears it" if bears else f"{said}: more than {words} bears",)

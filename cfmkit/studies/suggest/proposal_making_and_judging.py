@@ -70,6 +70,9 @@ MOST_ASKED = 0.9975
 RUBBING = ("pins", "guide", "bearings")
 """Blocks of a mechanism of rigid parts that may state a friction."""
 
+MESH_MARGIN = 1.04
+"""On the safety factor that corrections by solids aim at: a finer mesh finds about so much more stress in fillets."""
+
 MAX_CORRECTIONS = 2
 """How often a part is corrected by its finest model: what is still missed then is missed."""
 
@@ -238,10 +241,11 @@ def by_own_model(proposal: Proposal) -> Spec:
 def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
     """Return a proposal corrected and judged by the finest model of its family; the last of those that miss least."""
     spec, best, correct = remove_end_stop(near.spec, job.request), None, job.candidate.correct
+    aimed = replace(job.request, safety=MESH_MARGIN * job.request.safety)
     for _ in range(MAX_CORRECTIONS if correct else 1):
         if clock.late():
             break
-        made = function_named(correct)(spec, job.request) if correct else spec.replace({FIDELITY_KEY: near.pending})
+        made = function_named(correct)(spec, aimed) if correct else spec.replace({FIDELITY_KEY: near.pending})
         if clock.late():
             break
         found = judge_proposal(job.family, near.variant, made, job.request, job.seed, clock, near)
@@ -386,7 +390,7 @@ def judge_proposal(
     return Proposal(
         name, variant, text,
         missed=tuple(text for _, text in misses), fails=tuple(topic for topic, _ in misses), numbers=numbers,
-        notes=(*note_end_stop(request, result), *too_thin(written), *_notes(space, result)),
+        notes=(*note_end_stop(request, result, numbers["depth"]), *too_thin(written), *_notes(space, result)),
         movable=movable, unjudged=tuple(list_unjudged(request, result)),
         model=model_of(name, written), pending=pending, warnings=tuple(warnings.values()), seconds=seconds,
         own=near.model if near else "",
