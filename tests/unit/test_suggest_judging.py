@@ -29,7 +29,7 @@ from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
 from cfmkit.studies.suggest.misses_in_words import raised_out
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, judge_proposal, make_proposal
-from cfmkit.studies.suggest.requirements_of_request import list_requirements
+from cfmkit.studies.suggest.requirements_of_request import list_requirements, within_mesh_error
 from cfmkit.studies.suggest.search import Suggestions, _Making, _Times, offer_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -442,3 +442,19 @@ def test_only_springs_of_the_kind_that_is_required_are_offered():
         asked = request(envelope="[80 mm, 60 mm, 20 mm]", **({"springs": springs} if springs else {}))
         offer = offer_of(family("cam"), asked, Run())
         assert {one.springs for one in offer.candidates} == allowed
+
+
+def test_the_safety_of_a_solid_holds_with_the_error_of_its_mesh():
+    """A pair of Vs had 1.504 of 1.5, and 1.476 on a finer mesh."""
+    values = values_of_family({"mesh_stress_error": ("ratio", "")})
+    result = cfmkit.analyze(cfmkit.load("configs/vcfm_pla.yaml"))
+    factor = cfmkit.metrics.evaluate(result, ["safety_factor"])["safety_factor"].value
+    meshed = replace(result, scalars={**result.scalars, "mesh_stress_error": 0.03})
+    said = {
+        share: list(within_mesh_error(request(safety=f"{factor / share:.9g}"), meshed, values))
+        for share in (1.02, 1.04)
+    }
+    assert said[1.04] == []
+    (sentence,) = said[1.02]
+    assert f"is {factor / 1.03:.3g} if the mesh is 3 % off" in sentence
+    assert list(within_mesh_error(request(safety=f"{factor / 1.02:.9g}"), result, values)) == []

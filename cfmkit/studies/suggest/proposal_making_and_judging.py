@@ -36,6 +36,7 @@ from cfmkit.studies.suggest.misses_in_words import (
     too_short,
     too_thin,
     topic_of,
+    within_mesh_error,
 )
 from cfmkit.studies.suggest.redesign_of_proposal import block_for_redesign
 from cfmkit.studies.suggest.requirements_of_request import LIFE_METRICS, list_requirements, list_unjudged, windows_of
@@ -362,6 +363,7 @@ def judge_proposal(
         *((topic_of(one.metric), one.sentence) for one in missed if one.metric not in ENVELOPE_METRICS),
         *(("size", text) for text in sides_outside(request, space)),
         *(("stress", text) for text in (space.faults if space else ())),
+        *(("stress", text) for text in within_mesh_error(request, result, values)),
         *(("travel", text) for text in too_short(request, result)),
         *disqualifying(result),
     ]

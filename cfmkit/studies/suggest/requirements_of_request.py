@@ -80,6 +80,16 @@ def list_unjudged(request: Request, result: Result) -> Iterator[str]:
         yield f"contact pressure not judged: no strength is known of {_material(result)}"
 
 
+def within_mesh_error(request: Request, result: Result, values: Iterable[Definition]) -> Iterator[str]:
+    """Yield what is missed if the largest stress of a solid is as much larger as its mesh may be off."""
+    found = evaluate(result, None, None, values)
+    factor, error = (_value_of(found, name) for name in ("safety_factor", "mesh_stress_error"))
+    if factor is not None and error is not None and factor / (1.0 + error) < request.safety <= factor:
+        least = factor / (1.0 + error)
+        off = f"{100.0 * error:.2g} %"
+        yield f"safety {factor:.3g} is {least:.3g} if the mesh is {off} off, required >= {request.safety:g}"
+
+
 def stressed_motion(request: Request, spec: Spec) -> tuple[str, str]:
     """Return over what a mechanism has to bear its stress: all it does; of made parts from half of the run-in on.
 
