@@ -261,6 +261,20 @@ def test_shares_of_the_travel_are_those_of_each_stroke():
     compare(many)
 
 
+@pytest.mark.parametrize("name", [None, "mechanism.roller_radius"])
+def test_cams_whose_windows_differ_are_solved_together_each_over_its_own(name):
+    spec = SPEC.replace(
+        {"mechanism.bearings": {"bore": "5 mm", "friction": 0.002}, "analysis.window": ("3 mm", "90 %")}
+    )
+    values = {"analysis.window.0": np.linspace(0.002, 0.03, 12)}
+    if name is not None:
+        values[name] = spec.get_value(name) * np.linspace(0.99, 1.0, 12)
+    study, plan = study_of(spec, values)
+    variants = Variants(spec, values, lambda k: study.variant(plan.point(k)), 12)
+    assert sum(len(rows) for rows, _ in solve_rows(variants) if len(rows) > 3) == 12
+    compare_rows_with_runs(study, plan, step=4)
+
+
 def test_a_window_that_some_travels_leave_no_width_is_refused_as_each_mechanism_refuses_it():
     spec = config("studies/cam_tolerance").replace(
         {"analysis.travel": None, "analysis.window": ("240 mm", "100 %"), "requirements": []}

@@ -12,6 +12,7 @@ friction or weights of their own each take a solution of their own.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.families.rows import Variants
+    from cfmkit.specs.units import Ends
 
     Rows = NDArray[np.intp]
     Group = tuple[Rows, SolvedRows[Solution]]
@@ -86,7 +88,7 @@ def solve_rows(variants: Variants) -> Iterator[Group]:
         if not _is_left_out(spec):
             kinds.setdefault(_kind(spec), []).append(row)
     for alike in kinds.values():
-        yield from _in_parcels(np.array(alike), partial(_stack_specs, variants))
+        yield from _in_parcels(np.array(alike), partial(_stack_specs, variants), partial(_windows, variants))
 
 
 def _is_left_out(spec: CamSpec) -> bool:
@@ -145,27 +147,37 @@ def _with_columns(variants: Variants, paths: Sequence[str], spec: CamSpec, rows:
 def _stack_specs(variants: Variants, rows: Rows) -> CamSpec:
     """Return variants of one kind as one specification, with columns where numbers differ."""
     specs: list[CamSpec] = [variants[row] for row in rows.tolist()]
-    names = ("mechanism", "analysis", "design")
-    return specs[0].model_copy(update={name: stack([getattr(spec, name) for spec in specs]) for name in names})
+    analyses = [spec.analysis.model_copy(update={"window": specs[0].analysis.window}) for spec in specs]
+    blocks = {name: stack([getattr(spec, name) for spec in specs]) for name in ("mechanism", "design")}
+    return specs[0].model_copy(update=blocks | {"analysis": stack(analyses)})
+
+
+def _windows(variants: Variants, rows: Rows) -> Sequence[Ends]:
+    """Return the window of each of some variants where windows vary; nothing where all have the same, or none."""
+    varied = any(path.startswith("analysis.window") for path in variants.values)
+    windows = [variants[row].analysis.window for row in rows.tolist()] if varied else []
+    return () if None in windows else windows
 
 
 def _kind(spec: CamSpec) -> str:
     """Return what mechanisms side by side have in common beside the way that their computation takes."""
     analysis = spec.analysis
-    settings = analysis.points, analysis.window, analysis.origin
+    settings = analysis.points, analysis.window is None, analysis.origin
     curves = spec.mechanism.profile.curve, spec.target_curve
     return repr((settings, curves, [drop_numbers(block) for block in (spec.mechanism, analysis, spec.design)]))
 
 
-def _in_parcels(members: Rows, spec_of: Callable[[Rows], CamSpec]) -> Iterator[Group]:
+def _in_parcels(
+    members: Rows, spec_of: Callable[[Rows], CamSpec], windows_of: Callable[[Rows], Sequence[Ends]] = lambda _rows: ()
+) -> Iterator[Group]:
     """Yield mechanisms that are solved together, few at a time."""
     if len(members):
         samples = len(members) * spec_of(members[:1]).analysis.points
         for rows in np.array_split(members, -(-samples // MAX_SAMPLES_AT_ONCE)):
-            yield from _solve_alike(spec_of(rows), rows)
+            yield from _solve_alike(spec_of(rows), rows, windows_of)
 
 
-def _solve_alike(spec: CamSpec, rows: Rows) -> Iterator[Group]:
+def _solve_alike(spec: CamSpec, rows: Rows, windows_of: Callable[[Rows], Sequence[Ends]]) -> Iterator[Group]:
     """Yield mechanisms of one specification with columns; those whose computation takes another way apart."""
     try:
         assembly = assemble(spec)
@@ -177,15 +189,15 @@ def _solve_alike(spec: CamSpec, rows: Rows) -> Iterator[Group]:
         for value in (assembly.spec.mechanism.rolling_friction, loads.roller_weight, loads.sideways[0]):
             agree(np.not_equal(value, 0.0))
         agree(track.corner_end - track.start > low)
-        solution = solve(assembly, len(rows))
+        solution = replace(solve(assembly, len(rows)), windows=windows_of(rows))
     except RowsDiffer as kinds:
         if kinds.mask.all():
             for row, index in enumerate(rows.tolist()):
-                yield from _solve_alike(row_of(spec, row), np.array([index]))
+                yield from _solve_alike(row_of(spec, row), np.array([index]), windows_of)
         else:
             for some in (np.flatnonzero(kinds.mask), np.flatnonzero(~kinds.mask)):
                 part = row_of(spec, int(some[0])) if len(some) == 1 else rows_of(spec, some)
-                yield from _solve_alike(part, rows[some])
+                yield from _solve_alike(part, rows[some], windows_of)
         return
     except CfmError:  # whoever analyses it alone says why
         return

@@ -25,12 +25,13 @@ from cfmkit.results import ROUND_OFF
 from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.assembly import Assembly
+    from cfmkit.specs.units import Ends
 
 
 FEW_SAMPLES = 100
@@ -86,6 +87,7 @@ class Solution(ShortRepr):
     origin: float  # what is added to the travel to give the displacement [m]
     band: ForceBand | None = None  # forces of cams that are cut with errors
     count: int = 1  # number of mechanisms
+    windows: Sequence[Ends] = ()  # of each mechanism, where the specification does not state the same for all
 
     def __len__(self) -> int:
         """Return the number of mechanisms."""
@@ -237,8 +239,11 @@ class Solution(ShortRepr):
         low, high = places[..., :1], places[..., -1:]
         if stated is None:
             return Several((low, high))
-        ends = [window_places(stated, pair) for pair in zip(low.ravel().tolist(), high.ravel().tolist(), strict=True)]
-        return Several(np.array(ends).T[..., None] if low.ndim > 1 else np.array(ends[0])[:, None])
+        windows = self.windows or [stated]
+        which, lows, highs = np.broadcast_arrays(np.arange(len(windows)), low.ravel(), high.ravel())
+        own = zip(which.tolist(), zip(lows.tolist(), highs.tolist(), strict=True), strict=True)
+        ends = np.array([window_places(windows[row], pair) for row, pair in own]).T
+        return Several(ends[..., None] if low.ndim > 1 or self.windows else ends)
 
     @property
     def requested(self) -> Any:
