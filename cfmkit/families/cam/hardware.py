@@ -9,7 +9,7 @@ they diverge at a dead point, the next computed ones.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.export.contours import Contour
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.spec import Mechanism
     from cfmkit.stock.stock_series import Bearing, Screw
@@ -104,7 +105,7 @@ def hardware(solution: Solution) -> Hardware:
     across = float(np.hypot(abs(solution.assembly.loads.sideways[1]), solution.assembly.loads.off_plane))
     travel, radius = float(np.ptp(solution.travel)), mechanism.roller_radius
     rod = guide_rod(across, force, travel, 2.0 * radius, mechanism.guide, system, strength)
-    holes = [edge for contour in _plate(solution)[1:] for edge in contour.edges if isinstance(edge, Arc)]
+    holes = [edge for contour in cut_plate(solution)[1:] for edge in contour.edges if isinstance(edge, Arc)]
     count = max(len(holes), 2)
     needed = screw_for(force, thick, count, strength)
     screw = (screw_through(plate.hole_diameter) if holes else None) or needed
@@ -170,7 +171,8 @@ def _largest(solution: Solution, name: str) -> float:
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
-def _plate(solution: Solution) -> tuple[Any, ...]:
+def cut_plate(solution: Solution) -> tuple[Contour, ...]:
+    """Return the outline of the plate and its holes."""
     profile = solution.assembly.track.profile
     return plate_contours((profile, profile), solution.assembly.spec.mechanism.plate)
 
@@ -213,7 +215,7 @@ def _parts(
     """Yield plate, braces, rollers, slider, pins, shafts, bearings and springs."""
     mechanism = solution.assembly.spec.mechanism
     (thick, brace, width), (pin, shaft, bearing), (pull, press) = sizes, pins, loads
-    x0, y0, x1, y1 = _plate(solution)[0].extents
+    x0, y0, x1, y1 = cut_plate(solution)[0].extents
     of = strength.name + (", assumed" if strength.assumed else "")
     radius = mechanism.roller_radius
     yield ListedPart("cam", "cam plate", 1, f"{of}; geometry/cam.dxf", "make", mm(x1 - x0, y1 - y0, thick), "", "plate")
@@ -266,7 +268,7 @@ def _drawn_bodies(
     rollers, pins, radius = roller_path(solution), pin_path(solution), solution.assembly.spec.mechanism.roller_radius
     mirror = np.array([-1.0, 1.0])
     yield from (body for body in standing if body.name == "guide")
-    yield PosedBody.polygon("plate", "held", _plate(solution)[0].points(OUTLINE_TOLERANCE))
+    yield PosedBody.polygon("plate", "held", cut_plate(solution)[0].points(OUTLINE_TOLERANCE))
     yield from (body for body in standing if body.name == "screw")
     yield PosedBody.line("spring", "free", np.stack([rollers, rollers * mirror], axis=1), 0.35 * width)
     for side in (np.ones(2), mirror):
