@@ -111,6 +111,11 @@ def remember_plain(count: int) -> Callable[[Callable[..., T]], Callable[..., T]]
     return decorate
 
 
+def or_nan(value: float | None) -> float:
+    """Return a number, NaN in place of None."""
+    return np.nan if value is None else float(value)
+
+
 def is_column(*values: Any) -> bool:
     """Return True if one of some numbers is a column."""
     return any(np.ndim(value) > 0 for value in values)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import CfmError
 from cfmkit.families.run_control import Run
-from cfmkit.metrics import evaluate
+from cfmkit.metrics import mean_effort
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,7 +43,8 @@ def stiffening(spec: Spec, model: Callable[[Any, Run], Result]) -> float:
     """Return by what share the mean force over the window rises, by a model of beams; 0 if that does not know it."""
     try:
         means = [
-            _mean(model(spec.replace({WIDE_BEAMS_KEY: wide, "requirements": ()}), Run())) for wide in (False, True)
+            mean_effort(model(spec.replace({WIDE_BEAMS_KEY: wide, "requirements": ()}), Run()))
+            for wide in (False, True)
         ]
     except CfmError:
         return 0.0
@@ -56,10 +57,3 @@ def aim_below_stiffening(spec: Spec, request: Request, model: Callable[[Any, Run
     share = stiffening(spec, model)
     lowest, highest = BAND_MARGIN * request.low, request.high / (BAND_MARGIN * (1.0 + share))
     return replace(request, target=max(min(request.target / (1.0 + 0.5 * share), highest), lowest))
-
-
-def _mean(result: Result) -> float | None:
-    if not result.curves:
-        return None
-    name = f"{result.curve.kind}_mean"
-    return evaluate(result, [name])[name].value

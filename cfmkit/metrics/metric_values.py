@@ -286,6 +286,14 @@ def evaluate(
     return ({} if view is None else _all(view, definitions(kind, extra))) | dict(result.values)
 
 
+def mean_effort(result: Result) -> float | None:
+    """Return the mean force or torque over the window [N or N m]; None without a curve, or where it has none."""
+    if not result.curves:
+        return None
+    name = f"{result.curve.kind}_mean"
+    return evaluate(result, [name])[name].value
+
+
 @np.errstate(all="ignore")
 def _named_quantity(view: Survey | None, name: str, known: Mapping[str, Definition], result: Result) -> Quantity:
     metric, branch = split_name(name)

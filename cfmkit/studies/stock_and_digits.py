@@ -17,7 +17,7 @@ import numpy as np
 
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.metrics import check, evaluate, values_of_family
+from cfmkit.metrics import check, evaluate, mean_effort, values_of_family
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
 from cfmkit.stock.printing import is_whole, strands, strands_in_words
@@ -123,7 +123,7 @@ def with_whole_strands(original: Spec, outcome: Design, finish: Callable[[Spec],
             continue
         if spec is None or any(was and not now for was, now in zip(before, _outcomes(spec, run)[0], strict=True)):
             continue
-        means = [_mean(family(entry.family).analyze(entry, run)) or math.nan for entry in (outcome.spec, spec)]
+        means = [mean_effort(family(entry.family).analyze(entry, run)) or math.nan for entry in (outcome.spec, spec)]
         if not abs(means[1] / means[0] - 1.0) <= MOST_CHANGE:
             continue
         told = _comparison(f"whole strands taken: {words}", outcome.spec, spec, run)
@@ -168,20 +168,13 @@ def _change(before: Spec, after: Spec, series: StockSeries, sheet: float, widths
 def _comparison(begun: str, before: Spec, after: Spec, run: Run) -> str:
     """Return a sentence on a change, and what that does to the force."""
     record = family(after.family)
-    means = [_mean(record.analyze(entry, run)) for entry in (before, after)]
+    means = [mean_effort(record.analyze(entry, run)) for entry in (before, after)]
     if None in means or not means[0]:
         return f"{begun}, and designed again"
     kind = "torque" if after.motion == "angle" else "force"
     was, now = (format_short(float(mean or 0.0), kind) for mean in means)
     share = 100.0 * (float(means[1] or 0.0) / float(means[0]) - 1.0)
     return f"{begun}, and designed again: mean {kind} {now} instead of {was} ({share:+.2g} %)"
-
-
-def _mean(result: Result) -> float | None:
-    if not result.curves:
-        return None
-    name = f"{result.curve.kind}_mean"
-    return evaluate(result, [name])[name].value
 
 
 def decimals_of(accuracy: ProcessAccuracy) -> int:

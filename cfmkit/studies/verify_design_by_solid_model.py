@@ -19,7 +19,7 @@ import numpy as np
 from cfmkit.designing.reported_values_of_finished_design import search_values
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.metrics import evaluate, window_of
+from cfmkit.metrics import evaluate, mean_effort, window_of
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
 
@@ -136,7 +136,7 @@ def _values(beams: Result, solid: Result, name: str) -> tuple[float | None, floa
 def _means(beams: Result, solid: Result) -> tuple[float | None, float | None, str]:
     """Return the mean forces or torques of both, and over which travel where that is not their window."""
     if not beams.curves or not solid.curves or np.allclose(beams.travel or 0.0, solid.travel or 0.0, rtol=1e-9):
-        return _mean(beams), _mean(solid), ""
+        return mean_effort(beams), mean_effort(solid), ""
     far = min(abs(float(one.curve.motion[-1])) for one in (beams, solid))
     window = window_of(beams)
     low, high = sorted((abs(window.lo), abs(window.hi))) if window is not None else (0.0, far)
@@ -153,13 +153,6 @@ def _mean_over_travel(result: Result, low: float, high: float) -> float | None:
     if not (np.diff(motion) > 0).all() or low >= high:
         return None
     return float(PchipInterpolator(motion, effort).integrate(low, high)) / (high - low)
-
-
-def _mean(result: Result) -> float | None:
-    if not result.curves:
-        return None
-    name = f"{result.curve.kind}_mean"
-    return evaluate(result, [name])[name].value
 
 
 def _widths(spec: Spec) -> Mapping[str, float]:

@@ -7,8 +7,6 @@ import pytest
 
 import cfmkit
 import cfmkit.metrics
-from cfmkit import Run
-from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.design import missed_by, task_of
 from cfmkit.families.beam.shaping.search import Found
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
@@ -17,6 +15,8 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
     scatter_within_tolerances,
 )
 from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.findings import percent
+from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.studies.pool import Pool
 

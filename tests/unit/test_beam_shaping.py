@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from journal_support import NotesInMemory
 
-from cfmkit import Run, analyze, dumps, evaluate, load, loads
+from cfmkit import analyze, dumps, evaluate, load, loads
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
-from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping import multistart, search
 from cfmkit.families.beam.shaping.design import find_blocking, missed_by, optimise_shape, task_of
 from cfmkit.families.beam.shaping.multistart import explore
@@ -33,6 +32,8 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
 from cfmkit.families.beam.shaping.sqp_program import Flattest, ForceRatio, Shaping, Widest
 from cfmkit.families.beam.shaping.task import STRESS_MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
+from cfmkit.families.findings import percent
+from cfmkit.families.run_control import Run
 from cfmkit.numerics.monotone_interpolation import ThroughPoints
 from cfmkit.results import Status
 from cfmkit.specs.evaluable_target_curve import TargetCurve

@@ -272,7 +272,7 @@ def test_cams_whose_windows_differ_are_solved_together_each_over_its_own(name):
     study, plan = study_of(spec, values)
     variants = Variants(spec, values, lambda k: study.variant(plan.point(k)), 12)
     assert sum(len(rows) for rows, _ in solve_rows(variants) if len(rows) > 3) == 12
-    compare_rows_with_runs(study, plan, step=4)
+    assert_rows_equal_runs(study, plan, step=4)
 
 
 def test_a_window_that_some_travels_leave_no_width_is_refused_as_each_mechanism_refuses_it():

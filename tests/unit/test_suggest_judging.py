@@ -18,6 +18,7 @@ from cfmkit.families import family, stiffening_of_wide_beams
 from cfmkit.families.base import function_named
 from cfmkit.families.hardware import PartStrength
 from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, links_that_bear
+from cfmkit.metrics.metric_definitions import values_of_family
 from cfmkit.runs.part_on_paper import assumed_tolerances
 from cfmkit.runs.suggest_api import read_request
 from cfmkit.runs.suggestion_files import table

@@ -21,7 +21,7 @@ from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, target_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as OF_SURFACES
 from cfmkit.families.end_stops import DEFINITIONS as OF_CONTACTS
-from cfmkit.families.rows import ScalarQuantity, SeveralSolutions, SolvedRows, each_quantity, each_rule
+from cfmkit.families.rows import ScalarQuantity, SeveralSolutions, SolvedRows, each_quantity, each_rule, or_nan
 from cfmkit.metrics import split_name
 from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
@@ -65,14 +65,14 @@ class BeamRows:
         """The curve of each mechanism."""
         each, paths = self.each, PathsOfDesigns(self._laws)
         paths.solve_knots()
-        pose = np.array([_or_nan(one.spec.analysis.reference) for one in each])
-        allowable = np.array([_or_nan(one.assembly.allowable_stress) for one in each])
+        pose = np.array([or_nan(one.spec.analysis.reference) for one in each])
+        allowable = np.array([or_nan(one.assembly.allowable_stress) for one in each])
         curves = CurveRows(
             _samples(each),
             lambda: _pad_rows([law.places for law in self._laws]),
             paths.effort,
-            np.array([_or_nan(one.effort_error) for one in each]),
-            np.array([_or_nan(target_of(one)) for one in each]),
+            np.array([or_nan(one.effort_error) for one in each]),
+            np.array([or_nan(target_of(one)) for one in each]),
             MeasuringFrame.band,
             (np.array([one.motion[0] for one in each]), np.array([one.motion[-1] for one in each])),
             self._part_efforts,
@@ -89,10 +89,6 @@ class BeamRows:
 
     def _part_efforts(self, places: FloatArray) -> FloatArray:
         return np.array([one.part_efforts("", own) for one, own in zip(self.each, places, strict=True)])
-
-
-def _or_nan(value: float | None) -> float:
-    return np.nan if value is None else float(value)
 
 
 def _pad_rows(rows: Sequence[FloatArray], behind: float | None = None) -> FloatArray:

@@ -19,7 +19,7 @@ from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thi
 from cfmkit.families.beam.path_ending import drive_text, ending_of, in_units
 from cfmkit.families.beam.scalar_results import find_in_window
 from cfmkit.families.beam.solution import pairs_in_contact
-from cfmkit.families.findings import stiffer, too_soft
+from cfmkit.families.findings import percent, stiffer, too_soft
 from cfmkit.families.rows import FindingRule, findings_of_one
 from cfmkit.specs.units import format_short
 
@@ -31,17 +31,6 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.solution import Solution
     from cfmkit.families.beam.strips_and_gaps import BeamGap
     from cfmkit.results import Finding
-
-
-def percent(share: float) -> str:
-    """Return a share as a reader wants it, to three digits.
-
-    Examples
-    --------
-    >>> percent(0.025512)
-    '2.55 %'
-    """
-    return format_short(share, "ratio", 3)
 
 
 LENGTH_RTOL = 1e-9  # share of a length: gaps, movements and errors of a thickness below it are rounding

@@ -13,7 +13,7 @@ from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.end_stops import DEFINITIONS as OF_CONTACTS
 from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
-from cfmkit.families.rows import ScalarQuantity
+from cfmkit.families.rows import ScalarQuantity, or_nan
 from cfmkit.numerics.cubic_interpolation import value_at
 
 if TYPE_CHECKING:
@@ -46,10 +46,6 @@ def target_of(solution: SolvedMechanism) -> float | None:
     if design is None or design.rescale is None or design.rescale.force is None:
         return None
     return math.copysign(design.rescale.force, force_at_end(solution) or 1.0)
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 # --- parts before any load ------------------------------------------------------------------------------------------
@@ -117,7 +113,7 @@ def _event(kind: str, dimension: str) -> Callable[[Solution], float]:
 
 
 def _largest_stress(solution: Solution) -> float:
-    return _or_nan(largest(solution, lambda path: path.beam_stresses()[0], window_of(solution)))
+    return or_nan(largest(solution, lambda path: path.beam_stresses()[0], window_of(solution)))
 
 
 def _parasitic_motion(solution: Solution) -> float:
@@ -128,7 +124,7 @@ def _parasitic_motion(solution: Solution) -> float:
         away = np.cos(drive.direction) * y - np.sin(drive.direction) * x
         return np.array([away, -away])
 
-    return math.nan if drive.turns else _or_nan(largest(solution, observe, window_of(solution)))
+    return math.nan if drive.turns else or_nan(largest(solution, observe, window_of(solution)))
 
 
 def _parasitic_rotation(solution: Solution) -> float:
@@ -136,7 +132,7 @@ def _parasitic_rotation(solution: Solution) -> float:
         turn = path.motion(solution.assembly.driven)[:, 2]
         return np.array([turn, -turn])
 
-    return math.nan if _turns(solution) else _or_nan(largest(solution, observe, window_of(solution)))
+    return math.nan if _turns(solution) else or_nan(largest(solution, observe, window_of(solution)))
 
 
 def _cross_stiffness(solution: Solution) -> float:
@@ -150,7 +146,7 @@ def _cross_stiffness(solution: Solution) -> float:
 
     if _passes_pole(solution, drive.direction, window) or _has_pole(solution, observe, window):
         return math.nan
-    return -_or_nan(largest(solution, observe, window))
+    return -or_nan(largest(solution, observe, window))
 
 
 def _passes_pole(solution: Solution, direction: float, window: tuple[float, float]) -> bool:
@@ -224,7 +220,7 @@ def _quantity(
     dimension: str, definition: str, function: Callable[[Any], float | None], reason: str = ""
 ) -> ScalarQuantity[Solution]:
     """Return an entry of the table; by its function None is no value, too."""
-    return ScalarQuantity(dimension, definition, lambda solution: _or_nan(function(solution)), reason)
+    return ScalarQuantity(dimension, definition, lambda solution: or_nan(function(solution)), reason)
 
 
 def _of_solids(names: Iterable[str]) -> dict[str, ScalarQuantity[Solution]]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.export.contours import Contour
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.spec import Mechanism
     from cfmkit.stock.stock_series import Bearing, Screw, System
@@ -129,7 +130,7 @@ def hardware(solution: Solution) -> Hardware:
             f"the slider is {length_in_words(thick)} thick, as there is between the braces, too thin for rods of "
             f"{length_in_words(rods.diameter)}: use a plate of {length_in_words(rods.slider_thickness)}"
         )
-    holes = [edge for contour in _plate(solution)[1:] for edge in contour.edges if isinstance(edge, Arc)]
+    holes = [edge for contour in cut_plate(solution)[1:] for edge in contour.edges if isinstance(edge, Arc)]
     screw = _screw(mechanism, loads, len(holes), faults)
     slider = mm(max(side, rods.slider_width), side, thick)
     parts = (*_parts(solution, loads, width, (pin, shaft, bearing), slider), *_hook_bars(hooks, bar, shaft, strength))
@@ -242,7 +243,8 @@ def _largest(solution: Solution, name: str) -> float:
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
-def _plate(solution: Solution) -> tuple[Any, ...]:
+def cut_plate(solution: Solution) -> tuple[Contour, ...]:
+    """Return the outline of the plate and its holes."""
     profile = solution.assembly.track.profile
     return plate_contours((profile, profile), solution.assembly.spec.mechanism.plate)
 
@@ -307,7 +309,7 @@ def _parts(
         loads.strength,
         pins,
     )
-    x0, y0, x1, y1 = _plate(solution)[0].extents
+    x0, y0, x1, y1 = cut_plate(solution)[0].extents
     of = strength.name + (", assumed" if strength.assumed else "")
     radius = mechanism.roller_radius
     yield ListedPart("cam", "cam plate", 1, f"{of}; geometry/cam.dxf", "make", mm(x1 - x0, y1 - y0, thick), "", "plate")
@@ -378,7 +380,7 @@ def _drawn_bodies(
     rollers, pins, radius = roller_path(solution), pin_path(solution), solution.assembly.spec.mechanism.roller_radius
     mirror = np.array([-1.0, 1.0])
     yield from (body for body in standing if body.name == "guide")
-    yield PosedBody.polygon("plate", "held", _plate(solution)[0].points(OUTLINE_TOLERANCE))
+    yield PosedBody.polygon("plate", "held", cut_plate(solution)[0].points(OUTLINE_TOLERANCE))
     yield from (body for body in standing if body.name == "screw")
     thick = min(0.35 * width, 0.5 * hooks.outer)
     for place in hooks.places(count_of(solution.assembly.spec.mechanism.springs)):

@@ -10,8 +10,7 @@ import numpy as np
 from cfmkit.curves import Curve
 from cfmkit.export.contours import polygons
 from cfmkit.export.posed_part import PosedBody, PosedPart, box, rectangle
-from cfmkit.families.cam.hardware import hardware
-from cfmkit.families.cam.outline import plate_contours
+from cfmkit.families.cam.hardware import cut_plate, hardware
 from cfmkit.families.cam.part_sizes import (
     BRACE_WIDTH,
     PLATE_THICKNESS,
@@ -24,9 +23,7 @@ from cfmkit.families.cam.statics import forces
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.contours import Contour
     from cfmkit.families.cam.solution import Solution
     from cfmkit.results import Result
 
@@ -72,15 +69,9 @@ def part_over_motion(result: Result) -> PosedPart | None:
 def bodies(solution: Solution) -> tuple[PosedBody, ...]:
     """Return the boxes of the plate and its holes, the rollers, and the slider's pin as large, at every point."""
     radius = solution.assembly.spec.mechanism.roller_radius
-    plate = [PosedBody.polygon("plate", "held", rectangle(*contour.extents)) for contour in _plate(solution)]
+    plate = [PosedBody.polygon("plate", "held", rectangle(*contour.extents)) for contour in cut_plate(solution)]
     right = PosedBody.line("roller", "contact", roller_path(solution)[:, None], radius)
     return (*plate, right, right.mirror(), PosedBody.line("slider", "driven", pin_path(solution)[:, None], radius))
-
-
-def _plate(solution: Solution) -> tuple[Contour, ...]:
-    """Return the outline of the plate and its holes."""
-    profile = solution.assembly.track.profile
-    return plate_contours((profile, profile), solution.assembly.spec.mechanism.plate)
 
 
 # --- for pictures -----------------------------------------------------------------------------------------------
@@ -145,7 +136,7 @@ def scene(solution: Solution) -> Scene:
     height = top - bottom
     half = max(1.06 * across, MIN_ASPECT_RATIO * height)
     view = (-half, bottom - 0.03 * height, half, top + 0.14 * height)
-    return Scene(polygons(_plate(solution), "cut"), surface(solution), roller_path(solution), view)
+    return Scene(polygons(cut_plate(solution), "cut"), surface(solution), roller_path(solution), view)
 
 
 def swallowtail(solution: Solution, points: int = 200) -> FloatArray:

@@ -15,7 +15,7 @@ from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.families.cam.solution_of_measured_cam import large_holes, profile_coverage, requested_travel, window_mask
 from cfmkit.families.cam.statics import Losses, normal_turn
 from cfmkit.families.largest_next_to_samples import extreme_next_to, largest_of_each
-from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values, quantity_of_each, row_of
+from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values, or_nan, quantity_of_each, row_of
 from cfmkit.results import Quantity
 from cfmkit.specs.evaluable_target_curve import TargetCurve
 from cfmkit.specs.units import window_places
@@ -176,8 +176,7 @@ def largest_roller(cam: CamProfile) -> float:
 def smallest_constant(cam: CamProfile) -> float:
     """Return the smallest force constant whose path the roller can follow [m]; NaN without one, and of curves."""
     law = cam.path.law
-    found = law.smallest_force_constant(cam.roller_radius) if law.constant else None
-    return np.nan if found is None else found
+    return or_nan(law.smallest_force_constant(cam.roller_radius) if law.constant else None)
 
 
 def design_values(assembly: Assembly) -> dict[str, float]:

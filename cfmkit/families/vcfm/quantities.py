@@ -13,7 +13,7 @@ import numpy as np
 from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
 from cfmkit.families.findings import newton
-from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values, quantity_of_each
+from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values, or_nan, quantity_of_each
 from cfmkit.families.vcfm.leaf_laws_from_spec import share_of, strip_of
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import measured_stiffness_for
 from cfmkit.families.vcfm.solution import MEAN_PLACES
@@ -33,8 +33,7 @@ def _of_mesh(name: str) -> Callable[[Solution], float]:
 
     def read(solution: Solution) -> float:
         error = getattr(solution.sampler, "mesh_error", None)
-        value = None if error is None else error.values().get(name)
-        return np.nan if value is None else value
+        return or_nan(None if error is None else error.values().get(name))
 
     return read
 
@@ -393,6 +392,6 @@ def _table(rows: list[dict[str, Any]], columns: dict[str, str]) -> Table:
         if dimension in ("text", "count"):
             found.append(TableColumn(name, tuple(values)))
         else:
-            known = np.array([np.nan if value is None else value for value in values])
+            known = np.array([or_nan(value) for value in values])
             found.append(border_column(name, known, dimension))
     return Table(tuple(found))

@@ -36,10 +36,15 @@ from cfmkit.studies.suggest.misses_in_words import (
     too_short,
     too_thin,
     topic_of,
-    within_mesh_error,
 )
 from cfmkit.studies.suggest.redesign_of_proposal import block_for_redesign
-from cfmkit.studies.suggest.requirements_of_request import LIFE_METRICS, list_requirements, list_unjudged, windows_of
+from cfmkit.studies.suggest.requirements_of_request import (
+    LIFE_METRICS,
+    list_requirements,
+    list_unjudged,
+    windows_of,
+    within_mesh_error,
+)
 from cfmkit.studies.suggest.yield_of_proposal import (
     GoodParts,
     MovedForYield,

@@ -14,7 +14,6 @@ from cfmkit.designing import objective_and_constraints as design_limits
 from cfmkit.designing.bounds_and_rounding import find_active_bounds
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.families.beam.finding_names import finding
-from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.network_from_spec import assemble, known_allowable_stresses, thickest_of
 from cfmkit.families.beam.shaping.multistart import Explored, explore, rank
 from cfmkit.families.beam.shaping.report import REISSNER_MODEL, Judged, judge_design, notes_of, search_of, starts_table
@@ -23,6 +22,7 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScat
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task import BENDING_ONLY, STRESS_MARGIN, Coordinate, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.findings import percent
 from cfmkit.families.rows import with_values
 from cfmkit.results import Design, Finding, Status
 from cfmkit.specs.units import format_short

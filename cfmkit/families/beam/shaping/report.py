@@ -14,11 +14,11 @@ import numpy as np
 from cfmkit.designing.reported_values_of_finished_design import measure_metrics
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.beam.contacts import force_extremes
-from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.shaping.search import COORDINATE_DECIMALS, Found
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audit_design
 from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.findings import percent
 from cfmkit.families.run_control import Run
 from cfmkit.results import Quantity, Searched, Status
 from cfmkit.specs.units import format_short

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
-from cfmkit.families.rows import ScalarQuantity
+from cfmkit.families.rows import ScalarQuantity, or_nan
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.springs.scalar_results import SCALAR_DEFINITIONS as OF_SPRINGS
 
@@ -22,10 +22,6 @@ NO_STRENGTH = "the material has no 'yield_strength'"
 OF_PINS = "it belongs to springs at pins: see fidelity 'prb'"
 
 
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value
-
-
 def _absent(dimension: str, definition: str, reason: str) -> ScalarQuantity[Solution]:
     return ScalarQuantity(dimension, definition, lambda _: math.nan, reason)
 
@@ -34,7 +30,7 @@ def _run_in(share: float) -> ScalarQuantity[Solution]:
     return ScalarQuantity(
         "length",
         f"travel at which the force first reaches {100 * share:.0f} % of its mean in the window",
-        lambda solution: _or_nan(solution.run_in(share)),
+        lambda solution: or_nan(solution.run_in(share)),
         "the force does not reach it",
     )
 
@@ -46,7 +42,7 @@ def _largest(values: FloatArray) -> float:
 def stress_stroke(solution: Solution) -> float:
     """Return the travel at which the allowable stress is reached [m]; NaN if it is not, or not known."""
     limit = solution.material.allowable_stress
-    return math.nan if limit is None else _or_nan(solution.first_at(limit, stress=True))
+    return math.nan if limit is None else or_nan(solution.first_at(limit, stress=True))
 
 
 def _why_no_stroke(solution: Solution) -> str:
@@ -70,7 +66,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "allowable_stress": ScalarQuantity(
         "stress",
         "yield strength over `mechanism.safety_factor`",
-        lambda solution: _or_nan(solution.material.allowable_stress),
+        lambda solution: or_nan(solution.material.allowable_stress),
         NO_STRENGTH,
     ),
     "stress_place": ScalarQuantity(
