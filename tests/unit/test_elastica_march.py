@@ -33,6 +33,7 @@ from cfmkit.elastica.mechanics.march import engine, equations
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, NEXT_CORRECTION, compare_states
 from cfmkit.families.beam.network_from_spec import assemble
+from cfmkit.numerics.continuation.path import PathBranch
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted(path.name for path in (ROOT / "configs").glob("beam_*.yaml") if "design" not in path.name)
@@ -217,7 +218,7 @@ def test_marches_of_c_and_numpy_are_equal(seed: int, number: int) -> None:
         ramp, own = kind(network, True), kind(network)
         loaded = ramp.march(begin(ramp), np.array([1.0]), MarchPlan(0.5, 1.0)).states[-1]
         start, goals = begin(own, loaded.x), beam_networks.drives(net, seed)[number].points / network.scales.drive
-        ends.append(own.march(start, goals, MarchPlan(0.3 * abs(goals[0]), abs(goals[-1]), on_branch=True)))
+        ends.append(own.march(start, goals, MarchPlan(0.3 * abs(goals[0]), abs(goals[-1]), branch=PathBranch(0.0, 1))))
     one, other = ends
     assert one.code is other.code is MarchCode.DONE
     assert len(one.states) == len(other.states)

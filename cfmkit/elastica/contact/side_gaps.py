@@ -167,7 +167,8 @@ def search_sides(
     """Return what compiled code finds of the gaps of sides in n states, (n, sides, 5); None without it."""
     if not len(z):
         return None
-    return equations(mesh).search_sides(z, stage.rows(), sides, find_line_tables(mesh.degree), watch)
+    rows: FloatArray | None = equations(mesh).search_sides(z, stage.rows(), sides, find_line_tables(mesh.degree), watch)
+    return rows
 
 
 class LeastGap(NamedTuple):

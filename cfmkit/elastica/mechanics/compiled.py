@@ -256,14 +256,17 @@ class CompiledEquations(NumpyEquations):
         drive, effort, told, target = rows[:, 2 * n :].T
         unstable, at_targets = told.astype(np.int64), target.astype(np.int64)
         x, rate, step = rows[:, :n], rows[:, n : 2 * n], float(plan_row[0])
-        march = NaturalMarch(x, drive, rate, unstable, effort, at_targets, step, MarchCode(code))
+        march = NaturalMarch(x, drive, rate, unstable, effort, at_targets, step, plan.branch, MarchCode(code))
         return self._cut_at_stability_change(march, start.unstable) if self.follows else march
 
     def _cut_at_stability_change(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
         """Return a march with its unstable directions counted, as far as their number stays the same."""
-        march.unstable[:] = [self._unstable(state.x, state.drive, state.unstable) for state in march.states]
-        changed = np.flatnonzero(march.unstable != unstable)
-        return replace(march.cut(int(changed[0])), code=MarchCode.STABILITY_CHANGES) if len(changed) else march
+        counts = np.array([self._unstable(state.x, state.drive, state.unstable) for state in march.states], np.int64)
+        changed = np.flatnonzero(counts != unstable).tolist()
+        names = ("x", "drive", "rate", "effort", "target")
+        same: dict[str, Any] = {name: getattr(march, name)[: changed[0] if changed else None] for name in names}
+        same["unstable"] = np.full(len(same["drive"]), unstable)
+        return replace(march, **same, code=MarchCode.STABILITY_CHANGES if changed else march.code)
 
 
 def angle_laws(coefficients: Any, mesh: Discretisation) -> FloatArray:
@@ -294,9 +297,9 @@ def compare_rows(
 
 def plan_row_of(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
     """Return a `Plan` of march.h."""
-    return np.array(
-        [plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, plan.on_branch, start], float
-    )
+    on_branch = plan.branch is not None
+    numbers = plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, on_branch, start
+    return np.array(numbers, float)
 
 
 def model_arrays(of: NumpyEquations) -> dict[str, Any]:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.numerics.continuation.path import PathBranch
 
 MAX_ROUNDS = 14  # of Newton's method
 LARGEST_CORRECTION = 50.0  # of a motion: beyond that Newton's method has left the path
@@ -105,7 +106,7 @@ class MarchPlan:
     before: PathEquilibrium | None = None  # the state before the first, for a better prediction
     largest_turn: float = 0.35  # change of a motion in one step
     tolerance: float = 1e-10
-    on_branch: bool = False  # check that every state leads back: a branch may end
+    branch: PathBranch | None = None  # then it is checked that every state leads back: a branch may end
     room: int = 2000  # states
 
 
@@ -178,23 +179,10 @@ class NumpyEquations:
         drive, share = self.factors(place)
         return energy.gradient(self.mesh, energy.values(self.mesh, free, drive, share), drive, share)
 
-    def measure_nodes(self, z: FloatArray) -> FloatArray | None:
-        """Return the gaps of all contacts of nodes in states (n, size), (contacts, n); None without compiled code."""
-        return None
+    def _leave(self, *_: Any, **__: Any) -> Any:
+        """Return None: what `CompiledEquations` computes under these names functions in numpy compute elsewhere."""
 
-    def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
-        """Return the curvatures of gaps at contacts of sides in compiled code, (sides, n); None without it."""
-        return None
-
-    def search_sides(
-        self, z: FloatArray, stages: FloatArray, sides: SideData, tables: LineTables, watch: bool = False
-    ) -> FloatArray | None:
-        """Return what compiled code finds of the gaps of sides, (n, s, 5): see `CompiledEquations`; None without it."""
-        return None
-
-    def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, tables: LineTables) -> FloatArray | None:
-        """Return what compiled code finds at places of elements, (n, k, 4): see `CompiledEquations`; None without."""
-        return None
+    measure_nodes = measure_curvatures = search_sides = locate = compare = _leave
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
@@ -280,10 +268,6 @@ class NumpyEquations:
                 unstable = self.count_unstable(at)
                 return PathEquilibrium(free, place, rate, unstable, self._effort(free, place))
             last = largest
-        return None
-
-    def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
-        """Return how states (p, size) differ from equilibria of a higher degree; None without compiled code for it."""
         return None
 
     def solve_each(
@@ -412,7 +396,7 @@ def _march(equations: NumpyEquations, start: PathEquilibrium, targets: FloatArra
         x, rate = (np.array([state[k] for state in states]).reshape(shape) for k in (0, 2))
         drive, effort = (np.array([state[k] for state in states], float) for k in (1, 4))
         unstable = np.array([state.unstable for state in states], np.int64)
-        return NaturalMarch(x, drive, rate, unstable, effort, np.array(at_targets, np.int64), step, code)
+        return NaturalMarch(x, drive, rate, unstable, effort, np.array(at_targets, np.int64), step, plan.branch, code)
 
     passed = rejected = 0
     while passed < len(targets) and len(states) < plan.room:
@@ -435,7 +419,7 @@ def _march(equations: NumpyEquations, start: PathEquilibrium, targets: FloatArra
             rejected = max(0, rejected - 1)
             if not same:
                 return end(MarchCode.STABILITY_CHANGES)
-            if plan.on_branch and not _leads_back(equations, current, new, seen.moved, plan.tolerance):
+            if plan.branch and not _leads_back(equations, current, new, seen.moved, plan.tolerance):
                 return end(MarchCode.BRANCH_ENDS)
             earlier = [current, *earlier[: N_PREDICTING - 2]]
             current = new

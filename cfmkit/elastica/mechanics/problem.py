@@ -93,10 +93,12 @@ class NetworkProblem:
         left = walk.targets[walk.number :]
         plan = MarchPlan(
             walk.step, walk.options.span, walk.before, walk.options.largest_motion, self.next_correction,
-            on_branch=walk.branch is not None,
+            branch=walk.branch,
             room=self._room_in_contact if self.mesh.contacts else 2 * len(left) + N_SPARE_STATES,
         )  # fmt: skip
-        return self.equations.march(walk.here, left, plan)
+        marched = self.equations.march(walk.here, left, plan)
+        marched.target[marched.target >= 0] += walk.number
+        return marched
 
     @property
     def _room_in_contact(self) -> int:

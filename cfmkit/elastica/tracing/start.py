@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.contact.path_items import PathItem
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.drive import Control
-    from cfmkit.numerics.continuation.path import MarchedPoints
+    from cfmkit.numerics.continuation.path import MarchedSteps
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
     Remesh = Callable[[tuple[FlankPlace, ...]], Discretisation]
@@ -201,7 +201,7 @@ def follow_network(
     targets: FloatArray,
     options: Options,
     branch: PathBranch | None = None,
-) -> Iterator[PathItem | MarchedPoints]:
+) -> Iterator[PathItem | MarchedSteps]:
     """Yield points, events and changes of contacts of a path in order, and its ending at last; see `follow_together`.
 
     Every change comes behind a point that lies at it.

@@ -25,7 +25,7 @@ from cfmkit.elastica.tracing.start import DriveStart, find_start, follow_network
 from cfmkit.elastica.tracing.taut_beams import drop_locked_points, find_tension
 from cfmkit.numerics.continuation.events import relocate
 from cfmkit.numerics.continuation.path import (
-    MarchedPoints,
+    MarchedSteps,
     Options,
     PathBranch,
     PathEvent,
@@ -318,7 +318,7 @@ def trace_on(
         return resolution.arrays(network, drive, arrays.fits, flanks)
 
     start = find_start(arrays, control, remesh if sides else None)
-    events, first, points = list[PathEvent](), start.first, list[Point | MarchedPoints]()
+    events, first, points = list[PathEvent](), start.first, list[Point | MarchedSteps]()
     meshes = [(0, start.problem.mesh)]  # number of the first point of each piece, and its arrays
     changes: dict[int, list[ContactChange]] = {}  # by the points they are at
     ending = PathStop(WhyStopped.LOST, 0.0)
@@ -326,7 +326,7 @@ def trace_on(
     if start.at is not None and limit != 0 and not (first_only and first):
         options = _options(drive, control, unit)
         for item in follow_network(start.problem, start.at, drive.points / unit, options, start.branch):
-            if isinstance(item, Point | MarchedPoints):
+            if isinstance(item, Point | MarchedSteps):
                 points.append(item)
             elif isinstance(item, Remeshed):
                 meshes.append((len(points), item.problem.mesh))

@@ -14,7 +14,7 @@ from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
 from cfmkit.numerics.continuation.path import (
     AT_EVENT,
-    MarchedPoints,
+    MarchedSteps,
     PathEvent,
     PathStop,
     Point,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.losses import Items
-    from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathBranch
+    from cfmkit.numerics.continuation.path import Options, PathBranch
     from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
     from cfmkit.numerics.continuation.steps import Trial
 
@@ -85,10 +85,7 @@ def follow(
 def each_point(items: Iterable[Any]) -> Iterator[Any]:
     """Yield items of a path, the points of marches one by one."""
     for item in items:
-        if isinstance(item, MarchedPoints):
-            yield from item.each()
-        else:
-            yield item
+        yield from item.each_point() if isinstance(item, MarchedSteps) else (item,)
 
 
 def follow_together(
@@ -97,25 +94,20 @@ def follow_together(
     targets: FloatArray,
     options: Options,
     branch: PathBranch | None = None,
-) -> Iterator[Item | MarchedPoints]:
+) -> Iterator[Item | MarchedSteps]:
     """Yield what `follow` does, but the points of every march together, and no corners that are rounded."""
     left = options.most_points
     for item in _items(problem, start, targets, options, branch):
-        if isinstance(item, Point):
-            last, between = item.at.drive, int(item.target < 0)
-        elif isinstance(item, MarchedPoints):
-            last, between = float(item.steps.drive[-1]), int((item.target < 0).sum())
-        else:
-            between = 0
-        if between > left:
-            if isinstance(item, MarchedPoints):
-                item = item.cut(int(np.flatnonzero(item.target < 0)[left]) + 1)
-                last = float(item.steps.drive[-1])
+        if isinstance(item, MarchedSteps) and (between := int((item.target < 0).sum())) <= left:
             yield item
-            yield PathStop(WhyStopped.FULL, last, "more points than allowed at {place}")
-            return
-        left -= between
-        yield item
+            left -= between
+            continue
+        for single in each_point((item,)):
+            yield single
+            left -= isinstance(single, Point) and single.target < 0
+            if left < 0:
+                yield PathStop(WhyStopped.FULL, single.at.drive, "more points than allowed at {place}")
+                return
 
 
 def _items(
@@ -124,7 +116,7 @@ def _items(
     targets: FloatArray,
     options: Options,
     branch: PathBranch | None,
-) -> Iterator[Item | MarchedPoints]:
+) -> Iterator[Item | MarchedSteps]:
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
     step, steepest = options.first_step * options.span, max(0.0, abs(start.stiffness))
     walk = Walk(problem, options, targets, start, step, at_first, trail=(start,), branch=branch, steepest=steepest)
@@ -145,7 +137,7 @@ def _items(
     yield from follow_on(walk)
 
 
-def follow_on(walk: Walk) -> Iterator[Item | MarchedPoints]:
+def follow_on(walk: Walk) -> Iterator[Item | MarchedSteps]:
     """Yield the points and events of a path from a state of its follower on, and its ending at last."""
     outcome = yield from _walk_on(walk)
     if isinstance(outcome, PathStop):
@@ -155,7 +147,7 @@ def follow_on(walk: Walk) -> Iterator[Item | MarchedPoints]:
     yield PathStop(WhyStopped.COMPLETE, outcome.here.drive)
 
 
-def _walk_on(walk: Walk) -> Generator[Point | PathEvent | MarchedPoints, None, Walk | PathStop]:
+def _walk_on(walk: Walk) -> Generator[Point | PathEvent | MarchedSteps, None, Walk | PathStop]:
     """Yield the points and events up to the last requested value; return the walk there, or why it ended before."""
     march = getattr(walk.problem, "march", None)
     while not walk.done:
@@ -183,16 +175,14 @@ def _look_ahead(walk: Walk) -> Iterator[PathEvent]:
             yield item
 
 
-def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[MarchedPoints, None, Walk]:
+def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[MarchedSteps, None, Walk]:
     """Yield the points of steps that a problem takes by itself, as far as nothing happens; return the walk there."""
     marched = march(walk)
     if len(marched.drive):
-        target = np.where(marched.target < 0, -1, walk.number + marched.target)
-        yield MarchedPoints(marched, target, walk.branch)
-        *before, here = marched.last_two
+        yield marched
+        last = marched.at(-2) if len(marched.drive) > 1 else walk.here
         number = walk.number + int((marched.target >= 0).sum())
-        last = before[0] if before else walk.here
-        walk = replace(walk, before=last, here=here, trail=(*walk.trail, marched), number=number)
+        walk = replace(walk, before=last, here=marched.at(-1), trail=(*walk.trail, marched), number=number)
     return replace(walk, step=marched.step, rejections=ARC_AFTER if marched.stuck else 1)
 
 

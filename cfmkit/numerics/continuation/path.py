@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -73,19 +73,17 @@ class PointColumns(NamedTuple):
     branches: tuple[PathBranch | None, ...]
 
     @classmethod
-    def of(cls, points: list[Point | MarchedPoints]) -> PointColumns:
+    def of(cls, points: list[Point | MarchedSteps]) -> PointColumns:
         """Return single points and those of marches as columns."""
         x, rows, branches = list[Any](), list[Any](), list[PathBranch | None]()
         for item in points:
-            if isinstance(item, MarchedPoints):
-                steps = item.steps
-                x.append(steps.x)
-                rows.append((steps.drive, steps.unstable, steps.effort, item.target))
-                branches += [item.branch] * len(steps.drive)
+            if isinstance(item, MarchedSteps):
+                x.append(item.x)
+                rows.append((item.drive, item.unstable, item.effort, item.target))
             else:
                 x.append(item.at.x[None])
                 rows.append(([item.at.drive], [item.at.unstable], [item.at.effort], [item.target]))
-                branches.append(item.branch)
+            branches += [item.branch] * len(x[-1])
         if not rows:
             return cls([], np.empty(0), np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64), ())
         drive, unstable, effort, target = (np.concatenate(parts) for parts in zip(*rows, strict=True))
@@ -138,8 +136,9 @@ class MarchedSteps:
     rate: FloatArray  # (k, n)
     unstable: Any  # (k,)
     effort: FloatArray  # (k,)
-    target: Any  # (k,) number of the requested value that each is at, of those that were left; -1 if at none
+    target: Any  # (k,) number of the requested value that each is at, -1 if at none
     step: float  # with which to go on
+    branch: PathBranch | None
 
     @property
     def stuck(self) -> bool:
@@ -149,39 +148,17 @@ class MarchedSteps:
     @cached_property
     def states(self) -> tuple[PathEquilibrium, ...]:
         """The equilibria one by one."""
-        return self._list(slice(None))
+        return tuple(map(self.at, range(len(self.drive))))
 
-    @property
-    def last_two(self) -> tuple[PathEquilibrium, ...]:
-        """The last two of them, or the only one."""
-        return self._list(slice(-2, None))
+    def at(self, k: int) -> PathEquilibrium:
+        """Return one of the equilibria."""
+        numbers = float(self.drive[k]), self.rate[k], int(self.unstable[k]), float(self.effort[k])
+        return PathEquilibrium(self.x[k], *numbers)
 
-    def cut(self, count: int) -> Self:
-        """Return the first of them."""
-        names = ("x", "drive", "rate", "unstable", "effort", "target")
-        return replace(self, **{name: getattr(self, name)[:count] for name in names})
-
-    def _list(self, which: slice) -> tuple[PathEquilibrium, ...]:
-        lists = self.drive[which].tolist(), self.rate[which], self.unstable[which].tolist(), self.effort[which].tolist()
-        return tuple(map(PathEquilibrium, self.x[which], *lists))
-
-
-@dataclass(frozen=True, eq=False)
-class MarchedPoints:
-    """The points of a march."""
-
-    steps: MarchedSteps
-    target: Any  # (k,) number of the requested value that each is at, -1 if at none
-    branch: PathBranch | None
-
-    def each(self) -> Iterator[Point]:
-        """Yield them one by one."""
-        for at, target in zip(self.steps.states, self.target.tolist(), strict=True):
+    def each_point(self) -> Iterator[Point]:
+        """Yield the points one by one."""
+        for at, target in zip(self.states, self.target.tolist(), strict=True):
             yield Point(at, target, self.branch)
-
-    def cut(self, count: int) -> MarchedPoints:
-        """Return the first of them."""
-        return replace(self, steps=self.steps.cut(count), target=self.target[:count])
 
 
 @dataclass(frozen=True, eq=False)
