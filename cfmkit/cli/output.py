@@ -103,14 +103,8 @@ class Terminal:
                 bar.close()
 
 
-MAX_SHARE_SPENT = 0.99
-"""Share of a time budget that is reported at most while the work goes on."""
-
-
-LINE_EVERY = 10.0
-"""Seconds between two lines where nobody watches: a study of an hour leaves 360 lines in a log."""
-
-
+MAX_SHARE_SPENT = 0.99  # share of a time budget that is reported at most while the work goes on
+LINE_EVERY = 10.0  # seconds between two lines where nobody watches: a study of an hour leaves 360 lines in a log
 FIRST_ESTIMATE = 0.05
 """Share of the work before which the time left is not told: what is done first says little of the rest."""
 

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.results import Finding
 
-OUTLINE_TOLERANCE = 5e-6
-"""How far outlines may be from the exact ones by default [m]."""
+OUTLINE_TOLERANCE = 5e-6  # how far outlines may be from the exact ones by default [m]
 
 
 @dataclass(frozen=True)
@@ -193,8 +192,7 @@ def _points_between(edge: Smooth, sagitta: float) -> FloatArray:
     return np.vstack([found, edge.points[-1]])
 
 
-UNCUT_LAYERS = ("path", "reference", HELD_LAYER, DRIVEN_LAYER)
-"""Layers that nothing is cut along."""
+UNCUT_LAYERS = ("path", "reference", HELD_LAYER, DRIVEN_LAYER)  # layers that nothing is cut along
 
 
 def circle(center: tuple[float, float], radius: float, layer: str, hole: bool = False) -> Contour:

@@ -23,12 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
 
-SYNC_INTERVAL = 1.0
-"""Seconds after which the file is brought down to the disk."""
-
-WRITER_TIMEOUT = 60.0
-"""Seconds to wait for another writer, which may be making a large file small."""
-
+SYNC_INTERVAL = 1.0  # seconds after which the file is brought down to the disk
+WRITER_TIMEOUT = 60.0  # seconds to wait for another writer, which may be making a large file small
 _STUDIES_LOG = logging.getLogger("cfmkit.studies")
 _CREATE_TABLE = "CREATE TABLE IF NOT EXISTS records (key BLOB PRIMARY KEY, session INTEGER, record BLOB) WITHOUT ROWID"
 _ERROR_REASONS = {

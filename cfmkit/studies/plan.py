@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 Levels = tuple[Any, ...] | NDArray[Any]
 
-MOST_POINTS = 1_000_000
-"""Points of a study unless the user allows more."""
+MOST_POINTS = 1_000_000  # points of a study unless the user allows more
 
 
 @dataclass(frozen=True)

@@ -41,10 +41,7 @@ if TYPE_CHECKING:
 
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
-
-RECORD_VERSION = 4
-"""How records of the journal are written: those of another number are computed again."""
-
+RECORD_VERSION = 4  # how records of the journal are written: those of another number are computed again
 _STATUS_OF = {3: Status.INVALID, 4: Status.NO_EQUILIBRIUM, 70: Status.CRASHED}
 
 

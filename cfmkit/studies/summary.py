@@ -31,12 +31,8 @@ if TYPE_CHECKING:
     from cfmkit.studies.row_blocks_for_journal import ResultRows
 
 DEFAULT_OBJECTIVES = ("force_ripple", "torque_ripple")
-MOST_SHOWN = 4
-"""Metrics that are drawn."""
-
-
-TIE_RTOL = 1e-9
-"""Points whose values differ by less than this, relative to the value, count as equally good."""
+MOST_SHOWN = 4  # metrics that are drawn
+TIE_RTOL = 1e-9  # points whose values differ by less than this, relative to the value, count as equally good
 
 
 @dataclass(frozen=True)

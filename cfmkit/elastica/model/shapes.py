@@ -80,8 +80,7 @@ class Polynomial:
         return FittedShape(angle, lambda u, inside: length + 0.0 * u, read_only([0.0, 1.0]), True)
 
 
-STRAIGHT_SHAPE = Polynomial()
-"""The shape of a straight beam."""
+STRAIGHT_SHAPE = Polynomial()  # the shape of a straight beam
 
 
 def arc(sweep: float) -> Polynomial:
