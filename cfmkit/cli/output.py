@@ -113,7 +113,6 @@ class ProgressLines:
     """A line on standard error now and then, with the time that is left."""
 
     def __init__(self) -> None:
-        """Begin to count the time."""
         self._start = self._reported = time.monotonic()
         self._most = 0.0
 
@@ -138,7 +137,6 @@ class Bar:
     """The progress bar on standard error, one for all verbs: it appears with the first report and leaves nothing."""
 
     def __init__(self) -> None:
-        """Show nothing yet."""
         self._progress: Any = None
         self._task: Any = None
         self._most = 0

@@ -107,7 +107,6 @@ class Recording(ShortRepr):
         _check_values(self)
 
     def __len__(self) -> int:
-        """Return the number of points."""
         return len(self.motion)
 
     @property

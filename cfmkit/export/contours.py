@@ -90,7 +90,6 @@ class Smooth:
     tangents: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check their shapes."""
         object.__setattr__(self, "points", read_only(self.points))
         object.__setattr__(self, "tangents", read_only(self.tangents))
         if self.points.shape != self.tangents.shape or self.points.ndim != 2 or self.points.shape[1] != 2:

@@ -51,7 +51,6 @@ class Window:
     hi: float
 
     def __post_init__(self) -> None:
-        """Refuse windows without width."""
         if not self.lo < self.hi:
             raise ValueError(f"a window must be increasing, got {self.lo!r} to {self.hi!r}")
 

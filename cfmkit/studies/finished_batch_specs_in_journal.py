@@ -46,7 +46,6 @@ class KeptRuns:
     """
 
     def __init__(self, out: str, options: list[Any], notes: Notes) -> None:
-        """Nothing is read yet."""
         self._out, self._notes = out, notes
         self._about = stable_hash([RECORD_VERSION, options, origin(FILE_LIBRARIES), origins()])
         self._asked: dict[str, str | None] = {}

@@ -83,7 +83,6 @@ class Journal:
             _STUDIES_LOG.warning("journal  damaged records that were computed again: %d", self.damaged)
 
     def __len__(self) -> int:
-        """Return the number of records in the file."""
         return int(self._db.execute("SELECT count(*) FROM records").fetchone()[0])
 
     def find(self, key: str) -> Any:
@@ -191,7 +190,6 @@ class Memory:
     """The same for studies that write nothing."""
 
     def __init__(self) -> None:
-        """Start without records."""
         self._records: dict[str, Any] = {}
 
     def find(self, _key: str) -> None:

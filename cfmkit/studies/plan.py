@@ -58,7 +58,6 @@ class Plan:
     joint: bool = False
 
     def __len__(self) -> int:
-        """Return the number of points."""
         return self.size
 
     @property

@@ -58,7 +58,6 @@ class Metric:
     words: tuple[str, ...] = ()  # those that a metric of the dimension ``text`` is an index into
 
     def __post_init__(self) -> None:
-        """Fall back to the name."""
         if not self.label:
             object.__setattr__(self, "label", self.name.replace("[", "_").replace("]", ""))
 

@@ -38,7 +38,6 @@ class ResultRows:
     warned: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)  # name of a warning -> the rows that have it
 
     def __len__(self) -> int:
-        """Return the number of rows."""
         return len(self.values)
 
     @property

@@ -113,7 +113,6 @@ class Summary:
     kept: list[tuple[NDArray[np.int64], FloatArray, NDArray[np.bool_]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Start at zero."""
         self.met = np.zeros(len(self.study.spec.part_requirements), dtype=np.int64)
         columns = len(self.study.metrics)
         self._low, self._high = np.full(columns, np.inf), np.full(columns, -np.inf)

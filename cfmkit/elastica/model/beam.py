@@ -71,7 +71,6 @@ class Beam:
     end_offset: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Check the choices."""
         if self.closure not in ("rotscale", "raw"):
             raise InputError(f"closure must be 'rotscale' or 'raw', got {self.closure!r}")
         if self.start_joint not in _JOINT_KINDS or self.end_joint not in _JOINT_KINDS:

@@ -104,7 +104,6 @@ class EquilibriumPath(ShortRepr):
     at_contact: Any = False  # (n,) points at which a contact begins or ends; False for all
 
     def __len__(self) -> int:
-        """Return the number of points."""
         return len(self.at.z)
 
     @property
