@@ -23,11 +23,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 _LONG_QUOTE = re.compile(r"(?P<quote>['\"])(?P<text>(?:(?!(?P=quote)).){200,})(?P=quote)", re.DOTALL)
-
-
-EXCERPT_LENGTH = 90
-"""Characters of a line that is shown below a problem: a terminal of 100 has room for them."""
-
+EXCERPT_LENGTH = 90  # characters of a line that is shown below a problem: a terminal of 100 has room for them
 _LONG_WORD = re.compile(r"\S{400,}")
 """Longer than the paths of files that people have; names of keys, files and options stand without quotes."""
 

@@ -103,14 +103,8 @@ class Terminal:
                 bar.close()
 
 
-MAX_SHARE_SPENT = 0.99
-"""Share of a time budget that is reported at most while the work goes on."""
-
-
-LINE_EVERY = 10.0
-"""Seconds between two lines where nobody watches: a study of an hour leaves 360 lines in a log."""
-
-
+MAX_SHARE_SPENT = 0.99  # share of a time budget that is reported at most while the work goes on
+LINE_EVERY = 10.0  # seconds between two lines where nobody watches: a study of an hour leaves 360 lines in a log
 FIRST_ESTIMATE = 0.05
 """Share of the work before which the time left is not told: what is done first says little of the rest."""
 
@@ -119,7 +113,6 @@ class ProgressLines:
     """A line on standard error now and then, with the time that is left."""
 
     def __init__(self) -> None:
-        """Begin to count the time."""
         self._start = self._reported = time.monotonic()
         self._most = 0.0
 
@@ -144,7 +137,6 @@ class Bar:
     """The progress bar on standard error, one for all verbs: it appears with the first report and leaves nothing."""
 
     def __init__(self) -> None:
-        """Show nothing yet."""
         self._progress: Any = None
         self._task: Any = None
         self._most = 0

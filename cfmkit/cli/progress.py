@@ -25,11 +25,9 @@ if TYPE_CHECKING:
 
 DRAW_EVERY = 0.1
 """Seconds between two pictures of the bar: quicker than this nobody reads, and each costs some of the time."""
-
 RATE_WINDOW = 30.0
 """Seconds over which the rate is taken: three lines of a log, so that it follows points that get slower and does not
 jump with each."""
-
 FIRST_RESULTS = 0.2
 """Share of the time up to the first result within which others are first results of other processes, too: they say how
 long processes take to start and to compile, and not how long a point takes."""

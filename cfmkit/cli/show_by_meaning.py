@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 
 KINDS_OF_NAMES = {"metrics": "metric", "values": "metric", "keys": "key", "findings": "warning"}
 """Kinds of names whose texts are searched, and what one of them is called."""
-
-MAX_NAMES, MAX_PAGES = 14, 5
-"""On the page; the JSON document has all."""
+MAX_NAMES, MAX_PAGES = 14, 5  # on the page; the JSON document has all
 
 
 class NamedMeaning(NamedTuple):

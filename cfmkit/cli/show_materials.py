@@ -14,9 +14,7 @@ if TYPE_CHECKING:
 
     Section = tuple[str, Sequence[Mapping[str, Any]], tuple[Field, ...]]
 
-NO_SPREAD = "none stated"
-"""Of a property for which the sources of a material state no range."""
-
+NO_SPREAD = "none stated"  # of a property for which the sources of a material state no range
 PAGE_TEXT = (
     "At room temperature, under short-term loads; the ranges are what to expect in practice. What is assumed counts "
     "where a specification names the material and states no 'fatigue' or 'relaxation'. With --json in SI units."

@@ -15,9 +15,7 @@ if TYPE_CHECKING:
 
 LOCATION_PATTERN = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<reported>.*)", re.DOTALL)
 """How the fault of a file begins."""
-
-MAX_CHANGES = 8
-"""Changed values in one annotation: GitHub cuts long ones."""
+MAX_CHANGES = 8  # changed values in one annotation: GitHub cuts long ones
 
 
 def workflow_commands(

@@ -29,23 +29,12 @@ if TYPE_CHECKING:
     from cfmkit.documents.document import Document
     from cfmkit.specs.spec import Spec
 
-MOST_CURVES = 500
-"""Curves in one file: a point further down the table shows the command that makes its curve."""
-
-MOST_POINTS = 20_000
-"""Points in one file: more take a browser seconds for every move of a slider."""
-
-MOST_BYTES = 4_000_000
-"""Of JSON for the points: beyond it a browser needs seconds to begin."""
-
-MAX_STATIC_ROWS = 50
-"""Rows that stand in the page itself, for readers without scripts."""
-
-TEXT_COLUMNS = ("requirements_met", "status", "warnings", "message")
-"""The columns behind the metrics."""
-
-PAGE_DIGITS = 6
-"""Of a number in the page: more are in results.csv."""
+MOST_CURVES = 500  # curves in one file: a point further down the table shows the command that makes its curve
+MOST_POINTS = 20_000  # points in one file: more take a browser seconds for every move of a slider
+MOST_BYTES = 4_000_000  # of JSON for the points: beyond it a browser needs seconds to begin
+MAX_STATIC_ROWS = 50  # rows that stand in the page itself, for readers without scripts
+TEXT_COLUMNS = ("requirements_met", "status", "warnings", "message")  # the columns behind the metrics
+PAGE_DIGITS = 6  # of a number in the page: more are in results.csv
 
 
 class StudyPoints(NamedTuple):
@@ -182,13 +171,8 @@ def _simplify_branch(line: list[list[float]]) -> list[list[float]]:
     return [[float(f"{value:.5g}") for value in along] for along in places.T]
 
 
-MAX_SHIFT = 0.2
-"""Of a line by the points that are left out [pixels]."""
-
-_DIAGRAM_PIXELS = np.array([564.0, 264.0])
-"""Width and height of the diagram that study.js draws, without its margins."""
-
-
+MAX_SHIFT = 0.2  # of a line by the points that are left out [pixels]
+_DIAGRAM_PIXELS = np.array([564.0, 264.0])  # width and height of the diagram that study.js draws, without its margins
 _AXIS_PREFIXES = (("displacement [", "angle ["), ("force [", "torque ["))
 """How the columns of a curve begin that are drawn: over which, and which."""
 

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 Element = ElementTree.Element
 FAILURE_CODES = (ExitCode.NO_SOLUTION, ExitCode.PARTIAL)
 """Ends that say something about the mechanism; all others but these are errors of the run."""
-
 PASSED_CODES = (ExitCode.OK, ExitCode.REQUIREMENT_MISSED)
 NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 cannot hold, not even escaped."""

@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.batch_sources_and_outcomes import Entry
     from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
 
-MAX_CHANGES = 50
-"""Changed values that are listed; all stand in changes.csv."""
-
+MAX_CHANGES = 50  # changed values that are listed; all stand in changes.csv
 MARKUP_PATTERN = re.compile(r"([\\`*_\[\]<>|~&@#$]|^[=+-])")
 ZERO_WIDTH_SPACE = "&#8203;"
 """A blank of no width: a backslash before it does not keep a page from making a mention of @name."""

@@ -18,17 +18,9 @@ if TYPE_CHECKING:
 
     from cfmkit.documents.document import Document, PageTable
 
-MAX_CHARACTERS = 2000
-"""Of the text, without the figure."""
-
-MAX_FACTS, MAX_WARNINGS = 5, 4
-"""Values that are not required, and warnings, that are shown."""
-
-
-MAX_ROWS = 10
-"""Of a table: it is to be seen beside the code."""
-
-
+MAX_CHARACTERS = 2000  # of the text, without the figure
+MAX_FACTS, MAX_WARNINGS = 5, 4  # values that are not required, and warnings, that are shown
+MAX_ROWS = 10  # of a table: it is to be seen beside the code
 NO_FIGURES: Mapping[str, Callable[[], Figure]] = MappingProxyType({})
 
 

@@ -26,10 +26,8 @@ if TYPE_CHECKING:
     from cfmkit.errors import ExitCode
 
 NO_VALUE = "-"
-
 NOT_JUDGED = "open"
 """Cell of a value that no model computes or for which the material lacks data; a note says the reason."""
-
 COLUMN_RANKS = {"parts": 4, "variant": 3, "hysteresis": 2, "life": 1}
 """Columns that narrow pages leave out, the largest first."""
 

@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 
     from cfmkit.specs.spec import Spec
 
-MAX_RANGES = 6
-"""Results whose range a short page shows."""
-
+MAX_RANGES = 6  # results whose range a short page shows
 NO_INFLUENCE = 1e-9
 """Share of a value by which it may change and still counts as the same: rounding of sums leaves as much."""
 

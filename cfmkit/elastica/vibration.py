@@ -75,7 +75,6 @@ class NetworkMasses:
     nodes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Freeze and check the values."""
         for name, value in self.density.items():
             if not (value > 0 and isfinite(value)):
                 raise InputError(f"the density of beam {name!r} must be positive, got {value}")

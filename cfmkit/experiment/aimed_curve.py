@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
-N_PLACES = 65
-"""Places of the window at which the corrected curve is to be the one that was designed."""
-
+N_PLACES = 65  # places of the window at which the corrected curve is to be the one that was designed
 LARGEST_RESCALING = 0.03
 """Deviation of the designed mean from the target up to which it is taken for rounding and removed, too."""
 

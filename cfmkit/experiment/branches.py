@@ -27,24 +27,15 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
 
-REVERSAL_SHARE = 0.02
-"""The motion has turned back when it has returned by this part of its range."""
-
-COMPLETE_STROKE_SHARE = 0.9
-"""The second stroke of a cycle is complete when it covers this part of the first."""
-
+REVERSAL_SHARE = 0.02  # the motion has turned back when it has returned by this part of its range
+COMPLETE_STROKE_SHARE = 0.9  # the second stroke of a cycle is complete when it covers this part of the first
 SHORT_STROKE_SHARE = 0.1
 """Two strokes of which one covers less than this part of the other are no loop: the machine approached or let go."""
-
 LOAD_BRANCH, UNLOAD_BRANCH = "load", "unload"
-
-_PAUSE_SPEED_SHARE = 0.02
-"""It stands where it moves at less than this part of its usual speed."""
-
+_PAUSE_SPEED_SHARE = 0.02  # it stands where it moves at less than this part of its usual speed
 _SHORTEST_PAUSE = 12
 _REVERSAL_JITTERS = 8.0
 """Standard deviations of the jitter up to a reversal: either end may be off by four, as one value in 16 000 is."""
-
 _MIN_SAMPLES = 4
 
 

@@ -43,24 +43,13 @@ if TYPE_CHECKING:
 
 POORLY_DETERMINED = 0.3
 """Parameters whose half interval exceeds this part of their size are reported as poorly determined."""
-
-BY_CHANCE = 1e-3
-"""Residuals are not random where chance makes their means as large less often than that."""
-
+BY_CHANCE = 1e-3  # residuals are not random where chance makes their means as large less often than that
 NEGLIGIBLE_SWING = 0.2
 """Swings of the residuals that are smaller than this part of their noise are left alone, however certain."""
-
-MAX_HALF_INTERVAL = 1.0
-"""Parameters whose half interval exceeds this part of their size cannot be determined."""
-
-ALIKE_RTOL = 1e-7
-"""Branches of a model that differ by less than this part of the force are one: it has no losses."""
-
-TIED_CORRELATION = 0.999
-"""Parameters more correlated than this are reported as poorly distinguished."""
-
+MAX_HALF_INTERVAL = 1.0  # parameters whose half interval exceeds this part of their size cannot be determined
+ALIKE_RTOL = 1e-7  # branches of a model that differ by less than this part of the force are one: it has no losses
+TIED_CORRELATION = 0.999  # parameters more correlated than this are reported as poorly distinguished
 UNDETERMINED_MESSAGE = "cannot be determined from this recording"
-
 CALIBRATION_FINDINGS = {
     "weakly_identified": "the data determine a fitted value poorly",
     "at_bound": "a fitted value is at its bound: the data require a value beyond",

@@ -35,11 +35,8 @@ if TYPE_CHECKING:
     from cfmkit.metrics.compare import Measure
     from cfmkit.results import Result
 
-N_COMPARED_PLACES = 257
-"""Places of a window at which the branches of a loop are laid beside each other."""
-
-MAX_BRANCH_POINTS = 2000
-"""Points of a branch that are compared; more are averaged in groups."""
+N_COMPARED_PLACES = 257  # places of a window at which the branches of a loop are laid beside each other
+MAX_BRANCH_POINTS = 2000  # points of a branch that are compared; more are averaged in groups
 
 
 @dataclass(frozen=True)
@@ -141,8 +138,7 @@ class Comparison(ShortRepr):
         return replace(self, samples=(mean,), branches=self.samples)
 
 
-MEAN_BRANCH = "mean"
-"""Name of the samples that are the mean of both branches."""
+MEAN_BRANCH = "mean"  # name of the samples that are the mean of both branches
 
 
 def _mean_of(up: Samples, down: Samples, cycle: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:

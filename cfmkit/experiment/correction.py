@@ -35,13 +35,9 @@ if TYPE_CHECKING:
 
 UNKNOWN_ZERO = 0.01
 """Standard deviation of a zero of the force that neither the recording nor the user tells, over the largest force."""
-
 LEAST_CORRECTION = 0.005
 """Deviation of the mean force that is not corrected: the error of a testing machine of class 0.5 (ISO 7500-1)."""
-
-LARGEST_REMAINDER = 0.01
-"""Deviation of the mean force that a corrected part may still have."""
-
+LARGEST_REMAINDER = 0.01  # deviation of the mean force that a corrected part may still have
 CORRECTION_FINDINGS = {
     "not_told_apart": "the recording does not tell errors of the part apart: the correction allows for each",
     "modulus_outside": "the fitted modulus is outside the range that is known of the material",

@@ -76,8 +76,7 @@ def of_cycle(holes: Sequence[UnrecordedInterval], curve: Curve) -> list[Unrecord
     return [hole for hole in holes if hole.cycle in (None, number_of(curve))]
 
 
-NOT_RECORDED_TEXT = "not recorded"
-"""Begins the reason why a metric over a hole has no value."""
+NOT_RECORDED_TEXT = "not recorded"  # begins the reason why a metric over a hole has no value
 
 
 def large_holes(

@@ -54,9 +54,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
 
-LEFT_OUT = ("reversals", "spikes")
-"""What verbs leave out of a recording unless it is to count as recorded."""
-
+LEFT_OUT = ("reversals", "spikes")  # what verbs leave out of a recording unless it is to count as recorded
 CYCLES_PER_STROKE = 60.0
 """Cut-off of the filter that is used unless one is named, in cycles over the whole travel: 2 Hz in [SS]."""
 

@@ -31,11 +31,8 @@ if TYPE_CHECKING:
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement
     from cfmkit.metrics import Window
 
-LITTLE_MORE = 2.0
-"""Forces outside the window are shown as well if the range grows by no more than this factor."""
-
-MAX_DRAWN_BINS = 1200
-"""Columns of points that a picture can show: more samples are drawn as their extremes."""
+LITTLE_MORE = 2.0  # forces outside the window are shown as well if the range grows by no more than this factor
+MAX_DRAWN_BINS = 1200  # columns of points that a picture can show: more samples are drawn as their extremes
 
 
 def figures(source: MeasuredCurves, numbers: Measurement) -> dict[str, Callable[[], Figure]]:

@@ -16,9 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve
     from cfmkit.metrics import Window
 
-N_CYCLE_PLACES = 513
-"""Places in the window at which cycles are compared."""
-
+N_CYCLE_PLACES = 513  # places in the window at which cycles are compared
 REVERSED_LOOP_SHARE = 1e-3
 """A loop runs the wrong way round if its area is negative by more than this part of mean force times travel."""
 

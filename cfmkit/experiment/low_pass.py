@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 Per = Literal["time", "length", "angle"]
 
 DEFAULT_ORDER = 6
-_STEP_RTOL = 1e-3
-"""Steps that differ by less than this part of their mean are even."""
-
+_STEP_RTOL = 1e-3  # steps that differ by less than this part of their mean are even
 _FILTER_PATTERN = re.compile(r"(?P<cutoff>.+?)(?:[, ]+order +(?P<order>[0-9]+))?(?P<corrected>[, ]+corrected)?")
 
 

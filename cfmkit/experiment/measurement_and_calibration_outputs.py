@@ -36,8 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.plots.figure_options import FigureForm
     from cfmkit.results import Finding, Quantity
 
-SHOWN_METRICS = 6
-"""Metrics in the text of a report."""
+SHOWN_METRICS = 6  # metrics in the text of a report
 
 
 @dataclass(frozen=True, repr=False)

@@ -18,21 +18,15 @@ if TYPE_CHECKING:
     from cfmkit.experiment.reading import Recording
     from cfmkit.specs.spec import Spec
 
-DATA_PREFIX = "data."
-"""What begins so is no value of the specification, but of the recording."""
-
+DATA_PREFIX = "data."  # what begins so is no value of the specification, but of the recording
 ZERO_OFFSETS = {
     "force": {"force_offset": "force", "displacement_offset": "length", "drift": "force"},
     "torque": {"torque_offset": "torque", "angle_offset": "angle", "drift": "torque"},
 }
 """By kind of curve, what can be fitted of a recording, with its dimension: what the sensors show without load and at
 the mechanism's zero, and by how much the former grows from the first point of the recording to the last."""
-
-MAX_ZERO_SHIFT = 0.02
-"""Of the recorded travel: how far the zero of the displacement may be off unless bounds say more."""
-
-BOUND_CLEARANCE = 1e-9
-"""How far inside an open bound a value stays, in sizes of the parameter."""
+MAX_ZERO_SHIFT = 0.02  # of the recorded travel: how far the zero of the displacement may be off unless bounds say more
+BOUND_CLEARANCE = 1e-9  # how far inside an open bound a value stays, in sizes of the parameter
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,8 @@ if TYPE_CHECKING:
     from cfmkit.tables.lab_file import LabTable
 
 
-MAX_FILE_BYTES = 500_000_000
-"""Bytes of the largest file that is read."""
-
-MIN_CURVE_POINTS = 8
-"""Points without which there is no curve."""
+MAX_FILE_BYTES = 500_000_000  # bytes of the largest file that is read
+MIN_CURVE_POINTS = 8  # points without which there is no curve
 
 
 @dataclass(frozen=True)
@@ -110,7 +107,6 @@ class Recording(ShortRepr):
         _check_values(self)
 
     def __len__(self) -> int:
-        """Return the number of points."""
         return len(self.motion)
 
     @property
@@ -199,14 +195,11 @@ def read_recordings(
 
 TABLE_WORD, NO_COLUMN_WORD = "table", "none"
 """Words in place of a column: tables one below the other, and no column at all."""
-
 _NO_SPECIMEN = re.compile(
     r"(?i).*(cycle|zyklus|loop|branch|segment|step|schritt|direction|richtung|phase|stage|stroke|block|ramp|pass\b"
     r"|judg|state|status|mode|unit|remark|comment|note|event|flag|error|date|datum|time|zeit).*"
 )
 """Columns of such names tell parts of one recording apart, or say something of its points."""
-
-
 _SPECIMEN_PATTERN = re.compile(r"(?i).*(specimen|sample|probe|pr\u00fcfling|muster|teil|part|piece|serial|\bid\b).*")
 
 
@@ -236,8 +229,7 @@ def _options(column: str, values: Iterable[str]) -> str:
     return " or ".join(shown_ones) + (f" (and {len(listed) - MOST_LISTED} more)" if len(listed) > MOST_LISTED else "")
 
 
-MOST_LISTED = 6
-"""So many values are listed to choose from."""
+MOST_LISTED = 6  # so many values are listed to choose from
 
 
 def _labels(table: LabTable, column: ColumnInfo) -> list[str]:

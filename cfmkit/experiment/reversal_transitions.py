@@ -36,22 +36,15 @@ if TYPE_CHECKING:
 
 GAP_REACH = 0.2
 """Part of the shorter stroke, from its end, over which the gap is looked at; a passage takes half of it at most."""
-
-MIN_CLOSED_SHARE = 0.05
-"""A passage closes at least this part of the gap: smooth gaps that bend a little are left alone."""
-
+MIN_CLOSED_SHARE = 0.05  # a passage closes at least this part of the gap: smooth gaps that bend a little are left alone
 MIN_SIGNIFICANCE = 5.0
 """A passage is believed where the gap closes by so many standard deviations of what noise and waves would make it."""
-
-END_OF_DECAY = 0.003
-"""An exponential is over where this part of the gap is still closed."""
-
+END_OF_DECAY = 0.003  # an exponential is over where this part of the gap is still closed
 _MIN_SAMPLES = 8
 _MAX_SAMPLES = 400
 _MIN_SINGLE_SAMPLES = 24
 _N_LENGTHS = 120
-_LENGTH_RATIO = 1.05
-"""Lengths are tried in steps of some per cent."""
+_LENGTH_RATIO = 1.05  # lengths are tried in steps of some per cent
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from cfmkit.numerics.holes_in_samples import HOLE_STEP_RATIO
 
 _OVER_WINDOW = "over the measured travel in the window"
-
 RECORDED_VALUES = {
     "coverage": (
         "ratio",

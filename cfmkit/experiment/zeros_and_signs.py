@@ -15,11 +15,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
 
-START_WORD = "start"
-"""In place of a value: the mean of the first points, where the machine has not moved yet."""
-
-_STANDSTILL_SHARE = 1e-3
-"""The machine has not moved where it is this near to its first place, in parts of the travel."""
+START_WORD = "start"  # in place of a value: the mean of the first points, where the machine has not moved yet
+_STANDSTILL_SHARE = 1e-3  # the machine has not moved where it is this near to its first place, in parts of the travel
 
 
 def words_of(kind: str) -> tuple[str, str]:

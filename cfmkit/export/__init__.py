@@ -13,10 +13,8 @@ if TYPE_CHECKING:
     from cfmkit.export.arc_outlines import Outline
     from cfmkit.export.contours import Drawing
 
-FILE_FORMATS = ("dxf", "svg", "csv", "stl", "3mf", "step")
-"""What `files` can write."""
-DEFAULT_FORMATS = FILE_FORMATS[:3]
-"""What it writes unless told: what a cutter needs."""
+FILE_FORMATS = ("dxf", "svg", "csv", "stl", "3mf", "step")  # what `files` can write
+DEFAULT_FORMATS = FILE_FORMATS[:3]  # what it writes unless told: what a cutter needs
 
 
 def files(

@@ -26,12 +26,9 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network, Support
     from cfmkit.elastica.model.section import Section
 
-MIN_ELEMENTS_PER_BEAM = 24
-"""Along a beam, at least; twice as many change the force of Lan's part by less than 1e-4."""
-RIGID_MODULUS_FACTOR = 100.0
-"""Modulus of rigid links, in that of the beams."""
-NODE_DISTANCE_TOL = 1e-9
-"""Linked nodes closer than this are one [m]."""
+MIN_ELEMENTS_PER_BEAM = 24  # along a beam, at least; twice as many change the force of Lan's part by less than 1e-4
+RIGID_MODULUS_FACTOR = 100.0  # modulus of rigid links, in that of the beams
+NODE_DISTANCE_TOL = 1e-9  # linked nodes closer than this are one [m]
 DRIVE_STIFFNESS = "1.E7"
 """Stiffness of the spring between the drive and what it drives [N/mm]; with a decimal point, CalculiX wants one."""
 LEVER_LENGTH, N_ARC_LINES = 10.0, 360

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-SECTION_RTOL = 1e-3
-"""Largest relative error of an area and of a section modulus, b t^2 / 6."""
+SECTION_RTOL = 1e-3  # largest relative error of an area and of a section modulus, b t^2 / 6
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.results import Finding
 
-OUTLINE_TOLERANCE = 5e-6
-"""How far outlines may be from the exact ones by default [m]."""
+OUTLINE_TOLERANCE = 5e-6  # how far outlines may be from the exact ones by default [m]
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,6 @@ class Smooth:
     tangents: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check their shapes."""
         object.__setattr__(self, "points", read_only(self.points))
         object.__setattr__(self, "tangents", read_only(self.tangents))
         if self.points.shape != self.tangents.shape or self.points.ndim != 2 or self.points.shape[1] != 2:
@@ -193,8 +191,7 @@ def _points_between(edge: Smooth, sagitta: float) -> FloatArray:
     return np.vstack([found, edge.points[-1]])
 
 
-UNCUT_LAYERS = ("path", "reference", HELD_LAYER, DRIVEN_LAYER)
-"""Layers that nothing is cut along."""
+UNCUT_LAYERS = ("path", "reference", HELD_LAYER, DRIVEN_LAYER)  # layers that nothing is cut along
 
 
 def circle(center: tuple[float, float], radius: float, layer: str, hole: bool = False) -> Contour:

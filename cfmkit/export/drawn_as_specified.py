@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 MEASURING_TOLERANCE = 1e-5
 """How far lines may be from the edges of an outline that is measured, in thicknesses of the thinnest beam."""
-
 MIN_FREE_RADII = 4.0
 """Pieces of a beam that are shorter than this are not measured unless none is longer, in radii of the fillets: those at
 both ends may reach its middle."""

@@ -22,12 +22,9 @@ if TYPE_CHECKING:
 MAX_HEIGHT_SHARE, LETTER_BREADTH = 0.6, 0.8
 """Largest height of the text in parts of the piece's shorter side; breadth of a letter in its heights, which no usual
 font exceeds."""
-MAX_TEXT_HEIGHT = 5e-3
-"""Height of the text at most [m]."""
-MIN_HOLE_AREA = 1e-8
-"""Holes that cover less of a piece than this beside it touch it only [m2]."""
-FLATTENING_TOLERANCE = 5e-6
-"""Outlines of bodies are flattened within this [m]."""
+MAX_TEXT_HEIGHT = 5e-3  # height of the text at most [m]
+MIN_HOLE_AREA = 1e-8  # holes that cover less of a piece than this beside it touch it only [m2]
+FLATTENING_TOLERANCE = 5e-6  # outlines of bodies are flattened within this [m]
 
 
 def engrave_labels(

@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 MIN_FACE_AREA = 1e-12
 """Faces smaller than this are rounding, where the edge of a region runs along the edge of the part, in squares of its
 size."""
-POINT_RTOL = 1e-9
-"""Points of outlines and regions that are nearer to each other are one, in sizes of the part."""
+POINT_RTOL = 1e-9  # points of outlines and regions that are nearer to each other are one, in sizes of the part
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-NO_HOLES = "no holes there"
-"""Ends the note on pads that are too small."""
-
+NO_HOLES = "no holes there"  # ends the note on pads that are too small
 SCREWS_BY_NAME = {screw.name: screw for screw in SOCKET_SCREWS}
 
 

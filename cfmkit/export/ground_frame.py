@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-ROOT_SIDE = 2e-5
-"""Bars that cover less of a beam at its root than a square of this side stand beside it [m]."""
-BAR_OVERLAP_SHARE = 0.25
-"""Part of the frame's thickness by which bars reach into it."""
+ROOT_SIDE = 2e-5  # bars that cover less of a beam at its root than a square of this side stand beside it [m]
+BAR_OVERLAP_SHARE = 0.25  # part of the frame's thickness by which bars reach into it
 
 
 @dataclass(frozen=True)

@@ -28,10 +28,7 @@ _LAYER_LOOKS = {
 }
 HELD_LAYER, DRIVEN_LAYER = "held", "driven"
 """Layers of what stands while the mechanism works, and of what is moved: closed contours that nothing is cut along."""
-
-ENGRAVED_LAYER = "engraved"
-"""Layer of texts on the parts."""
-
+ENGRAVED_LAYER = "engraved"  # layer of texts on the parts
 _MARK_LOOKS = {HELD_LAYER: LayerLook(3, "#008000", (1.0, 1.0)), DRIVEN_LAYER: LayerLook(30, "#ff8000", (1.0, 1.0))}
 _MARK_LOOKS[ENGRAVED_LAYER] = LayerLook(5, "#0000ff")
 _OTHER_LOOKS = (LayerLook(6, "#ff00ff"), LayerLook(4, "#00a0a0"), LayerLook(34, "#995200"), LayerLook(92, "#408000"))

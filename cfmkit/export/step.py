@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.export.arc_outlines import Outline
     from cfmkit.export.contours import Region, Sheet
 
-LINE_RISE = 1e-6
-"""Arcs that rise less over their chord are lines: less than a CAD kernel can tell [mm]."""
+LINE_RISE = 1e-6  # arcs that rise less over their chord are lines: less than a CAD kernel can tell [mm]
 
 
 def step_bytes(name: str, drawn: Sequence[Outline], sheet: Sheet) -> bytes:

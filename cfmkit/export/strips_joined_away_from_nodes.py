@@ -25,16 +25,11 @@ MIN_WAY_APART = 6.0
 less than 19 degrees between them are still one piece that far from it."""
 POINTS_PER_THICKNESS = 4.0
 """Points along a strip in each thickness with its fillets: two that touch have points close to the place."""
-MAX_STRIP_POINTS = 2000
-"""Points of a strip at most; those of more windings are farther apart."""
-GAP_RTOL = 1e-6
-"""Gaps that are rounding, in thicknesses of the thinnest strip."""
-MAX_TRIED_LINES = 200
-"""Lines between two strips that are looked at, the shortest ones."""
-SAGITTA_RTOL = 1e-3
-"""How far arcs of the outline may be from their lines, in the same."""
-OUTSIDE_RTOL = 1e-5
-"""Lines run through the material if less than this lies outside, in the same."""
+MAX_STRIP_POINTS = 2000  # points of a strip at most; those of more windings are farther apart
+GAP_RTOL = 1e-6  # gaps that are rounding, in thicknesses of the thinnest strip
+MAX_TRIED_LINES = 200  # lines between two strips that are looked at, the shortest ones
+SAGITTA_RTOL = 1e-3  # how far arcs of the outline may be from their lines, in the same
+OUTSIDE_RTOL = 1e-5  # lines run through the material if less than this lies outside, in the same
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,12 +21,9 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.export.contours import Contour
 
-MIN_FACING_SINE = 0.7
-"""Sine of the angle at which a ray must meet an edge that is the other side of a wall: 45 degrees."""
-
+MIN_FACING_SINE = 0.7  # sine of the angle at which a ray must meet an edge that is the other side of a wall: 45 degrees
 PER_WALL, MOST_PLACES = 2.0, 20_000
 """Places along an edge in the thinnest wall that a process makes, and all round a part at most."""
-
 MIN_WAY_AROUND = 4.0
 """Way along the edge from one side of a wall to the other, in its thickness, at least: round a tip of 27 degrees it is
 4.2 times as long as the ray, round blunter ones less. The end of a wall belongs to it up to 1.5 thicknesses from there.

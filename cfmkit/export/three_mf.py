@@ -32,8 +32,7 @@ _PACKAGE_RELATIONS = (
     f'Target="/3D/3dmodel.model" Id="model" '
     'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>\n'
 )
-_FILE_DATE = (1980, 1, 1, 0, 0, 0)
-"""Of every file in the archive: the same part gives the same bytes."""
+_FILE_DATE = (1980, 1, 1, 0, 0, 0)  # of every file in the archive: the same part gives the same bytes
 
 
 def threemf_bytes(name: str, bodies: Sequence[Body]) -> bytes:

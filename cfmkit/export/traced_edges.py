@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-ANGLE_TOL = 1e-6
-"""Arcs whose angles differ by less are the same [rad]."""
+ANGLE_TOL = 1e-6  # arcs whose angles differ by less are the same [rad]
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,17 +29,14 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-GRID_DISTANCE = 1e-8
-"""Distance of the points between which the union is computed, in sizes of the thinnest piece."""
+GRID_DISTANCE = 1e-8  # distance of the points between which the union is computed, in sizes of the thinnest piece
 MAX_GRID_DISTANCES = 50.0
 """Places nearer to each other than this are one, in grid distances: rounding moves lines by less than one."""
 SAGITTA_RTOL = 1e-3
 """How far the polygons of arcs may be from them while the union is computed, in the same sizes: what crosses is then
 found, and where it crosses is computed on the arcs themselves."""
-MIN_HOLE_SIDE = 1e-3
-"""Holes and parts smaller than the square of this are rounding, in the same sizes."""
-TANGENT_ANGLE = 1e-6
-"""Where the direction turns by less than this edges are tangent [rad]."""
+MIN_HOLE_SIDE = 1e-3  # holes and parts smaller than the square of this are rounding, in the same sizes
+TANGENT_ANGLE = 1e-6  # where the direction turns by less than this edges are tangent [rad]
 MIN_CROSSING_ANGLE = 1e-3
 """Edges that cross at less than this angle [rad] are cut where their polygons cross: where they overlap, anywhere."""
 MAX_BAND_TURN = 0.5 * math.pi

@@ -28,7 +28,6 @@ FAMILY_MODULES = {
     "vcfm": "cfmkit.families.vcfm.record",
 }
 """Those of this package, and the module with the record of each."""
-
 _REGISTERED_FAMILIES: dict[str, Family] = {}
 _REGISTRATION_STAMPS: dict[str, str] = {}
 _WITH_OWN_METRICS: dict[str, tuple[str, Family, Family]] = {}

@@ -20,7 +20,6 @@ class CannotBuild(SolutionError):
     """The mechanism cannot exist as described; carries the finding that says why."""
 
     def __init__(self, found: Finding) -> None:
-        """Keep the finding."""
         self.finding = found
         super().__init__(found.message)
 

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 ZERO_EFFORT_SHARE = 1e-9
 """An effort at the reference below this share of the largest is rounding: a band in per cent of it has no width."""
-
 STATED_ERROR = 1e-12
 """Numerical error of a curve whose model states none, in parts of its largest effort: the digits of a file, sums."""
 

@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 
 WINDOW_RTOL = 1e-9
 """How far a sample may miss an end of the window and still count as on it, as a fraction of the window."""
-
-BAND_RTOL = 1e-12
-"""A force on the edge of a band is inside it, whatever the last bits of the division say."""
+BAND_RTOL = 1e-12  # a force on the edge of a band is inside it, whatever the last bits of the division say
 
 
 class Undefined(Exception):
@@ -53,7 +51,6 @@ class Window:
     hi: float
 
     def __post_init__(self) -> None:
-        """Refuse windows without width."""
         if not self.lo < self.hi:
             raise ValueError(f"a window must be increasing, got {self.lo!r} to {self.hi!r}")
 

@@ -26,10 +26,8 @@ if TYPE_CHECKING:
 
 N_COMPARED_PLACES = 1001
 """Where two curves are compared: so many places, evenly over the motion that they have in common."""
-
 COMPARISON_RTOL = 1e-6
 """Relative change that is none: other versions of the libraries round in the last digits, and searches stop there."""
-
 NO_CHANGE = 1e-9
 """Values in border units between which there is no difference: what should be zero is rounding, and rounding varies."""
 

@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 
 N_ZOOMS, ZOOM_FACTOR, ZOOM_STEPS = 11, 4.0, np.linspace(-2.0, 2.0, 17)
 """How often it is looked more closely, how much more each time, and where around a place, in steps."""
-
 N_WHOLE_ZOOMS = 4
 """The first looks, which keep the samples elsewhere: of two windows of nearly one length the other may be longer."""
-
 N_MODEL_ZOOMS, MODEL_ZOOM_STEPS, MODEL_ZOOM_FACTOR = 6, np.linspace(-2.0, 2.0, 65), 16.0
 """The same where a call of the model is what takes the time: more places in half as many calls."""
 

@@ -63,8 +63,7 @@ def metrics_json(quantities: Mapping[str, Quantity]) -> dict[str, dict[str, Any]
     return found
 
 
-OF_BRANCH = ("value", "reason")
-"""Keys of a metric that may differ between branches."""
+OF_BRANCH = ("value", "reason")  # keys of a metric that may differ between branches
 
 
 def flat_metrics(block: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:

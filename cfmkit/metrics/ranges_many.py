@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     Pair = tuple[FloatArray, FloatArray]
 
 
-UNIFORM_POINTS = 100
-"""Points at which `rms_to_target` is taken, the start excluded: Q of [Bilancia 2019, eq. 8]."""
+UNIFORM_POINTS = 100  # points at which `rms_to_target` is taken, the start excluded: Q of [Bilancia 2019, eq. 8].
 
 
 @dataclass(frozen=True, eq=False)

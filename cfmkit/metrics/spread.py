@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 MEAN_RTOL = 1e-13
 """A mean that is smaller than this part of the largest effort is rounding: sums of 10 000 points stay below it."""
-
-
 EXTREME_RTOL = 1e-7
 """A sum of both extremes that is smaller than this part of their distance is what their search leaves, with room."""
 

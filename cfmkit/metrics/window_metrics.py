@@ -31,9 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.metrics.usable_interval_of_all_branches import Cycle
 
 
-NO_STRESS = 1e-12
-"""Share of the allowable stress that rounding leaves where nothing is stressed."""
-
+NO_STRESS = 1e-12  # share of the allowable stress that rounding leaves where nothing is stressed
 UNKNOWN_BESIDE = "the stress of another load case is not known everywhere in the window"
 """Why there is no largest stress, and no life."""
 
@@ -261,7 +259,6 @@ def _where_known(function: Callable[[Any], FloatArray], rows: Any) -> FloatArray
 
 _TABLE_3 = "[Sanchez-Salinas 2022, Table 3]"
 _DING = "[Ding 2022, sec. 6.2]"
-
 IN_WINDOW = (
     Definition(
         "force_mean",
@@ -358,7 +355,6 @@ IN_WINDOW = (
     ),
 )
 """Metrics of the effort in the window, in the order in which they are shown."""
-
 LOSS_AND_STRESS_METRICS = (
     Definition(
         "hysteresis_area",
@@ -385,7 +381,6 @@ LOSS_AND_STRESS_METRICS = (
     ),
 )
 """Metrics of loss and stress."""
-
 LONG_TERM = (
     Definition(
         "fatigue_life",

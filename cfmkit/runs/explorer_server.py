@@ -32,27 +32,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 SERVER_HOST = "127.0.0.1"
-MAX_BODY_BYTES = 200_000
-"""Of a request: a thousand changes are a fifth of that."""
-
-MAX_CONNECTIONS = 32
-"""At a time: several times what a browser opens."""
-
-MAX_READ_SECONDS = 10.0
-"""Until a request must have arrived: on the computer itself it takes milliseconds."""
-
-MAX_SEND_SECONDS = 30.0
-"""Until an answer must have been taken."""
-
-MAX_DRAIN_SECONDS = 0.3
-"""Until a connection is closed whose client goes on sending after its answer."""
-
+MAX_BODY_BYTES = 200_000  # of a request: a thousand changes are a fifth of that
+MAX_CONNECTIONS = 32  # at a time: several times what a browser opens
+MAX_READ_SECONDS = 10.0  # until a request must have arrived: on the computer itself it takes milliseconds
+MAX_SEND_SECONDS = 30.0  # until an answer must have been taken
+MAX_DRAIN_SECONDS = 0.3  # until a connection is closed whose client goes on sending after its answer
 CONTENT_POLICY = (
     "default-src 'none'; style-src 'nonce-{nonce}'; script-src 'nonce-{nonce}'; connect-src 'self'; img-src data:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 NO_CONTENT_POLICY = "default-src 'none'; frame-ancestors 'none'"
-
 REDIRECT_PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="referrer" content="no-referrer">
 <meta http-equiv="refresh" content="0; url={address}"><title>cfmkit explore</title></head>

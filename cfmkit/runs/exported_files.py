@@ -21,11 +21,8 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
     from cfmkit.specs.spec import Spec
 
-DECK_FORMAT = "inp"
-"""Format of decks of a finite-element solver, which need more than the outlines: the elastic parts."""
-
-DRAWING_FORMATS = ("png", "pdf")
-"""Formats of the dimensioned drawing."""
+DECK_FORMAT = "inp"  # format of decks of a finite-element solver, which need more than the outlines: the elastic parts
+DRAWING_FORMATS = ("png", "pdf")  # formats of the dimensioned drawing
 
 
 def export_files(
@@ -80,8 +77,7 @@ def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Dr
     return engrave_labels(outlines, spec.name)
 
 
-MAX_NAMED_WALLS = 3
-"""Most thin walls that a warning names."""
+MAX_NAMED_WALLS = 3  # most thin walls that a warning names
 
 
 def _thin_walls(outlines: Drawing, spec: Spec) -> Iterator[Finding]:

@@ -34,7 +34,6 @@ class DataSource(str):
         return source
 
     def __reduce__(self) -> tuple[type[DataSource], tuple[str, str]]:
-        """Return what copying and pickling need."""
         return type(self), (str(self), self.folder)
 
     @property

@@ -29,8 +29,6 @@ _NUMPY_FUNCTIONS = {name: getattr(np, name) for name in ("sin", "cos", "tan", "s
     "min": np.minimum,
     "max": np.maximum,
 }
-
-
 _FUNCTION_SLOPES: dict[str, Callable[[Any], Any]] = {
     "sin": np.cos,
     "cos": lambda x: -np.sin(x),

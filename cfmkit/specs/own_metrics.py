@@ -16,11 +16,8 @@ from cfmkit.errors import UsageError, visible
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-NAME_PATTERN = re.compile("[a-z][a-z_0-9]*")
-"""Names that a requirement may have."""
-
-PLAIN_NUMBER = "factor"
-"""Dimension of a metric that states none."""
+NAME_PATTERN = re.compile("[a-z][a-z_0-9]*")  # names that a requirement may have
+PLAIN_NUMBER = "factor"  # dimension of a metric that states none
 
 
 @dataclass(frozen=True)

@@ -116,7 +116,6 @@ def _creep(moduli: tuple[float, float, float], source: str) -> AssumedCreep:
 
 
 _LOSS_LECTURE = "NPTEL course 112104040, lecture 9, Table 9.1, order of size"
-
 ASSUMED_DATA: Mapping[str, LastingData] = MappingProxyType(
     {
         "steel-1.4310": LastingData(steel(1300e6, "EN 10151, +C1300"), loss_factor=1e-3, loss_source=_LOSS_LECTURE),

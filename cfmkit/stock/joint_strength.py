@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-SHEAR_SHARE = 1.0 / sqrt(3.0)
-"""Yield strength in shear over that in tension (von Mises)."""
+SHEAR_SHARE = 1.0 / sqrt(3.0)  # yield strength in shear over that in tension (von Mises)
 
 
 def link_stress(axial: Any, moment: Any, width: Any, thickness: Any, hole: Any) -> Any:

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
 PositiveStress = Annotated[Stress, Field(gt=0)]
 SafetyFactor = Annotated[Ratio, Field(ge=1, description="allowable stress: yield strength over this factor")]
 
-_POISSON_RATIO = 0.3
-"""Of a material described by its values alone: between that of metals and that of plastics."""
+_POISSON_RATIO = 0.3  # of a material described by its values alone: between that of metals and that of plastics
 
 
 class MaterialSpec(Model):
@@ -352,8 +351,7 @@ class PaddedPart(CutPart):
     )
 
 
-USUAL_FILLET = 0.5
-"""Radius of inside corners in smallest thicknesses, where nothing else is stated."""
+USUAL_FILLET = 0.5  # radius of inside corners in smallest thicknesses, where nothing else is stated
 
 
 def fillet_of(part: CutPart | None, thinnest: float) -> float:

@@ -127,7 +127,6 @@ _METAL_LIST = (
         ("c17200", "cube2", "beryllium-bronze"),
     ),
 )  # fmt: skip
-
 _PLASTIC_LIST = (
     Material(
         "pla", 3.0e9, 0.36, 45e6, 1240.0,
@@ -216,7 +215,6 @@ _PLASTIC_LIST = (
         poisson_is_assumed=True,
     ),
 )  # fmt: skip
-
 _PUBLISHED_LIST = (
     Material(
         "pom-lan-2010", 2.0e9, 0.35, 76e6, 1410.0,
@@ -246,7 +244,6 @@ _PUBLISHED_LIST = (
         Scatter((195e9, 210e9), (980e6, 1200e6), poisson_ratio=(0.295, 0.32), density=(7850.0, 7870.0)),
     ),
 )  # fmt: skip
-
 MATERIALS_BY_NAME: Mapping[str, Material] = MappingProxyType(
     {item.name: item for item in (*_METAL_LIST, *_PLASTIC_LIST, *_PUBLISHED_LIST)}
 )

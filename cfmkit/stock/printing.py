@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 Layers = Literal["along", "across"]
 """Whether what bends is stressed along the layers of the print (it lies flat), or across them (it stands)."""
 
-WHOLE_SHARE = 0.02
-"""Part of a strand within which a thickness counts as a whole number of them."""
+WHOLE_SHARE = 0.02  # part of a strand within which a thickness counts as a whole number of them
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,8 @@ from cfmkit.errors import CfmError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-NUMERICAL_LIBRARIES = ("numpy", "scipy")
-"""The libraries whose versions can change a number."""
-
-_LEFT_BEHIND = (".pyc", ".pyo", ".so", ".pyd")
-"""Endings of what Python and a compiler put beside source files."""
+NUMERICAL_LIBRARIES = ("numpy", "scipy")  # the libraries whose versions can change a number
+_LEFT_BEHIND = (".pyc", ".pyo", ".so", ".pyd")  # endings of what Python and a compiler put beside source files
 
 
 def file_hash(path: Path) -> str | None:

@@ -37,22 +37,16 @@ if TYPE_CHECKING:
 LOCK_NAME = ".cfmkit.lock"
 SOFT_LOCK = ".cfmkit.softlock"
 _STORE_LOG = logging.getLogger("cfmkit.store")
-
-SIGNATURE_TIMEOUT = 0.3
-"""Seconds to wait for the owner's name to appear in a lock file that was just made."""
-
+SIGNATURE_TIMEOUT = 0.3  # seconds to wait for the owner's name to appear in a lock file that was just made
 SOFT_LOCK_TIMEOUT = 0.5
 """Seconds to wait for a soft lock: `filelock` removes the one of a dead process in its first try, takes it in the
 second."""
-
 _NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL}
 """EINVAL is what Windows says of a network drive without locks."""
-
 NO_LOCK = "CFMKIT_NO_LOCK"
 """Variable of the environment that says to lock nothing: workers in other processes write folders, too."""
 
-_descriptors: set[int] = set()
-"""Lock files that this process has open: a forked child closes them."""
+_descriptors: set[int] = set()  # lock files that this process has open: a forked child closes them
 
 
 @contextlib.contextmanager

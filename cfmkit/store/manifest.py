@@ -35,7 +35,6 @@ RESULT_LIBRARIES = (
     "yaml",
 )
 """The libraries whose versions can change a result; those a run imported are listed."""
-
 _OWN_KEYS = ("cfmkit", "duration_s", "files", "finished", "started", "versions")
 
 

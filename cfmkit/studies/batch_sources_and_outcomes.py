@@ -19,13 +19,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 
-OUTPUT_FOLDER = "cfm-out"
-"""Folders of this name hold results: a search for specifications does not look into them."""
-
+OUTPUT_FOLDER = "cfm-out"  # folders of this name hold results: a search for specifications does not look into them
 SPEC_SUFFIXES = (".yaml", ".yml")
 TAKEN_NAMES = ("results.csv", "requirements.csv", "metrics.json", "manifest.json", "report.html", "changes.csv")
 """Names in the output folder that no specification's folder may have."""
-
 SKIPPED_STATUS, SKIPPED_MESSAGE = "skipped", "not run: an earlier specification failed"
 
 
@@ -295,7 +292,6 @@ OUTCOME_WORDS = {
     ExitCode.BUG: "bug",
 }
 """What an exit code is called in a summary."""
-
 TIMED_OUT = "timed out"
 
 

@@ -20,13 +20,8 @@ if TYPE_CHECKING:
 
 NEED_STRESS = ("stress_max", "safety_factor")
 """Metrics of curves that have stresses; others leave these columns out unless asked."""
-
-NEED_FATIGUE = ("fatigue_life",)
-"""Metrics that need fatigue data of the material."""
-
-NEED_CURVE = ("deviation_from_curve", "rms_to_curve")
-"""Metrics that compare with a target curve."""
-
+NEED_FATIGUE = ("fatigue_life",)  # metrics that need fatigue data of the material
+NEED_CURVE = ("deviation_from_curve", "rms_to_curve")  # metrics that compare with a target curve
 NEED_TIME = ("force_after", "torque_after")
 """Metrics of a time, which their name says: without one there is nothing to note."""
 

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 FIDELITY_KEY = "analysis.fidelity"
-
 FIDELITY_OPTION = "--compare-fidelity"
 
 

@@ -25,12 +25,9 @@ from cfmkit.studies.batch_sources_and_outcomes import Entry
 if TYPE_CHECKING:
     from cfmkit.designing.run_many_starts import Notes
 
-RECORD_VERSION = 1
-"""How records are written: those of another number are not found."""
-
+RECORD_VERSION = 1  # how records are written: those of another number are not found
 FILE_LIBRARIES = ("SALib", "PyYAML", "ezdxf", "matplotlib", "numpy", "pint", "pydantic", "scipy", "shapely")
 """Those that can change a file of a run."""
-
 KEPT_CODES = (ExitCode.OK, ExitCode.INVALID, ExitCode.NO_SOLUTION, ExitCode.PARTIAL, ExitCode.REQUIREMENT_MISSED)
 """Ends that would be the same tomorrow; a full disk, a folder in use, a time-out or a bug may not."""
 
@@ -49,7 +46,6 @@ class KeptRuns:
     """
 
     def __init__(self, out: str, options: list[Any], notes: Notes) -> None:
-        """Nothing is read yet."""
         self._out, self._notes = out, notes
         self._about = stable_hash([RECORD_VERSION, options, origin(FILE_LIBRARIES), origins()])
         self._asked: dict[str, str | None] = {}

@@ -23,12 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
 
-SYNC_INTERVAL = 1.0
-"""Seconds after which the file is brought down to the disk."""
-
-WRITER_TIMEOUT = 60.0
-"""Seconds to wait for another writer, which may be making a large file small."""
-
+SYNC_INTERVAL = 1.0  # seconds after which the file is brought down to the disk
+WRITER_TIMEOUT = 60.0  # seconds to wait for another writer, which may be making a large file small
 _STUDIES_LOG = logging.getLogger("cfmkit.studies")
 _CREATE_TABLE = "CREATE TABLE IF NOT EXISTS records (key BLOB PRIMARY KEY, session INTEGER, record BLOB) WITHOUT ROWID"
 _ERROR_REASONS = {
@@ -87,7 +83,6 @@ class Journal:
             _STUDIES_LOG.warning("journal  damaged records that were computed again: %d", self.damaged)
 
     def __len__(self) -> int:
-        """Return the number of records in the file."""
         return int(self._db.execute("SELECT count(*) FROM records").fetchone()[0])
 
     def find(self, key: str) -> Any:
@@ -195,7 +190,6 @@ class Memory:
     """The same for studies that write nothing."""
 
     def __init__(self) -> None:
-        """Start without records."""
         self._records: dict[str, Any] = {}
 
     def find(self, _key: str) -> None:

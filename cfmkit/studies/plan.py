@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 Levels = tuple[Any, ...] | NDArray[Any]
 
-MOST_POINTS = 1_000_000
-"""Points of a study unless the user allows more."""
+MOST_POINTS = 1_000_000  # points of a study unless the user allows more
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,6 @@ class Plan:
     joint: bool = False
 
     def __len__(self) -> int:
-        """Return the number of points."""
         return self.size
 
     @property

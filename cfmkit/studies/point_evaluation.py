@@ -41,10 +41,7 @@ if TYPE_CHECKING:
 
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
-
-RECORD_VERSION = 4
-"""How records of the journal are written: those of another number are computed again."""
-
+RECORD_VERSION = 4  # how records of the journal are written: those of another number are computed again
 _STATUS_OF = {3: Status.INVALID, 4: Status.NO_EQUILIBRIUM, 70: Status.CRASHED}
 
 
@@ -61,7 +58,6 @@ class Metric:
     words: tuple[str, ...] = ()  # those that a metric of the dimension ``text`` is an index into
 
     def __post_init__(self) -> None:
-        """Fall back to the name."""
         if not self.label:
             object.__setattr__(self, "label", self.name.replace("[", "_").replace("]", ""))
 

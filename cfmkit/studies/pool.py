@@ -38,17 +38,11 @@ if TYPE_CHECKING:
 
     Messages = SimpleQueue[tuple["_Worker", bytes | None]]
 
-MAX_WORKER_DEATHS = 2
-"""A job is given up after so many of its workers have died."""
-
-POLL_INTERVAL = 0.1
-"""Seconds between two looks at the clock and at whether to stop."""
-
+MAX_WORKER_DEATHS = 2  # a job is given up after so many of its workers have died
+POLL_INTERVAL = 0.1  # seconds between two looks at the clock and at whether to stop
 OUT_OF_TIME_MESSAGE = "the time allowed for all jobs was used up"
-
 QUICK_JOB_DURATION, JOBS_AHEAD = 0.02, 4
 """Jobs that take less than so many seconds are handed out so many at a time: the pipe is never empty."""
-
 MOST_STILLBORN = {True: 60, False: 4}
 """Workers in a row that may die before their first job: by a signal, and by themselves."""
 

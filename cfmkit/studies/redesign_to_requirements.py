@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 FIDELITY = "analysis.fidelity"
-
 NO_LEVEL_MESSAGE = (
     "the requirements state no {0} that the mechanism could be designed for: require '{0}_mean', or a band of it"
 )

@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-WARNINGS_JOINT = "; "
-"""Between the names of warnings in a column of a table."""
-
+WARNINGS_JOINT = "; "  # between the names of warnings in a column of a table
 _STATUS_BY_KEY = {status.key: status for status in Status}
 
 
@@ -40,7 +38,6 @@ class ResultRows:
     warned: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)  # name of a warning -> the rows that have it
 
     def __len__(self) -> int:
-        """Return the number of rows."""
         return len(self.values)
 
     @property
@@ -172,11 +169,8 @@ def _unpack(text: str, dtype: Any) -> NDArray[Any]:
     return np.frombuffer(base64.b64decode(text), dtype=dtype)
 
 
-N_DIFFERENCE_ORDERS = 4
-"""Each column is kept as its differences of order 0, 1, 2 or 3, whichever takes the fewest bits."""
-
-_N_PROBED_ROWS = 512
-"""Rows from which the order is chosen."""
+N_DIFFERENCE_ORDERS = 4  # each column is kept as its differences of order 0, 1, 2 or 3, whichever takes the fewest bits
+_N_PROBED_ROWS = 512  # rows from which the order is chosen
 
 
 def squeeze(values: FloatArray) -> str:

@@ -83,8 +83,7 @@ def serial(work: Work, jobs: Iterator[Any], stopping: Stopping = never) -> Itera
             collect()
 
 
-COLLECTION_SHARE = 0.03
-"""Of the time of a study that may go into freeing memory."""
+COLLECTION_SHARE = 0.03  # of the time of a study that may go into freeing memory
 
 
 @contextmanager
@@ -124,20 +123,11 @@ def cores() -> int:
 
 LOCAL_CLUSTER = "local"
 ADDRESS_PATTERN = re.compile(r"([a-z]+://)?[^\s/]+:[0-9]{1,5}")
-MAX_RETRIES = 1
-"""Other workers that get a job after its worker has died."""
-
-JOBS_PER_THREAD = 4
-"""Jobs under way for each thread of the cluster: none of them waits for this process."""
-
-CONNECT_WITHIN = 10
-"""Seconds to wait for a scheduler."""
-
-WORKERS_WITHIN = 60
-"""Seconds to wait for a worker, at the start and when all have left."""
-
-POLL_INTERVAL = 0.2
-"""Seconds between two looks at whether to stop."""
+MAX_RETRIES = 1  # other workers that get a job after its worker has died
+JOBS_PER_THREAD = 4  # jobs under way for each thread of the cluster: none of them waits for this process
+CONNECT_WITHIN = 10  # seconds to wait for a scheduler
+WORKERS_WITHIN = 60  # seconds to wait for a worker, at the start and when all have left
+POLL_INTERVAL = 0.2  # seconds between two looks at whether to stop
 
 
 @dataclass(frozen=True)

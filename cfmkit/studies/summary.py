@@ -31,12 +31,8 @@ if TYPE_CHECKING:
     from cfmkit.studies.row_blocks_for_journal import ResultRows
 
 DEFAULT_OBJECTIVES = ("force_ripple", "torque_ripple")
-MOST_SHOWN = 4
-"""Metrics that are drawn."""
-
-
-TIE_RTOL = 1e-9
-"""Points whose values differ by less than this, relative to the value, count as equally good."""
+MOST_SHOWN = 4  # metrics that are drawn
+TIE_RTOL = 1e-9  # points whose values differ by less than this, relative to the value, count as equally good
 
 
 @dataclass(frozen=True)
@@ -117,7 +113,6 @@ class Summary:
     kept: list[tuple[NDArray[np.int64], FloatArray, NDArray[np.bool_]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Start at zero."""
         self.met = np.zeros(len(self.study.spec.part_requirements), dtype=np.int64)
         columns = len(self.study.metrics)
         self._low, self._high = np.full(columns, np.inf), np.full(columns, -np.inf)

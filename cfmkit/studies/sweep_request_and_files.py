@@ -26,9 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Plan
 
-MOST_CURVES = 100
-"""Curves in one picture; of studies with more points only the metrics are drawn."""
-
+MOST_CURVES = 100  # curves in one picture; of studies with more points only the metrics are drawn
 NOTHING_TO_VARY = "nothing to vary: give --vary '{example}', or add a block 'sweep: {vary: {...}}' to the spec"
 
 

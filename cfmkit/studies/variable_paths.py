@@ -24,10 +24,7 @@ Kind = Literal["quantity", "number", "whole", "word", "switch"]
 
 FIXED_BLOCKS = ("cfmkit", "family", "name", "description", "requirements", "sweep", "sensitivity")
 """Blocks of a specification that do not describe the mechanism or its analysis."""
-
-NAME_PLACEHOLDER = "NAME"
-"""Stands for any name of a block's own choosing in a path, as the name of a beam."""
-
+NAME_PLACEHOLDER = "NAME"  # stands for any name of a block's own choosing in a path, as the name of a beam
 _MAX_DEPTH = 8
 
 

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.variable_paths import Value
 
 VARY_EXAMPLE = "write e.g. --vary 'mechanism.roller_radius=8 mm:16 mm:5' or --vary 'a.b=[1 mm, 2 mm]'"
-MAX_COUNT = 10**18
-"""No count is larger than this: whatever reads it stays a plain integer."""
+MAX_COUNT = 10**18  # no count is larger than this: whatever reads it stays a plain integer
 
 
 @dataclass(frozen=True)

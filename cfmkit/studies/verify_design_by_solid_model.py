@@ -31,9 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 FIDELITY_KEY = "analysis.fidelity"
-WIDTH_DIGITS = 7
-"""Significant ones of a corrected width: a tenth of a micrometre in a metre."""
-
+WIDTH_DIGITS = 7  # significant ones of a corrected width: a tenth of a micrometre in a metre
 AT_END = {"design.rescale.force": "nominal_force"}
 """Levels that are no mean over the window, but the force at its end; and the metric that is compared."""
 

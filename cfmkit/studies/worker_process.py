@@ -27,7 +27,6 @@ WORKER_PROGRAM = (
     "from cfmkit.studies.worker_process import main; main(given['parent'])"
 )
 """The program of a worker; its only argument says where to find modules and whose process it is."""
-
 READY_MESSAGE, STARTED_MESSAGE, DONE_MESSAGE, BROKEN_MESSAGE = b"r", b"s", b"d", b"b"
 LENGTH_BYTES = 8
 

@@ -76,7 +76,6 @@ class GapBounds:
     """
 
     def __init__(self, mesh: Discretisation) -> None:
-        """Begin without any."""
         self.mesh = mesh
         places = [contact.place for contact in mesh.contacts]
         self.places = np.array(places)
@@ -118,7 +117,6 @@ class ContactEquations(NumpyEquations):
     slots: Any = field(init=False)  # (size,) number of every unknown among the free ones, -1 where it is held
 
     def __post_init__(self) -> None:
-        """Number the free unknowns."""
         super().__post_init__()
         object.__setattr__(self, "slots", number_free_unknowns(self.mesh))
         object.__setattr__(self, "watched", GapBounds(self.mesh))

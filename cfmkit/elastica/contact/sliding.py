@@ -87,7 +87,6 @@ class SlidingEquations(NumpyEquations):
     slots: Any = field(init=False)  # (size,) number of every unknown among the free ones, -1 where it is held
 
     def __post_init__(self) -> None:
-        """Number the free unknowns."""
         super().__post_init__()
         object.__setattr__(self, "slots", number_free_unknowns(self.mesh))
         nodes = tuple(contact for contact in self.mesh.contacts if contact.slide < 0)

@@ -36,7 +36,6 @@ class CurveSpring:
     end: None = None  # the ground
 
     def __post_init__(self) -> None:
-        """Check the curve."""
         if len(self.displacement) != len(self.force) or len(self.force) < 2:
             raise InputError("a spring's curve needs as many forces as displacements, at least two")
         if any(after <= before for before, after in pairwise(self.displacement)):

@@ -39,7 +39,6 @@ class SectionForces:
     """
 
     def __init__(self, angle: Any, h: Any, v: Any) -> None:
-        """Compute the forces."""
         self.arguments = angle, h, v
         self.cos, self.sin = cos_sin(plain(angle))
         self.normal = plain(h) * self.cos + plain(v) * self.sin  # N, along the tangent

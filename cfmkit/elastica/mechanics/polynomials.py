@@ -16,8 +16,7 @@ from cfmkit.arrays import read_only
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-N_EXTRA_POINTS = 4
-"""Gauss points more than the degree: sine and cosine of the rotation are no polynomials."""
+N_EXTRA_POINTS = 4  # Gauss points more than the degree: sine and cosine of the rotation are no polynomials
 
 
 class Basis(NamedTuple):

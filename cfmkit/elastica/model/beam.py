@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 Joint = Literal["rigid", "pin"]
 Closure = Literal["rotscale", "raw"]
 
-PARAMETER_TOL = 1e-12
-"""Parameters of a shape that differ by less count as one place."""
-
+PARAMETER_TOL = 1e-12  # parameters of a shape that differ by less count as one place
 _ANGLE_TOL = 1e-9  # [rad] an angle that is no corner; [1] a share of the complex step that is rounding
 _N_PANELS = 8  # of a smooth piece at least
 _MAX_PANEL_TURN = (
@@ -39,8 +37,6 @@ BEAM_QUADRATURE = (
     np.tile(0.5 * _GAUSS_WEIGHTS / _N_PANELS, _N_PANELS),
 )
 """Places and weights of the quadrature over a whole smooth beam, parameter from 0 to 1."""
-
-
 _JOINT_KINDS = ("rigid", "pin")
 
 
@@ -75,7 +71,6 @@ class Beam:
     end_offset: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Check the choices."""
         if self.closure not in ("rotscale", "raw"):
             raise InputError(f"closure must be 'rotscale' or 'raw', got {self.closure!r}")
         if self.start_joint not in _JOINT_KINDS or self.end_joint not in _JOINT_KINDS:

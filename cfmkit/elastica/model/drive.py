@@ -34,7 +34,6 @@ class Displacement(ShortRepr):
     loads: tuple[LoadOn, ...] = ()
 
     def __post_init__(self) -> None:
-        """Freeze and check the points."""
         object.__setattr__(self, "points", _points(self.points))
 
 
@@ -50,7 +49,6 @@ class Rotation:
     loads: tuple[LoadOn, ...] = ()
 
     def __post_init__(self) -> None:
-        """Freeze and check the points."""
         object.__setattr__(self, "points", _points(self.points))
 
 
@@ -66,7 +64,6 @@ class Loading:
     points: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze and check the points and the loads."""
         object.__setattr__(self, "points", _points(self.points))
         if not self.loads or not all(isinstance(load, PointLoad | LineLoad) for load in self.loads):
             raise InputError("a load drive needs at least one load")
@@ -117,7 +114,6 @@ class Control:
     imperfection: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the values."""
         if not 1e-12 <= self.tolerance <= 0.1:
             raise InputError(f"the tolerance must be between 1e-12 and 0.1, got {self.tolerance}")
         if self.branch not in ("stable", "primary", "stop") or self.sign not in (1, -1):

@@ -175,7 +175,6 @@ class Network(ShortRepr):
     contacts: tuple[Contact, ...] = ()  # stops, obstacles, pads on beams
 
     def __post_init__(self) -> None:
-        """Freeze the mappings and check that names match."""
         nodes, beams = dict(self.nodes), dict(self.beams)
         object.__setattr__(self, "nodes", MappingProxyType(nodes))
         object.__setattr__(self, "beams", MappingProxyType(beams))

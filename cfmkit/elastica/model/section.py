@@ -38,7 +38,6 @@ class Taper:
     values: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze and check the arrays."""
         for name in ("stations", "values"):
             given = np.asarray(getattr(self, name))
             object.__setattr__(self, name, read_only(given, given.dtype if given.dtype.kind == "c" else float))
@@ -90,7 +89,6 @@ class Section:
     wide: bool = False
 
     def __post_init__(self) -> None:
-        """Check the values."""
         _positive("youngs_modulus", self.youngs_modulus)
         _positive("width", self.width)
         _positive("shear_factor", self.shear_factor)

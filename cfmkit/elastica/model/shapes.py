@@ -80,8 +80,7 @@ class Polynomial:
         return FittedShape(angle, lambda u, inside: length + 0.0 * u, read_only([0.0, 1.0]), True)
 
 
-STRAIGHT_SHAPE = Polynomial()
-"""The shape of a straight beam."""
+STRAIGHT_SHAPE = Polynomial()  # the shape of a straight beam
 
 
 def arc(sweep: float) -> Polynomial:
@@ -101,7 +100,6 @@ class CosineArch:
     waves: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check that the ends are level."""
         if self.waves not in (0.5, 1.0):
             raise InputError(f"a cosine arch has 0.5 or 1 waves, got {self.waves}")
 
@@ -127,7 +125,6 @@ class Polyline:
     points: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze and check the points."""
         object.__setattr__(self, "points", _points(self.points))
 
     def course(self, chord: Any) -> FittedShape:
@@ -153,7 +150,6 @@ class Spline:
     points: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze and check the points."""
         object.__setattr__(self, "points", _points(self.points))
 
     def course(self, chord: Any) -> FittedShape:

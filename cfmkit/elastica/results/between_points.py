@@ -32,20 +32,15 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.stress_between_points import Knots
 
 MIN_PATH_POINTS = 4  # points of a path below which nothing is said of what lies between them: a cubic needs four
-
 N_EXTREME_ROUNDS = 3
 """Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
-
 MAX_RELATIVE_STRAY, MIN_STRAY_DISTANCE = 0.5, 1e-3
 """Largest distance of a pose from its first guess: as a share of the change between the two points around it, and at
 least [rad or mean beam lengths]. Beyond that another branch was found."""
-
 CORNER_OFFSET = 1e-6
 """Share of the drive's range by which the knots next to a corner are beside it: no cubic goes across it but there."""
-
 CORNER_SHARES = (0.1, 0.01, 0.001)
 """Shares of the way from a corner to the next point: equilibria are solved for there, to extrapolate to the corner."""
-
 AT_POINT = 1e-10  # share of the drive's range within which a bifurcation is at a point: it is not located better
 PLACE_RTOL = 1e-12  # share of the drive's range within which a place is that of a point
 

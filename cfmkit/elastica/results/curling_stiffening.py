@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.path import EquilibriumPath
 
 _ENERGY_RTOL = 1e-24  # share of the largest energy below which there is none: squares of rounded moments
-
-_COMPLEX_STEP = 1e-30
-"""Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
+_COMPLEX_STEP = 1e-30  # of a complex step: nothing is subtracted, so that its square may vanish beside one
 
 
 @dataclass(frozen=True, repr=False)

@@ -25,9 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.results.path import EquilibriumPath
 
-DIFFERENCE_STEP = 1e-6
-"""Of the largest unknown along the path, to either side: the motion's difference is off by 1e-10."""
-
+DIFFERENCE_STEP = 1e-6  # of the largest unknown along the path, to either side: the motion's difference is off by 1e-10
 FORCE_ROUNDING = 30 * np.finfo(float).eps
 """Share of the stiffest element's force for a unit motion that rounding of places leaves, with room."""
 

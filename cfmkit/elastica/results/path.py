@@ -30,10 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
 
-N_PLACES = 17
-"""Even places of every element at which states along a beam are handed out; neighbours share their ends."""
-
-
+N_PLACES = 17  # even places of every element at which states along a beam are handed out; neighbours share their ends
 STRESS_RTOL = 1e-9  # share by which stresses of two beams differ that are one but for rounding
 
 
@@ -107,7 +104,6 @@ class EquilibriumPath(ShortRepr):
     at_contact: Any = False  # (n,) points at which a contact begins or ends; False for all
 
     def __len__(self) -> int:
-        """Return the number of points."""
         return len(self.at.z)
 
     @property

@@ -22,12 +22,9 @@ if TYPE_CHECKING:
     Knots = tuple[FloatArray, FloatArray]  # places, increasing, and stresses of one beam
     Solve = Callable[[FloatArray], tuple[FloatArray, Any]]
 
-N_EXTREME_ROUNDS = 3
-"""Rounds in which extremes are located and solved for: the third moves them by less than rounding."""
-
+N_EXTREME_ROUNDS = 3  # rounds in which extremes are located and solved for: the third moves them by less than rounding
 CANDIDATE_SHARE = 0.9
 """Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
-
 N_FIRST_POINTS = 24  # points at which the stress is computed first
 NEIGHBOUR_SHARE = 0.95  # share of the largest stress at these from which on the largest of all may be near
 STENCIL_REACH = 4  # points on either side that a cubic, or the next one, may go through

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 
 N_MORE_PLACES = 8
 """Places on an element more than the degree of its rotation: sines of the angle, and tapers, are no polynomials."""
-N_GRID = 49
-"""Places of a grid on an element: the extreme lies between the neighbours of the highest one."""
+N_GRID = 49  # places of a grid on an element: the extreme lies between the neighbours of the highest one
 MAX_STEPS = 10  # of Newton's method, or halvings where it leaves the neighbours
 MAX_TOGETHER = 1_000_000  # numbers on the grids of some points: 8 MB
 STRESS_ROUNDING = 4 * np.finfo(float).eps  # share by which a value is higher than another one

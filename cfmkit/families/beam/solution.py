@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 _DISPLACEMENT_RTOL = 1e-15
 """Share of the largest displacement: a few units in the last place, as of the cosine of 90 deg."""
-
 _N_POSES = 7
 AT_CORNER = 1e-9  # share of the travel within which a place is that of a corner
 _N_FLUTTER_MODES = 4  # modes among which two may meet: it is the lowest ones that do

@@ -45,19 +45,12 @@ if TYPE_CHECKING:
 
 RISE_RATIOS = (3.7, 4.0, 4.25, 4.5, 5.5, 7.0)
 """Rise over thickness of the leaves: below 3.63 they are no longer buckled half way, above 7 they are thin and wide."""
-
 LENGTH_RATIOS = (1.04, 1.15, 1.4, 1.8, 2.4)
 """Leaf lengths, over the shortest that the stress allows: longer leaves are wider, and the force flatter."""
-
-PAIR_COUNTS = (2, 1, 3, 4)
-"""Vs that carry the shuttle; one V alone needs a guide."""
-
-THICKNESS_RATIOS = (1.0, 1.6, 2.4)
-"""Thickness of the diamond's leaves over that of the Vs."""
-
+PAIR_COUNTS = (2, 1, 3, 4)  # vs that carry the shuttle; one V alone needs a guide
+THICKNESS_RATIOS = (1.0, 1.6, 2.4)  # thickness of the diamond's leaves over that of the Vs
 REGION_SHARES = (0.8, 0.9, 0.98)
 """Share of the linear region that is used: the exact leaves depart from the line at its ends, which widths correct."""
-
 STRUCTURE_BLOCKS = {
     kind.proposal.name: (block, kind.proposal)
     for block, kinds in (("positive", SPRING_KINDS.values()), ("bistable", LEAF_KINDS.values()))
@@ -65,35 +58,20 @@ STRUCTURE_BLOCKS = {
     if kind.proposal is not None
 }
 """Name -> the block that is changed, and what is proposed in place of a designed diamond or its Vs."""
-
-SPRING_ANGLE = 7.0 * pi / 180.0
-"""Of the diamond's leaves, as in Ding, Li and Li 2022."""
-
+SPRING_ANGLE = 7.0 * pi / 180.0  # of the diamond's leaves, as in Ding, Li and Li 2022
 STRESS_MARGIN = 1.03
 """On the stress: the exact model has a little more of it than the closed forms that give the leaf's length."""
-
-DEFAULT_ADJUSTMENT = 0.02
-"""Adjustment, over the force, where none is required: every such mechanism has one."""
-
+DEFAULT_ADJUSTMENT = 0.02  # adjustment, over the force, where none is required: every such mechanism has one
 VARIANT_ORDER = {"1 V": 2, "3 Vs": 4, "4 Vs": 5, "2 Vs, catalogue": 7} | {
     one.variant: one.turn for _, one in STRUCTURE_BLOCKS.values()
 }
 """Variants by their first words, in the order in which they are tried behind two Vs with a diamond."""
-
 MIN_RISE_RATIO = 0.9
 """Smallest rise over that of the leaves that helical springs may ask for: the nearest of the series is taken."""
-
-WIDE_LAST = 100.0
-"""Promise of designs whose leaves are too wide to curl: they come after all others."""
-
-TRAVEL_OVER_LINEAR_REGION = 1.2
-"""End of the travel over that of the linear region: the flattest window may lie farther."""
-
-SPRING_CLEARANCE_RATIO = 1.2
-"""Room across that a helical spring takes, over its diameter: as they are drawn."""
-
+WIDE_LAST = 100.0  # promise of designs whose leaves are too wide to curl: they come after all others
+TRAVEL_OVER_LINEAR_REGION = 1.2  # end of the travel over that of the linear region: the flattest window may lie farther
+SPRING_CLEARANCE_RATIO = 1.2  # room across that a helical spring takes, over its diameter: as they are drawn
 MAX_PROPOSALS = 28
-
 FINISH_FUNCTION = "cfmkit.families.vcfm.proposals:finish"
 FINISH_WITH = "cfmkit.families.vcfm.proposals:finish_with"
 CORRECTION_FUNCTION = "cfmkit.families.vcfm.proposals_corrected_by_solids:correct"
@@ -355,9 +333,7 @@ def _use_flattest_window(spec: VcfmSpec, request: Request, preloads: tuple[float
 
 WINDOW_CENTRES = np.linspace(0.5, 1.5, 41)
 """Middles of windows that are looked at, over the rise: that of Vs is 1, that of cosine arches 4/3."""
-
-N_LENGTHENINGS = 3
-"""Times that parts are made longer: stress falls a little less than with the square of the length."""
+N_LENGTHENINGS = 3  # times that parts are made longer: stress falls a little less than with the square of the length
 
 
 @dataclass(frozen=True)

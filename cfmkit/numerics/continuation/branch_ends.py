@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 LOOK_AHEAD = 1e-5, 1e-4, 1e-3, 1e-2, 1e-6, 1e-7
 """Shares of the range behind a fold at which a path is looked for that the branch may have joined."""
-LOOK_BACK = 1.0, 3.0, 10.0, 30.0, 100.0
-"""Times these, before the fold, at which that path must be less stable."""
+LOOK_BACK = 1.0, 3.0, 10.0, 30.0, 100.0  # times these, before the fold, at which that path must be less stable
 SAME_PLACE = 1e-7  # motion, with a share of the step
 SHORT_STEP = 1e-6  # share of the range: after so short steps on a branch it is asked whether it has ended
 IN_DOUBT = 0.05, 0.02

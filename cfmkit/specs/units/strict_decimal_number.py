@@ -17,10 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 MAX_NUMBER_LENGTH = 40
-
 NUMBER_PATTERN = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 """Sign, digits, dot, exponent; leading zeros are refused separately, with a hint."""
-
 _LEADING_ZERO = re.compile(r"([-+]?)0+([0-9].*)")
 _MINUS_SIGNS = "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d"
 _MAX_SHOWN_LENGTH = 50

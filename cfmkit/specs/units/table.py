@@ -40,7 +40,6 @@ class Dimension:
 
 
 _DEGREES_PER_RADIAN = 180 / math.pi
-
 _DIMENSION_LIST = (
     Dimension("length", "mm", "length, displacement, elongation", "200 mm", up=1e3),
     Dimension("angle", "deg", "plane angle, rotation", "30 deg", up=_DEGREES_PER_RADIAN),
@@ -72,10 +71,8 @@ _DIMENSION_LIST = (
     Dimension("count", "1", "number of items", "2"),
     Dimension("text", "", "a word, not a number", "load"),
 )
-
 DIMENSIONS_BY_NAME: Mapping[str, Dimension] = MappingProxyType({item.name: item for item in _DIMENSION_LIST})
 """Every dimension by name."""
-
 _PI_DIGITS = "3.14159265358979323846264338327950288419716939937510582097494459230781640629"
 
 
@@ -90,9 +87,7 @@ COMMON_UNIT_SIZES: Mapping[tuple[str, str], Fraction] = MappingProxyType(
     | {("ratio", "%"): Fraction(1, 100), ("angle", "rad"): Fraction(1), ("stress", "GPa"): Fraction(10**9)}
 )
 """Exact SI size of what nearly every file says, by (dimension, unit): these need no look into pint's registry."""
-
-UNITLESS_DIMENSIONS = ("ratio", "factor", "count")
-"""Dimensions whose numbers need no unit."""
+UNITLESS_DIMENSIONS = ("ratio", "factor", "count")  # dimensions whose numbers need no unit
 
 
 @dataclass(frozen=True)
@@ -153,7 +148,6 @@ UNIT_TABLE = (
     Unit("ksi", "kilopound_per_square_inch", "1000 * pound_per_square_inch", "stress", input_only=True),
 )
 """The whole list; there are no prefixes beyond what it spells out."""
-
 UNITS_BY_SYMBOL: Mapping[str, Unit] = MappingProxyType(
     {word: unit for unit in UNIT_TABLE for word in (unit.symbol, *unit.aliases)}
 )

@@ -54,11 +54,9 @@ SEAT_FACTORS: Mapping[Seats, float] = MappingProxyType(
     {"fixed-fixed": 0.5, "fixed-pivoted": 0.707, "pivoted-pivoted": 1.0, "fixed-free": 2.0}
 )
 """alpha, by which the free length counts in buckling [Sh, Table 10-2]; a fixed end stands flat on a plate."""
-
 SMALL_HOLE, SMALL_HOLE_CLEARANCE, ROD_CLEARANCE = 0.013, 0.10, 0.05
 """Inner diameter below which a spring is small [m]; clearance of small and of larger springs on a rod, as shares of it
 [Norton]."""
-
 MAX_GUIDE_CLEARANCE = 0.20
 """Largest clearance of a guide, in diameters of the inside (rod) or outside (tube): twice that of [Norton], assumed. A
 spring in a looser guide bows as far as the clearance lets it."""

@@ -25,15 +25,9 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-MIN_INDEX, MAX_INDEX = 5.0, 16.0
-"""Mean diameter of the coil over that of the wire: what is wound easily."""
-
-N_INDICES = 12
-"""Indices that are compared for the largest rate."""
-
-MIN_WIRE_DIAMETER = 0.2e-3
-"""Wire that springs are usually wound of [m]."""
-
+MIN_INDEX, MAX_INDEX = 5.0, 16.0  # mean diameter of the coil over that of the wire: what is wound easily
+N_INDICES = 12  # indices that are compared for the largest rate
+MIN_WIRE_DIAMETER = 0.2e-3  # wire that springs are usually wound of [m]
 WIRE_DIAMETERS = tuple(
     size
     for series in ALL_SERIES
@@ -42,18 +36,11 @@ WIRE_DIAMETERS = tuple(
     if MIN_WIRE_DIAMETER <= size <= MUSIC_WIRE.thickest
 )
 """Wire on offer [m], of the metric series."""
-
-MIN_TURNS = 3.0
-"""Turns below which the loops decide the rate."""
-
+MIN_TURNS = 3.0  # turns below which the loops decide the rate
 PIN_SHARE = 0.9
 """Diameter of a pin over the inside of a torsion spring that is wound up: what spring makers leave as clearance."""
-
-COIL_STEP, COIL_STEP_OF_LARGE, LARGE_COIL = 1e-5, 5e-5, 1e-2
-"""Steps of coil diameters, and those above a diameter [m]."""
-
-STEPS_PER_TURN = 100.0
-"""Steps of turns: a torsion spring's legs stand within 4 deg of where they should."""
+COIL_STEP, COIL_STEP_OF_LARGE, LARGE_COIL = 1e-5, 5e-5, 1e-2  # steps of coil diameters, and those above a diameter [m]
+STEPS_PER_TURN = 100.0  # steps of turns: a torsion spring's legs stand within 4 deg of where they should
 
 
 def extension_spring(rate: float, stretch: float, room: float, safety: float = 1.0) -> HelicalSpring | None:

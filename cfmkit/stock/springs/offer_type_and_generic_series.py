@@ -32,20 +32,15 @@ if TYPE_CHECKING:
 
     from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
 
-GENERIC_SERIES = "generic"
-"""The word for the series that ships with the package."""
-
+GENERIC_SERIES = "generic"  # the word for the series that ships with the package
 WIRE_DIAMETERS = (0.4, 0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
 SPRING_INDICES = (6.0, 8.0, 10.0, 12.5)
 COIL_COUNTS = (6, 8, 10, 12, 16, 20, 25, 32, 40, 50, 63, 80, 100, 125, 160)
 TORSION_TURNS = (3, 4, 5, 6, 8, 10, 12)
-SPRING_COUNTS = (1, 2, 4)
-"""The generic series: wires [mm] and numbers of turns are preferred numbers (ISO 3, R10)."""
-
+SPRING_COUNTS = (1, 2, 4)  # the generic series: wires [mm] and numbers of turns are preferred numbers (ISO 3, R10)
 SHEAR_SHARE, BENDING_SHARE = 0.38, 0.60
 """Shares of the tensile strength that the generic series allows: assumed. At 38 % in the turns the loops of an
 extension spring bear up to 74 % in bending; Shigley, Table 10-7, allows 75 % there."""
-
 SOLID_RESERVE = 1.15
 """A compression spring of the series touches its turns at so many times its largest deflection: assumed."""
 

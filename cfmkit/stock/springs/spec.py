@@ -29,14 +29,10 @@ if TYPE_CHECKING:
     from cfmkit.stock.springs.helical_spring_formulas import Kind
 
 Positive = Field(gt=0)
-RATE_RTOL = 0.1
-"""A stated rate may be off by so much from that of wire, coil and turns: makers' tolerance."""
-
-
+RATE_RTOL = 0.1  # a stated rate may be off by so much from that of wire, coil and turns: makers' tolerance
 MAX_TENSION_RATIO = 3.0
 """Largest initial tension over the upper end of what is easily wound: springs that are wound on a bench have more, but
 none has more than this."""
-
 MIDDLE_OF_WIRE = 0.5
 """Wire diameters by which a stated outer diameter may differ from that of coil and wire: half of what tells it from the
 mean diameter."""

@@ -35,8 +35,7 @@ WireName = Literal[
     "beryllium-copper",
 ]
 
-RANGE_RTOL = 1e-9
-"""Diameters at the ends of a range are inside of it, whatever their rounding."""
+RANGE_RTOL = 1e-9  # diameters at the ends of a range are inside of it, whatever their rounding
 
 
 class WireOutOfRange(InputError, ValueError):
@@ -125,7 +124,6 @@ class WireMaterial:
 
 
 _EN_10270_1 = "EN 10270-1 [G]: 206 and 81.5 GPa for all diameters"
-
 WIRES_BY_NAME: Mapping[str, WireMaterial] = MappingProxyType(
     {
         one.name: one
@@ -188,6 +186,4 @@ WIRES_BY_NAME: Mapping[str, WireMaterial] = MappingProxyType(
     }
 )  # fmt: skip
 """Every class by name."""
-
-MUSIC_WIRE = WIRES_BY_NAME["music-wire"]
-"""What a spring is wound of where nothing else is stated."""
+MUSIC_WIRE = WIRES_BY_NAME["music-wire"]  # what a spring is wound of where nothing else is stated

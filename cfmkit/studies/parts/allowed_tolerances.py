@@ -34,17 +34,12 @@ if TYPE_CHECKING:
 
 ERRORS_TRIED = np.array([-2.5, -1.7, -0.85, 0.85, 1.7, 2.5])
 """Errors at which limits are solved, in standard deviations; 1.7 is just within the ends of a range."""
-
 MAX_SOLUTIONS, SAME_FACTOR, LEAST_FACTOR, N_ROUGH = 4, 1.3, 1e-6, 500
 """How often limits are solved, what is taken for the same tolerance, the least part of a stated one, and the parts that
 decide where to solve again."""
-
 MAX_TOLERANCE_FACTOR = 20.0
 """A tolerance is not made wider than so many times what is stated: first order does not reach farther."""
-
-N_BISECTIONS = 26
-"""Bisections: to a millionth of what is stated."""
-
+N_BISECTIONS = 26  # bisections: to a millionth of what is stated
 MIN_TOLERANCE_RATIO = 1e-3
 """Of the widest tolerance the narrowest of an allocation has at least so much: no cost is beyond all others."""
 

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 OF_PLATES = "laser"
 """How links and cams are made that say nothing of a material: as the prototype of Sanchez-Salinas et al. (2022)."""
-
 MODULUS_KEY = "mechanism.material.youngs_modulus"
 
 

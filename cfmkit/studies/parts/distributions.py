@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-COVERED_DEVIATIONS = 3.0
-"""Standard deviations on either side that stand for the range of a normal parameter."""
+COVERED_DEVIATIONS = 3.0  # standard deviations on either side that stand for the range of a normal parameter
 
 
 class Incompatible(ValueError):

@@ -32,9 +32,7 @@ if TYPE_CHECKING:
 
 COMMON_SPREAD = 0.1
 """An error is common if its relative change of force varies along the motion by at most this share of itself."""
-
-LEAST_FORCE = 0.05
-"""Where the force is below this share of its largest value, a share of it says nothing."""
+LEAST_FORCE = 0.05  # where the force is below this share of its largest value, a share of it says nothing
 
 
 @dataclass(frozen=True)

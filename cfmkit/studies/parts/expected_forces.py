@@ -23,14 +23,9 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.results import Result
 
-NAMED_PARTS_SHARE = 0.95
-"""Share of parts whose forces are named."""
-
-MAX_NAMED_DIMENSIONS = 3
-"""How many dimensions are named: more are not measured."""
-
-SIZE_DIMENSIONS = ("length", "angle")
-"""What a dimension is measured in."""
+NAMED_PARTS_SHARE = 0.95  # share of parts whose forces are named
+MAX_NAMED_DIMENSIONS = 3  # how many dimensions are named: more are not measured
+SIZE_DIMENSIONS = ("length", "angle")  # what a dimension is measured in
 
 
 def expected_forces(result: Result, run: Run) -> str:

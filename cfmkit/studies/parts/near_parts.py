@@ -34,15 +34,10 @@ if TYPE_CHECKING:
 
     Numbers = Callable[[Spec], FloatArray | None]
 
-N_DRAWN = 4000
-"""Parts that are drawn: the standard error of a share is then 0.8 % at most."""
-
-PROPORTIONALITY_RTOL = 1e-3
-"""To this share a force goes with the modulus; differences are as good as that."""
-
+N_DRAWN = 4000  # parts that are drawn: the standard error of a share is then 0.8 % at most
+PROPORTIONALITY_RTOL = 1e-3  # to this share a force goes with the modulus; differences are as good as that
 FEW_POINTS, SAME_RTOL = 31, 1e-6
 """Points on the curves of parts, where the design's metrics are the same with so few, but for this share of them."""
-
 MAX_QUICK, MAX_ANALYSES = 24, 12
 """Parts solved for an estimate that nobody requested, by the quick way or by analyses: some tenths of a second."""
 

@@ -35,8 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.parts.parts import Parts
     from cfmkit.studies.point_evaluation import Metric
 
-FORCE_DIMENSIONS = ("force", "torque", "energy")
-"""Dimensions of metrics that go with the force."""
+FORCE_DIMENSIONS = ("force", "torque", "energy")  # dimensions of metrics that go with the force
 
 
 @dataclass(frozen=True)

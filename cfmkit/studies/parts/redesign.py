@@ -57,26 +57,16 @@ if TYPE_CHECKING:
 
 N_ESTIMATED_PARTS = 4000
 """Parts whose yield is by linear estimate: one standard deviation of the estimate is 0.5 % at 90 %."""
-
-SEARCH_SEED = 7919
-"""Added to the seed: the parts that a search looks at are not those that it is judged by."""
-
+SEARCH_SEED = 7919  # added to the seed: the parts that a search looks at are not those that it is judged by
 N_CHECKED_PARTS, MAX_CHECK_ROUNDS, MOST_ASKED = 400, 4, 0.9975
 """Parts that are solved to see whether the estimate holds, how often more is then requested, and for how much."""
-
-OTHER_SPRINGS = 4
-"""Choices of bought springs that are tried where the best one misses the yield."""
-
+OTHER_SPRINGS = 4  # choices of bought springs that are tried where the best one misses the yield
 N_LOWER_YIELDS = 4
 """How often less is requested where a yield is not reached: the largest is then known to a sixteenth of what lacks."""
-
 N_DRAWN_PARTS = 48
 """Parts that `design.robust` solves at each step: of Lan's shape 96 % are good after it, after 24 of them 93 %."""
-
 NOTHING_FREE = "this design has no values that may change ('design.free')"
-
-VALUE_DECIMALS = 6
-"""Decimals of a value that is written, as a share of its range."""
+VALUE_DECIMALS = 6  # decimals of a value that is written, as a share of its range
 
 
 @dataclass(frozen=True)

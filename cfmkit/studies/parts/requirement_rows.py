@@ -38,12 +38,9 @@ if TYPE_CHECKING:
 
 N_WINDOW_POSES = 15
 """Chebyshev-Lobatto poses in a window; between them the force of a mechanism that is worth making is smooth."""
-
 CONTRADICTION_SHARE = 0.01
 """By so much of its terms a row is below zero where it contradicts the analysis, and not only by rounding."""
-
-NARROW_WINDOW_SHARE = 0.02
-"""A window that is a smaller share of the whole span has its ends only."""
+NARROW_WINDOW_SHARE = 0.02  # a window that is a smaller share of the whole span has its ends only
 
 
 @dataclass(frozen=True)

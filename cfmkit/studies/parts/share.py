@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-CONFIDENCE_LEVEL = 0.95
-"""Confidence of every interval."""
+CONFIDENCE_LEVEL = 0.95  # confidence of every interval
 
 Interval = tuple[float, float]
 

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
 Place = tuple[str | int, ...]
 
-ALL_ITEMS = "*"
-"""In place of an index: all items of a list."""
+ALL_ITEMS = "*"  # in place of an index: all items of a list
 
 
 @dataclass(frozen=True)

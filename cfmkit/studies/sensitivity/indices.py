@@ -13,9 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-N_RESAMPLES = 200
-"""Bootstrap samples behind an interval."""
-
+N_RESAMPLES = 200  # bootstrap samples behind an interval
 CONSTANT_OUTPUT_RTOL = 1e-12
 """An output that varies less than so much of its size does not vary: it has no variance to share out."""
 

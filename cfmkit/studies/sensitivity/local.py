@@ -34,11 +34,8 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.setup import Setup
 
-N_STEP_LEVELS = 7
-"""How often a step is halved, and one."""
-
-FIRST_STEP = 0.5
-"""The largest step, in half widths of the parameter's range."""
+N_STEP_LEVELS = 7  # how often a step is halved, and one
+FIRST_STEP = 0.5  # the largest step, in half widths of the parameter's range
 
 
 @dataclass(frozen=True)

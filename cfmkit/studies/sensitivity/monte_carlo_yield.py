@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.parts.distributions import ParameterSpread
 
 YIELD_GAIN, VARIANCE_DROP = "yield_gain_when_halved", "variance_drop_when_halved"
-TIGHTENING_FACTOR = 0.5
-"""By which factor a tolerance is tightened."""
+TIGHTENING_FACTOR = 0.5  # by which factor a tolerance is tightened
 
 Groups = tuple[tuple[int, ...], ...]
 

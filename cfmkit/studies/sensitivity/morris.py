@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 MU_STAR, MU_INDEX, SIGMA_INDEX = "mu_star", "mu", "sigma"
 INDEX_NAMES = (MU_STAR, MU_INDEX, SIGMA_INDEX)
-N_GRID_LEVELS = 4
-"""Levels of the grid in each direction; an effect is that of a step over two thirds of the range."""
+N_GRID_LEVELS = 4  # levels of the grid in each direction; an effect is that of a step over two thirds of the range
 
 
 def sample(

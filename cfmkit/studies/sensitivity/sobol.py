@@ -35,8 +35,7 @@ if TYPE_CHECKING:
 
 FIRST_ORDER_INDEX, TOTAL_ORDER_INDEX = "first_order", "total_order"
 INDEX_NAMES = (FIRST_ORDER_INDEX, TOTAL_ORDER_INDEX)
-MIN_BLOCKS = 16
-"""Convergence is shown from so many blocks on."""
+MIN_BLOCKS = 16  # convergence is shown from so many blocks on
 
 
 def sample(

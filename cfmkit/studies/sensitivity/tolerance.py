@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.setup import Setup
 
-DRAWN_ROLE = "drawn"
-"""The role of a sample of a Monte Carlo run."""
-
+DRAWN_ROLE = "drawn"  # the role of a sample of a Monte Carlo run
 YIELD_METRIC = Metric("yield", "ratio", "share of parts that meet every requirement")
 
 

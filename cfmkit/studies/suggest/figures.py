@@ -20,16 +20,10 @@ if TYPE_CHECKING:
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
 
 N_COLUMNS = 3
-
 MAX_DRAWN_PROPOSALS = 24
 """Proposals that are drawn: four families give three each and often some more; beyond it drawings get too small."""
-
-
-LINE_SPACING = 3.4
-"""Between lines of small text [mm]: 7 pt with a third of it between them."""
-
-LETTER_WIDTH = 1.4
-"""Room of one letter of small text [mm]: names of proposals take 1.33 on average (DejaVu Sans, 7 pt)."""
+LINE_SPACING = 3.4  # between lines of small text [mm]: 7 pt with a third of it between them
+LETTER_WIDTH = 1.4  # room of one letter of small text [mm]: names of proposals take 1.33 on average (DejaVu Sans, 7 pt)
 
 
 def label_proposal(number: int, proposal: Proposal) -> str:

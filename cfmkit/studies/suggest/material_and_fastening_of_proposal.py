@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.families.suggestion_request import Request
     from cfmkit.specs.spec import Spec
 
-USUAL_SCREWS = ("M4", "M3", "M2.5", "M2", "M1.6")
-"""Screws that hold small parts, the first one that fits."""
+USUAL_SCREWS = ("M4", "M3", "M2.5", "M2", "M1.6")  # screws that hold small parts, the first one that fits
 
 
 def add_process_and_materials(spec: Spec, request: Request) -> Spec:

@@ -25,10 +25,7 @@ if TYPE_CHECKING:
 
 ADJUSTMENT_TOL = 0.025
 """How far the mean may be from an end of the adjustment: as far as from a force that is required as a number."""
-
-STRAIGHT_LINKS = "1 %"
-"""Largest elastic turn of a link over that of its spring: models of links take them for rigid."""
-
+STRAIGHT_LINKS = "1 %"  # largest elastic turn of a link over that of its spring: models of links take them for rigid
 LIFE_METRICS = ("fatigue_life", "spring_life")
 """Metrics that say how many cycles the material, and bought springs, last."""
 

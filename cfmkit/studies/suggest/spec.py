@@ -18,15 +18,10 @@ from cfmkit.stock.processes import PROCESSES_BY_NAME, ProcessName, why_not_made
 PositiveTorque = Annotated[Torque, Field(gt=0)]
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
 
-MEAN_TOL = 0.025
-"""How far the mean may be from a force that is required as a number; who wants less gives a band."""
-
-DEFAULT_RIPPLE = 0.05
-"""Ripple where none is required."""
-
+MEAN_TOL = 0.025  # how far the mean may be from a force that is required as a number; who wants less gives a band
+DEFAULT_RIPPLE = 0.05  # ripple where none is required
 DEFAULT_SAFETY = 1.5
 """Safety factor where none is required: usual for parts whose material and loads are known on average."""
-
 USUAL_MATERIALS: dict[str, tuple[str, ...]] = {
     "fdm": ("pla", "petg", "abs"),
     "sls": ("pa12-sls",),

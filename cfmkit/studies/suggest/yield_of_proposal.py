@@ -45,13 +45,9 @@ if TYPE_CHECKING:
 
 N_DRAWN = 100
 """Parts that are drawn of a proposal, each analysed in full: one standard deviation is 3 % where 90 % are good."""
-
-AT_ONCE = 10
-"""Parts between two looks at whether too many are bad already, or the time is up."""
-
+AT_ONCE = 10  # parts between two looks at whether too many are bad already, or the time is up
 MAX_REDESIGN_STEPS = 15
 """Steps of one redesign, which is ended by them and not by a clock: what can be reached is nearly reached in ten."""
-
 OUT_OF_TIME = "the time budget ended before its manufactured parts were evaluated"
 
 

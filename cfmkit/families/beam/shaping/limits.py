@@ -223,11 +223,8 @@ LIMIT_FUNCTIONS: dict[str, Callable[[View], list[PendingRows]]] = {
     "force": force,
 }
 """All limits by name."""
-
-
 BOUND_SHARPNESS = 25.0
 """Of the smooth bound on distances of 17 by 17 places: at most ln(289)/25, 23 % of those required, below the least."""
-
 _N_PLACES = 16
 _NO_WEIGHT = 1e-10  # of a pair of places in the smooth bound: its derivative is left out
 

@@ -36,9 +36,7 @@ if TYPE_CHECKING:
 
 
 _N_REFINED = 3  # of the widest: one in a finer order takes as long as a widening, and others gain little
-
 _N_LEADERS = 3  # of the flattest over a wider window: finishing one takes as long as a start
-
 _STAGE_DURATIONS = {
     "starts": 9.0,
     "widenings": 5.0,

@@ -26,11 +26,8 @@ if TYPE_CHECKING:
 
 
 N_AUDIT_PLACES = 240
-
 BOUND_TOLERANCES = 1e-6, 1e-5  # a nanometre and a share: a number so near to an end of its range is held by it
-
 STRESS_RTOL = 2e-4  # of the stress: by how much its peak depends on how finely the strip is sampled
-
 ACTIVE_LIMIT_SHARE = 0.02  # a value so near to its limit, as a share of the limit, holds the design
 
 

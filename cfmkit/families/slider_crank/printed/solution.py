@@ -36,14 +36,11 @@ if TYPE_CHECKING:
 
 FIRST_NODE_SHARE = 1e-6
 """Share of the travel at which the first node stands: the force there is about a thousandth of its level."""
-
 INITIAL_PANEL_WIDTH = 1.5
 """Width of a panel at first, in the logarithm of the travel: a path that has no corner is resolved at once."""
-
 COEFFICIENT_RTOL = (1e-8, 1e-7)
 """Size of the last coefficients, relative to the largest, at which force and stress have converged: the force of a good
 chain changes by a hundredth over its travel, and a place on it is to be right to a millionth of that."""
-
 MAX_HALVINGS = 12
 """At most so many: the stress has a kink where its place jumps, and a chain without a kink has a sharp corner."""
 
