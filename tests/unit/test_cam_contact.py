@@ -99,6 +99,8 @@ def test_a_measured_cam_is_judged_as_well():
     result = cfmkit.analyze(spec)
     assert "overstressed" in names(result)
     assert stresses(result, None)[1] < 1
+    largest = max(np.nanmax(curve.extra["contact_pressure"].values) for curve in result.curves)
+    assert result.values["contact_pressure_max"].value == pytest.approx(largest, rel=1e-3)
 
 
 def test_without_a_contact_or_a_strength_there_is_nothing_to_judge():

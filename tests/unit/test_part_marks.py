@@ -30,10 +30,11 @@ def test_what_stands_and_what_moves_is_on_layers_of_its_own(name, held, driven):
     assert (len(middles(drawing, "held")), len(middles(drawing, "driven"))) == (held, driven)
 
 
-def test_marks_lie_on_the_part_and_change_nothing_of_it():
+@pytest.mark.parametrize("name", ["vcfm_ding2022", "vcfm_straight", "vcfm_u_shape", "slider_crank_strip"])
+def test_marks_lie_on_the_part_and_change_nothing_of_it(name):
     from shapely import Polygon
 
-    drawing = drawn("vcfm_ding2022")
+    drawing = drawn(name)
     solid = Polygon()
     for one in drawing.contours:
         if one.layer == "cut":
