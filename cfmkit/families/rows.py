@@ -147,7 +147,7 @@ def root_between(function: Callable[[Any], Any], low: Any, high: Any) -> Any:
 class PlacesKept(Generic[T]):
     """A function of places of all rows that keeps its last two results.
 
-    What is wanted on the way up is asked for again on the way down, at other places in between.
+    What is wanted on the way up is wanted again on the way down, at other places in between.
     """
 
     def __init__(self, function: Callable[[FloatArray], T]) -> None:

@@ -242,8 +242,7 @@ def test_a_warning_that_states_a_key_with_its_value_has_it_as_a_command():
         for _, parts, is_call in findings_made()
         if is_call and len(parts) == 2 and setting.search(ast.unparse(parts[1]))
     }
-    # two values of a key without a remedy; a guide that the page has as what would be feasible
-    assert left == {"width_error", "asymmetric_buckling"}
+    assert left == {"width_error"}  # two values of a key, without a remedy
 
 
 def run(capsys, *words):

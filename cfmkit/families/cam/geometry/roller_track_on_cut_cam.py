@@ -66,6 +66,10 @@ class TrackStates(ShortRepr):
         """d2y/dx2 of the centre's track, (n,) [1/m]; it is wanted at dead points alone."""
         return self.compute_bend()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # what computes the last array may not be pickled
+        return TrackStates, (*self.fields(), partial(np.asarray, self.bend))
+
     def fields(self) -> tuple[NDArray[Any], ...]:
         """Return the arrays in the order in which the class takes them."""
         return self.x, self.y, self.slope, self.tangent, self.on_corner, self.parameter
