@@ -29,10 +29,7 @@ _TYPER_OPTIONS: dict[str, Any] = {
     "add_completion": False,
     "pretty_exceptions_enable": False,
 }
-
-
-PLAIN_TYPES = (str, int, bool)
-"""Types of options whose values need no conversion."""
+PLAIN_TYPES = (str, int, bool)  # types of options whose values need no conversion
 
 
 @dataclass(frozen=True)

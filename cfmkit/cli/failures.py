@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.output import Terminal
 
-MAX_EXCERPTS = 10
-"""Problems with the line of the file below them: more are a list to read, not a place to look at."""
+MAX_EXCERPTS = 10  # problems with the line of the file below them: more are a list to read, not a place to look at
 
 ParserError: type[Exception] = typer.BadParameter.__mro__[1]
 """What the option parser raises; typer does not name it itself."""
@@ -119,7 +118,6 @@ _PARSER_WORDS = (
     (r"No such option: --room\b.*", "No such option: --room, it is --envelope now"),
 )
 """Patterns of what the library says that checks the types of options, and what to say instead."""
-
 _VALUE_AS_OPTION = (
     r"(No such option: --(?:force|torque|stroke|travel|angle|ripple|envelope|material|stiffness|thickness|length)\b).*",
     r"\1; values of the spec are changed with --set, e.g. --set design.force='60 N'",

@@ -144,13 +144,8 @@ class PageSection(NamedTuple):
 
 HEADING_WEIGHT, TEXT_WEIGHT, MAX_COUNT_IN_TEXT = 6.0, 1.0, 5
 """Weight of a phrase in a heading, and in the text for each of so many times."""
-
-SYNONYM_WEIGHT = 0.5
-"""Weight of what the glossary names in place of the word itself."""
-
-
-NAVIGATION_PAGES = ("index", "glossary")
-"""Pages that name every subject and explain none: no search leads there."""
+SYNONYM_WEIGHT = 0.5  # weight of what the glossary names in place of the word itself
+NAVIGATION_PAGES = ("index", "glossary")  # pages that name every subject and explain none: no search leads there
 
 
 def search(word: str) -> list[PageSection]:

@@ -39,8 +39,6 @@ HELP_EPILOG = (
     "Exit codes: 0 ok, 2 usage, 3 invalid spec or data, 4 no solution, 5 a requirement is missed, 6 partial, "
     "7 input/output, 8 folder in use, 70 a bug, 130 and 143 stopped by a signal."
 )
-
-
 _MADE_BETWEEN_COLLECTIONS = 250_000
 """Objects; the imports of a run make about so many that stay, and looking through them for garbage takes a tenth of a
 short run."""

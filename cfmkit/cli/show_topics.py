@@ -379,7 +379,6 @@ KEY_FIELDS = (
 )
 SYMBOL_FIELDS = (field("name", "symbol"), field("family"), field("key", wraps=True), field("meaning", wraps=True))
 METRIC_FIELDS = (field("name", "metric"), field("unit"), field("definition", wraps=True))
-
 TOPIC_KINDS: Mapping[str, TopicKind] = {
     "terms": TopicKind(_terms, (field("name", "word"), field("meaning", wraps=True))),
     "materials": TopicKind(
@@ -422,7 +421,6 @@ TOPIC_KINDS: Mapping[str, TopicKind] = {
     ),
 }
 """Kinds of names that `show` explains, by the heading of each on a page."""
-
 TOPIC_HEADINGS: Mapping[str, tuple[str, Callable[[], Document]]] = {
     "units": ("the units that a spec may use, and those that files are written in", units_page),
     "metrics": ("the constant-force metrics: name, unit, definition", metrics_page),

@@ -34,8 +34,7 @@ class Tone(StrEnum):
     FAINT = "dim"
 
 
-LABEL_COLUMNS = 11
-"""Columns of the words that begin a paragraph: ``test plan`` and two blanks."""
+LABEL_COLUMNS = 11  # columns of the words that begin a paragraph: ``test plan`` and two blanks
 
 
 class Span(NamedTuple):
@@ -284,17 +283,10 @@ class Document:
 
 TONES_BY_EXIT_CODE = {0: "good", 3: "bad", 4: "bad", 5: "bad", 6: "warn", 7: "bad", 70: "bad"}
 """How a run ended, by its exit code, as the colour of its verdict."""
-
-
-MAX_WARNING_LENGTH = 100
-"""Characters of a warning on a page: its name, its consequence and a remedy."""
-
+MAX_WARNING_LENGTH = 100  # characters of a warning on a page: its name, its consequence and a remedy
 MIN_CLAUSE_LENGTH = 24
 """Characters below which a clause says too little: rather a part of the next one is taken as well."""
-
-DOTS = "..."
-"""What ends a text that is cut inside a clause."""
-
+DOTS = "..."  # what ends a text that is cut inside a clause
 NUMBER_START = re.compile(r"(?<![A-Za-z_])\d")
 PLAIN_WORDS = re.compile(r"[a-z]+ [a-z]+ ")
 

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Requirement
 
 STDIN_PATH = "-"
-
 SHORT_LABELS = {
     "force_ripple": "ripple",
     "torque_ripple": "ripple",
@@ -48,7 +47,6 @@ SHORT_LABELS = {
     "hysteresis_area": "hysteresis",
 }
 """What values are called where there is little room."""
-
 SHOWN_METRICS = (
     "force_ripple",
     "torque_ripple",
@@ -56,7 +54,6 @@ SHOWN_METRICS = (
     "safety_factor",
 )
 """Metrics that are shown of every family, as far as they have a value."""
-
 SHOWN_PARTS = {
     "test plan": re.compile(r", and expect (?P<text>.*): each range"),
     "yield": re.compile(
@@ -64,9 +61,7 @@ SHOWN_PARTS = {
     ),
 }
 """What a short page shows of a paragraph that is longer: its text, and the options that remedy it."""
-
-LITTLE_MARGIN = 1.05
-"""Safety factor below which the margin is called little."""
+LITTLE_MARGIN = 1.05  # safety factor below which the margin is called little
 
 
 @dataclass(frozen=True)

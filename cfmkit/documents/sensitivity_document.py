@@ -19,14 +19,10 @@ if TYPE_CHECKING:
     from cfmkit.studies.parts.share import Share
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
 
-PERCENT_INDICES = (YIELD_GAIN, VARIANCE_DROP)
-"""Indices that are shown in percent."""
-
+PERCENT_INDICES = (YIELD_GAIN, VARIANCE_DROP)  # indices that are shown in percent
 NO_INFLUENCE = 1e-12
 """An index below this is the rounding of a difference of numbers near 1 (2e-16 each), not an influence."""
-
-MAX_PARAMETERS = 6
-"""Parameters of each metric on a short page: two metrics with them fit on a screen of 24 lines."""
+MAX_PARAMETERS = 6  # parameters of each metric on a short page: two metrics with them fit on a screen of 24 lines
 
 
 def document_of(found: Findings, files: Written | None = None) -> Document:

@@ -49,25 +49,12 @@ if TYPE_CHECKING:
 
 MAX_LINES, MAX_LINES_WITH_TABLES = 15, 24
 """Of a short page of one mechanism, and of one that lists points, specifications or proposals: a screen."""
-
-INDENT_COLUMNS, WORD_COLUMNS = 2, 12
-"""Columns before a word such as ``test plan``, and columns that it gets."""
-
-GAP_COLUMNS = 3
-"""Columns between the two halves of the headline, and before a remedy."""
-
-LEAST_GAP = 2
-"""Columns between the two ends of a line: fewer would read as one text."""
-
-LEAST_TEXT = 8
-"""Characters of a text beside a name: with fewer only the name is shown."""
-
-MIN_FACTS = 4
-"""Lines of the headline that are filled with what is not required, where there is room."""
-
-MORE_TEXT = "-v: all"
-"""What stands at the end of a short page."""
-
+INDENT_COLUMNS, WORD_COLUMNS = 2, 12  # columns before a word such as ``test plan``, and columns that it gets
+GAP_COLUMNS = 3  # columns between the two halves of the headline, and before a remedy
+LEAST_GAP = 2  # columns between the two ends of a line: fewer would read as one text
+LEAST_TEXT = 8  # characters of a text beside a name: with fewer only the name is shown
+MIN_FACTS = 4  # lines of the headline that are filled with what is not required, where there is room
+MORE_TEXT = "-v: all"  # what stands at the end of a short page
 TONE_STYLES = {"good": Tone.GOOD, "warn": Tone.BAD, "bad": Tone.BAD}
 
 
@@ -395,8 +382,7 @@ def _text(*spans: Span, whole: bool = False) -> Text:
     return text
 
 
-LEAST_COLUMNS = 8
-"""Columns that a cell of several lines gets at least: most words of the pages are not longer."""
+LEAST_COLUMNS = 8  # columns that a cell of several lines gets at least: most words of the pages are not longer
 
 
 def _least_width(block: CellGrid, rows: Sequence[Sequence[Text]]) -> int:

@@ -44,39 +44,21 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.parts.assumed_errors import Assumed
 
-STRONG_EVIDENCE = 10.0
-"""Difference of Schwarz's criterion from which one explanation is preferred to another."""
-
-MOST_ERRORS = 3
-"""Errors that are fitted at once: a force curve has hardly more independent features."""
-
+STRONG_EVIDENCE = 10.0  # difference of Schwarz's criterion from which one explanation is preferred to another
+MOST_ERRORS = 3  # errors that are fitted at once: a force curve has hardly more independent features
 FORCE_RESOLUTION = 1e-4
 """Part of the largest force below which residuals say nothing: curves are linear between their points."""
-
-LARGEST_FACTOR = 3.0
-"""Of a modulus or a rate: farther off it is another material or another part."""
-
-LARGEST_THICKNESS_ERROR = 0.25
-"""Of the thinnest leaf: farther off it is another part."""
-
+LARGEST_FACTOR = 3.0  # of a modulus or a rate: farther off it is another material or another part
+LARGEST_THICKNESS_ERROR = 0.25  # of the thinnest leaf: farther off it is another part
 LARGEST_MISFIT = 0.1
 """Root mean square of the residuals of the best explanation, over the largest force: beyond it is another part."""
-
-LARGEST_OVERTRAVEL = 1.25
-"""Recorded travel over that of the mechanism: beyond it is another part."""
-
+LARGEST_OVERTRAVEL = 1.25  # recorded travel over that of the mechanism: beyond it is another part
 LARGEST_UNCERTAINTY_OF_ZERO = 0.01
 """Standard deviation of the zero of the force, over the largest force, beyond which it is not fitted: an unknown zero
 is taken to be off by as much."""
-
-USUAL_DEVIATION = 0.1
-"""Standard deviation of a modulus or a rate of which nothing else is known, as a share of it."""
-
-FIT_TOLERANCE = 1e-7
-"""Relative change of values at which fits end: far below their intervals."""
-
-LEAST_FRICTION = 1e-6
-"""Where a model without friction is compared with a loop: with it the model has both branches."""
+USUAL_DEVIATION = 0.1  # standard deviation of a modulus or a rate of which nothing else is known, as a share of it
+FIT_TOLERANCE = 1e-7  # relative change of values at which fits end: far below their intervals
+LEAST_FRICTION = 1e-6  # where a model without friction is compared with a loop: with it the model has both branches
 
 
 @dataclass(frozen=True)

@@ -35,35 +35,18 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
-MOST_CHANGE = 3.0
-"""Factor by which a drawn value may change where the design does not limit it."""
-
+MOST_CHANGE = 3.0  # factor by which a drawn value may change where the design does not limit it
 SECTION_RELUCTANCE = {"width": 1e-4, "thickness": 1e-3}
 """Deviation of the force that is accepted for not changing a value at all: widths do not change stress or shape."""
-
-OTHER_RELUCTANCE = 1e-2
-"""The same of any other value."""
-
-N_DIGITS = 5
-"""Digits of a corrected value that is no length or angle."""
-
-CLOSE_DEPARTURE = 2e-3
-"""Root mean square departure from the aim, over its level, with which no more values are changed."""
-
-MEAN_WEIGHT = 10.0
-"""How much a departure of the mean force counts, over one of the same size from the curve."""
-
-MISSED_WEIGHT = 3.0
-"""How much missing another requirement by a share counts, over missing the force by as much."""
-
-REQUIREMENT_MARGIN = 1e-3
-"""Part of its bound by which a requirement is to be met: values are rounded afterwards."""
-
+OTHER_RELUCTANCE = 1e-2  # the same of any other value
+N_DIGITS = 5  # digits of a corrected value that is no length or angle
+CLOSE_DEPARTURE = 2e-3  # root mean square departure from the aim, over its level, with which no more values are changed
+MEAN_WEIGHT = 10.0  # how much a departure of the mean force counts, over one of the same size from the curve
+MISSED_WEIGHT = 3.0  # how much missing another requirement by a share counts, over missing the force by as much
+REQUIREMENT_MARGIN = 1e-3  # part of its bound by which a requirement is to be met: values are rounded afterwards
 RELATIVE_STEP, MAX_STEPS = 1e-4, 40
 """Relative change of a value for derivatives, and steps of a search, which usually takes five."""
-
-NO_CURVE = 10.0
-"""Deviation that stands for a part that has no curve."""
+NO_CURVE = 10.0  # deviation that stands for a part that has no curve
 
 
 class NotMakeable(SolutionError):

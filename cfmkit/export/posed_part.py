@@ -22,11 +22,8 @@ if TYPE_CHECKING:
 Role = Literal["held", "driven", "free", "contact"]
 """Whether a body stands, moves as the drive says, moves as the mechanism lets it, or rolls or slides on another one."""
 
-MIRROR_FACTORS = np.array([-1.0, 1.0])
-"""Factors of x and y of the mirror image about the y axis."""
-
+MIRROR_FACTORS = np.array([-1.0, 1.0])  # factors of x and y of the mirror image about the y axis
 N_CIRCLE_POINTS = 73
-
 N_PLACES, N_COVERING = 26, 41
 """Positions of a screw that are tried along half an edge, and poses in which they must be free."""
 

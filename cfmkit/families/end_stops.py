@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from cfmkit.families.end_stops_spec import EndStop
 
 SAME_PLACE = 1e-12  # motions that differ by less are one [m]
-
 DEFINITIONS = {
     "first_contact": ("length", "displacement of the driven node at which the first contact begins"),
     "contact_force[contact]": (

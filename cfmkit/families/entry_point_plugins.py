@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Family
 
 ENTRY_POINT_SECTION = "[cfmkit.families]"  # heading of the group in a file of entry points
-
 _INFO_PATTERN = re.compile(r"(?P<package>[^-]+)(?:-(?P<version>[^-]+))?.*\.(?:dist|egg)-info")
 """Name of a folder in which an installer describes a package, with the package's name and version."""
 

@@ -194,13 +194,10 @@ def fillet_table(rows: Sequence[FilletRow], motion: tuple[str, str] = ("displace
 MIN_STRESS_SHARE = 0.1
 """Nominal stresses below this part of the beams' largest at the same displacement are none: solid and beams differ by
 some hundredths of the largest for other reasons, which would make a third of such a ratio."""
-
 N_PATH_STEPS = 40  # of the beams' path beside the requested displacements: as dense as curves are
 STEP_RTOL = 1e-6  # steps nearer to a requested displacement than this part of the largest are left out
-
 PATH_TOLERANCE = 1e-6
 """Of the beams' path: far below what a mesh is off, and slender leaves reach it where they are pulled straight."""
-
 CHORD_TOLERANCE = 0.02
 """How far a fillet may end from the edge of its beam, in thicknesses: what lines between the places of a curved beam
 are off."""

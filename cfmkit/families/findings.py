@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
 
 TOO_SOFT = 0.01  # share of the energy of bending above which wide beams that are solved as narrow ones are reported
-
-
 MIN_PLANE_STRESS_RATIO = 3.0
 """Width over thickness up to which plane stress is within about 1 % of a solid in three dimensions (docs/solid.md)."""
 

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 N_WINDOWS = 400  # windows that are compared, evenly over the curve
-
 WINDOW_EXTENSION_SHARE = 1e-6
 """A window is made longer by this share of its length: to write it down must not make it shorter."""
 

@@ -31,16 +31,11 @@ if TYPE_CHECKING:
 
 DEFAULT_MATERIAL = "steel-s235"  # of links and plates that state none
 DEFAULT_SAFETY = 1.5  # against yield, where `safety_factor` is not above 1
-
 SAFETY_METRICS = ("safety_factor", "link_safety_factor", "spring_safety_factor")
 """Metrics of strength: what a requirement asks of them is asked of pins, shafts and screws, too."""
-
 PIN_STRENGTH = 235e6
 """Yield strength of pins and rods [Pa]: plain carbon steel, EN 10025-2 S235; hardened ones bear more."""
-
-PIN_MODULUS = 210e9
-"""Young's modulus of pins and rods [Pa]: EN 1993-1-1, sec. 3.2.6."""
-
+PIN_MODULUS = 210e9  # young's modulus of pins and rods [Pa]: EN 1993-1-1, sec. 3.2.6.
 SIDE_SHARE = 0.1  # load across a guide over the largest force on its slider, at least: assumed
 SAG_SHARE = 1e-3  # sag of a guide's rod over its span, at most: assumed
 LEAST_WALL = 0.25  # wall beside a hole over its diameter, at least

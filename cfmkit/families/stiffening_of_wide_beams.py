@@ -22,10 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 WIDE_BEAMS_KEY = "mechanism.wide_beams"
-
 BAND_MARGIN = 1.002  # how far inside its band a force is aimed at: the next solution is that of a part a little wider
-
-
 PER_SQUARE = 0.007
 """Stiffening over 2 (b/t)^2 sigma/E, b^2 K/t at the largest stress: 0.0026 to 0.0075 of POM leaves and networks
 whose stiffening was computed; the real one ends at 1/(1 - nu^2) - 1."""

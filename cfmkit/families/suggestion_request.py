@@ -19,16 +19,13 @@ if TYPE_CHECKING:
 
 MaterialBlock = Mapping[str, Any]
 
-Springs = Literal["catalogue", "custom"]
-"""Springs as they are sold, or made to a wire, a coil and a number of turns."""
+Springs = Literal["catalogue", "custom"]  # springs as they are sold, or made to a wire, a coil and a number of turns
 
 STRENGTH_SHARE = 0.8
 """Share of the strength that is used where made parts have to be good: sources scatter moduli by 10 % and more."""
-
 ASSUMED_STRAINS = {"plastic": (0.015, 0.04), "metal": (0.003, 0.006)}
 """Strains that designs use of a material whose strength is not stated: about those of PLA and aluminium at yield, then
 what published mechanisms of printed plastic are bent to. The stress of what comes of it is not judged."""
-
 STOP_MARGIN_SHARE = 0.03
 """Free way behind the travel, over the travel, at which an end stop stands: so far off may it be made and not shorten
 the travel. For parts of a few millimetres that is a tenth of one, the usual tolerance of a cut length."""

@@ -21,18 +21,12 @@ if TYPE_CHECKING:
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 """Gauss points in each step between two places: polynomials of degree seven are integrated exactly."""
-
-
-FEW_SAMPLES = 100
-"""Samples below which a parabola through three of them is no more than a first guess."""
-
+FEW_SAMPLES = 100  # samples below which a parabola through three of them is no more than a first guess
 N_PARABOLAS, VERTEX_OFFSETS = 3, np.array([-0.08, 0.0, 0.08])
 """Parabolas for few samples, and where the model is asked next to the vertex, as shares of the way between the outer
 points. Vertices alone draw nearer from one side only, slowly where a curve is skew; with a place on either side the
 way is a sixth as long after each round: of a cam at 31 points the last extreme is right to 2e-8 of the force.
 """
-
-
 EXTREME_SIGNS = np.array([1.0, -1.0])
 """By which values are multiplied of which the largest is wanted: for the largest and for the smallest one."""
 

@@ -33,10 +33,8 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 WITHIN_SCATTER = "within the scatter: nothing to correct"
-
 SHOWN_METRICS = ("ripple", "max", "stress_max", "safety_factor", "hysteresis_area")
 """What is compared beside the mean; the first two are of the force or torque."""
-
 N_ROWS_ON_PAGE = 8
 
 

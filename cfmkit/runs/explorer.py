@@ -37,21 +37,15 @@ if TYPE_CHECKING:
 
 LEFT_OUT = ("cfmkit", "family", "name", "description", "design", "sweep", "sensitivity")
 """Blocks without sliders: what is analysed does not depend on them."""
-
-MOST_POINTS = 600
-"""Points of a branch that the page draws: more than there are pixels across its diagram."""
-
+MOST_POINTS = 600  # points of a branch that the page draws: more than there are pixels across its diagram
 SLIDER_SPAN = 0.5
 """Share of a value by which its slider goes down and up: far enough to see a trend, near enough to stay a mechanism."""
-
 RELATIVE_STEP = 0.01
 """Share of a value by which it is changed to find its influence: above the noise of solvers, and a small change."""
-
 PAIR_LABELS = {name: ("x", "y") for name in ("at", "mirror")} | {
     name: ("from", "to") for name in ("window", "over", "travel")
 }
 """What the two numbers of a list are called."""
-
 OWN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,80}\.ya?ml")
 """Names of files that the page may save: no folder, nothing hidden."""
 

@@ -111,8 +111,7 @@ def suggest(
     return SuggestionsView.answering(search_families(block.request(), run, block.prefer), block)
 
 
-OPTIONS_SOURCE = "options"
-"""Name of a request that has no file."""
+OPTIONS_SOURCE = "options"  # name of a request that has no file
 
 
 def read_request(

@@ -109,8 +109,7 @@ def _make_files(
     return list(({"design.yaml": b""} | made_files | {"design.yaml": proposal.text.encode()}).items())
 
 
-MAX_SLOWDOWN = 2.0
-"""How much longer than before an analysis may take: others run beside it, and figures are drawn."""
+MAX_SLOWDOWN = 2.0  # how much longer than before an analysis may take: others run beside it, and figures are drawn
 
 
 def _draw_part(spec: Spec, plots: bool) -> Iterator[tuple[str, bytes]]:
@@ -181,9 +180,7 @@ def _list_in_words(pairs: Mapping[str, Any]) -> str:
     return ", ".join(f"{key.replace('_', ' ')} {_words(key, value)}" for key, value in pairs.items())
 
 
-SHARE_COLUMNS = ("ripple", "hysteresis", "yield")
-"""Numbers of a proposal that are shares."""
-
+SHARE_COLUMNS = ("ripple", "hysteresis", "yield")  # numbers of a proposal that are shares
 LIST_SEPARATORS = {"envelope": " x ", "material": " or ", "prefer": ", "}
 """What stands between the values of a key that has several; else they are the two ends of a band."""
 

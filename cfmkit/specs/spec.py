@@ -177,8 +177,7 @@ else:
     )
 
 
-AS_MADE = "as_made"
-"""Key of the context in which a manufactured part is validated: see `Spec.replace`."""
+AS_MADE = "as_made"  # key of the context in which a manufactured part is validated: see `Spec.replace`
 
 
 def is_made(info: ValidationInfo) -> bool:

@@ -45,10 +45,8 @@ _PROCESS_LIST = (
     ProcessAccuracy("mill", 2.0e-3, 0.02e-3, 0.02e-3, 0.5e-3, 1.0e-3,
             "a thin leaf yields to the cutter; inside corners have the radius of a 2 mm one"),
 )  # fmt: skip
-
 PROCESSES_BY_NAME: Mapping[str, ProcessAccuracy] = MappingProxyType({one.name: one for one in _PROCESS_LIST})
 """All by name."""
-
 SPRING_RATE = 0.05
 """Half width of the range in which the rate of a spring is found, over its nominal rate: all values are equally likely.
 
@@ -56,17 +54,11 @@ Assumed for custom springs, helical and torsion: EN 15800 (which replaced DIN 20
 coiled springs in grade 2, the usual one, tolerances of this size; it is written for compression springs. Stock springs
 are wider: Lee Spring states 10 % of the rate.
 """
-
 PROCESS_BY_PLASTIC = {"pla": "fdm", "abs": "fdm", "petg": "fdm", "pa12-sls": "sls", "pa12-mjf": "sls"}
 MIN_METAL_MODULUS = 20e9
 """Young's modulus above which a material is taken for a metal [Pa]: no plastic reaches it, no metal is as soft."""
-
-
-POWDER_MATERIALS = ("pa12-sls", "pa12-mjf")
-"""Materials whose values are those of sintered powder."""
-
-RUBBER_MATERIALS = ("tpu-95a",)
-"""Materials that yield to a cutter."""
+POWDER_MATERIALS = ("pa12-sls", "pa12-mjf")  # materials whose values are those of sintered powder
+RUBBER_MATERIALS = ("tpu-95a",)  # materials that yield to a cutter
 
 
 def why_not_made(process: str, material: str | None, youngs_modulus: float) -> str:

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 System = Literal["metric", "inch"]
 Kind = Literal["sheet", "wire", "pin", "dowel", "bearing", "screw"]
 
-SIZE_RTOL = 1e-6
-"""A size that is so near to one of a series is that one: inches are written in millimetres."""
-
+SIZE_RTOL = 1e-6  # a size that is so near to one of a series is that one: inches are written in millimetres
 KIND_WORDS: Mapping[Kind, str] = {
     "sheet": "sheet that is {} thick",
     "wire": "wire of {}",
@@ -79,7 +77,6 @@ class Bearing:
 
 BOLTS_LIBRARY = "BOLTS parts library (boltsparts/BOLTS_archive, data/bearings.blt, and its tables of release 0.3)"
 FASTENER_TABLES = "data of the FreeCAD Fasteners workbench (shaise/FreeCAD_FastenersWB, FsData)"
-
 BALL_BEARINGS = tuple(
     Bearing(name, *_mm(bore, outer, width))
     for name, bore, outer, width in (
@@ -128,12 +125,9 @@ SOCKET_SCREWS = tuple(
     )
 )  # fmt: skip
 """ISO 4762 heads and ISO 273 medium holes."""
-
 SCREW_LENGTHS = _mm(2.5, 3, 4, 5, 6, 8, 10, 12, 14, 16, *range(20, 81, 5), *range(100, 161, 10))
 """ISO 4762 [data of the FreeCAD Fasteners workbench, iso4762def.csv]."""
-
 MARKET_SOURCE = "sellers' list"
-
 ALL_SERIES = (
     StockSeries("sheet", "metric", MARKET_SOURCE,
            "aluminiumplatesupplier.com, how to choose aluminum plate thickness (6061)",

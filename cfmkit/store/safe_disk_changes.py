@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     Data = bytes | bytearray | memoryview | Iterable[bytes]
 
 
-system = os
-"""Every change to the disk goes through this name, so that tests can make each one fail."""
+system = os  # every change to the disk goes through this name, so that tests can make each one fail
 
 TEMPORARY_NAME = ".cfmkit-{pid}-{count}.tmp"
 _counter = itertools.count()

@@ -15,10 +15,7 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.results import Result
 
-PLAIN_FRICTION = 0.15
-"""Coefficient of pins and guide, assumed: dry steel on steel has 0.1 to 0.2."""
-
-
+PLAIN_FRICTION = 0.15  # coefficient of pins and guide, assumed: dry steel on steel has 0.1 to 0.2
 JOINT_NAMES = {"pins": "pins", "bearings": "plain bearings of the rollers", "guide": "guide"}
 """Names of what rubs, by its block of the mechanism."""
 

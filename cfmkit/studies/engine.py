@@ -37,17 +37,13 @@ if TYPE_CHECKING:
     from cfmkit.studies.point_evaluation import Study
     from cfmkit.studies.serial_and_cluster_executors import Executor
 
-TARGET_JOB_COUNT = 64
-"""Blocks that a study is cut into unless they become too large, or too small."""
-
+TARGET_JOB_COUNT = 64  # blocks that a study is cut into unless they become too large, or too small
 MAX_POINTS_PER_TASK, MIN_TASKS = 512, 12
 """Points that small blocks are computed together up to; of traced models, where that leaves a dozen processes some.
 
 A made cam takes a quarter less time in 512 at a time than in 128.
 """
-
-ROW_MISSING, ROW_IN_MEMORY, ROW_IN_JOURNAL = 0, 1, 2
-"""Where a row is: nowhere yet, in memory, in the journal."""
+ROW_MISSING, ROW_IN_MEMORY, ROW_IN_JOURNAL = 0, 1, 2  # where a row is: nowhere yet, in memory, in the journal
 
 
 @dataclass(frozen=True)

@@ -33,18 +33,12 @@ if TYPE_CHECKING:
     from cfmkit.stock.processes import ProcessAccuracy
     from cfmkit.stock.stock_series import StockSeries
 
-MAX_SHEETS = 4
-"""Sheets for which a design is tried, the nearest first: farther ones would be another mechanism."""
-
+MAX_SHEETS = 4  # sheets for which a design is tried, the nearest first: farther ones would be another mechanism
 SHARE_OF_DEVIATION = 0.1
 """Largest unit of the last digit over the standard deviation of the process: the error is at most 5 % of it."""
-
-MOST_CHANGE = 0.05
-"""Change of the mean force with which a design of whole strands still counts as the same design."""
-
+MOST_CHANGE = 0.05  # change of the mean force with which a design of whole strands still counts as the same design
 FINER_DIGITS = 4
 """Decimals by which the digits are refined where a rounded design misses a requirement that it met: to a nanometre."""
-
 NOT_CHOSEN = ("wound", "bought", "catalogue", "free", "tolerances", "material")
 """Blocks whose sizes are those of a maker, or limits that are stated."""
 

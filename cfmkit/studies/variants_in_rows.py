@@ -34,11 +34,8 @@ if TYPE_CHECKING:
     ByBranch = Mapping[str, FloatArray]
 
 
-BLOCK_SIZE = 4096
-"""Points that are evaluated and noted together."""
-
-_OF_WINDOWS = ("analysis.window", "requirements")
-"""Where specifications state windows."""
+BLOCK_SIZE = 4096  # points that are evaluated and noted together
+_OF_WINDOWS = ("analysis.window", "requirements")  # where specifications state windows
 
 
 class SolvedVariants:

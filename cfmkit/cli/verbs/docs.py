@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 HELP_POSITION = 62
 HELP_EXAMPLE = "cfmkit docs --search creep"
-MAX_SECTIONS = 12
-"""Most sections that a search prints; ``--json`` has all."""
+MAX_SECTIONS = 12  # most sections that a search prints; ``--json`` has all
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,11 +14,8 @@ if TYPE_CHECKING:
 
 HELP_POSITION = 52
 HELP_EXAMPLE = "cfmkit examples cam"
-
 ALL_EXAMPLES = "all"
-QUICK_EXAMPLES = "quick"
-"""All but those that search for a shape."""
-
+QUICK_EXAMPLES = "quick"  # all but those that search for a shape
 DURATION_TEXT = (
     "{quick} examples take some seconds each, the last {long} search for shapes for many minutes; "
     "`cfmkit examples --run quick` leaves those out"

@@ -32,15 +32,11 @@ if TYPE_CHECKING:
 
 HELP_POSITION = 5
 HELP_EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --envelope 100x100x20mm"
-
 DEFAULT_BUDGET = "3min"
-
 FIGURES_RESERVE, WRITING_RESERVE = 4.0, 1.0
 """Before the end of the time budget no more figures are begun [s], those of one proposal take about two; and nothing
 but what was found is written."""
-
-WRITING_SHARE = 0.1
-"""Share of the time budget that is kept for files."""
+WRITING_SHARE = 0.1  # share of the time budget that is kept for files
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,11 +83,8 @@ class SuggestOptions(RequestOptions):
 
 REQUEST_KEYS = tuple(one.name for one in fields(RequestOptions) if one not in fields(Common))
 """Options that are keys of a request."""
-
 LIST_KEYS = ("material", "adjustable", "prefer")
-
-BAND_KEYS = ("force", "torque")
-"""Keys that are a list where two values are given."""
+BAND_KEYS = ("force", "torque")  # keys that are a list where two values are given
 
 
 def run(options: SuggestOptions, terminal: Terminal) -> Document:

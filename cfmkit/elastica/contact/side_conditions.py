@@ -50,8 +50,6 @@ NEW_PLACE = 1e-4  # of a beam from its end, or from another place, at which a co
 ROUNDING_OF_KIND = {"touch": 1e-11, "tangent": 1e-11, "end": 0.0, "closes": 0.0, "spreads": 1e-9, "pinch": 0.0,
              "wraps": 1e-9, "pulls": 1e-9}  # fmt: skip
 """By how much each kind of condition may be negative."""
-
-
 PAD_OF_SIDE: dict[type, Any] = {BeamOnObstacle: NodeOnObstacle, BeamOnBeam: NodeOnBeam}
 """Contacts of the node at the end of a beam with what its side may touch, too."""
 

@@ -51,8 +51,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
 
 NO_NUMBERS = read_only([])
-N_COMPARED = 7
-"""As in compare.c."""
+N_COMPARED = 7  # as in compare.c
 OF_ELEMENTS = tuple(
     name for name in BeamElements._fields if name in ADDRESS_FIELDS and name not in ("ends", "unknowns")
 )

@@ -19,9 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.numbering import Numbering
 
-WITHOUT_C_VARIABLE = "CFMKIT_WITHOUT_C"
-"""Environment variable that keeps everything in numpy, whatever its value."""
-
+WITHOUT_C_VARIABLE = "CFMKIT_WITHOUT_C"  # environment variable that keeps everything in numpy, whatever its value
 COUNT_FIELDS = (
     "elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows", "contacts", "presses",
     "sides", "moved", "coefficients",
@@ -34,8 +32,7 @@ ADDRESS_FIELDS = (
     "unit_bend",
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
-MAX_DEGREE = 40
-"""As in march.h: arrays of one element are on the stack."""
+MAX_DEGREE = 40  # as in march.h: arrays of one element are on the stack
 N_SIDE_COLUMNS, N_LAW = 13, 3
 """Columns of `side_at`; numbers of an element that moves, before the coefficients of its angle: as in march.h."""
 

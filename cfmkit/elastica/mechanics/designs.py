@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network
 
 TABLE_NAMES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap")
-
 NO_OFFSET = (0.0, 0.0)
 CURLING_TABLES = ("rest", "curl", "hindrance")  # of wide strips
 

@@ -49,8 +49,7 @@ FLOOR_UNDER_MOTION = 3e-12
 """1/EA [L^2/EI] of a straight beam that does not stretch: at rest nothing else determines the force along it."""
 FLOOR_UNDER_LOADS = 1e-3 * FLOOR_UNDER_MOTION
 """The same where loads drive: they reach 1e3 times the force that a motion causes before it is noticed."""
-FRAME_OF_DRIVE = 3
-"""Frame of a node that is held nowhere in `driven`: that of the drive, along whose x it moves."""
+FRAME_OF_DRIVE = 3  # frame of a node that is held nowhere in `driven`: that of the drive, along whose x it moves
 
 
 class BeamElements(NamedTuple):

@@ -36,9 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.families.beam.spec import BeamSpec
 
-ROWS_TOGETHER = 64
-"""Mechanisms that are looked at together: their unknowns at 200 points take 20 MB."""
-
+ROWS_TOGETHER = 64  # mechanisms that are looked at together: their unknowns at 200 points take 20 MB
 ROW_COLUMNS = {name: each_quantity(quantity) for name, quantity in SCALAR_QUANTITIES.items()} | {
     split_name(name)[0]: ScalarQuantity[SeveralSolutions[Solution]](*about, lambda _: np.nan)
     for name, about in (OF_SURFACES | OF_CONTACTS).items()

@@ -30,14 +30,10 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
 
-RANGE_BAND = 0.05
-"""Largest difference of the force from F_d in the range, as a share of F_d [Lan, sec. 2]."""
-
+RANGE_BAND = 0.05  # largest difference of the force from F_d in the range, as a share of F_d [Lan, sec. 2].
 MAX_REFINEMENTS = 4
 """Most equilibria solved to refine one place; Lan's mechanism (`configs/beam_lan2010.yaml`) needs three."""
-
 PLACE_RTOL = 1e-11  # share of the travel: a place that moves by less is refined enough
-
 EXTREME_STENCIL = 0.1 * np.arange(-2.0, 3.0)
 """Where equilibria are solved around an extreme, as shares of the step of the curve: wide enough that the solver's
 error does not move the extreme, and close enough that a polynomial of degree four through them does not either."""

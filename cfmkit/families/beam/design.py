@@ -45,14 +45,11 @@ def design(spec: BeamSpec, run: Run) -> Design:
     return Design(None, Status.INVALID, "this spec has no 'design' block: add 'rescale' or 'optimise'")
 
 
-FORCE_EXPONENTS = {"width": 1.0, "thickness": 3.0, "size": -2.0}
-"""How the force goes with what may be free, by Eq. 6."""
-
+FORCE_EXPONENTS = {"width": 1.0, "thickness": 3.0, "size": -2.0}  # how the force goes with what may be free, by Eq. 6.
 FORCE_RTOL = 1e-9
 MAX_ROUNDS = 12
 """Of corrections, of which `configs/beam_rescaled.yaml` needs two; of travels, each a quarter longer: the last is 14.6
 times the first."""
-
 TRAVEL_STEP = 1e-5  # travel that follows from the stress is rounded down to whole hundredths of a millimetre [m]
 
 

@@ -29,20 +29,15 @@ if TYPE_CHECKING:
 
 PAD_DEPTH = 4.0  # depth of a pad behind the end of a beam, in thicknesses
 EYE_RADIUS, HOLE_RADIUS = 2.5, 1.2  # radii of the eye and of the hole at a pinned support, in thicknesses
-
 STANDING_DISTANCE = 1e-4
 """A beam whose end is nearer to its node than this ends at it [thicknesses]: the two then differ by rounding only."""
-
 CONTINUATION_ANGLE = 1e-6  # a beam that turns by less than this continues another one [rad]
 MIN_PAD_SHARE = 0.1  # a pad is left out if less than this share of it lies behind all beams that end there
-
 SQUARE_SINE = 0.1
 """Sine of the angle between a beam and a section at a bend below which the section is that across the beam."""
-
 SECTION_LENGTH_FACTOR = 1.02
 """Length of sections at bends, in what straight beams have there: edges of curved ones are a little off. Beyond the
 edge a section has no nodes."""
-
 _N_CIRCLE_CORNERS = 64  # a polygon with so many lies within its circle by at most 0.12 % of the radius
 
 

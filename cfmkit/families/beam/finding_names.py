@@ -48,5 +48,4 @@ BEAM_FINDINGS = {
     "side_in_obstacle": "the side of a beam that is not in `beams` passes through an obstacle",
 }
 
-finding = Finder(BEAM_FINDINGS)
-"""Return a finding of this family; the name must be one that `BEAM_FINDINGS` explains."""
+finding = Finder(BEAM_FINDINGS)  # return a finding of this family; the name must be one that `BEAM_FINDINGS` explains

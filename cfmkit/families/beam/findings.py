@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 
 LENGTH_RTOL = 1e-9  # share of a length: gaps, movements and errors of a thickness below it are rounding
-
 SLENDERNESS_LIMIT = 10.0
 """Length over thickness at which shear makes a beam between two guided ends 3 % softer, 2.6/(5/6) (t/l)^2."""
 
@@ -394,7 +393,6 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     ),
 )
 """Of all mechanisms, in the order in which they are shown."""
-
 LAST_RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule(
         "wide_beam",

@@ -26,15 +26,11 @@ if TYPE_CHECKING:
 
 N_EXTREME_ROUNDS = 4
 """Extremes are solved for, and looked for again with what was found: the last moves them by less than 1e-9."""
-
 CANDIDATE_SHARE, MIN_RISE_SHARE = 0.05, 1e-10
 """Shares of a row's range: how much too low the first cubic may be, and what a later one is to add to count."""
-
 MAX_MEDIAN_RATIO = 1e6
 """Values so many times as large as the middle one are in no cubic: a straight beam is nearly rigid lengthwise."""
-
 PLACE_RTOL = 1e-12  # share of the largest place within which two places are one
-
 WINDOW_SLACK = 1e-9
 """Share of the range of motion by which the ends of a window, where they were looked for, may be beside it."""
 

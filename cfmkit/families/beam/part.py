@@ -50,16 +50,12 @@ if TYPE_CHECKING:
 OUTLINE_TOLERANCE = 2e-4
 """How far outlines may be from the exact ones unless somebody states another value, in thicknesses of the thinnest
 beam: both edges together change its bending stiffness by 1.2e-3 at most."""
-
 MIN_FILLET_RATIO = 1e-4  # fillets smaller than this are not drawn, in thicknesses of the thinnest beam
 N_SWEPT = 25  # poses at which what moves must be clear of the frame: in between beams go by less than their thickness
-
 N_POSES = 13
 """Poses that a box counts: between two of them, a twelfth of the travel apart, beams bulge by next to nothing."""
-
 BOX_TOLERANCE = 5e-5  # tolerance of the outline of a box: it is wanted to a tenth of a millimetre [m]
 POLYGON_TOLERANCE_SHARE = 0.2  # part of the tolerance that polygons of eyes may be off
-
 POINT_TOLERANCE_FACTOR = 5.0
 """How far lines between the points of a beam may be from its edges, in tolerances: edges are cubics between the points,
 which are nearer by the square of that again."""

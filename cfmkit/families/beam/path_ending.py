@@ -127,7 +127,6 @@ def in_units(assembly: Assembly, text: str) -> str:
 
 
 EXTENSIBLE_OPTION = "analysis.fidelity=extensible"
-
 _PARALLEL_RTOL = 1e-9  # of its length a beam may leave the line of the drive: angles are read in degrees and rounded
 
 

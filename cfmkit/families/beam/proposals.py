@@ -44,34 +44,20 @@ if TYPE_CHECKING:
 
 SHAPE_FILES = ("lan-2010", "lan-flat", "lan-wide", "lan-tall", "arch", "end-effector-leg")
 """Files of `shapes`: each a complete specification, as the papers or the shape search have it."""
-
 RELATIVE_SIZES = (1.0, 0.96, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
 """Sizes that are tried, over the largest that fits the envelope with the pads scaled, too, which they are not."""
-
-ROUNDED_BOX = 1.0 - 2e-4
-"""Share of the envelope that the largest takes: its lengths are rounded."""
-
-BENDING_STRESS_SHARE = 0.95
-"""Share of the allowable stress by bending alone: what stretching adds is judged afterwards."""
-
+ROUNDED_BOX = 1.0 - 2e-4  # share of the envelope that the largest takes: its lengths are rounded
+BENDING_STRESS_SHARE = 0.95  # share of the allowable stress by bending alone: what stretching adds is judged afterwards
 RIPPLE_SHARES = (0.95, 1.02)
 """Shares of the ripple required that the scaled curve may have: the second where no window has the first."""
-
 DEPTH_SHARE = 0.99
 """Width over the depth that may seem to be needed: stretch and shear make beams softer or stiffer by a per cent."""
-
 MAX_THICKNESS_RATIOS = (1.15, 1.0)
 """Largest thicknesses over that of the shape at the same size: thicker beams would touch, and hardly bend as lines do;
 of its own thickness a shape keeps its curve to the last digit, and its pads their share of the envelope."""
-
-MIN_WIDTH_RATIO = 1.0
-"""Least width of a beam over its thickness: narrower ones leave the plane."""
-
+MIN_WIDTH_RATIO = 1.0  # least width of a beam over its thickness: narrower ones leave the plane
 MAX_PROPOSALS = 24
-
-WIDE_LAST = 100.0
-"""Promise of shapes whose beams are too wide to curl: they come after all others."""
-
+WIDE_LAST = 100.0  # promise of shapes whose beams are too wide to curl: they come after all others
 SAYS_LESS = 1e3
 """Times by which a shape that cannot travel so far misses more: the reason is that of one that can, if there is any."""
 

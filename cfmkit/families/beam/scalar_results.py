@@ -374,10 +374,8 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     ),
 }
 """Every scalar result of the family, in the order in which they are shown."""
-
 SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()} | OF_CONTACTS
 """Name -> dimension and definition."""
-
 EXTREME_METRICS = ("peak_displacement", "peak_force", "valley_displacement", "valley_force")
 RANGE_METRICS = tuple(SCALAR_QUANTITIES)[: tuple(SCALAR_QUANTITIES).index("allowable_stress")]
 """Those that the curve of any model has."""

@@ -23,7 +23,6 @@ Point = tuple[Length, Length]
 _CLOSING_RTOL = 1e-9  # of the length; the engine cannot fit what is shorter
 # 20 places of the quadrature on each panel, of a turn below a radian on the average
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(20)
-
 CLOSED_SHAPE_MESSAGE = "the shape returns to its start: it cannot be fitted"
 
 

@@ -124,8 +124,6 @@ def largest(function: Callable[[FloatArray], FloatArray], places: FloatArray) ->
 
 
 _N_ZOOMS, _PLACES_PER_ZOOM = 5, 65  # each makes the places 32 times as dense
-
-
 TIP_DEFINITIONS = {
     "tip_force_min": ("force", "smallest axial force of the tip along the surface"),
     "tip_force_max": ("force", "largest axial force of the tip along the surface"),
@@ -140,7 +138,6 @@ TIP_DEFINITIONS = {
         "factor", "allowable stress over the largest stress along the surface; 1 or more is within the limit"
     ),
 }  # fmt: skip
-
 _TRAVEL_SLACK = 1e-12  # of the travel: a surface may reach exactly to its ends
 _NO_FORCE = 1e-9  # of the largest force: less is none
 

@@ -52,10 +52,7 @@ if TYPE_CHECKING:
 
 MAX_SAMPLES_AT_ONCE = 125_000
 """Points that are worked on together: few enough to stay in a processor's cache, 260 curves of 481 points."""
-
-MIN_SHARED_CAMS = 8
-"""Mechanisms around one cam from which on they are worth a solution of their own."""
-
+MIN_SHARED_CAMS = 8  # mechanisms around one cam from which on they are worth a solution of their own
 BESIDE_THE_CAM = re.compile(
     r"mechanism\.(rolling_friction|springs\.(stiffness|count)(\.\d+)?|masses\.(slider|brace|roller)|contact\.width)"
     r"|design\.force"

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 
-YIELD_PRESSURE = 1.67
-"""Pressure at which a line contact first yields, over the yield strength [J, eq. 6.4]."""
+YIELD_PRESSURE = 1.67  # pressure at which a line contact first yields, over the yield strength [J, eq. 6.4].
 
 
 def pressure(

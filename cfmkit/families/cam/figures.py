@@ -52,10 +52,8 @@ if TYPE_CHECKING:
 
 
 TRAVEL_SCALE = Scale("displacement", "length")
-
 MOST_RADIUS = 100.0
 """Times the brace's length: a path with a larger radius of curvature is straight, and is left out of its picture."""
-
 STACK_BELOW = 0.5
 """Flat mechanisms, less high than this fraction of their width, are drawn below each other, not side by side."""
 

@@ -68,12 +68,10 @@ CAM_FINDINGS = {
     "no_spring_fits": "no spring of the catalogue meets the limits",
 }
 
-finding = Finder(CAM_FINDINGS)
-"""Return a finding of this family; the name must be one that `CAM_FINDINGS` explains."""
+finding = Finder(CAM_FINDINGS)  # return a finding of this family; the name must be one that `CAM_FINDINGS` explains
 
 
 LIMIT_RTOL = 1e-9  # a value that exceeds its limit by this share is on it: conversions of units and sums leave less
-
 LENGTH_TOL = 1e-12
 """Springs shorter than at rest by less [m] are at rest: rounding of half widths of decimetres is smaller."""
 

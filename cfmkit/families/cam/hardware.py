@@ -61,10 +61,8 @@ if TYPE_CHECKING:
     from cfmkit.stock.stock_series import Bearing, Screw, System
 
 BEARING_IN_ROLLER = 0.9  # outside diameter of a bearing over that of the roller around it, at most
-
 SHAFT_IN_ROLLER = 0.7
 """Diameter of a plain shaft over that of the roller around it, and of the pin over the slider's side, at most."""
-
 MAX_BAR_WIDTH = 1.0
 """Width of a bar for springs over half of the rollers' distance at the start, at most: two of them stand in it."""
 

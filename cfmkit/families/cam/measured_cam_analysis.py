@@ -71,10 +71,8 @@ if TYPE_CHECKING:
 
 
 MAX_HEIGHT_DEVIATION = 0.01  # points are those of another part if they are off the design by this part of their height
-
 WIDTH_CERTAIN = 5.0
 """An error of width is taken out of the points only if it is larger than this many of its standard deviations."""
-
 WIDTH_EXPLAINS = 0.6
 """It must also leave less than this part of the variance that the points' errors have if it is not taken out."""
 

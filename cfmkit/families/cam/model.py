@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 
 STROKE_RTOL = 1e-13
 """Rounding of the travel to the end of a flank that is cut for a stroke: mechanisms side by side have one travel."""
-
 UNEQUAL_SIDES_MESSAGE = (
     "the quasi-static model is symmetric and would give the force of two right sides: add 'analysis.dynamics' with a "
     "slow motion, or accept that with analysis.fidelity: quasi-static"

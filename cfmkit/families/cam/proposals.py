@@ -39,45 +39,27 @@ if TYPE_CHECKING:
 
 ROLLING_FRICTION = 0.002
 """Rolling resistance over roller radius: what [SS] measured on steel rollers; assumed for every material."""
-
 SLIDING_FRICTION = 0.1
 """Friction of the plain slider pin, of the springs' hooks and of the guide where none is stated and hysteresis is
 required: greased steel; assumed."""
-
 PIN_SHARE = 0.25
 """Diameter of the slider pin and of the pins that springs hook on, over that of a roller, at least: assumed."""
-
 PULL_MARGIN, CONTACT_MARGIN = 1.1, 1.1
 """On the pull of a brace, and on the force between roller and cam: friction adds to them."""
-
-N_PROPORTIONS = 60_000
-"""Proportions that are looked at."""
-
-MAX_PROPOSALS = 16
-"""Designs that are worth trying."""
-
+N_PROPORTIONS = 60_000  # proportions that are looked at
+MAX_PROPOSALS = 16  # designs that are worth trying
 TAB_HEIGHT_RATIO, TOP_MARGIN_RATIO, MAX_HOLE_DIAMETER = 0.06, 0.02, 0.0066
 """Height of the plate's tab and of its margin above the flanks over that of the envelope; largest fixing hole [m]."""
-
-PLATE_MIN = 0.002
-"""Thinnest plate [m]."""
-
-ROLLER_MIN = 0.0015
-"""Smallest radius of a roller [m]: that of the smallest usual ball bearings."""
-
-THINNEST_SHAFT = 0.001
-"""Of a roller [m]: the thinnest pin that is used."""
-
+PLATE_MIN = 0.002  # thinnest plate [m]
+ROLLER_MIN = 0.0015  # smallest radius of a roller [m]: that of the smallest usual ball bearings
+THINNEST_SHAFT = 0.001  # of a roller [m]: the thinnest pin that is used
 SHAFT_ARM = 0.004
 """About how far from the braces a roller presses on its shaft [m]: half of a plate of 5 mm and of a brace."""
-
 SPRING_COUNTS = (2, 4, 6, 8, 12, 20, 40)
 """Numbers of springs that are tried: an odd one would pull on one side of the plate."""
-
 SPARE_SHARE, SPARE_LENGTH = 0.03, 0.3e-3
 """Of the travel, and [m]: beyond the window where made parts have to be good; holes that lie 0.05 mm off move the end
 of the travel by a few times as much."""
-
 RESERVE_SHARES, FLAT_RESERVE = 0.97, 0.9
 """Shares of envelope and ripple that closed forms may use: they leave out the plate's margins, and friction squared."""
 

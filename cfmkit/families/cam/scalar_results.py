@@ -79,7 +79,6 @@ BUILT_DEFINITIONS = {
         "friction",
     ),
 }
-
 FRICTION_KINDS = {
     "rolling": "rolling on the cam dissipates",
     "bearings": "the rollers' bearings dissipate",
@@ -87,7 +86,6 @@ FRICTION_KINDS = {
     "guide": "the slider's guide dissipates",
 }
 """Of friction, and what each does."""
-
 SCALAR_DEFINITIONS = {
     "force_constant": ("length", "A of the cut profile; the force is 4 K A [SS, eq. 1]"),
     "spring_stiffness": ("stiffness", "K, the sum of all parallel springs"),
@@ -376,7 +374,6 @@ _SCALAR_FUNCTIONS: dict[str, tuple[Callable[[Solution], Any], Callable[[Solution
     "manufacturing_force_share": (_deviations(0.5), lambda one: one.band is not None),
     "manufacturing_force_share_95": (_deviations(0.95), lambda one: one.band is not None),
 }
-
 SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **{
         name: ScalarQuantity(*SCALAR_DEFINITIONS[name], function, "", applies)
@@ -385,7 +382,6 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **{name: quantity_of_each(name, about, _wires) for name, about in WIRE_DEFINITIONS.items()},
 }
 """Every scalar result of a quasi-static cam as designed, in the order in which they are shown."""
-
 ROW_COLUMNS: Mapping[str, ScalarQuantity[Solution]] = {
     **SCALAR_QUANTITIES,
     **columns_of_absent_values({n: about for n, about in SCALAR_DEFINITIONS.items() if n not in SCALAR_QUANTITIES}),

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 FEW_SAMPLES = 100
 """Of fewer samples than these all are looked at for jams; of more, only places between which a jam may begin."""
-
 ON_CORNER = np.linspace(0.0, 1.0, 34)[1:]
 """Shares of the travel on a corner next to which an extreme of the force is looked for: its end is a kink."""
 
@@ -414,10 +413,7 @@ def _clip_intervals(jams: tuple[tuple[float, float], ...], end: float) -> tuple[
     return tuple((max(low, 0.0), min(high, end)) for low, high in jams if low < end)
 
 
-BRANCH_DIRECTIONS = {"load": 1.0, "unload": -1.0}
-"""Up and down, by branch."""
-
-
+BRANCH_DIRECTIONS = {"load": 1.0, "unload": -1.0}  # up and down, by branch
 _TRAVEL_SHARES = np.concatenate(
     [np.geomspace(1e-14, 1e-4, 51), np.linspace(0.0, 1.0, 181) ** 2, 1.0 - np.geomspace(1e-9, 0.03, 24)]
 )
@@ -427,7 +423,6 @@ With friction it rises from zero to its constant value within nanometres: nodes 
 there, at even steps of the springs' stretch beyond, and close together before the end, where a brace may come near
 horizontal.
 """
-
 _SORTED_SHARES = np.sort(_TRAVEL_SHARES)
 _ON_CORNER = np.concatenate([np.geomspace(1e-9, 0.02, 30), np.linspace(0.0, 1.0, 61)])
 """The same on a corner, where it rises within a tenth of a millimetre."""

@@ -49,9 +49,7 @@ if TYPE_CHECKING:
 
     Interval = tuple[float, float]
 
-STANDARD_GRAVITY = 9.80665
-"""Standard acceleration of gravity, exact by definition (3rd CGPM, 1901) [m/s^2]."""
-
+STANDARD_GRAVITY = 9.80665  # standard acceleration of gravity, exact by definition (3rd CGPM, 1901) [m/s^2]
 JAM_SHARES = np.sort(np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 40), 1.0 - np.geomspace(1e-6, 0.1, 20)]))
 """Where to look for a jam along a part of the track: mostly it is at the ends."""
 

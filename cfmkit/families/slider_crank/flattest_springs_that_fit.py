@@ -20,13 +20,10 @@ if TYPE_CHECKING:
 
 N_MOTION_PLACES = 91  # places of the motion that are looked at for the largest effort
 N_FITTED_PLACES = 49  # places of a window at which rates are fitted
-
 N_WINDOWS, N_NEIGHBOUR_WINDOWS = 21, 9
 """Windows of the whole motion that are compared; and of those between the neighbours of the best."""
-
 PIVOT_ENVELOPE_SHARES = (0.5, 0.3, 0.7)
 """Of the room for springs on both sides of the links, what the pivot's has: the others are on the other side."""
-
 TRAVEL_RTOL = 1e-9  # travels below this share of the slider's travel count as zero
 RATE_SHARE = 0.98  # share of the largest rate that is used: coils and turns are rounded
 

@@ -48,58 +48,34 @@ PUSHED_PROPORTIONS = (
     Proportions(2.4, 1.1, 0.43, 0.6),
 )
 """For a force at the slider: the published lengths, and two linkages beside them, shorter and longer."""
-
 START_SHARES = (0.04, 0.1)
 """Where the travel begins, over its length: before that the force of an elastic part comes up from zero."""
-
 EARLIEST_START, LATE_START = 0.026, 0.35
 """The same of a travel nearly as long as the reach of the linkage, and of flexures, whose force is level later."""
-
-RELATIVE_SIZES = (1.0, 0.8, 0.6, 0.42, 0.3)
-"""Sizes that are tried, over the largest that the envelope allows."""
-
+RELATIVE_SIZES = (1.0, 0.8, 0.6, 0.42, 0.3)  # sizes that are tried, over the largest that the envelope allows
 FULL_PADS = 0.054
 """Crank from which on the pads of a printed part are as large as usual [m], that of Bilancia, Geraci, Berselli 2019;
 those of smaller parts are smaller in proportion."""
-
 ROUNDED_BOX = 1.0 - 1e-4
 """Share of the envelope that the largest part takes: sizes are rounded, and its outline is known to a few digits."""
-
 PAIR_GAP = (0.1, 4e-3)
 """Between the parts of a mirrored pair: a share of one's height, and a length [m], as they are drawn."""
-
 MAX_WIDTH_RATIO = 3.0
 """So much wider than there is room for a part may seem: the estimate is of one proportion and one run-in."""
-
-PROBABLY_TOO_WIDE = 1.3
-"""From so much on it comes after all parts that are not, with whatever reserve of strength."""
-
-FLEXURES_WIDER = 8.0
-"""About how much wider than a strip flexures of a tenth of its free length have to be."""
-
+PROBABLY_TOO_WIDE = 1.3  # from so much on it comes after all parts that are not, with whatever reserve of strength
+FLEXURES_WIDER = 8.0  # about how much wider than a strip flexures of a tenth of its free length have to be
 N_STRIP_NODES = 9
 """Thicknesses of a tapered strip: over nearly all of the reach five vary by 2.4 %, nine by 1.7 % in a third more time,
 13 by 1.0 % in four times as much."""
-
-SLOW_PROMISE = 10.0
-"""Promise of what takes seconds to design, where everything else takes a part of one."""
-
-FLEXURE_LENGTH_RATIO = 0.2
-"""Length of a flexure, over the crank's length, as in Bilancia, Geraci, Berselli 2019."""
-
+SLOW_PROMISE = 10.0  # promise of what takes seconds to design, where everything else takes a part of one
+FLEXURE_LENGTH_RATIO = 0.2  # length of a flexure, over the crank's length, as in Bilancia, Geraci, Berselli 2019
 MAX_THICKNESS_RATIOS, THICKEST_TAPERED = 0.1, 0.05
 """Largest thickness of a strip, and of a tapered one, over the crank's length: thicker ones hardly bend as lines do."""
-
 MAX_PROPOSALS = 24
-
 MODULE_NAME = "cfmkit.families.slider_crank.proposals"
 PART_FUNCTION, CORRECTION_FUNCTION = f"{MODULE_NAME}:part", f"{MODULE_NAME}:correct"
 """What finishes the parts of one piece, and what corrects them by their solids."""
-
-TRAVEL_EXTENSION = 1.1
-"""How far a solid is followed, over its travel, to look for a flatter window."""
-
-
+TRAVEL_EXTENSION = 1.1  # how far a solid is followed, over its travel, to look for a flatter window
 FOLLOWED_TRAVEL_RATIO = 1.02
 """Travel up to which parts of one piece are followed, over the reach of their proportions: nothing ends there."""
 

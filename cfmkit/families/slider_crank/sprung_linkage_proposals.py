@@ -74,33 +74,24 @@ TORQUE_PROPORTIONS = (
 )
 """For a torque: crank, coupler, offset (over the crank's length) and unloaded angle [deg]; first Li and Hao 2019. The
 last three are the flattest of some thousands of random linkages over 40 to 90 deg: their springs are wound up first."""
-
 WOUND_UP = -math.radians(60.0)
 """Unloaded angle below which the torque is constant behind the stretched position, not around it [rad]."""
-
 RELATIVE_SIZES = (0.99, 0.8)
 """Sizes of linkages for a torque over the largest that fits the envelope; smaller ones leave room for wider springs."""
-
 MAX_TORQUE_RATIO = 4.0
 """Torque that springs can hold by the bound over the one required, above which more of it says nothing."""
-
 FLAT_DEVIATION_SHARE, MAX_DEVIATION_SHARE = 0.45, 0.25
 """Deviation over the ripple required that is flat enough: up to it springs for a torque are left out, and those for a
 force stay in the first window and the envelope; and the largest deviation that is worth a look."""
-
 MIN_TORQUE_SHARE = 0.9
 """Of the torque required: linkages whose springs hold less by the bound are not designed; it knows some places only."""
-
 LINK_SHARES = (1.0 / 12.0, 1.0 / 9.0, 1.0 / 7.0, 1.0 / 5.5, 1.0 / 4.5)
 """Thickness of links with springs at their pins over the depth required: three quarters to a third are left for the
 springs."""
-
 SLIDING_FRICTION = 0.1
 """Friction of plain pins and of a plain guide where none is stated: greased steel, or dry POM on steel; assumed."""
-
 PIN_IN_COIL = 0.9
 """Largest diameter of a pin over the inner one of a torsion spring around it, wound up: makers leave a tenth."""
-
 FINISH_FUNCTION = "cfmkit.families.slider_crank.sprung_linkage_proposals:finish"
 """What finishes linkages with springs at their pins."""
 

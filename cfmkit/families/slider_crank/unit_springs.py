@@ -157,7 +157,6 @@ class _SliderState:
 
 NEARLY_FOLDED = 0.99
 """Above this share of sin(psi/2) the knee angle is computed from its cosine, which keeps the digits next to pi."""
-
 NEAR_FOOT = 0.01  # below this share of the stretched position squared, x0 squared as a difference has lost digits
 
 

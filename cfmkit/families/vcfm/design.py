@@ -192,10 +192,8 @@ def write_sizes(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
 
 LENGTH_MARGIN = 1.01
 """Margin on the least width when a leaf length is proposed: the exact model changes widths by less than a percent."""
-
 LENGTH_STEP, MOST_STEPS = 1.002, 10_000
 """Factor from one leaf length to the next until leaves are wide enough, and the most lengths tried."""
-
 ENVELOPE_MARGIN = 1.02
 """Margin on an envelope that is proposed: the exact stress may lengthen the spring, and so widen it."""
 

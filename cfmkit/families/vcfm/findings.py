@@ -50,7 +50,6 @@ if TYPE_CHECKING:
 
 
 TRACED_MODELS = ("exact", "solid")  # models that follow leaves along their branches
-
 VCFM_FINDINGS = {
     "no_negative_stiffness": "the leaves are too thick for their rise: no negative stiffness anywhere",
     "no_linear_region": "the leaves do not buckle: their negative stiffness is not constant",
@@ -84,14 +83,11 @@ VCFM_FINDINGS = {
     "stress_unreachable": "no leaf length brings the exact stress below the allowable stress",
 }
 
-finding = Finder(VCFM_FINDINGS)
-"""Return a finding of this family; the name must be one that `VCFM_FINDINGS` explains."""
+finding = Finder(VCFM_FINDINGS)  # return a finding of this family; the name must be one that `VCFM_FINDINGS` explains
 
 MAX_WAVINESS_RATIO = 0.02  # waviness over thickness from which on the flatness suffers
-
 TURNING_LOAD_RATIO = POLE_LOAD / (4.0 * np.pi**2)
 """Load at which a leaf buckles whose shuttle can turn, over that with a shuttle that cannot; each in E I/L^2."""
-
 STIFFNESS_RTOL = 0.01  # stiffnesses that differ by less than this share cancel
 EXACT_FORM = 2e-4  # share of a stress that counts for nothing: designs are fitted to 1e-4
 

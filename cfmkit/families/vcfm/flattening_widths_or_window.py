@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 FLATNESS_SHARES = (0.998, 0.99, 0.97, 0.94, 0.9)
 """Shares of the flatness that are looked for where a window is proposed: by the samples of a curve, with a corner cut
 off, the whole must be kept."""
-
 MAX_WIDTH_FACTOR = 50.0  # factor on a width up to which one is looked for that makes the force flat
 
 

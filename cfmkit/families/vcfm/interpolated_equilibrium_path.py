@@ -25,37 +25,27 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Network, Path
 
 DOWN_ANGLE = -0.5 * np.pi
-
 GRID_SIZES = (127, 113)  # points requested first, to find the bifurcations; the second where the first leave a doubt
 BIFURCATION_DISTANCE = 0.02  # bifurcations closer than this share of the travel are looked at again
-
 PATH_TOLERANCES = (1e-9, 1e-7, 1e-6, 1e-5)
 """Of the path, relative to its largest force, which far beyond the flat pose is a thousand times the peak. Slender
 leaves that are pulled straight there do not reach the first: the next is taken."""
-
 COEFFICIENT_RTOL = 3e-8
 """Size of a panel's last coefficients, relative to the largest force so far, at which it has converged; where only a
 looser tolerance of the path was reached, or rounding of places leaves more, that: halving does not take it away."""
-
 PANEL_COUNTS, N_CORNER_PANELS = (4, 3, 5), 16
 """Panels of a piece at first, the next number where a path left its branch; and of one that may have corners."""
-
 BIFURCATION_CLEARANCE, PANEL_CLEARANCE = 5e-4, 0.05
 """Nodes keep this share of the travel away from a bifurcation, but no more than that share of their panel: the engine
 misses a branch of leaves just above the critical slenderness where a point is requested at 1e-4 of the travel behind
 its beginning. From 0.05 of a panel inside, the polynomial at its end makes 450 times the rounding, 1e-9 of the peak."""
-
 MAX_HALVINGS = 12  # at most so many: a corner left then is 1/16000 of its piece
-
-
 MIN_POINT_ANGLE = 1e-3
 """Least distance of points that the stress is interpolated between, in the angle that is pi for a piece [rad]."""
-
 NEGLIGIBLE_WAVINESS = 1e-7
 """Waviness, in parts of the travel, of leaves whose branch opens and closes again within so little that it is missed:
 with it they go round the corner. Just above the slenderness at which arches buckle, 1.0001 times that, their force is
 within 2e-6 of the peak of that of the unbuckled form."""
-
 PEAK_TRAVEL_SHARE = 0.25
 """Part of the travel within which the leaves have their peak, which is the scale of all before it."""
 

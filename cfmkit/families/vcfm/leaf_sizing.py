@@ -34,7 +34,6 @@ MIN_WIDTH_RATIO = 2.0  # least width of a leaf over its thickness: narrower ones
 SNAPPING_RISE_RATIO = 3.2  # rise over thickness below which leaves that buckle may do so with a jump
 FITTED_REGION_SHARE = 0.84  # part of the linear region over which the widths are fitted to the force
 N_RESCALES = 4  # two do for the shipped mechanisms
-
 MAX_ROUNDS = 40
 """Of iterations that end after five, since forces and stresses are powers of the sizes within a few per cent."""
 WIDTH_RTOL = 1e-6  # share of the width by which it may be off when sizes are found

@@ -51,11 +51,8 @@ if TYPE_CHECKING:
 
 RETURN_TRAVEL_RATIO = 1.5
 """How far back leaves are followed, over where the closed form has the shuttle at rest: their width is still open."""
-
 MAX_TRIED_SPRINGS = 12
 """Springs, the best by the closed forms first, whose leaves are sized by the exact model until some keep the stress."""
-
-
 PRELOAD_RTOL = 0.01
 """Preloads stated for other springs are reported beyond this: a force that is that far off shows [1]."""
 

@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 MOST_BACK = 20
 """The way from the rest position to the unloaded position has at most so many times the points of the travel: a travel
 of some nanometres would take them by the billion."""
-
 MAX_SAMPLES = 60_000  # samples that are worked on together: few enough to stay in a processor's cache
 
 

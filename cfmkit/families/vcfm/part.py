@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 N_POSES = 9
 """Travels of each preload that a box counts: rigid parts move linearly, leaves bulge less than a wall is thick."""
-
 N_WINDINGS = 8  # turns of a bought spring as they are drawn
 
 Point = tuple[float, float]

@@ -266,10 +266,8 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **{name: quantity_of_each(name, about, _wires) for name, about in WIRE_DEFINITIONS.items()},
 }
 """Every scalar result of the family, in the order in which they are shown."""
-
 ROW_COLUMNS = columns_of_absent_values(OF_STOPS) | dict(SCALAR_QUANTITIES)
 """What studies may ask of rows; a mechanism with stops is solved by itself."""
-
 SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()} | OF_STOPS
 """Name -> dimension and definition."""
 

@@ -36,18 +36,12 @@ if TYPE_CHECKING:
     Ends = tuple[FloatArray, FloatArray]
 
 
-FLAT_PLACES = 401
-"""Even places of a constant-force window over which its mean is taken."""
-
-MEAN_PLACES = 201
-"""Even places of the window at which the forces of all preloads are averaged."""
-
+FLAT_PLACES = 401  # even places of a constant-force window over which its mean is taken
+MEAN_PLACES = 201  # even places of the window at which the forces of all preloads are averaged
 LIMIT_RTOL = 1e-9
 """A force or a travel beyond its limit by this share is on it: conversions of units and sums leave less."""
-
 N_EVEN_PLACES = 257
 """Places at even steps: the force beyond the peak is smooth, and the leaves' law has no shorter waves."""
-
 CROWDED_SHARES = np.geomspace(1e-6, 1.0, 73)
 """Shares of the travel, and of the way from an end of the constant stiffness, at which more places stand."""
 

@@ -40,8 +40,7 @@ RIGID_CLUSTERS, NEARLY_RIGID = (0.5, 2.0, 8.0, 32.0), 1e-6
 NEAR_SHARE = 1e-3  # of the way to the first of them: the other modes of a slender column are not together with it
 ON_PATH = 1e-3  # motion by which an equilibrium may be off the path's secant just before a bifurcation
 LOOK_PAST_FROM = 2e-3  # share of the range behind here where a slope is taken
-LOOK_PAST_BY = 2e-3, 2e-2
-"""Shares of the range ahead of here and of the goal at which the path may be less stable."""
+LOOK_PAST_BY = 2e-3, 2e-2  # shares of the range ahead of here and of the goal at which the path may be less stable
 LOOK_PAST_MISS = 0.02  # motion
 CRITICAL_STIFFNESS = 1e-6  # stiffness of a mode in EI / L, say, below which a start is critical
 FIRST_AMPLITUDE, MAX_HALVINGS = 0.02, 30  # arc length of the first step from there

@@ -29,16 +29,10 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-MAX_FLOAT_DIGITS = 15
-"""Every decimal with so many digits survives the way through a float."""
-
-_MAX_EXACT_POWER = 22
-"""Powers of ten up to this one are exact floats."""
-
+MAX_FLOAT_DIGITS = 15  # every decimal with so many digits survives the way through a float
+_MAX_EXACT_POWER = 22  # powers of ten up to this one are exact floats
 _POWERS_OF_TEN = np.array([float(f"1e{power}") for power in range(-_MAX_EXACT_POWER, _MAX_EXACT_POWER + 1)])
-
-_WIDE_CONTEXT = Context(prec=800)
-"""Wide enough for the exact digits of any float."""
+_WIDE_CONTEXT = Context(prec=800)  # wide enough for the exact digits of any float
 
 
 def shift_decimal(

@@ -37,10 +37,7 @@ if TYPE_CHECKING:
 PLACE_DIMENSIONS = ("length", "angle")
 MIN_QUANTITY, MAX_QUANTITY = 1e-30, 1e30
 """Sizes that a specification may give, in SI units: their squares and products are still numbers."""
-
-MOST_TURNS = 10_000
-"""Angles that a specification may give, in turns: arrays are made as long as a shape winds."""
-
+MOST_TURNS = 10_000  # angles that a specification may give, in turns: arrays are made as long as a shape winds
 _BOUND_OPERATORS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
     "gt": (">", operator.gt),
     "ge": (">=", operator.ge),

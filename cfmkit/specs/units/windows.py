@@ -9,8 +9,7 @@ from cfmkit.errors import InputError, QuantityError
 from cfmkit.specs.units.fields import PLACE_DIMENSIONS, DimensionedField, DimensionedFloat, Place
 from cfmkit.specs.units.quantities import format_quantity
 
-SHARE_DIMENSION = "ratio"
-"""Dimension of an end of a window that is given as a share of the travel."""
+SHARE_DIMENSION = "ratio"  # dimension of an end of a window that is given as a share of the travel
 
 
 class TravelShare(Place):

@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.yamlio.document import YamlDocument
 
 BASE_KEY = "base"
-MAX_FILES = 16
-"""In a chain of bases: more are a mistake."""
-
+MAX_FILES = 16  # in a chain of bases: more are a mistake
 _BASE_KEY = re.compile(rb"^(\xef\xbb\xbf)?[\"']?base[\"']?\s*:", re.MULTILINE)
 
 

@@ -114,7 +114,6 @@ def _position(text: str, index: int) -> tuple[int, int]:
 
 _YAML_LOADERS: list[Any] = [*filter(None, [getattr(yaml, "CSafeLoader", None)]), yaml.SafeLoader]
 """libyaml if PyYAML has it, which is fast, then PyYAML's own parser, for the words of errors: those of libyaml vary."""
-
 MAX_DEPTH = 32
 MAX_NODES = 100_000
 MAX_FAULTS = 1000

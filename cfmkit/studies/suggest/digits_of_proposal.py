@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 ROUNDED_BLOCKS = ("mechanism", "analysis", "design")
-
 MOTION_UNITS = {"force": ("mm", 1e-3), "torque": ("deg", math.pi / 180.0)}
 """Kind of a request -> unit of its motion in files, and what that is in SI."""
 

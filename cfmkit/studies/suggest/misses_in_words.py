@@ -17,16 +17,12 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
-LENGTH_RTOL = 1e-9
-"""On lengths that are compared: what writing a number down does to its last digit."""
-
-
+LENGTH_RTOL = 1e-9  # on lengths that are compared: what writing a number down does to its last digit
 METRIC_TOPICS = {
     "ripple": "ripple", "safety": "stress", "life": "life", "hysteresis": "hysteresis", "adjusted": "adjustment",
     "link_turn": "stiffness",
 }  # fmt: skip
 """Parts of names of metrics, and what a requirement on them is about; all others are about the force."""
-
 DISQUALIFYING_FINDINGS = {
     "stress": ("overstressed", "surface_stress_exceeded", "bearing_overloaded"),
     "springs": (

@@ -61,26 +61,15 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
-MAX_SEARCH_SECONDS = 15.0
-"""Seconds that one design may search."""
-
+MAX_SEARCH_SECONDS = 15.0  # seconds that one design may search
 OUT_OF_TIME = "the time budget ended before it was designed and evaluated"
 ENDED_EARLY = f"its design was not finished after {MAX_SEARCH_SECONDS:g} s"
-
-MAX_YIELD_TRIES = 3
-"""How often a higher yield is required than drawn parts had."""
-
-MOST_ASKED = 0.9975
-"""For a larger share the drawn parts of the search are too few."""
-
-RUBBING = ("pins", "guide", "bearings")
-"""Blocks of a mechanism of rigid parts that may state a friction."""
-
+MAX_YIELD_TRIES = 3  # how often a higher yield is required than drawn parts had
+MOST_ASKED = 0.9975  # for a larger share the drawn parts of the search are too few
+RUBBING = ("pins", "guide", "bearings")  # blocks of a mechanism of rigid parts that may state a friction
 MESH_MARGIN = 1.04
 """On the safety factor that corrections by solids aim at: a finer mesh finds about so much more stress in fillets."""
-
-MAX_CORRECTIONS = 2
-"""How often a part is corrected by its finest model: what is still missed then is missed."""
+MAX_CORRECTIONS = 2  # how often a part is corrected by its finest model: what is still missed then is missed
 
 
 @dataclass(frozen=True)

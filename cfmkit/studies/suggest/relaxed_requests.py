@@ -28,18 +28,11 @@ if TYPE_CHECKING:
 RELAXATION_FACTORS, LAST_FACTOR = (1.15, 2.2), 6.0
 """Factors at which a request is relaxed for a family. The last is looked at first: most of what nothing helps ends
 there, and a mechanism six times as large is no alternative any more."""
-
-N_HALVINGS = 3
-"""Of the last step, on a logarithmic scale: what is left is less than what the laws leave out."""
-
+N_HALVINGS = 3  # of the last step, on a logarithmic scale: what is left is less than what the laws leave out
 FURTHER_FACTORS = (1.03, 1.15, 1.5, 2.2, 3.6)
 """Beyond the first candidates: laws leave out pads, margins, and what stretches."""
-
-MAX_RIPPLE = 0.5
-"""Ripple and hysteresis above which nobody would speak of a constant force."""
-
-MAX_NAMED_KEYS = 2
-"""Keys that are named, those first that have to be relaxed least."""
+MAX_RIPPLE = 0.5  # ripple and hysteresis above which nobody would speak of a constant force
+MAX_NAMED_KEYS = 2  # keys that are named, those first that have to be relaxed least
 
 
 @dataclass(frozen=True)

@@ -48,22 +48,15 @@ if TYPE_CHECKING:
 
 ENOUGH_PROPOSALS, ENOUGH_WITH_PARTS = 3, 2
 """Proposals of a family after which no more of its candidates are made; fewer where parts of each are drawn."""
-
 ROUND_SIZES = (3, 4, 6, 12)
 """Candidates of a family in each round, the last again and again: every round waits for the one before it."""
-
 ASKING_SHARE, LAST_SHARE = 0.5, 0.05
 """Shares of the time budget in which families answer, and which are left where nothing is found."""
-
 RESERVE_FOR_FILLETS = 0.8
 """Share of the strength that beams may use first: fillets of solids had 1.05 to 1.35 times the stress of their
 beams."""
-
 UNANSWERED_MESSAGE = "the time budget ended before it had answered"
-
-FIGURE_SECONDS = 14.0
-"""Seconds that figures of a dozen proposals take on two cores."""
-
+FIGURE_SECONDS = 14.0  # seconds that figures of a dozen proposals take on two cores
 RESERVE_OF_FEW = 6.0
 """The same of the one or two that turn up after nothing was found for most of the budget, and of the overview."""
 
@@ -461,8 +454,7 @@ def measure(proposal: Proposal, name: str) -> float:
     return numbers.get(name, np.inf)
 
 
-MAX_OVERSIZE = 1.5
-"""Sides over those of the envelope up to which a mechanism is an alternative."""
+MAX_OVERSIZE = 1.5  # sides over those of the envelope up to which a mechanism is an alternative
 
 
 def _near(done: Sequence[Proposal], request: Request) -> list[Proposal]:

@@ -167,7 +167,6 @@ def _place(value: float) -> float:
 
 
 REISSNER_MODEL = "reissner"
-
 SEARCH_DEFINITIONS = {
     "starts": ("count", "random starts that led to a shape"),
     "starts_within_limits": ("count", "starts whose shape meets all limits, as the audit at more poses found"),

@@ -101,7 +101,6 @@ class Shaping(DesignProgram):
 
 LEAST_MIDDLE = 1e-3
 _REFINEMENT_FACTOR = 3  # a whole number, so that the points at which the force is solved are among the finer ones
-
 BAND_WEIGHT = 10.0
 """On the half band: a solver that begins with the identity for the Hessian takes too small a slope for none."""
 

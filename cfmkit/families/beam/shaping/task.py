@@ -19,10 +19,8 @@ if TYPE_CHECKING:
 Objective = Literal["ripple", "range", "paper"]
 
 BENDING_ONLY = "inextensible"  # the model of beams that bend only, as ``analysis.fidelity`` names it
-
 STRESS_MARGIN = 2e-3
 """The search asks for so much less stress and slimmer beams: the stress peaks between its poses and places, too."""
-
 MAX_START_ORDER = 3
 """Orders above that are for what was widened: a start in them takes longer and ends in the same families of shapes."""
 

@@ -93,9 +93,7 @@ class Variables:
 
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(24)
-
 _GAUSS_NODES, _GAUSS_WEIGHTS = 0.5 * (_GAUSS_NODES + 1), 0.5 * _GAUSS_WEIGHTS
-
 _COMPLEX_STEP = 1e-30  # of a complex step: nothing is subtracted, so that its square may vanish beside one
 
 
@@ -167,7 +165,6 @@ def _by_reach(variables: Variables, name: str) -> FloatArray:
 
 
 _MAX_DRAWS = 2000
-
 _LEAST_CHORD = 0.1  # of the mean distance of joined nodes, if no slenderness is asked
 
 

@@ -231,7 +231,6 @@ def multibody_history(
 
 
 N_BISECTIONS = 60  # they leave 1e-18 of a step in time: less than rounding
-
 CONTACT_FORCE_RTOL = 1e-9
 """A contact force below zero by this part of the largest is rounding: springs at rest press with nothing."""
 

@@ -32,12 +32,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.monotone_interpolation import ThroughPoints
 
-NEAR_START = 1e-7
-"""Share of the travel next to a start at zero force within which 0/0 is taken from a place beside it."""
-
-PATH_END_FACTOR = 1.05
-"""Times the curve's end: so far a path that is cut for friction is integrated."""
-
+NEAR_START = 1e-7  # share of the travel next to a start at zero force within which 0/0 is taken from a place beside it
+PATH_END_FACTOR = 1.05  # times the curve's end: so far a path that is cut for friction is integrated
 N_EVEN_PLACES = 2001
 """Places of a path among which the tightest one is looked for, beside those next to the points of the curve."""
 

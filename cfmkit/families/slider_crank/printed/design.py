@@ -53,22 +53,16 @@ if TYPE_CHECKING:
 
 SEARCH_RESERVES, RESERVE_STRESS = (4e-5, 2e-4), 5e-4
 """What the search keeps of the band (a share of the force), more if that was not enough, and of the stress allowed."""
-
 MIN_STROKE_SHARE = 0.99
 """Share of the stroke searched that the finished strip must have, or the search is repeated with more in reserve."""
-
 MAX_ANALYSIS_POINTS = 61
 """Points, at most, of the analysis that judges a uniform strip: between them the curve is just as exact."""
-
 MAX_NAMED_LIMITS = 4
 """So many of the limits that hold a strip are named in the message; all are in the document of `--json`."""
-
 FORM_DECIMALS, LENGTH_DECIMALS = 6, 9
 """Of the numbers of a form, mostly millimetres, and of lengths in metres: both nanometres."""
-
 DEFAULT_THICKNESS = (0.5e-3, 2e-3)  # range where none is given [m]: what printing makes
 DEFAULT_WIDTH = (5e-3, 8e-3)  # range where none is given [m], as of the strip of [B, Table 3]
-
 THICKER_BY = 3.0
 """Times the thickest strip beyond which no thickness from the stress is stated: rubber may bear any curvature of the
 motion, and what grows without end by corrections is no dimension."""

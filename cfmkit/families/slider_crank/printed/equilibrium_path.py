@@ -36,22 +36,16 @@ if TYPE_CHECKING:
 
 
 FIRST_STEP = 1e-5  # of the travel
-
 STRAIGHT_OFFSET, DECISIVE_OFFSET = 1e-9, 2e-4
 """Offset of the crank pin, in lengths of the chain: below the first there is no kink, above the second it decides."""
-
 KINK_OFFSET = 2e-3  # offset that a chain is given to send it to one side, in lengths of the chain
 MIN_CURVE_POINTS = 2  # a curve has at least so many points
-
 NEAR_LIMIT = 1e-12
 """Last step back towards the limit point of a branch, as a share of the travel at which the branch is known: the force
 there goes with the root of the distance, and is right to 1e-6."""
-
 SLOPE_STEP = 1e-4  # where the slope of the branch is taken, as a share of the travel at its first known point
-
 MAX_PREDICTION_ERROR = 0.3
 """How far unknowns may be from their prediction in such a step, as a share of their change; else another branch."""
-
 FRAME_OFFSET = 0.1  # offset beyond which it is a frame rather than a chain, and goes where its shape sends it
 
 

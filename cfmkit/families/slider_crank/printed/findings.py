@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 THINNEST_RATIO = 2.0
 """Width over thickness below which out-of-plane bending is less than four times as stiff as that in the plane."""
-
 SIDE_SHARE = 0.5  # side force over force above which friction in the guide deserves a word
 RUN_IN_SHARE = 0.1  # travel to 98 % of the force, as a share of all, above which the kink is called large
 

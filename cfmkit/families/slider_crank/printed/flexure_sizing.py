@@ -91,9 +91,7 @@ def rotations(linkage: Linkage, unloaded: float, travel: FloatArray, side: int =
 
 
 _MAX_ROUNDS = 8  # `configs/slider_crank_lumped.yaml` needs four; a fixed width may take four times as many
-
 _N_POINTS = 40
-
 _MIN_SLENDERNESS = 2.0  # length over thickness below which a flexure is none
 
 
@@ -272,7 +270,6 @@ FACTOR_PHRASES = (
     "of flexures sized by the closed forms over that of pure bending",
 )
 """What is said of the factors of force and stress."""
-
 PER_METRE = 1e8  # thicknesses are whole parts of it, rounded down: the stress is that of the written one
 
 

@@ -63,9 +63,7 @@ class Flexure:
 
 
 SLIDER_NODE = "slider"  # name of the node that moves along the way
-
 FLEXURE_BEAMS = ("pivot", "crank_pin", "slider_pin")
-
 STRIP_BEAM = "strip"  # names of the beams
 
 

@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 
 DEFAULT_SHARE = 0.35
 """Travel where none is requested, in lengths of the slider's path from the pivot: that of [B, sec. 2.1]."""
-
 _ENDING_NAMES = {
     PressingEnd.LIMIT_POINT: "limit_point",
     PressingEnd.UNSTABLE: "unstable",

@@ -31,10 +31,8 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 PAD_SIZE = (0.012, 0.010)  # length and width of the pads [m]
-
 STRAIGHT_SINE, MITRE_LIMIT = 1e-9, 2.0
 """Sine of an angle that is no corner; reach of the edges at a sharp corner, in half widths."""
-
 SAME_PLACE = 1e-9  # points nearer to each other than this are one, in lengths of the centre line
 COMPLEX_AXES = np.array([1.0, 1j])  # from x and y to x + iy
 LINK_RATIO = 5.0  # width of a rigid link in flexure thicknesses

@@ -84,6 +84,5 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "crank_pin_rotation_max": _absent(*OF_SPRINGS["crank_pin_rotation_max"], OF_PINS),
 }
 """Every scalar result of the model, in the order in which they are shown."""
-
 SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()}
 """Name -> dimension and definition."""

@@ -119,15 +119,10 @@ class Form:
 
 
 N_FORCE_POINTS, N_BAND_POINTS = 12, 81  # where the force is computed, and where its band is kept
-
-RMS_POINTS = 10
-"""Points of the root mean square, even in the travel, its start left out [B, eq. 14]."""
-
+RMS_POINTS = 10  # points of the root mean square, even in the travel, its start left out [B, eq. 14].
 PATH_TOLERANCE = 1e-6
-
 MIN_STATION_DISTANCE = 1e-5
 """Least distance of stations, as a share of the length: ranges that overlap must not exchange them."""
-
 _DIFFERENCE_STEP = 1e-5  # of a share, or of the width as a share of itself, for central differences
 
 
@@ -357,13 +352,9 @@ def _trace(network: Network, drive: Displacement) -> Path | None:
 
 N_STRESS_POINTS, N_STRESS_PLACES = 4, 13
 """Points at which the stress is computed, the last ones, and places from the first to the last of them."""
-
 N_STENCIL_POINTS = 9  # samples of a polynomial: more of them, evenly spaced, swing beyond its ends
-
 _STENCIL_NODES = np.arange(float(N_STENCIL_POINTS))
-
 _SLOPE_WEIGHTS = differentiation(_STENCIL_NODES)
-
 _MAX_NEWTON_STEPS = 8
 
 

@@ -46,18 +46,14 @@ def descend(
 
 MAX_IDLE_EVALUATIONS = 20
 """Evaluations without a smaller violation after which a search is stuck: two of the solver's line searches."""
-
 N_COARSE_THICKNESSES = 5  # thicknesses of the first tapered strip; then twice as many intervals each time
 COARSE_RIPPLE = 0.01  # ripple within which the coarse strip is sought: few thicknesses cannot keep less
 START_DEVIATION = 0.15  # standard deviation of the logarithm of the thicknesses that other starts begin with
 MIN_BAND_LENGTH = 2e-3  # length of the band that is sought at least [m]
 MOST_RIPPLE = 100.0  # largest deviation from the force that a search for the smallest one considers [%]
-
 MAX_BAND_WIDENING, N_NARROWING_STEPS = 0.1, 5
 """Largest share of the force by which a band is widened at first where it is out of reach, and steps back to it."""
-
 INITIAL_THICKNESS = 1e-3  # thickness of one that is searched, at first [m]
-
 _MAX_ROUNDS, _STEP_RTOL = 12, 1e-10
 """Steps at most, of which strips of the shipped specifications need four to six, and how near the last two lie."""
 

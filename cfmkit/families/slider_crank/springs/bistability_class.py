@@ -38,14 +38,11 @@ if TYPE_CHECKING:
 
 CLASS_NAMES = ("positive", "zero", "local negative", "snap-through", "bistable", "tristable")
 """The classes; a curve's class is an index."""
-
 POSITIVE_CLASS, ZERO_CLASS, NEGATIVE_CLASS, SNAP_THROUGH_CLASS, BISTABLE_CLASS, TRISTABLE_CLASS = range(
     len(CLASS_NAMES)
 )
-
 EFFORT_RTOL = 1e-11
 """An effort so small, as a fraction of the largest, is zero; a fall so small, as a fraction of the peak, none."""
-
 DROP_TOL = 1e-3  # a drop so near to 1 may be on either side of it in a mechanism that is made
 
 

@@ -57,7 +57,6 @@ if TYPE_CHECKING:
 
 MAX_DEVIATION = 0.5  # springs that miss the target by more are no design, even where no tolerance is stated
 N_NEXT_SETS = 4  # sets of bought springs that are tried where the best one does not have the yield
-
 GRID_SIZES = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
 """Values of each free length on the grid, and around its best: a least-squares problem costs the least."""
 
@@ -310,11 +309,9 @@ def _reference(solved: Solved) -> float:
 
 DEVIATION_TOL = 5e-4
 """More deviation, as a fraction of the target, that nobody would notice: such designs are reported as equals."""
-
 TOLERANCE_RESERVE = 1e-3
 """Share of the tolerance that preferred rates keep in reserve: between the places of the search they deviate more, by
 some 1e-5 of the tolerance."""
-
 N_PROGRAMME_PLACES = 60  # places of the window for the programmes that say how far the rates may move
 
 

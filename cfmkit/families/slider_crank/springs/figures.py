@@ -157,7 +157,6 @@ def torsion_spring(joint: Point, direction: float, radius: float) -> FloatArray:
 
 STACK_BELOW = 0.55
 """Mechanisms less high than this fraction of their width are drawn below each other, not side by side."""
-
 SPRING_COLOURS = (LINE_BLUE, LINE_VERMILLION, LINE_PURPLE, LINE_BROWN)  # of the springs, in the order of the joints
 
 

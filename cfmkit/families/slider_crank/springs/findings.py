@@ -385,7 +385,6 @@ FINDING_RULES: tuple[Rule, ...] = (
     FindingRule("stretched_outside_window", _leaves_out_stretched, _stretched_outside),
 )
 """Findings of every mechanism, the gravest first."""
-
 NO_SPRING: Rule = FindingRule(
     "no_spring",
     lambda _solution: True,

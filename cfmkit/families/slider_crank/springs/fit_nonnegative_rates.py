@@ -62,7 +62,6 @@ class RateGoal:
 
 MIN_RESOLVED_DEVIATION = 1e-5
 """Below this deviation a second programme, in units of it, refines the rates: the first meets its rows to 1e-7 only."""
-
 MAX_PROGRAMME_PLACES, N_FIRST_PLACES = 128, 25
 """So many places the linear programme takes at once; of more it starts with few, and adds those where it fails."""
 

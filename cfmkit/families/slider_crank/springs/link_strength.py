@@ -152,12 +152,9 @@ PIN_DIAMETERS = tuple(
     one for series in ALL_SERIES if series.standard == "ISO 2338" for one in series.sizes if one >= 1e-3
 )
 """Pins of links [m]: the diameters of ISO 2338 from 1 mm on."""
-
 LARGEST_TURN_SHARE = 0.01  # turn of a link over that of its spring up to which links count as rigid
-
 WIDEST_SHARE = 0.5
 """Largest width of a link over the length of the shorter one: wider ones are plates, and bend as plates do."""
-
 SIZE_MARGIN = 1.001  # sizes are larger by this share than just enough
 
 

@@ -64,10 +64,7 @@ Ends = tuple[float, float]
 
 RATE_KEYS = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINT_NAMES)}
 """Where a specification has the rates, and the rows of the springs."""
-
-ROWS_TOGETHER = 64
-"""Mechanisms that are solved together: few enough for their grids to stay in a processor's cache."""
-
+ROWS_TOGETHER = 64  # mechanisms that are solved together: few enough for their grids to stay in a processor's cache
 ROW_COLUMNS = columns_of_absent_values(OF_PARTS | OF_STOPS) | dict(SCALAR_QUANTITIES)
 """What studies may ask of rows: of values that only printed parts and stops have their cells are empty."""
 

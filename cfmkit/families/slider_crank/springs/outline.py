@@ -18,14 +18,11 @@ if TYPE_CHECKING:
 
 SHEET_KEY = "mechanism.part.sheet"
 """Says how thick the links are: without springs that are part of them, they have no width."""
-
 EYE_SHARE, HOLE_SHARE = 0.08, 0.04
 """Radii of eyes, which are half as wide as links, and of pin holes in lengths of the shorter link, where no pins are
 stated."""
-
 PIN_IN_COIL = 0.8
 """Diameter of a pin that is not stated over the inside of the relaxed spring around it: wound up that is narrower."""
-
 EYE_OF_HOLE = 2.0  # least radius of an eye in those of its hole: a wall as thick as the hole's radius
 
 

@@ -22,17 +22,11 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
 
 
-FREE_LENGTH_KEYS = ("crank_length", "offset", "unloaded_offset")
-"""Lengths that a design may choose."""
-
-N_PROBES = 721
-"""Places at which the limits of the joints are looked at."""
-
+FREE_LENGTH_KEYS = ("crank_length", "offset", "unloaded_offset")  # lengths that a design may choose
+N_PROBES = 721  # places at which the limits of the joints are looked at
 N_REFINEMENTS = 3
 """Times that they are looked at, each between two neighbours of the last: a window may end where a limit is reached."""
-
-N_WINDOW_PLACES = 1001
-"""Places of a window over which the largest deviation is kept."""
+N_WINDOW_PLACES = 1001  # places of a window over which the largest deviation is kept
 
 
 @dataclass(frozen=True)

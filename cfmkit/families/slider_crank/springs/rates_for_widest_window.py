@@ -29,24 +29,17 @@ if TYPE_CHECKING:
 
 N_SEARCH_PLACES = 48  # places of a window during the search; the result is judged on `DENSE` ones
 WIDTH_OVER_LEAD = 0.533  # width of the best window over the lead of the unloaded position, for 0.5 % and small angles
-
 MAX_STEPS = 24
 """Twenty halvings leave 1e-6 of a width, which ends the search; with steps by the law, the tests need ten."""
-
 MIN_TOLERANCE_SHARE = 1.0 - 1e-4
 """A deviation between this share of the tolerance and all of it ends the search: the width is then right to 3e-5."""
-
 MIN_WIDTH_GAIN, MIN_WIDTH_SHARE = 1e-3, 5e-4
 """A window wider by less than the first share is not looked for; nor one below the second share of the motion."""
-
 N_START_INTERVALS, MAX_PROGRAMMES = 32, 4000
 """Intervals of beginnings that the search of the whole motion starts with, and its largest number of programmes."""
-
 NEIGHBOUR_WIDTH_SHARE = 0.08  # once a window is found, the next one is looked for so near, as a share of its width
-
 POOR_WIDTH_SHARE, N_ELSEWHERE_PLACES = 0.5, 25
 """A window narrower than this share of what was expected is also looked for elsewhere, at so many places."""
-
 TOLERANCE_SHARE = 1.0 - 2e-5  # between the places on which it is judged, a deviation can be larger by this
 
 

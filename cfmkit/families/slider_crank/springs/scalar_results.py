@@ -35,13 +35,9 @@ if TYPE_CHECKING:
 
 
 _REFERENCE_TEXT = "the reference (`analysis.reference_angle` or `reference_travel`)"
-
 NO_UNSTABLE = "there is no unstable equilibrium"
-
 NO_SECOND = "there is no second stable equilibrium in the motion"
-
 NO_FACTOR = "it needs torsion springs and a spring at the slider"
-
 HELD_TEXT = "friction holds the mechanism in a part of its motion, next to which forces are unbounded"
 
 
@@ -331,6 +327,5 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "link_turn_share_max": _of_link("link_turn_share_max", lambda bar, loads, _allowable: bar.turn_share(loads)),
 }
 """Every scalar result, in the order in which they are shown."""
-
 SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()}
 """Name -> dimension and definition."""

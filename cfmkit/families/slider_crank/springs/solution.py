@@ -55,16 +55,10 @@ if TYPE_CHECKING:
 
 N_GRID_PLACES = 1025
 """Places of the grid. Efforts between them are cubics; a class changes within 1e-9 of the exact value of a rate."""
-
-MOTION_RTOL = 1e-9
-"""An equilibrium so near to the unloaded position, as a share of the motion, is that position."""
-
+MOTION_RTOL = 1e-9  # an equilibrium so near to the unloaded position, as a share of the motion, is that position
 NEXT_TO_START = 1e-9
 """Share of the motion after its start at which forces with friction are computed: they are 0/0 at a stretched start."""
-
-BAND_EDGE_FACTOR = 1.0 + 1e-9
-"""An effort on the edge of a band is inside it, whatever the last bits say."""
-
+BAND_EDGE_FACTOR = 1.0 + 1e-9  # an effort on the edge of a band is inside it, whatever the last bits say
 NO_LEVEL = 1e-9
 """Share of the largest effort up to which the effort at the reference is rounding, and there is no band around it."""
 

@@ -39,9 +39,7 @@ if TYPE_CHECKING:
 
 
 FULL_TURN = 2.0 * math.pi
-
 SHORT_OF_END = 1e-3  # share of an arc that a motion stays away from its ends, where efforts are unbounded
-
 MIN_END_SHARE = 1e-6
 """Nearer to such an end, as a share of the way to it, the last digits of the motion decide the effort's."""
 
@@ -347,7 +345,6 @@ def coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
 
 DIFFERENCE_STEP = 1e-5
 """Of the angle [rad]: the effort is a quadratic of q at most, so that central differences are off by rounding alone."""
-
 N_WINDOW_PLACES = 201  # of the window, over which the change of the effort is averaged
 
 

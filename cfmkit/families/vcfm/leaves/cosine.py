@@ -26,10 +26,8 @@ if TYPE_CHECKING:
 _MAX_TENSION = 1e5  # tension down to z = -1e5: strains beyond anything that bends
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(24)
 _POSITIVE_NODES, _POSITIVE_WEIGHTS = _GAUSS_NODES[12:], _GAUSS_WEIGHTS[12:]  # what is integrated is even
-
 _ROUNDING_ERROR = 4.0 * float(np.finfo(float).eps)
 _BRACKET_PLACES = np.linspace(-1.0, 1.0, 41)
-
 N_EDGE_POINTS = 201  # points of the unloaded centre line, from which edges are drawn
 
 

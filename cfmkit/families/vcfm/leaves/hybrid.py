@@ -26,15 +26,11 @@ if TYPE_CHECKING:
 
 MAX_RISE_RATIO, MAX_BUCKLING_RATIO = 6.0, 0.25
 """Rise over the thickness of a flexure, and axial force over its own buckling load, above which that force bends it."""
-
 MIDDLE_THICKNESS_RATIO = 4.0  # thickness of the middle over that of the flexures, where none is stated
-
 PROPOSED_FLEXURE = 0.2
 """Length of each flexure of a proposed leaf over that of the leaf: as in Ding, Li and Li 2022, a little longer."""
-
 PROPOSED_RISE = 1.6
 """Rise of proposed leaves over that of straight ones for the same travel: their force falls over less of it."""
-
 N_FLEXURE_POINTS = 15  # points of a flexure in pictures
 
 

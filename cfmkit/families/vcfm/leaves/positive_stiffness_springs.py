@@ -353,7 +353,6 @@ DIAMOND_SPRING = SpringKind(
     truss=TrussDiamond,
     can_be_designed=True,
 )
-
 FOLDED_SPRING = SpringKind(
     "folded",
     "eight folded ones",
@@ -364,7 +363,6 @@ FOLDED_SPRING = SpringKind(
     ),
     drawing_note="one half of the eight folded beams is drawn: make it twice",
 )
-
 STRAIGHT_SPRING = SpringKind(
     "straight",
     "one straight beam",
@@ -373,7 +371,6 @@ STRAIGHT_SPRING = SpringKind(
     is_linear=False,
     stands_on_ends=True,
 )
-
 U_SHAPE = SpringKind(
     "u-shape",
     "two U-shapes",

@@ -31,7 +31,6 @@ POLE_LOAD = 20.190728556426629  # z at which tan q = q: the S form can carry no 
 BUCKLING_LOAD = np.pi**2  # z of the buckling form 1 - cos(2 pi s/L), P = 4 pi^2 E I/L^2
 MAX_SERIES_LOAD = 0.35  # below this |z| the closed forms cancel and the series is used
 NEWTON_STEPS = 60  # at most so many to find z
-
 _STIFFNESS_SERIES = np.array(
     [
         6.0, -2 / 5, -2 / 175, -4 / 7875, -74 / 3031875, -236 / 197071875, -11012 / 186232921875, -6616 / 2261399765625,

@@ -72,17 +72,13 @@ class TrussLeaf(LeafLaw):
 
 NEGATIVE_ABOVE = 1.4246  # rise over thickness above which a V-beam has a negative stiffness anywhere
 LINEAR_ABOVE = np.pi  # rise over thickness above which it buckles, and so has a linear negative stiffness
-
 FLAT_BUCKLED_ABOVE = 2.0 * np.pi / 3.0**0.5
 """Rise over thickness above which it is still buckled when flat, so that its force is zero there."""
-
 THICK_LEAF_RATIO, STOCKY_LEAF_RATIO = 0.1, 0.25
 """Thickness over length of a leaf from which on the closed forms are off by 5 to 10 % of the peak, cosine leaves first
 (a quarter as thick: half of it); and from which on a leaf is a beam no more, so that no model here holds."""
-
 MAX_LEAF_ANGLE = radians(15)
 """Angle of the leaves beyond which the closed forms are off by more than a few percent: none steeper is designed."""
-
 MAX_TRAVEL_RATIO = 1.6
 """Travel over rise beyond which the S form is no longer to be trusted (0.07 N of 2.3 at 1.9 of [D], Table I)."""
 
