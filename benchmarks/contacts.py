@@ -19,7 +19,7 @@ from cfmkit.elastica import Control, Displacement, Loading, trace
 from cfmkit.families.beam.network_from_spec import assemble
 
 ROOT = Path(__file__).parents[1]
-sys.path += [str(ROOT / "tests" / part) for part in ("support", "unit")]
+sys.path += [str(ROOT / "tests" / part) for part in ("support", "elastica")]
 import test_elastica_beam_on_beam as pairs  # noqa: E402
 import test_elastica_pads_on_beams as pads  # noqa: E402
 from contact_layouts import among_discs, with_pads  # noqa: E402

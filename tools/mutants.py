@@ -1,6 +1,6 @@
 """Count how many small faults in the product a selection of tests notices.
 
-    python tools/mutants.py cfmkit/families/cam -n 25 --seed 1 -- tests/unit/test_cam_*.py
+    python tools/mutants.py cfmkit/families/cam -n 25 --seed 1 -- tests/cam
 
 Puts one random fault at a time into a copy of the tree (an operator, a comparison, ``and``/``or``, a constant, a
 condition negated, ``min`` for ``max``) and runs the tests there until one fails. Prints each fault with the test that

@@ -45,7 +45,7 @@ OWN = ("manifest.json", ".cfmkit-journal.sqlite")
 
 
 ELSEWHERE = {"explore", "suggest", "correct"}
-"""Listens until it is stopped (tests/unit/test_explorer.py, tests/browser); searches for seconds; needs a recording."""
+"""Listens until it is stopped (tests/runs/test_explorer.py, tests/browser); searches for seconds; needs a recording."""
 
 
 def test_every_verb_is_tried():

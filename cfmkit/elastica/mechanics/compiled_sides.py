@@ -1,6 +1,6 @@
 """Sides of beams that touch at points, in compiled code (`sides.c`); what lies on an obstacle is in numpy.
 
-`SlidingEquations` is the specification (tests/unit/test_elastica_march.py).
+`SlidingEquations` is the specification (tests/elastica/test_elastica_march.py).
 """
 
 from __future__ import annotations

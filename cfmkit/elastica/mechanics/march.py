@@ -1,6 +1,6 @@
 """The equations of a network, compiled or in numpy where there is no compiler.
 
-Both give the same to rounding (tests/unit/test_elastica_march.py).
+Both give the same to rounding (tests/elastica/test_elastica_march.py).
 """
 
 from __future__ import annotations
