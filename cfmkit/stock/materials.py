@@ -209,9 +209,9 @@ _PLASTIC_LIST = (
     Material(
         "tpu-95a", 26e6, 0.48, 8.6e6, 1220.0,
         "Printed (filament), Shore 95A: modulus and stress at yield: data sheet of Ultimaker TPU 95A (not read again "
-        "for this table); its ends and the Poisson ratio: assumed; density: additive.tools/materials/tpu (1200 to 1250 kg/m^3); scatter "
-        "of E: measured on four printed TPUs (Haid et al. 2022, 24 to 247 MPa). Strongly nonlinear: only for small "
-        "strains.",
+        "for this table); its ends and the Poisson ratio: assumed; density: additive.tools/materials/tpu (1200 to 1250 "
+        "kg/m^3); scatter of E: measured on four printed TPUs (Haid et al. 2022, 24 to 247 MPa). Strongly nonlinear: "
+        "only for small strains.",
         Scatter((24e6, 250e6), (5e6, 12e6), density=(1200.0, 1250.0)), ("tpu", "polyurethane"),
         poisson_is_assumed=True,
     ),
