@@ -12,7 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from cfmkit.errors import UsageError, visible
-from cfmkit.runs.examples import shipped_folder
+from cfmkit.runs.shipped_folders import shipped_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

@@ -13,6 +13,7 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError, UsageError, visible
+from cfmkit.runs.shipped_folders import shipped_folder
 
 if TYPE_CHECKING:
     import os
@@ -32,21 +33,6 @@ class Example:
 
 
 ABBREVIATED_WORDS = ("sec.", "eqs.", "figs.")
-
-
-def shipped_folder(
-    name: str,  # as it stands in the tree: ``configs``, ``docs``
-    sample: str,  # a file that it must have: another package's folder of that name may stand beside this one
-) -> Path:
-    """Return a folder that comes with the package.
-
-    Raises UsageError if this installation has none.
-    """
-    package = Path(__file__).parents[1]
-    for place in (package / name, package.parent / name):
-        if (place / sample).is_file():
-            return place
-    raise UsageError(f"this installation has no {name}; install cfmkit from a wheel or from its source")
 
 
 def folder() -> Path:

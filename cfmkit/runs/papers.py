@@ -241,7 +241,7 @@ def _report_value(value: float, text: str) -> str:
 
 
 class _Scope(NamedTuple):
-    """Where the names of a question are looked up: an example with changes, as it is analysed, designed or swept."""
+    """Scope of the names of a question: an example with changes, as it is analysed, designed or swept."""
 
     spec: str
     changes: tuple[str, ...] = ()

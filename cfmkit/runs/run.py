@@ -95,7 +95,7 @@ class RunTask:
 
     @property
     def all_changes(self) -> tuple[str, ...]:
-        """What replaces values of the specification: ``--set``, then ``--fidelity``."""
+        """Changes of the specification: ``--set``, then ``--fidelity``."""
         if self.fidelity is None:
             return self.changes
         if not self.fidelity.strip():

@@ -258,7 +258,7 @@ def _similar(name: str) -> str:
 
 def _shipped_hint(base: str) -> str:
     """Return how an example of that name is had: pages name it as it lies in the sources."""
-    from cfmkit.runs.examples import shipped_folder
+    from cfmkit.runs.shipped_folders import shipped_folder
 
     try:
         there = next(shipped_folder("configs", "cam.yaml").rglob(glob.escape(base)), None) if base else None

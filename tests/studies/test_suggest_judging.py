@@ -31,7 +31,7 @@ from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
 from cfmkit.studies.suggest.misses_in_words import raised_out
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, judge_proposal, make_proposal
-from cfmkit.studies.suggest.requirements_of_request import list_requirements, within_mesh_error
+from cfmkit.studies.suggest.requirements_of_request import list_misses_within_mesh_error, list_requirements
 from cfmkit.studies.suggest.search import Suggestions, _Making, _Times, offer_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -454,7 +454,7 @@ def test_the_safety_of_a_solid_holds_with_the_error_of_its_mesh():
     factor = cfmkit.metrics.evaluate(result, ["safety_factor"])["safety_factor"].value
     meshed = replace(result, values={**result.values, "mesh_stress_error": Quantity(0.03, "ratio", "")})
     asked = {share: request(safety=f"{factor / share:.9g}") for share in (1.02, 1.04)}
-    (sentence,) = within_mesh_error(asked[1.02], meshed, values)
+    (sentence,) = list_misses_within_mesh_error(asked[1.02], meshed, values)
     assert f"is {factor / 1.03:.3g} if the mesh is 3 % off" in sentence
-    assert list(within_mesh_error(asked[1.04], meshed, values)) == []
-    assert list(within_mesh_error(asked[1.02], result, ())) == []
+    assert list(list_misses_within_mesh_error(asked[1.04], meshed, values)) == []
+    assert list(list_misses_within_mesh_error(asked[1.02], result, ())) == []

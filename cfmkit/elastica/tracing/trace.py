@@ -345,7 +345,7 @@ def trace_on(
     while ending.end is WhyStopped.COMPLETE and points and isinstance(points[-1], Point) and points[-1].target < 0:
         points.pop()
     status, message = _explain(start, ending, unit)
-    columns = PointColumns.of(points)
+    columns = PointColumns.from_points(points)
     _settle_events(columns, events, SAME_PLACE * _range(drive) / unit)
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _path(network, drive, _states(start, meshes, columns), columns, told, status, message)

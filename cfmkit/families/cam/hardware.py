@@ -69,7 +69,7 @@ MAX_BAR_WIDTH = 1.0
 
 @dataclass(frozen=True)
 class _Loads:
-    """What sizes of parts follow from: the largest forces, thicknesses, and stresses that parts may have."""
+    """Largest forces, thicknesses, and stresses that parts may have: sizes of parts follow from these."""
 
     strength: PartStrength
     thickness: float  # of plate, rollers and slider [m]

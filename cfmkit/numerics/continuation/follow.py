@@ -180,9 +180,9 @@ def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[March
     marched = march(walk)
     if len(marched.drive):
         yield marched
-        last = marched.at(-2) if len(marched.drive) > 1 else walk.here
+        last = marched.point_at(-2) if len(marched.drive) > 1 else walk.here
         number = walk.number + int((marched.target >= 0).sum())
-        walk = replace(walk, before=last, here=marched.at(-1), trail=(*walk.trail, marched), number=number)
+        walk = replace(walk, before=last, here=marched.point_at(-1), trail=(*walk.trail, marched), number=number)
     return replace(walk, step=marched.step, rejections=ARC_AFTER if marched.stuck else 1)
 
 

@@ -73,7 +73,7 @@ class PointColumns(NamedTuple):
     branches: tuple[PathBranch | None, ...]
 
     @classmethod
-    def of(cls, points: list[Point | MarchedSteps]) -> PointColumns:
+    def from_points(cls, points: list[Point | MarchedSteps]) -> PointColumns:
         """Return single points and those of marches as columns."""
         x, rows, branches = list[Any](), list[Any](), list[PathBranch | None]()
         for item in points:
@@ -148,9 +148,9 @@ class MarchedSteps:
     @cached_property
     def states(self) -> tuple[PathEquilibrium, ...]:
         """The equilibria one by one."""
-        return tuple(map(self.at, range(len(self.drive))))
+        return tuple(map(self.point_at, range(len(self.drive))))
 
-    def at(self, k: int) -> PathEquilibrium:
+    def point_at(self, k: int) -> PathEquilibrium:
         """Return one of the equilibria."""
         numbers = float(self.drive[k]), self.rate[k], int(self.unstable[k]), float(self.effort[k])
         return PathEquilibrium(self.x[k], *numbers)

@@ -40,10 +40,10 @@ from cfmkit.studies.suggest.misses_in_words import (
 from cfmkit.studies.suggest.redesign_of_proposal import block_for_redesign
 from cfmkit.studies.suggest.requirements_of_request import (
     LIFE_METRICS,
+    list_misses_within_mesh_error,
     list_requirements,
     list_unjudged,
     windows_of,
-    within_mesh_error,
 )
 from cfmkit.studies.suggest.yield_of_proposal import (
     GoodParts,
@@ -66,7 +66,7 @@ OUT_OF_TIME = "the time budget ended before it was designed and evaluated"
 ENDED_EARLY = f"its design was not finished after {MAX_SEARCH_SECONDS:g} s"
 MAX_YIELD_TRIES = 3  # how often a higher yield is required than drawn parts had
 MOST_ASKED = 0.9975  # for a larger share the drawn parts of the search are too few
-RUBBING = ("pins", "guide", "bearings")  # blocks of a mechanism of rigid parts that may state a friction
+RUBBING_BLOCKS = ("pins", "guide", "bearings")  # blocks of a mechanism of rigid parts that may state a friction
 MESH_MARGIN = 1.04
 """On the safety factor that corrections by solids aim at: a finer mesh finds about so much more stress in fillets."""
 MAX_CORRECTIONS = 2  # how often a part is corrected by its finest model: what is still missed then is missed
@@ -357,7 +357,7 @@ def judge_proposal(
         *((topic_of(one.metric), one.sentence) for one in missed if one.metric not in ENVELOPE_METRICS),
         *(("size", text) for text in sides_outside(request, space)),
         *(("stress", text) for text in (space.faults if space else ())),
-        *(("stress", text) for text in within_mesh_error(request, result, values)),
+        *(("stress", text) for text in list_misses_within_mesh_error(request, result, values)),
         *(("travel", text) for text in too_short(request, result)),
         *disqualifying(result),
     ]
@@ -408,7 +408,7 @@ def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> d
         return max(values) if values else None
 
     lost, mechanism = worst("hysteresis_area"), result.spec.get_value("mechanism")
-    rubs = not hasattr(mechanism, "pins") or any(_friction(mechanism, name) for name in RUBBING)
+    rubs = not hasattr(mechanism, "pins") or any(_friction(mechanism, name) for name in RUBBING_BLOCKS)
     means = {key: one.value for key, one in found.items() if key.partition("[")[0] == f"{kind}_mean"}
     each = [value for key, value in means.items() if value is not None and ("[" in key or len(means) == 1)]
     mean = float(np.mean(each)) if each else None
@@ -447,7 +447,7 @@ def _notes(space: BoundingBox | None, result: Result) -> Iterator[str]:
     if space is not None and space.assumed:
         yield space.assumed
     mechanism = result.spec.get_value("mechanism")
-    rubs = [f"{name} {value:g}" for name in RUBBING if (value := _friction(mechanism, name))]
+    rubs = [f"{name} {value:g}" for name in RUBBING_BLOCKS if (value := _friction(mechanism, name))]
     if rubs:
         yield f"friction assumed: {', '.join(rubs)}"
     elif hasattr(mechanism, "pins"):

@@ -77,7 +77,7 @@ def list_unjudged(request: Request, result: Result) -> Iterator[str]:
         yield f"contact pressure not judged: no strength is known of {_material(result)}"
 
 
-def within_mesh_error(request: Request, result: Result, values: Iterable[Definition]) -> Iterator[str]:
+def list_misses_within_mesh_error(request: Request, result: Result, values: Iterable[Definition]) -> Iterator[str]:
     """Yield what is missed if the largest stress of a solid is as much larger as its mesh may be off."""
     found = evaluate(result, None, None, values)
     factor, error = (_value_of(found, name) for name in ("safety_factor", "mesh_stress_error"))

@@ -205,7 +205,7 @@ def _loads(machine: Machine, parts: Constants, at: Kinematics, moment: Moment) -
     roller = at.first * push + at.second * square + lift
     middle: ComplexArray = 0.5 * (roller + (1j * push + lift))
     along = at.way * push + at.bend * square
-    pull = machine.springs.force(AxisGap.between_mirrored(at.center, at.first * moment.speed))
+    pull = machine.springs.force(AxisGap.of_mirror_images(at.center, at.first * moment.speed))
     return MovingLoads(
         roller=roller,
         middle=middle,
