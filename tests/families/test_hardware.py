@@ -197,6 +197,9 @@ def test_a_slider_has_walls_around_its_rods_which_leave_its_pin_free():
     clear = abs(left.core[0, 0, 0] - right.core[0, 0, 0]) / 2 - left.reach - pin.reach
     assert clear == pytest.approx(0.25 * 2 * max(left.reach, pin.reach))
     assert not found.faults
+    (slider,) = (row for row in table(result) if row["name"] == "slider")
+    # the plate ends at 291.5 mm, the pin begins at 188.1 mm, the slider is 32 mm high
+    assert "forked: over 120 mm of its way" in slider["data"]
     thin = cfmkit.analyze(
         cfmkit.load("configs/cam.yaml", ["mechanism.contact.width=2 mm", "mechanism.plate.thickness=2 mm"])
     )

@@ -323,6 +323,11 @@ def _parts(
     data = f"with a hole of {seat}, presses with {newton(loads.press)}"
     yield ListedPart("on the cam", "roller", 2, data, "make", size, "", "roller")
     data = f"with a hole of {hole_with_fit(pin, 8)} between those of its guide"
+    if (beside := y1 - float(pin_path(solution)[:, 1].min()) + radius) > 0.0:
+        data += (
+            f"; forked: over {mm(1e-3 * math.ceil(1e3 * beside))} of its way it, pin and guide stand on both sides of "
+        )
+        data += "the plate, which the depth does not count"
     yield ListedPart("on its guide", "slider", 1, data, "make", slider, "", "slider")
     yield pin_part("slider pin", 1, pin, thick + 2.0 * brace, 2.0 * loads.pull, "slider pin")
     long = thick + 2.0 * brace + min(count_of(mechanism.springs), 2) * hooks.outer
