@@ -83,7 +83,7 @@ class Hardware:
     rubbing: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     faults: tuple[str, ...] = ()  # parts that do not bear their loads, or cannot be made, each in a sentence
     heads: float = 0.0  # how far heads of screws stand out of the plate or the ground [m]
-    slider_excess: float = 0.0  # how much thicker than its layer the slider is [m]
+    slider_excess: float = 0.0  # how much the slider adds to the depth of the layers [m]
 
 
 def in_sentences(faults: Mapping[str, str]) -> tuple[str, ...]:
@@ -134,29 +134,32 @@ def screw_bears(screw: Screw, load: float, thickness: float, count: int, strengt
 
 @dataclass(frozen=True)
 class GuideRods:
-    """Two equal rods that guide a slider, one on either side of its pin."""
+    """Equal rods that guide a slider, in pairs: one on either side of its pin."""
 
+    count: int
     diameter: float  # [m]
     length: float  # between their supports [m]
     bush: float  # length of the slider on them [m]
-    apart: float  # distance between their axes [m]
-    load: float  # across both [N]
+    load: float  # across all of them [N]
     pressure: float  # of the bushes on the rods, the load over their shadow [Pa]
 
-    @property
-    def slider_width(self) -> float:
-        """Width of a slider with walls around both rods [m]."""
-        return self.apart + (1.0 + 2.0 * LEAST_WALL) * self.diameter
+    def apart(self, pin: float) -> float:
+        """Return the distance between the axes of a pair, with walls around the slider's pin of a diameter [m]."""
+        return pin + self.diameter + 2.0 * LEAST_WALL * max(pin, self.diameter)
+
+    def slider_width(self, pin: float) -> float:
+        """Return the width of a slider with walls around a pair [m]."""
+        return self.apart(pin) + self.slider_thickness
 
     @property
     def slider_thickness(self) -> float:
         """Thickness of a slider with walls around its rods [m]."""
         return (1.0 + 2.0 * LEAST_WALL) * self.diameter
 
-    def bodies(self, ends: FloatArray) -> tuple[PosedBody, PosedBody]:
-        """Return both rods beside a line (2, 2) [m]."""
+    def bodies(self, ends: FloatArray, pin: float) -> tuple[PosedBody, PosedBody]:
+        """Return a pair beside a line (2, 2) [m]."""
         x, y = (ends[1] - ends[0]) / math.dist(*ends)
-        aside = 0.5 * self.apart * np.array([-y, x])
+        aside = 0.5 * self.apart(pin) * np.array([-y, x])
         left, right = (
             PosedBody.line("guide", "held", ends + side * aside, 0.5 * self.diameter) for side in (1.0, -1.0)
         )
@@ -164,13 +167,13 @@ class GuideRods:
 
 
 def guide_rods(
+    count: int,  # of rods that share the load
     # across, force: largest loads across the guide and along it [N]
     across: float,
     force: float,
     # travel, bush: of the slider, and its length where `guide` states none [m]
     travel: float,
     bush: float,
-    pin: float,  # diameter of the slider's pin [m]
     guide: Guide | None,  # as stated
     system: System | None,  # of their diameter
     strength: PartStrength,  # of the rods
@@ -180,10 +183,9 @@ def guide_rods(
     couple = 0.0 if guide is None else 2.0 * force * guide.offset / length  # at each end of the bushes
     load = max(across + couple, SIDE_SHARE * force)
     span, sizes = travel + length, series_sizes("pin", system)
-    result = rod_that_guides(0.5 * load, span, PIN_MODULUS, strength.pins, SAG_SHARE, sizes)
+    result = rod_that_guides(load / count, span, PIN_MODULUS, strength.pins, SAG_SHARE, sizes)
     diameter = sizes[-1] if result is None else result
-    apart = pin + diameter + 2.0 * LEAST_WALL * max(pin, diameter)
-    return GuideRods(diameter, span, length, apart, load, load / (2.0 * diameter * length))
+    return GuideRods(count, diameter, span, length, load, load / (count * diameter * length))
 
 
 def mm(*sizes: float) -> str:
@@ -218,13 +220,13 @@ def screw_part(
     )  # fmt: skip
 
 
-def guide_part(rods: GuideRods, sliders: int, assumed: bool) -> ListedPart:
-    """Return the guides of the list, two for each slider, with what is assumed of them."""
+def guide_part(rods: GuideRods, pin: float, assumed: bool) -> ListedPart:
+    """Return the guides of the list beside a pin, with what is assumed of them."""
     said = ", side load and friction assumed" if assumed else ""
     data = (
-        f"rod for the slider, {mm(rods.apart)} beside the other, {format_short(rods.load, 'force', 3)} across both, "
-        f"{format_short(rods.pressure, 'stress', 3)} in the bushes{said}"
+        f"rod for the slider, {mm(rods.apart(pin))} beside the other, {format_short(rods.load, 'force', 3)} across all,"
+        f" {format_short(rods.pressure, 'stress', 3)} in the bushes{said}"
     )
     return ListedPart(
-        "guide of the slider", "guide", 2 * sliders, data, "make", mm(rods.diameter, rods.length), "", "guide"
+        "guide of the slider", "guide", rods.count, data, "make", mm(rods.diameter, rods.length), "", "guide"
     )

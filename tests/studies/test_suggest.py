@@ -18,6 +18,7 @@ from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK
 from cfmkit.errors import SolutionError, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.beam.proposals import kept_shapes
+from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage import linkage_of
 from cfmkit.families.slider_crank.proposals import PUSHED_PROPORTIONS, _strip, largest_printed
@@ -324,7 +325,8 @@ def test_catalogue_springs_of_a_cam_take_the_depth_of_their_own_coil():
     springs, plate = made_of.spec.mechanism.springs, made_of.spec.mechanism.contact.width
     assert springs.name.startswith("generic-extension")
     coils = min(springs.count, 2) * (springs.wound.coil + springs.wound.wire)
-    assert made_of.numbers["depth"] == pytest.approx(3.0 * plate + coils)
+    slider = hardware(cfmkit.analyze(made_of.spec).state).slider_excess
+    assert made_of.numbers["depth"] == pytest.approx(3.0 * plate + slider + coils)
 
 
 def test_proposals_of_several_materials_say_which():

@@ -2,8 +2,9 @@
 
 Each roller has a brace on both sides of the plate, pulled from the roller's shaft to the slider's pin, both of which
 stand out of the plate by half of plate and brace. Those of both rollers share a side: at the slider's pin each is half
-as thick, so that an eye there bears as much as a whole one with all of the pull. The springs hook on the ends of the
-shafts, beyond the braces; more than one on a side hook above each other on bars that the shafts carry. Forces are the
+as thick, so that an eye there bears as much as a whole one with all of the pull. The pin moves over the plate: outside
+of the braces there is half of the slider on each side, on two rods, with a pin of its own. The springs hook on the ends
+of the shafts, beyond these; more than one on a side hook above each other on bars that the shafts carry. Forces are the
 largest on both branches; where they diverge at a dead point, the next computed ones.
 """
 
@@ -77,6 +78,7 @@ class _Loads:
     pull: float  # of both braces of a roller [N]
     press: float  # of a roller on the cam [N]
     force: float  # on the slider [N]
+    rods: GuideRods  # of both halves of the slider
     hooks: _Hooks
 
     @classmethod
@@ -88,7 +90,11 @@ class _Loads:
         thickness = plate.thickness or (contact.width if contact else PLATE_THICKNESS)
         brace = min(thickness, BRACE_WIDTH)
         pull, press, force = (_largest(solution, name) for name in ("brace", "contact", "slider"))
-        return cls(strength, thickness, brace, pull, press, force, _hooks(solution, brace))
+        loads, side = solution.assembly.loads, 2.0 * spec.mechanism.roller_radius
+        across, travel = float(np.hypot(abs(loads.sideways[1]), loads.off_plane)), float(np.ptp(solution.travel))
+        rods = guide_rods(4, across, force, travel, side, spec.mechanism.guide, plate.stock, strength)
+        hooks = _hooks(solution, brace, rods.slider_thickness)
+        return cls(strength, thickness, brace, pull, press, force, rods, hooks)
 
     @property
     def arm(self) -> float:
@@ -104,7 +110,7 @@ class _Loads:
 def hardware(solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism."""
     mechanism, loads, faults = solution.assembly.spec.mechanism, _Loads.of_solution(solution), dict[str, str]()
-    strength, thick, hooks, system = loads.strength, loads.thickness, loads.hooks, mechanism.plate.stock
+    strength, thick, hooks = loads.strength, loads.thickness, loads.hooks
     pin = _slider_pin(mechanism, loads, faults)
     shaft, bearing = _shaft(mechanism, loads, faults)
     for place, diameter in (("slider pin", pin), ("shafts of the rollers", shaft)):
@@ -120,42 +126,49 @@ def hardware(solution: Solution) -> Hardware:
         faults["springs to the shafts"] = (
             f"{length_in_words(bar)} wide for springs {length_in_words(hooks.height)} high: use fewer springs"
         )
-    across = float(np.hypot(abs(solution.assembly.loads.sideways[1]), solution.assembly.loads.off_plane))
-    travel, side = float(np.ptp(solution.travel)), 2.0 * mechanism.roller_radius
-    rods = guide_rods(across, loads.force, travel, side, pin, mechanism.guide, system, strength)
-    if rods.slider_thickness > thick * (1 + 1e-9):
+    rods, side = loads.rods, 2.0 * mechanism.roller_radius
+    if 0.5 * rods.slider_width(pin) + 0.5 * shaft > mechanism.rest_half_width:
         faults["guide of the slider"] = (
-            f"the slider is {length_in_words(thick)} thick, as there is between the braces, too thin for rods of "
-            f"{length_in_words(rods.diameter)}: use a plate of {length_in_words(rods.slider_thickness)}"
+            f"{length_in_words(rods.slider_width(pin))} wide with rods of {length_in_words(rods.diameter)}, in the "
+            "way of the rollers' shafts: start farther out ('mechanism.rest_half_width')"
         )
     holes = [edge for contour in cut_plate(solution)[1:] for edge in contour.edges if isinstance(edge, Arc)]
     screw = _screw(mechanism, loads, len(holes), faults)
-    slider = mm(max(side, rods.slider_width), side, thick)
+    slider = mm(max(side, rods.slider_width(pin)), side, rods.slider_thickness)
     parts = (*_parts(solution, loads, width, (pin, shaft, bearing), slider), *_hook_bars(hooks, bar, shaft, strength))
-    parts = (*parts, guide_part(rods, 1, mechanism.guide is None))
+    parts = (*parts, guide_part(rods, pin, mechanism.guide is None))
     if holes:
         parts = (*parts, screw_part("plate to its base", len(holes), screw, thick, "screw"))
-    standing = tuple(_standing(solution, rods, holes, screw))
+    standing = tuple(_standing(solution, rods, pin, holes, screw))
     drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft), bearing, (hooks, bar)))
     rubbing: dict[str, dict[str, float]] = {"pins": {"diameter": pin}, "guide": {}}
     if bearing is None and mechanism.bearings is None:
         rubbing["bearings"] = {"bore": shaft}
     heads = screw.head_height if holes else 0.0
     around = *(body for body in drawn if body.name == "brace"), *_box_of_springs(solution, hooks, bar)
-    return Hardware(with_faults(parts, faults), (*standing, *around), drawn, rubbing, in_sentences(faults), heads)
+    return Hardware(
+        with_faults(parts, faults),
+        (*standing, *around),
+        drawn,
+        rubbing,
+        in_sentences(faults),
+        heads,
+        2.0 * rods.slider_thickness,
+    )
 
 
 def _slider_pin(mechanism: Mechanism, loads: _Loads, faults: dict[str, str]) -> float:
     """Return the stated slider pin, or the thinnest that bears [m]; faults are added."""
-    pin, bears = pin_for(loads.pull, loads.arm, loads.brace, loads.strength, mechanism.plate.stock)
+    arm, thin = 0.5 * (loads.brace + loads.rods.slider_thickness), min(loads.brace, loads.rods.slider_thickness)
+    pin, bears = pin_for(loads.pull, arm, thin, loads.strength, mechanism.plate.stock)
     if not bears:
         faults["slider pin"] = f"no pin of the series bears the {newton(loads.pull)} of a brace"
     if mechanism.pins is None:
         return pin
     allowable = loads.strength.allowable, loads.strength.pins
-    if pin_that_bears(loads.pull, loads.arm, loads.brace, *allowable, (mechanism.pins.diameter,)) is None:
+    if pin_that_bears(loads.pull, arm, thin, *allowable, (mechanism.pins.diameter,)) is None:
         faults["slider pin"] = (
-            f"too weak for the {newton(loads.pull)} of a brace {length_in_words(loads.arm)} beside it: use at least "
+            f"too weak for the {newton(loads.pull)} of a brace {length_in_words(arm)} beside it: use at least "
             f"{length_in_words(pin)} ('mechanism.pins.diameter')"
         )
     return mechanism.pins.diameter
@@ -208,7 +221,7 @@ class _Hooks:
         return max(width, hole * (1.0 + 2.0 * LEAST_WALL))
 
 
-def _hooks(solution: Solution, brace: float) -> _Hooks:
+def _hooks(solution: Solution, brace: float, slider: float) -> _Hooks:
     springs = solution.assembly.spec.mechanism.springs
     stretch, half_width = float(solution.elongation.max()), solution.assembly.spec.mechanism.rest_half_width
     count, (wire, coil) = count_of(springs), wire_and_coil(springs, stretch, half_width) or (0.0, math.inf)
@@ -216,7 +229,7 @@ def _hooks(solution: Solution, brace: float) -> _Hooks:
     share = (count + 1) // 2 / count
     pull = share * (springs.total * stretch + springs.initial_tension * count)
     height = stack_height(outer, count) if count > 2 else 0.0
-    return _Hooks(pull, 0.5 * (brace + outer), outer, coil - wire, height, min(brace, outer))
+    return _Hooks(pull, 0.5 * (brace + outer) + slider, outer, coil - wire, height, min(brace, outer))
 
 
 def _hook_bars(hooks: _Hooks, width: float, shaft: float, strength: PartStrength) -> Iterator[ListedPart]:
@@ -322,15 +335,11 @@ def _parts(
     seat = hole_with_fit(shaft, 8) if bearing is None else f"{hole_with_fit(bearing.outer, 7)} for its bearing"
     data = f"with a hole of {seat}, presses with {newton(loads.press)}"
     yield ListedPart("on the cam", "roller", 2, data, "make", size, "", "roller")
-    data = f"with a hole of {hole_with_fit(pin, 8)} between those of its guide"
-    if (beside := y1 - float(pin_path(solution)[:, 1].min()) + radius) > 0.0:
-        data += (
-            f"; forked: over {mm(1e-3 * math.ceil(1e3 * beside))} of its way it, pin and guide stand on both sides of "
-        )
-        data += "the plate, which the depth does not count"
-    yield ListedPart("on its guide", "slider", 1, data, "make", slider, "", "slider")
-    yield pin_part("slider pin", 1, pin, thick + 2.0 * brace, 2.0 * loads.pull, "slider pin")
-    long = thick + 2.0 * brace + min(count_of(mechanism.springs), 2) * hooks.outer
+    data = f"half, outside of the braces, with a hole of {hole_with_fit(pin, 8)} between those of its guide"
+    yield ListedPart("on its guide", "slider", 2, data, "make", slider, "", "slider")
+    half = loads.rods.slider_thickness
+    yield pin_part("slider pin", 2, pin, brace + half, loads.pull, "slider pin")
+    long = thick + 2.0 * (brace + half) + min(count_of(mechanism.springs), 2) * hooks.outer
     shafts = pin_part("shafts of the rollers", 2, shaft, long, loads.press, "shaft")
     end = hooks.seat(shaft)
     yield shafts if end == shaft else replace(shafts, data=f"{shafts.data}, ends turned to {mm(end)} for the loops")
@@ -354,11 +363,11 @@ def _parts(
     yield ListedPart("between the rollers", springs.name or "", number, data, "buy", size, "", "spring")
 
 
-def _standing(solution: Solution, rods: GuideRods, holes: list[Arc], screw: Screw) -> Iterator[PosedBody]:
+def _standing(solution: Solution, rods: GuideRods, pin: float, holes: list[Arc], screw: Screw) -> Iterator[PosedBody]:
     """Yield the rods that guide the slider over its way, and the heads of the screws in the plate."""
     heights = pin_path(solution)[:, 1]
     ends = np.array([[0.0, float(heights.min()) - 0.5 * rods.bush], [0.0, float(heights.max()) + 0.5 * rods.bush]])
-    yield from rods.bodies(ends)
+    yield from rods.bodies(ends, pin)
     yield from (PosedBody.line("screw", "held", np.array([hole.center]), 0.5 * screw.head) for hole in holes)
 
 

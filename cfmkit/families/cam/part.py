@@ -36,8 +36,8 @@ MIN_ASPECT_RATIO = 0.2
 def part_over_motion(result: Result) -> PosedPart | None:
     """Return a solved mechanism over its travel; None of a motion in time, or of a cam as built.
 
-    In the depth there are the plate, a brace on both sides of it, and outside of these the springs, which stand above
-    each other.
+    In the depth there are the plate, on both sides of it a brace and half of the slider, and outside of these the
+    springs, which stand above each other.
     """
     solution = result.state
     if not hasattr(solution, "states"):
@@ -52,9 +52,10 @@ def part_over_motion(result: Result) -> PosedPart | None:
     reported = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE_WIDTH):.4g} mm each, {wound}"
     if depth is None:
         reported = "no steel spring fits between the rollers"
-    # plate, two rollers, four braces, slider
-    pieces = 8 + count_of(mechanism.springs)
+    # plate, two rollers, four braces, two halves of the slider
+    pieces = 9 + count_of(mechanism.springs)
     joining = hardware(solution)
+    depth = None if depth is None else depth + joining.slider_excess
     depth = None if depth is None else 0.5 * depth + max(0.5 * depth, 0.5 * thick + joining.heads)
     return PosedPart(
         (*bodies(solution), *joining.bodies),

@@ -171,23 +171,22 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
         modulus = material.modulus / (2.0 * (1.0 - material.poisson**2))
         bearable = YIELD_PRESSURE * material.yield_strength / request.safety
         press = CONTACT_MARGIN * size["contact"] * request.target
-        thick = max(
-            PLATE_MIN, press * modulus / (np.pi * size["roller"] * bearable**2), _slider(request, size, material)
-        )
+        thick = max(PLATE_MIN, press * modulus / (np.pi * size["roller"] * bearable**2))
+        slider = _slider(request, size, material)
         depths: dict[int, float] = {}
-        pin = _slider_pin(request, size, thick, material)
+        pin = _slider_pin(request, size, (thick, slider), material)
         for count in SPRING_COUNTS if pin is not None else ():
             springs = Springs(stiffness=total / count, count=count)
             depth = depth_of(thick, springs, stretch, size["start"], request.safety)
-            if depth is None or depth > (request.depth or sum(request.envelope)):
+            if depth is None or depth + 2.0 * slider > (request.depth or sum(request.envelope)):
                 continue
             outer = coil_diameter(springs, stretch, size["start"], request.safety) or 0.0
-            if not _shafts_as_assumed(request, size, (thick, outer), material, 0.5 * total * stretch):
+            if not _shafts_as_assumed(request, size, (thick, slider, outer), material, 0.5 * total * stretch):
                 continue
             stack = stack_height(outer, count)
             below = 0.5 * stack - max(size["roller"], TAB_HEIGHT_RATIO * request.envelope[1])
             if size["height"] + max(below, 0.0) <= request.envelope[1]:
-                depths[count] = depth
+                depths[count] = depth + 2.0 * slider
         if depths:
             # as few springs as there is room for; without a depth they may be as deep as the envelope is wide
             modest = [count for count, depth in depths.items() if request.depth or depth <= max(request.envelope)]
@@ -196,18 +195,21 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
     return None
 
 
-def _slider_pin(request: Request, size: dict[str, float], thick: float, material: MaterialSpec) -> float | None:
+def _slider_pin(
+    request: Request, size: dict[str, float], sizes: tuple[float, float], material: MaterialSpec
+) -> float | None:
     """Return the slider's pin, for the pull of a brace at the end of the travel [m].
 
     None if it, or the shaft of a roller, is too thick for roller and slider.
     """
     strength = PartStrength.from_material(material, request.safety)
+    thick, slider = sizes  # of the plate, and of half of the slider [m]
     brace = min(thick, BRACE_WIDTH)
-    arm = 0.5 * (thick + brace)
     rise = np.sqrt(size["brace"] ** 2 - size["end"] ** 2)
     pull = PULL_MARGIN * 0.5 * request.target * size["brace"] / float(rise)
-    pin, pin_bears = pin_for(pull, arm, brace, strength, None)
-    shaft, shaft_bears = pin_for(CONTACT_MARGIN * size["contact"] * request.target, arm, thick, strength, None)
+    pin, pin_bears = pin_for(pull, 0.5 * (brace + slider), min(brace, slider), strength, None)
+    press = CONTACT_MARGIN * size["contact"] * request.target
+    shaft, shaft_bears = pin_for(press, 0.5 * (thick + brace), thick, strength, None)
     most = SHAFT_IN_ROLLER * 2.0 * size["roller"]
     handy = next((entry for entry in series_sizes("pin", None) if entry >= PIN_SHARE * 2.0 * size["roller"]), pin)
     return max(pin, handy) if pin_bears and shaft_bears and max(pin, shaft) <= most else None
@@ -216,26 +218,25 @@ def _slider_pin(request: Request, size: dict[str, float], thick: float, material
 def _shafts_as_assumed(
     request: Request,
     size: dict[str, float],
-    # of the plate, and of a spring's coil [m]
-    sizes: tuple[float, float],
+    sizes: tuple[float, float, float],  # thickness of plate and half slider, diameter of a spring's coil [m]
     material: MaterialSpec,
     pull: float,  # of the springs of a side [N]
 ) -> bool:
     """Return True unless friction counts, and rollers that were to have ball bearings have too thick shafts."""
     if request.hysteresis is None or size["plain"]:
         return True
-    (thick, outer), press = sizes, CONTACT_MARGIN * size["contact"] * request.target
+    (thick, slider, outer), press = sizes, CONTACT_MARGIN * size["contact"] * request.target
     brace = min(thick, BRACE_WIDTH)
-    arm = 0.25 * (thick + brace) + 0.5 * (brace + outer) * pull / press
+    arm = 0.25 * (thick + brace) + (0.5 * (brace + outer) + slider) * pull / press
     shaft, bears = pin_for(press, arm, thick, PartStrength.from_material(material, request.safety), None)
     return bears and bool(_turn_on_bearings(shaft, size["roller"]))
 
 
 def _slider(request: Request, size: dict[str, float], material: MaterialSpec) -> float:
-    """Return how thick the slider is around the rods that guide it [m]: so thick is the plate."""
+    """Return how thick half of the slider is around the rods that guide it [m]."""
     strength, travel = PartStrength.from_material(material, request.safety), size["run_in"] + request.travel
     load = (0.0, PULL_MARGIN * request.target, travel + spare_stroke(request), 2.0 * size["roller"])
-    return guide_rods(*load, 0.0, None, None, strength).slider_thickness
+    return guide_rods(4, *load, None, None, strength).slider_thickness
 
 
 def with_wire(spec: CamSpec, request: Request) -> CamSpec:

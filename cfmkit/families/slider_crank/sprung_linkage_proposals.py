@@ -205,7 +205,7 @@ def _slider_excess(request: Request, sheet: float) -> float:
     pushed = request.kind == "force"
     force, travel = (request.target, request.travel) if pushed else (request.target / (0.25 * longest), 0.5 * longest)
     strength = PartStrength.from_material(None, request.safety)
-    rods = guide_rods(0.0, force, travel, 0.1 * longest, 0.0, None, None, strength)
+    rods = guide_rods(2, 0.0, force, travel, 0.1 * longest, None, None, strength)
     return max(rods.slider_thickness - sheet, 0.0)
 
 

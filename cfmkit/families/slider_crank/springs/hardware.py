@@ -71,10 +71,10 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
         cure = f"use at least {length_in_words(least)} ('mechanism.pins.diameter')" if bears else "use thicker links"
         faults["joints"] = f"too weak for {newton(load)} in links of {length_in_words(sheet)}: {cure}"
     across, force, travel, rod_at = _guide_loads(spec, solution)
-    rods = guide_rods(across, force, travel, 2.0 * eye, pin, mechanism.guide, system, strength)
+    rods = guide_rods(2, across, force, travel, 2.0 * eye, mechanism.guide, system, strength)
     screw = screw_for(load * legs, sheet, N_SCREWS, strength)
     ends = rod_at + np.array([[-0.5 * rods.bush, 0.0], [0.5 * rods.bush, 0.0]])
-    margin = np.array([eye, max(eye, 0.5 * rods.slider_width)])
+    margin = np.array([eye, max(eye, 0.5 * rods.slider_width(pin))])
     low, high = np.minimum(ends.min(axis=0) - margin, -eye), np.maximum(ends.max(axis=0) + margin, eye)
     spare = 0.5 * np.maximum(LEAST_GROUND * screw.head - (high - low), 0.0)
     low, high = low - spare, high + spare
@@ -87,7 +87,7 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
         )
     bodies = (
         PosedBody.polygon("ground", "held", ground),
-        *rods.bodies(ends),
+        *rods.bodies(ends, pin),
         *(PosedBody.line("screw", "held", at[None], 0.5 * screw.diameter) for at in places),
     )
     parts = (
@@ -102,7 +102,7 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
             "",
             "ground",
         ),
-        guide_part(rods, 1, mechanism.guide is None),
+        guide_part(rods, pin, mechanism.guide is None),
         screw_part(GROUND_SCREWS, len(places), screw, sheet, "screw", countersunk=not reached),
     )
     rubbing = {"pins": {"diameter": pin}, "guide": {}}
@@ -188,7 +188,7 @@ def _parts(
         1,
         f"with a hole of {hole_with_fit(pin, 8)} between those of its guide",
         "make",
-        mm(width, max(width, rods.slider_width), thick),
+        mm(width, max(width, rods.slider_width(pin)), thick),
         "",
         "slider",
     )
