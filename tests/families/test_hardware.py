@@ -266,6 +266,9 @@ def test_rollers_without_ball_bearings_rub_on_their_shafts():
     assert set(cam_hardware(result.state).rubbing) == {"pins", "guide", "bearings"}
     assert "plain bearings of the rollers (" in friction_note(result, Run())
     assert set(cam_hardware(cfmkit.analyze(cfmkit.load("configs/cam.yaml")).state).rubbing) == {"pins", "guide"}
+    # a bearing is no wider than its roller: beside it there are the braces
+    thin = cfmkit.load("configs/cam.yaml", ["mechanism.contact.width=3 mm", "mechanism.plate.thickness=3 mm"])
+    assert "bearings" in cam_hardware(cfmkit.analyze(thin).state).rubbing
     plain = cfmkit.load("configs/cam.yaml", ["mechanism.bearings={bore: 5 mm, friction: 0.1, kind: plain}"])
     assert not [row for row in table(cfmkit.analyze(plain)) if row["place"] == "in the rollers"]
     with pytest.raises(cfmkit.SpecError, match="of rolling bearings"):

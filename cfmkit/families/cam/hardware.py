@@ -270,7 +270,8 @@ def _shaft(mechanism: Mechanism, loads: _Loads, faults: dict[str, str]) -> tuple
     least, most = loads.thinnest_shaft(mechanism.plate.stock), BEARING_IN_ROLLER * 2.0 * mechanism.roller_radius
     stated = mechanism.bearings
     if stated is None:
-        fitting = [entry for entry in BALL_BEARINGS if entry.bore >= least and entry.outer <= most]
+        inside = [entry for entry in BALL_BEARINGS if entry.outer <= most and entry.width <= loads.thickness]
+        fitting = [entry for entry in inside if entry.bore >= least]
         bearing = min(fitting, key=lambda entry: entry.outer, default=None)
         shaft = bearing.bore if bearing else least
     else:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
     from cfmkit.families.suggestion_request import Request
+    from cfmkit.stock.stock_series import Bearing
 
 ROLLING_FRICTION = 0.002
 """Rolling resistance over roller radius: what [SS] measured on steel rollers; assumed for every material."""
@@ -135,9 +136,10 @@ def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _turn_on_bearings(shaft: Any, roller: Any) -> Any:
-    """Return whether a ball bearing fits around shafts and into rollers of some radius [m]."""
-    fits = [(entry.bore >= shaft) & (entry.outer <= BEARING_IN_ROLLER * 2.0 * roller) for entry in BALL_BEARINGS]
+def _turn_on_bearings(shaft: Any, roller: Any, *bearings: Bearing) -> Any:
+    """Return whether a ball bearing, or one of those given, fits around shafts and into rollers of some radius [m]."""
+    tried = bearings or BALL_BEARINGS
+    fits = [(entry.bore >= shaft) & (entry.outer <= BEARING_IN_ROLLER * 2.0 * roller) for entry in tried]
     return np.any(fits, axis=0)
 
 
@@ -172,6 +174,10 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
         bearable = YIELD_PRESSURE * material.yield_strength / request.safety
         press = CONTACT_MARGIN * size["contact"] * request.target
         thick = max(PLATE_MIN, press * modulus / (np.pi * size["roller"] * bearable**2))
+        if request.hysteresis is not None and not size["plain"]:
+            thick = max(
+                thick, *(entry.width for entry in BALL_BEARINGS if _turn_on_bearings(0.0, size["roller"], entry))
+            )
         slider = _slider(request, size, material)
         depths: dict[int, float] = {}
         pin = _slider_pin(request, size, (thick, slider), material)
