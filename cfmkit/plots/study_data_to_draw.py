@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.plots.axis_labels_and_headings import axis_label
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ PERCENT_DIMENSION = "percent"  # dimension of shares that are drawn in per cent
 MAX_LABEL_LENGTH = 64  # characters of an axis label: so many of 8 pt fit on 92 mm of print, the axis of a map
 
 
-@dataclass(frozen=True)
-class DrawnScale:
+@dataclass(frozen=True, repr=False)
+class DrawnScale(ShortRepr):
     """Something that is drawn: a parameter or a metric, in border units."""
 
     # name, dimension: for its label
@@ -83,8 +84,8 @@ def short_names(paths: Sequence[str]) -> tuple[str, ...]:
         counts = longer
 
 
-@dataclass(frozen=True)
-class StudyMarks:
+@dataclass(frozen=True, repr=False)
+class StudyMarks(ShortRepr):
     """Outcome of a study, as its pictures need it."""
 
     # varied, metrics: parameters and the metrics to draw

@@ -198,7 +198,7 @@ MIN_BLOCK_SIZES, SMALLEST_TRACED = 64, 8
 def are_solved_together(study: Study, plan: Plan) -> int:
     """Return of how many points a block of rows is at least; 0 if the first, middle and last point are no rows."""
     solve = family(study.spec.family).rows
-    if solve is None or study.design or not len(plan):
+    if solve is None or study.design or not len(plan) or "analysis.points" in plan.paths:  # curves of other lengths
         return 0
     indices = sorted({0, len(plan) // 2, len(plan) - 1})
     try:

@@ -383,7 +383,11 @@ def test_an_unknown_metric_is_refused(name):
 
 def test_small_blocks_are_computed_together_and_noted_one_by_one(tmp_path):
     many = work("mechanism.roller_radius=6 mm:10 mm:60", "mechanism.rolling_friction=0:0.003:60", names=("force_mean",))
-    assert (many.vectorised, many.step, many.together) == (True, 64, 256)
+    assert (many.vectorised, many.step, many.together) == (True, 64, 512)
+    finer = dataclasses.replace(many.study, spec=many.study.spec.replace({"analysis.points": 100_000}))
+    assert (
+        dataclasses.replace(many, study=finer).together == 256
+    )  # of slow ones as many as leave a dozen processes some
     jobs = []
 
     def noting(work, queue, _stopping):
@@ -393,7 +397,7 @@ def test_small_blocks_are_computed_together_and_noted_one_by_one(tmp_path):
 
     with Journal(tmp_path / "journal") as journal:
         first = values(run(many, noting, journal))
-    assert [stop - start for start, stop in jobs] == 14 * [256] + [16]
+    assert [stop - start for start, stop in jobs] == 7 * [512] + [16]
     with Journal(tmp_path / "journal") as journal:
         assert len(journal) == 57
         again = run(many, journal=journal)

@@ -90,6 +90,7 @@ LINK_SHARES = (1.0 / 12.0, 1.0 / 9.0, 1.0 / 7.0, 1.0 / 5.5, 1.0 / 4.5)
 springs."""
 SLIDING_FRICTION = 0.1
 """Friction of plain pins and of a plain guide where none is stated: greased steel, or dry POM on steel; assumed."""
+ACROSS_SHARE = 0.6  # load across the guide over the force along it, about: the coupler is inclined
 PIN_IN_COIL = 0.9
 """Largest diameter of a pin over the inner one of a torsion spring around it, wound up: makers leave a tenth."""
 FINISH_FUNCTION = "cfmkit.families.slider_crank.sprung_linkage_proposals:finish"
@@ -205,7 +206,7 @@ def _slider_excess(request: Request, sheet: float) -> float:
     pushed = request.kind == "force"
     force, travel = (request.target, request.travel) if pushed else (request.target / (0.25 * longest), 0.5 * longest)
     strength = PartStrength.from_material(None, request.safety)
-    rods = guide_rods(2, 0.0, force, travel, 0.1 * longest, None, None, strength)
+    rods = guide_rods(2, ACROSS_SHARE * force, force, travel, 0.1 * longest, None, None, strength)
     return max(rods.slider_thickness - sheet, 0.0)
 
 
