@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from cfmkit.runs.sweep_and_sensitivity_api import sensitivity, sweep
     from cfmkit.specs.spec import Spec
 
-_HOMES = {
+_NAMES_OF_MODULE = {
     "cfmkit.api": (
         "analyze",
         "check",
@@ -103,7 +103,7 @@ _HOMES = {
     "cfmkit.runs.suggest_api": ("suggest",),
     "cfmkit.runs.sweep_and_sensitivity_api": ("sensitivity", "sweep"),
 }
-_HOME = {name: module for module, names in _HOMES.items() for name in names}
+_MODULE_OF_NAME = {name: module for module, names in _NAMES_OF_MODULE.items() for name in names}
 
 __all__ = [
     "AnalysisView",
@@ -158,9 +158,9 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first needed."""
-    if name not in _HOME:
+    if name not in _MODULE_OF_NAME:
         raise AttributeError(f"module 'cfmkit' has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
+    value = getattr(import_module(_MODULE_OF_NAME[name]), name)
     globals()[name] = value
     return value
 

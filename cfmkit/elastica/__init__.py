@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.tracing.trace import trace
     from cfmkit.elastica.tracing.trace_many import NetworkOutcome, trace_many
 
-_HOMES = {
+_NAMES_OF_MODULE = {
     "model.beam": ("Beam",),
     "model.drive": ("Control", "Displacement", "Loading", "Rotation"),
     "model.network": (
@@ -67,7 +67,7 @@ _HOMES = {
     "tracing.trace": ("trace",),
     "tracing.trace_many": ("NetworkOutcome", "trace_many"),
 }
-_HOME = {name: f"{__name__}.{module}" for module, names in _HOMES.items() for name in names}
+_MODULE_OF_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_OF_MODULE.items() for name in names}
 
 __all__ = [
     "CLAMPED_SUPPORT",
@@ -111,8 +111,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import a name when it is first needed: a path without its derivatives needs half of the engine."""
-    if name not in _HOME:
+    if name not in _MODULE_OF_NAME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
+    value = getattr(import_module(_MODULE_OF_NAME[name]), name)
     globals()[name] = value
     return value

@@ -122,7 +122,7 @@ def _with_own_metrics(record: Family) -> Family:
 
 def _record(name: str) -> Family:
     if name in FAMILY_MODULES:
-        record: Family = import_module(FAMILY_MODULES[name]).FAMILY
+        record: Family = import_module(FAMILY_MODULES[name]).FAMILY_RECORD
         return record
     if name in _REGISTERED_FAMILIES:
         return _REGISTERED_FAMILIES[name]

@@ -99,10 +99,17 @@ def _usable(cycle: Cycle) -> Interval:
     return cycle.usable
 
 
-_LAN = "d is the end of the window, c where the {effort} first reaches 0.95 of that at d [Lan 2010, sec. 2]"
+_RANGE_MEANING = "d is the end of the window, c where the {effort} first reaches 0.95 of that at d [Lan 2010, sec. 2]"
 TRAVEL_METRICS = (
-    Definition("range_95", "motion", f"d - c: {_LAN}", range_95, worst="smallest", windowed=False),
-    Definition("range_95_fraction", "ratio", f"(d - c)/d: {_LAN}", range_95_fraction, worst="smallest", windowed=False),
+    Definition("range_95", "motion", f"d - c: {_RANGE_MEANING}", range_95, worst="smallest", windowed=False),
+    Definition(
+        "range_95_fraction",
+        "ratio",
+        f"(d - c)/d: {_RANGE_MEANING}",
+        range_95_fraction,
+        worst="smallest",
+        windowed=False,
+    ),
     *(
         Definition(
             name,

@@ -28,25 +28,13 @@ MAX_BEAM_TURN = 16.0  # turn [rad] up to which GAUSS integrates sine and cosine 
 
 
 class Bundle:
-    """The beams of a network between given ends.
-
-    Attributes
-    ----------
-    plain : list of int
-        Beams with a polynomial angle and one thickness; `others` has the rest.
-    coefficients : (plain, m) array
-        Of the angle, rotation of the fit included in the first.
-    length : (plain,) array
-        Arc length as used [m].
-    rigidities : (3, plain) array
-        Of bending, and the compliances of stretching and shearing, as `Section.rigidities` has them.
-    """
+    """The beams of a network between given ends."""
 
     def __init__(self, network: Network, ends: Any) -> None:
         """Fit the plain beams; `ends` (b, 2, 2) [m] has the places of their ends."""
         self.names, self.beams = list(network.beams), list(network.beams.values())
         plain = [k for k, beam in enumerate(self.beams) if is_plain(beam)]
-        self.plain = plain
+        self.plain = plain  # beams with a polynomial angle and one thickness; `others` has the rest
         self.others = [] if len(plain) == len(self.beams) else [k for k in range(len(self.beams)) if k not in plain]
         if plain:
             self._fit_plain(ends if not self.others else ends[plain])
@@ -64,7 +52,7 @@ class Bundle:
         if any(nominal):
             first = np.array([d if one is None else one for d, one in zip(distance, nominal, strict=True)])
         self.reach, self.drawn = reach, (first, cx, cy)
-        rotation, self.length = fit_to_ends(cx, cy, reach)
+        rotation, self.length = fit_to_ends(cx, cy, reach)  # arc length as used (plain,) [m]
         self.scale = distance / (own * first)
         closures = [beam.closure for beam in beams]
         if "raw" in closures:
@@ -72,9 +60,9 @@ class Bundle:
             rotation, self.scale = np.where(raw, 0.0, rotation), np.where(raw, 1.0, self.scale)
             self.length = np.where(raw, first, self.length)
         self.rotation = rotation
-        self.coefficients = c if c.dtype == rotation.dtype else c + 0j
+        self.coefficients = c if c.dtype == rotation.dtype else c + 0j  # of the angle, the rotation in the first
         self.coefficients[:, 0] += rotation
-        self.rigidities = rigidities_of(beams)
+        self.rigidities = rigidities_of(beams)  # (3, plain): bending, compliances of stretching and shearing
 
     @property
     def gap(self) -> Any:
