@@ -15,23 +15,26 @@ from contact_paths import assert_work_is_energy, at_drive, check_complementarity
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
     Beam,
+    BeamOnBeam,
     Control,
     Displacement,
     Loading,
     Network,
     Node,
+    NodeOnBeam,
+    NodeOnObstacle,
     PathStatus,
     PointLoad,
     Section,
     SlideSpring,
     arc,
+    line_edge,
     slider_support,
     trace,
 )
 from cfmkit.elastica.contact.sliding import SlidingEquations
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam, NodeOnObstacle, line
 from cfmkit.elastica.results.between_points import interpolate_path
 
 DOWN = -np.pi / 2
@@ -151,7 +154,7 @@ def test_a_tip_becomes_tangent_and_touches_with_its_side_and_goes_back():
 
 def test_a_leaf_that_falls_on_a_stiffer_and_stiffer_one_falls_on_a_floor():
     """Of the floor the numbers are those of shooting, `test_elastica_sides.py`."""
-    floor = line((0, HALF), 0.0)
+    floor = line_edge((0, HALF), 0.0)
     alone = (NodeOnObstacle("floor", "tip", floor, HALF),)
     drive = Displacement("root", DOWN, np.array([0.1, 0.2]))
     known = trace(falling_leaf(contacts=alone), drive, EXACT).effort[-1]

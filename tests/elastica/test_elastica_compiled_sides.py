@@ -12,6 +12,9 @@ from contact_layouts import THIN_SECTION, among_discs
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
     Beam,
+    BeamOnBeam,
+    BeamOnObstacle,
+    BeamSide,
     Control,
     Displacement,
     LineLoad,
@@ -19,9 +22,14 @@ from cfmkit.elastica import (
     Loading,
     Network,
     Node,
+    NodeOnBeam,
+    NodeOnObstacle,
     PointLoad,
     Polynomial,
     Section,
+    circle_edge,
+    line_edge,
+    polyline_edge,
     slider_support,
     trace,
 )
@@ -32,22 +40,12 @@ from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE, load_compiled
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import CompiledSides, equations
-from cfmkit.elastica.model.contact import (
-    BeamOnBeam,
-    BeamOnObstacle,
-    BeamSide,
-    NodeOnBeam,
-    NodeOnObstacle,
-    circle,
-    line,
-    polyline,
-)
 
 pytestmark = pytest.mark.skipif(load_compiled() is None, reason="the compiled module was not built")
 OUTLINES = {
-    "disc": circle((0.4, -0.2), 0.1),
-    "roof": polyline([(-0.5, -1), (0.7, -0.2), (1.5, -1)], 0.05),
-    "hole": circle((0.0, 0.0), 1.4, hole=True),
+    "disc": circle_edge((0.4, -0.2), 0.1),
+    "roof": polyline_edge([(-0.5, -1), (0.7, -0.2), (1.5, -1)], 0.05),
+    "hole": circle_edge((0.0, 0.0), 1.4, hole=True),
 }
 SHAPES = {"straight": Polynomial(), "curved": Polynomial((0.1, 0.4, 0.2))}
 LEAF_PLACES = FlankPlace(0, 0.3), FlankPlace(1, 0.7), FlankPlace(3, 0.4), FlankPlace(2, 0.6)
@@ -58,7 +56,7 @@ SECTIONS = {"stiff": THIN_SECTION, "soft": replace(THIN_SECTION, axial=True), "w
 
 def leaf(shape: str = "straight", section: str = "stiff") -> Network:
     """Return a leaf under its weight, with a pad at its tip, that may touch three obstacles with its side."""
-    pad = NodeOnObstacle("floor", "tip", line((0, -0.2), 0.1), 0.005)
+    pad = NodeOnObstacle("floor", "tip", line_edge((0, -0.2), 0.1), 0.005)
     contacts = (pad, *(BeamOnObstacle(name, "leaf", edge) for name, edge in OUTLINES.items()))
     nodes = {"root": Node(0.0, 0.0, CLAMPED_SUPPORT), "tip": Node(1.0, 0.0)}
     beams = {"leaf": Beam("root", "tip", SECTIONS[section], SHAPES[shape])}

@@ -12,16 +12,28 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from cfmkit.elastica import Beam, Control, Displacement, Network, Node, PathStatus, Section, slider_support, trace
+from cfmkit.elastica import (
+    Beam,
+    Control,
+    Displacement,
+    Network,
+    Node,
+    NodeOnObstacle,
+    PathStatus,
+    Section,
+    Stop,
+    circle_edge,
+    line_edge,
+    polyline_edge,
+    slider_support,
+    trace,
+)
 from cfmkit.elastica.contact.changes import PieceOfPath
 from cfmkit.elastica.contact.friction import choose_friction
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.model.contact import NodeOnObstacle, Stop, circle, line, polyline
 from cfmkit.elastica.results.between_points import interpolate_path
-from cfmkit.numerics.continuation.path import Options
-from cfmkit.numerics.continuation.problem import PathEquilibrium
-from cfmkit.numerics.quadrature import clenshaw_curtis
+from cfmkit.numerics.continuation import Options, PathEquilibrium
 
 SECTION = Section(1.0, 12.0, 1.0, axial=False, shear=False)  # EI = 1
 EXACT = Control(tolerance=1e-9)
@@ -38,11 +50,11 @@ def lower(contact, places, angle=ANGLE):
 
 
 def on_floor(friction, radius=0.0):
-    return NodeOnObstacle("floor", "tip", line((0, -0.4), 0.0), radius, friction=friction)
+    return NodeOnObstacle("floor", "tip", line_edge((0, -0.4), 0.0), radius, friction=friction)
 
 
 def on_disc(friction, radius=0.0):
-    return NodeOnObstacle("disc", "tip", circle(CENTRE, DISC), radius, friction=friction)
+    return NodeOnObstacle("disc", "tip", circle_edge(CENTRE, DISC), radius, friction=friction)
 
 
 def tip_x(path):
@@ -120,11 +132,11 @@ def test_a_rounded_corner_rubs_as_the_disc_of_its_fillet():
     radius, turn = 0.3, np.radians(50)
     corner = np.add(CENTRE, [-radius * np.tan(turn / 2), radius])
     before = corner - [0.3 * np.cos(turn), 0.3 * np.sin(turn)]
-    edge = polyline([before, corner, np.add(corner, [0.5, 0.0])], radius)
+    edge = polyline_edge([before, corner, np.add(corner, [0.5, 0.0])], radius)
     places = [0.2, 0.25, 0.2]
     paths = [
         lower(NodeOnObstacle("edge", "tip", outline, 0.0, friction=0.2), places, angle=0.0)
-        for outline in (edge, circle(CENTRE, radius))
+        for outline in (edge, circle_edge(CENTRE, radius))
     ]
     forces = [at_requested(path, path.contact_force(0)) for path in paths]
     assert forces[0] == pytest.approx(forces[1], rel=1e-9)
@@ -133,8 +145,8 @@ def test_a_rounded_corner_rubs_as_the_disc_of_its_fillet():
 def test_what_a_cycle_costs_is_what_friction_takes():
     path = lower(on_floor(0.3), [*np.linspace(0.02, 0.2, 10), *np.linspace(0.18, 0.0, 10)])
     turn = int(np.flatnonzero(path.requested == 9)[0])
-    weights = clenshaw_curtis(33)
-    shares = 0.5 * (1 - np.cos(np.pi * np.arange(33) / 32))
+    nodes, weights = np.polynomial.legendre.leggauss(33)
+    shares, weights = 0.5 * (1 + nodes), 0.5 * weights
     works, rubbed = [], []
     for way, sense in ((path.take(np.arange(turn + 1)), 1), (path.take(np.arange(turn, len(path))), -1)):
         law = interpolate_path(way)
@@ -151,14 +163,15 @@ def test_what_a_cycle_costs_is_what_friction_takes():
 
 
 def test_without_friction_nothing_is_added():
-    smooth, plain = (lower(NodeOnObstacle("floor", "tip", line((0, -0.4), 0.0), **own), [0.1, 0.2]) for own in
+    smooth, plain = (lower(NodeOnObstacle("floor", "tip", line_edge((0, -0.4), 0.0), **own), [0.1, 0.2]) for own in
                      ({"friction": 0.0}, {}))  # fmt: skip
     assert np.array_equal(smooth.at.z, plain.at.z)
     assert all(contact.rub < 0 for contact in smooth.mesh.contacts)
 
 
 def test_a_strut_that_leans_more_than_friction_lets_it_slide_blocks_the_drive():
-    path = lower(NodeOnObstacle("floor", "tip", line((0, -np.sin(1.2) - 0.02), 0.0), friction=0.8), [0.1], angle=1.2)
+    floor = NodeOnObstacle("floor", "tip", line_edge((0, -np.sin(1.2) - 0.02), 0.0), friction=0.8)
+    path = lower(floor, [0.1], angle=1.2)
     assert path.status is PathStatus.BLOCKED
     assert path.message == "the drive is blocked by 'tip' on 'floor' at 0.02"
     assert path.drive[-1] == pytest.approx(0.02)
@@ -169,7 +182,7 @@ def test_it_is_counted_how_many_states_of_friction_can_go_on():
     # and jam, or slide and be pulled on to the floor [Painleve]; Coulomb's law says no more
     stretches = Section(8000.0, 12.0, 0.05, axial=True, shear=False)  # EI = 1, 20 times as long as thick
     nodes = {"root": Node(0, 0, slider_support(0.02)), "tip": Node(np.cos(1.2), -np.sin(1.2))}
-    floor = NodeOnObstacle("floor", "tip", line((0, -np.sin(1.2)), 0.0), friction=1.2)
+    floor = NodeOnObstacle("floor", "tip", line_edge((0, -np.sin(1.2)), 0.0), friction=1.2)
     net = Network(nodes, {"b": Beam("root", "tip", stretches)}, contacts=(floor,))
     problem = NetworkProblem(discretise(net, Displacement("root", 0.02, np.array([0.01])), 9))
     piece = PieceOfPath(problem, frozenset({0}), Options(0.01))

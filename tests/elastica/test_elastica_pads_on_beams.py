@@ -14,24 +14,28 @@ from contact_paths import at_drive, check_complementarity, place_of, shoot
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
     Beam,
+    BeamOnObstacle,
     Control,
     Displacement,
     Link,
     Loading,
     Network,
     Node,
+    NodeOnBeam,
+    NodeOnObstacle,
     PathStatus,
     PointLoad,
     Section,
     Support,
     Taper,
     arc,
+    circle_edge,
+    line_edge,
     slider_support,
     trace,
 )
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnBeam, NodeOnObstacle, circle, line
 from cfmkit.elastica.sensitivity import gradient
 from cfmkit.errors import InputError
 
@@ -92,7 +96,7 @@ def test_a_pad_on_a_curved_leaf_solves_the_equations_of_shooting(curvature, radi
 def test_a_pad_of_a_node_that_is_held_is_a_disc(load):
     leaf = {"tip": Node(1, 0), "root": Node(0, 0, CLAMPED_SUPPORT), "post": Node(0.5, -0.1, CLAMPED_SUPPORT)}
     net = Network(leaf, {"leaf": Beam("root", "tip", THIN)}, contacts=(NodeOnBeam("p", "post", "leaf", 0.045),))
-    disc = replace(net, contacts=(BeamOnObstacle("p", "leaf", circle((0.5, -0.1), 0.045)),))
+    disc = replace(net, contacts=(BeamOnObstacle("p", "leaf", circle_edge((0.5, -0.1), 0.045)),))
     pad, known = (trace(case, Loading(TIP_LOAD, np.array([0.3, load, 0.4])), EXACT) for case in (net, disc))
     assert [event.drive for event in pad.contact_events] == pytest.approx([e.drive for e in known.contact_events])
     assert pad.contact_force(0) == pytest.approx(known.contact_force(0), rel=1e-11, abs=1e-12)
@@ -106,7 +110,7 @@ def test_a_pad_that_is_driven_against_a_leaf_needs_the_force_of_a_root_that_is_d
     driven = trace(moving, Displacement("post", np.pi / 2, np.array([0.04, 0.2, 0.35])), EXACT)
     resting = Network(
         {"root": Node(0, 0, slider_support(np.pi / 2)), "tip": Node(1, 0)}, {"leaf": Beam("root", "tip", THIN)},
-        contacts=(BeamOnObstacle("p", "leaf", circle((0.6, -0.1), 0.045)),),
+        contacts=(BeamOnObstacle("p", "leaf", circle_edge((0.6, -0.1), 0.045)),),
     )  # fmt: skip
     known = trace(resting, Displacement("root", DOWN, np.array([0.04, 0.2, 0.35])), EXACT)
     assert driven.contact_force(0)[-1] > 0
@@ -115,7 +119,7 @@ def test_a_pad_that_is_driven_against_a_leaf_needs_the_force_of_a_root_that_is_d
 
 
 def test_a_leaf_that_is_stiffer_and_stiffer_becomes_a_floor():
-    floor = NodeOnObstacle("floor", "tip", line((0, HALF), 0.0), HALF)
+    floor = NodeOnObstacle("floor", "tip", line_edge((0, HALF), 0.0), HALF)
     load = Loading(TIP_LOAD, np.array([0.5, 2.0]))
     known = trace(two_leaves(floor), load, EXACT).contact_force(0)[-1]
     missed = []
@@ -146,7 +150,7 @@ def layout(seed):
     contacts = (replace(PAD, radius=rng.uniform(0.0, 0.03)), NodeOnBeam("end_upper", "end", "upper", HALF))
     net = two_leaves(*contacts, height=height, end=Node(*ends))
     if rng.integers(2):
-        disc = circle((0.6, -0.5), 0.2)
+        disc = circle_edge((0.6, -0.5), 0.2)
         net = replace(net, contacts=(*contacts, BeamOnObstacle("disc", "lower", disc)))
     section = replace(THIN, thickness=taper) if rng.integers(2) else THIN
     net = replace(net, beams={**net.beams, "lower": Beam("wall", "end", section, arc(bend))})

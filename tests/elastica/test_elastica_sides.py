@@ -15,25 +15,29 @@ from contact_paths import assert_work_is_energy, check_complementarity, place_of
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
     Beam,
+    BeamOnObstacle,
     Control,
     Displacement,
     Loading,
     Network,
     Node,
+    NodeOnObstacle,
     PathStatus,
     PointLoad,
     Section,
     Support,
     Taper,
     arc,
+    arc_edge,
+    circle_edge,
+    line_edge,
+    polyline_edge,
     slider_support,
     trace,
 )
 from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, circle, line, polyline
-from cfmkit.elastica.model.contact import arc as edge_of_arc
 
 DOWN = -np.pi / 2
 HALF = 0.005  # half the thickness: radii of the references are those of the centre line
@@ -61,8 +65,8 @@ def at_drive(path, drive):
 ROUND = 0.05 - HALF
 APEX = -0.1 + np.sqrt(2) * ROUND  # of a roof whose ridge is rounded about (0.5, -0.1)
 PINS = {
-    "disc": circle((0.5, -0.1), ROUND),
-    "fillet": polyline([(-0.5, APEX - 1), (0.5, APEX), (1.5, APEX - 1)], ROUND),
+    "disc": circle_edge((0.5, -0.1), ROUND),
+    "fillet": polyline_edge([(-0.5, APEX - 1), (0.5, APEX), (1.5, APEX - 1)], ROUND),
 }
 
 
@@ -86,7 +90,7 @@ def test_a_pin_under_a_leaf_has_the_force_and_the_place_of_shooting_both_ways(pi
 
 
 def test_a_tip_on_a_floor_becomes_tangent_and_lies_flank_on_and_goes_back():
-    floor = line((0, -HALF), 0.0)
+    floor = line_edge((0, -HALF), 0.0)
     net = leaf(NodeOnObstacle("floor", "tip", floor, HALF), side("floor", floor),
                support=slider_support(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9)  # fmt: skip
     path = trace(net, Displacement("root", DOWN, np.array([0.1, 0.2, 0.25, 0.3, 0.25, 0.1, 0.05])), EXACT)
@@ -101,7 +105,7 @@ def test_a_tip_on_a_floor_becomes_tangent_and_lies_flank_on_and_goes_back():
 
 
 def test_a_tip_on_a_floor_that_stretches_has_the_forces_of_shooting():
-    floor = line((0, -0.025), 0.0)
+    floor = line_edge((0, -0.025), 0.0)
     section = Section(12 / 0.05**3, 1.0, 0.05, axial=True, shear=False)
     net = leaf(NodeOnObstacle("floor", "tip", floor, 0.025), side("floor", floor),
                support=slider_support(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9, section=section)  # fmt: skip
@@ -126,7 +130,7 @@ def test_a_leaf_wraps_around_a_disc_as_the_closed_form_says(radius, onset, known
     """An arc begins where the leaf is clamped; before it its edge is straight."""
     drive = Loading(TIP_LOAD, np.array([1.0, 2, 4, 8, 4, 2, 0.5]))
     centre = (0, -radius), radius - HALF
-    drum = edge_of_arc(*centre, 0.5 * np.pi, -0.5) if is_arc else circle(*centre)
+    drum = arc_edge(*centre, 0.5 * np.pi, -0.5) if is_arc else circle_edge(*centre)
     path = trace(leaf(side("drum", drum)), drive, EXACT)
     assert path.status is PathStatus.COMPLETE
     kinds, drives = zip(*((event.kind, event.drive) for event in path.contact_events), strict=True)
@@ -144,13 +148,13 @@ def test_a_leaf_wraps_around_a_disc_as_the_closed_form_says(radius, onset, known
 
 def test_a_leaf_wraps_around_a_disc_without_compiled_code(monkeypatch):
     monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
-    path = trace(leaf(side("drum", circle((0, -0.5), 0.5 - HALF))), Loading(TIP_LOAD, np.array([2.0, 4.0])), EXACT)
+    path = trace(leaf(side("drum", circle_edge((0, -0.5), 0.5 - HALF))), Loading(TIP_LOAD, np.array([2.0, 4.0])), EXACT)
     assert path.contact_places(0)[-1] == pytest.approx([0.0, 0.1998403214625088], rel=1e-10)
 
 
 @pytest.mark.slow  # it ends where a search for a path that goes on fails
 def test_a_pinned_column_between_walls_touches_lies_flat_and_buckles_again():
-    walls = side("top", line((0, 0.05 + HALF), np.pi)), side("bottom", line((0, -0.05 - HALF), 0.0))
+    walls = side("top", line_edge((0, 0.05 + HALF), np.pi)), side("bottom", line_edge((0, -0.05 - HALF), 0.0))
     nodes = {"root": Node(0, 0, Support(True, True, False)), "tip": Node(1, 0, Support(False, True, False))}
     net = Network(nodes, {"leaf": Beam("root", "tip", THIN)}, contacts=walls)
     euler = np.pi**2
@@ -169,7 +173,7 @@ def test_a_pinned_column_between_walls_touches_lies_flat_and_buckles_again():
 def test_a_ring_between_plates_has_the_forces_of_shooting_and_lies_flat():
     nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(1, 1, Support(False, False, True))}
     net = Network(
-        nodes, {"leaf": Beam("root", "tip", THIN, arc(np.pi / 2))}, contacts=(side("floor", line((0, -HALF), 0)),)
+        nodes, {"leaf": Beam("root", "tip", THIN, arc(np.pi / 2))}, contacts=(side("floor", line_edge((0, -HALF), 0)),)
     )
     path = trace(net, Displacement("tip", DOWN, np.array([0.1, 0.2, 0.35, 0.4, 0.5, 0.35, 0.1])), EXACT)
     known = [0.587165757200244, 1.057650189060502, 1.698863931470137, 1.993805586239256, 2.871080044184531]
@@ -184,7 +188,7 @@ def test_a_snap_is_caught_by_a_disc_where_the_path_becomes_stable_again():
     held = Support(True, True, True, displacement=(-0.02, 0, 0))
     nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "mid": Node(0.5, 0), "tip": Node(1, 0, held)}
     beams = {"leaf": Beam("root", "mid", THIN), "other": Beam("mid", "tip", THIN)}
-    net = Network(nodes, beams, contacts=(side("pin", circle((0.25, -0.07), 0.05 - HALF)),))
+    net = Network(nodes, beams, contacts=(side("pin", circle_edge((0.25, -0.07), 0.05 - HALF)),))
     drive = Loading((PointLoad("mid", 0, -1.0, 0.02),), np.array([2.0, 10, 20]))
     path = trace(net, drive, replace(EXACT, through_folds=True, sign=-1))
     (begin,) = path.contact_events
@@ -195,7 +199,7 @@ def test_a_snap_is_caught_by_a_disc_where_the_path_becomes_stable_again():
 
 
 def test_a_compressed_leaf_between_arcs_touches_at_a_point_and_does_not_lie_where_it_would_be_pulled():
-    net = leaf(side("low", circle((0, -1.0), 1 - HALF)), side("up", circle((0, 1.0), 1 - HALF)))
+    net = leaf(side("low", circle_edge((0, -1.0), 1 - HALF)), side("up", circle_edge((0, 1.0), 1 - HALF)))
     net = replace(net, loads=(PointLoad("tip", -0.95 * np.pi**2 / 4, 0.0),))
     path = trace(net, Displacement("tip", DOWN, np.array([0.05, 0.2, 0.3, 0.4, 0.43, 0.45])), EXACT)
     known = [
@@ -216,7 +220,7 @@ def test_a_compressed_leaf_between_arcs_touches_at_a_point_and_does_not_lie_wher
 
 def test_a_small_disc_beside_the_way_of_a_leaf_is_found():
     """The leaf sweeps over a pin that is a fortieth of the way of its middle."""
-    net = leaf(side("pin", circle((0.6, -0.12), 0.01)))
+    net = leaf(side("pin", circle_edge((0.6, -0.12), 0.01)))
     path = trace(net, Loading(TIP_LOAD, np.array([4.0])), EXACT)
     assert path.contact_events[0].kind == "begins"
     assert path.contact_gap(0).min() > -1e-10
@@ -225,7 +229,7 @@ def test_a_small_disc_beside_the_way_of_a_leaf_is_found():
 
 def test_a_leaf_that_cannot_lie_on_a_disc_ends_with_the_reason():
     section = replace(THIN, axial=True, shear=True)
-    net = leaf(side("drum", circle((0, -1.0), 1 - HALF)), section=section)
+    net = leaf(side("drum", circle_edge((0, -1.0), 1 - HALF)), section=section)
     path = trace(net, Loading(TIP_LOAD, np.array([0.5, 4.0])), EXACT)
     assert path.status is PathStatus.LOST
     assert "begins to lie on it along a length" in path.message
@@ -244,7 +248,7 @@ def test_random_layouts_of_discs_return_to_their_own_points_and_keep_every_condi
 
 
 def test_the_tangent_of_a_side_that_lies_and_one_that_touches_is_the_derivative_of_the_residual():
-    net = leaf(side("drum", circle((0, -1.0), 1 - HALF)), side("pin", circle((0.7, -0.4), 0.1)))
+    net = leaf(side("drum", circle_edge((0, -1.0), 1 - HALF)), side("pin", circle_edge((0.7, -0.4), 0.1)))
     mesh = discretise(net, Loading(TIP_LOAD, np.array([1.0])), flanks=[FlankPlace(0, 0.3, -1), FlankPlace(1, 0.6)])
     mesh = replace(mesh, contacts=tuple(one._replace(closed=True) for one in mesh.contacts))
     own = equations(mesh)
@@ -264,7 +268,7 @@ def test_the_tangent_of_a_side_that_lies_and_one_that_touches_is_the_derivative_
 
 @pytest.mark.parametrize("with_pad", [False, True])
 def test_a_leaf_parallel_to_a_floor_ends_with_the_reason(with_pad):
-    floor = line((0, -HALF), 0.0)
+    floor = line_edge((0, -HALF), 0.0)
     pads = (NodeOnObstacle("floor", "tip", floor, HALF),) if with_pad else ()
     net = leaf(*pads, side("floor", floor), support=slider_support(np.pi / 2), at=(0.0, 0.1))
     path = trace(net, Displacement("root", DOWN, np.array([0.05, 0.2])), EXACT)
@@ -286,7 +290,7 @@ def soft(slenderness, thickness=None):
 
 def over_disc(slenderness, radius):
     depth = 1 / slenderness
-    return leaf(side("pin", circle((0.5, -0.05 - radius - depth / 2), radius)), section=soft(slenderness))
+    return leaf(side("pin", circle_edge((0.5, -0.05 - radius - depth / 2), radius)), section=soft(slenderness))
 
 
 @pytest.mark.parametrize(
@@ -311,14 +315,14 @@ def test_a_leaf_that_shears_has_the_force_and_the_place_of_shooting(slenderness,
 
 def falling(slenderness, flips=False):
     """Return a leaf that shears, falls on a floor with its tip, and touches it with its side after that."""
-    floor, depth, angle = line((0, -0.5 / slenderness), 0.0), 1 / slenderness, -np.pi / 9
+    floor, depth, angle = line_edge((0, -0.5 / slenderness), 0.0), 1 / slenderness, -np.pi / 9
     pads = NodeOnObstacle("floor", "tip", floor, depth / 2), side("floor", floor)
     net = leaf(*pads, support=slider_support(np.pi / 2), at=(0.0, 0.4), angle=angle, section=soft(slenderness))
     return replace(net, beams={"leaf": Beam("tip", "root", soft(slenderness))}) if flips else net
 
 
 STRETCHING = Taper(np.array([0, 0.4, 1.0]), np.array([0.065, 0.05, 0.03]))
-TAPERED = leaf(side("pin", circle((0.6, -0.275), 0.2)), section=soft(20, STRETCHING))
+TAPERED = leaf(side("pin", circle_edge((0.6, -0.275), 0.2)), section=soft(20, STRETCHING))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from functional_paths import beam_stress
 from vcfm_support import leaf, side
 
 import cfmkit.elastica as el
@@ -165,7 +164,7 @@ def test_a_straight_beam_has_the_stress_of_a_beam_in_large_deflection_between_cl
     section = el.Section(strip.youngs_modulus, strip.width, strip.thickness)
     half = el.Network(nodes, {"leaf": el.Beam("wall", "middle", section)})
     path = el.trace(half, el.Displacement("middle", np.pi / 2, travel))
-    exact = beam_stress(path, "leaf")[0][path.at_requested]
+    exact = path.beam_stresses()[0][0][path.at_requested]
     assert positive_stiffness_springs.StraightSpring(strip).stress(travel) == pytest.approx(exact, rel=0.02)
 
 

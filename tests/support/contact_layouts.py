@@ -4,8 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Loading, Network, Node, PointLoad, Section, Support
-from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, Stop, arc, circle, line, polyline
+from cfmkit.elastica import (
+    CLAMPED_SUPPORT,
+    Beam,
+    BeamOnObstacle,
+    Loading,
+    Network,
+    Node,
+    NodeOnObstacle,
+    PointLoad,
+    Section,
+    Stop,
+    Support,
+    arc_edge,
+    circle_edge,
+    line_edge,
+    polyline_edge,
+)
 
 HALF_THICKNESS = 0.005
 SECTION = Section(1.0, 12.0, 1.0, axial=False, shear=False)
@@ -29,10 +44,10 @@ def with_pads(seed: int) -> tuple[Network, Loading]:
         low, pad = -rng.uniform(0.01, 0.35) * x * x - 0.005, rng.uniform(0.01, 0.1)
         outline = [
             None,
-            line((0.0, low - pad), 0.0),
-            circle((x + 0.05 * rng.normal(), low - pad - 0.2), 0.2),
-            polyline([(-1, low - pad), (0.9 * x, low - pad), (0.9 * x, -9.0)], 0.02),
-            arc((x - 0.1, low - pad - 0.4), 0.4, 0.9 * np.pi, 0.2 * np.pi),
+            line_edge((0.0, low - pad), 0.0),
+            circle_edge((x + 0.05 * rng.normal(), low - pad - 0.2), 0.2),
+            polyline_edge([(-1, low - pad), (0.9 * x, low - pad), (0.9 * x, -9.0)], 0.02),
+            arc_edge((x - 0.1, low - pad - 0.4), 0.4, 0.9 * np.pi, 0.2 * np.pi),
         ][int(rng.integers(5))]
         if outline is None:
             contacts.append(Stop(f"s{number}", node, -low, -np.pi / 2 + 0.2 * rng.normal(), stiffness=stiffness))
@@ -50,10 +65,10 @@ def among_discs(seed: int) -> tuple[Network, Loading]:
     for number in range(int(rng.integers(1, 4))):
         x, radius = rng.uniform(0.25, 0.95), rng.uniform(0.03, 0.15)
         y = -rng.uniform(0.02, 0.35) * x * x - 0.01 - radius
-        disc, name = circle((x, y), radius), f"d{number}"
+        disc, name = circle_edge((x, y), radius), f"d{number}"
         contacts += [BeamOnObstacle(name, "leaf", disc), NodeOnObstacle(name, "tip", disc, HALF_THICKNESS)]
     if rng.integers(2):
-        floor = line((0, -rng.uniform(0.15, 0.4)), 0.0)
+        floor = line_edge((0, -rng.uniform(0.15, 0.4)), 0.0)
         contacts += [BeamOnObstacle("floor", "leaf", floor), NodeOnObstacle("floor", "tip", floor, HALF_THICKNESS)]
     up = np.linspace(0, 1, 7)[1:] * rng.uniform(1, 5)
     load = (PointLoad("tip", 0.2 * rng.normal(), -1.0),)

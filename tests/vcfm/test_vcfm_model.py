@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from functional_paths import beam_stress
 from study_rows import assert_rows_equal_runs
 from vcfm_support import CONFIGS, MM, analyzed, leaf, table_i
 
@@ -382,7 +381,7 @@ def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, sle
     force, stress, _, buckled = found.evaluate(path.drive[here])
     peak = np.abs(path.effort[path.drive < rise]).max()
     assert force == pytest.approx(path.effort[here], abs=1e-6 * peak)
-    assert stress == pytest.approx(beam_stress(path, "leaf")[0][here], rel=1e-3, abs=2e-4 * stress.max())
+    assert stress == pytest.approx(path.beam_stresses()[0][0][here], rel=1e-3, abs=2e-4 * stress.max())
     assert buckled.tolist() == [found.edges[1] < place < found.buckled_range[1] for place in path.drive[here]]
 
 
