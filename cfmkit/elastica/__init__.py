@@ -15,7 +15,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.mechanics.march import engine
+    from cfmkit.elastica.model.beam import Beam, fit
     from cfmkit.elastica.model.contact import (
         BeamOnBeam,
         BeamOnObstacle,
@@ -56,7 +57,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica.vibration import NetworkMasses, frequencies
 
 _HOMES = {
-    "model.beam": ("Beam",),
+    "mechanics.march": ("engine",),
+    "model.beam": ("Beam", "fit"),
     "model.contact": (
         "BeamOnBeam",
         "BeamOnObstacle",
@@ -140,6 +142,8 @@ __all__ = [
     "arc",
     "arc_edge",
     "circle_edge",
+    "engine",
+    "fit",
     "frequencies",
     "gradient",
     "hindered_curling",

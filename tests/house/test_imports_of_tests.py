@@ -13,31 +13,23 @@ pytestmark = pytest.mark.lists
 TESTS = Path(__file__).parents[1]
 FAMILIES = ("beam", "cam", "slider_crank", "vcfm")
 OPEN_FOLDERS = {
-    "beam",
     "browser",
     "cam",
     "cli",
     "contract",
-    "designing",
     "documents",
     "experiment",
     "export",
-    "families",
     "house",
     "metrics",
     "plots",
-    "published",
     "regression",
     "runs",
     "slider_crank",
-    "solid",
     "specs",
     "stock",
     "store",
     "studies",
-    "support",
-    "tables",
-    "vcfm",
 }
 """Folders that still import the inside of other packages."""
 

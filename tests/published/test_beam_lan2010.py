@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from beam_support import MM, at, config, solved, value
+from cam_support import design_exactly
 from lan_2010 import LEG, ROWS, TRAVEL, VALUES
 
 import cfmkit
 from cfmkit.specs.units import read_quantity
-from cfmkit.studies import stock_and_digits
 
 CLOSURES = ("rotscale", "chain")
 KINDS = {"at": "length", "coefficients": "angle"}
@@ -224,14 +224,13 @@ def test_layers_that_split_carry_one_force_at_two_displacements():
     assert two.curve.stable.all()
 
 
-def test_rescaling_follows_equation_6(monkeypatch):
+def test_rescaling_follows_equation_6():
     """Before lengths are rounded to the digits of a process."""
-    monkeypatch.setattr(stock_and_digits, "with_digits_of_process", lambda _original, outcome, *_: outcome)
-    design = cfmkit.design(config("beam_lan2010", "design.rescale.force=15 N"))
-    assert design.spec.mechanism.width == pytest.approx(0.010 * 15 / 9.7396931, rel=1e-6)
-    half = cfmkit.design(config("beam_lan2010", "design.rescale.force=15 N", "design.rescale.free=size"))
-    assert half.spec.mechanism.nodes["n2"].at[0] == pytest.approx(0.0345 * np.sqrt(9.7396931 / 15), rel=1e-6)
-    result = cfmkit.analyze(half.spec)
+    design = design_exactly(config("beam_lan2010", "design.rescale.force=15 N"))
+    assert design.mechanism.width == pytest.approx(0.010 * 15 / 9.7396931, rel=1e-6)
+    half = design_exactly(config("beam_lan2010", "design.rescale.force=15 N", "design.rescale.free=size"))
+    assert half.mechanism.nodes["n2"].at[0] == pytest.approx(0.0345 * np.sqrt(9.7396931 / 15), rel=1e-6)
+    result = cfmkit.analyze(half)
     assert value(result, "nominal_force") == pytest.approx(15, rel=1e-8)
     assert value(result, "range_fraction") == pytest.approx(0.486489, abs=2e-6)
 

@@ -10,14 +10,14 @@ from vcfm_support import CONFIGS, MM, analyzed, message, names, table_i
 
 import cfmkit
 from cfmkit import api
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import SpecError
-from cfmkit.families.findings import mpa
 from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.exact_model import ExactSampler
 from cfmkit.families.vcfm.findings import EXACT_FORM, VCFM_FINDINGS, finding
 from cfmkit.families.vcfm.model import solve_rows
 from cfmkit.results import Status
+from cfmkit.specs.units import format_short
 
 FLAT = "mechanism.positive.width=8.509 mm"
 """With K_p = K_n."""
@@ -102,7 +102,7 @@ def test_a_stress_that_is_too_high_between_two_points_is_found(model, points):
         one = cfmkit.analyze(spec)
         assert ("overstressed" in names(one)) is found
         if found:
-            assert f"reaches {mpa(top)}" in message(one, "overstressed")
+            assert f"reaches {format_short(top, 'stress')}" in message(one, "overstressed")
         if model == "analytic":
             ((_, rows),) = solve_rows([spec, spec])
             assert ("overstressed" in rows.findings()) is found
@@ -117,7 +117,7 @@ def test_a_safety_factor_below_one_is_a_finding_or_explained(tmp_path, capsys):
         assert ("overstressed" in names(found)) is reported
         swept = cfmkit.sweep(spec, vary={"mechanism.bistable.width": spec.mechanism.bistable.width * np.ones(1)})
         assert ("overstressed" in (swept.table["warnings"][0] or "")) is reported
-    main(["analyze", str(CONFIGS / "vcfm_pla.yaml"), "--no-plots", "-o", str(tmp_path / "out")])
+    run_command(["analyze", str(CONFIGS / "vcfm_pla.yaml"), "--no-plots", "-o", str(tmp_path / "out")])
     assert "(stress overestimated by up to" in " ".join(capsys.readouterr().out.split())
 
 
@@ -562,8 +562,8 @@ def test_a_preload_of_a_thousand_kilometres_is_refused_with_its_place(tmp_path, 
     """The exact model would follow the leaves all the way back."""
     spec = str(CONFIGS / "vcfm_hybrid.yaml")
     changes = ["--set", "analysis.preloads=[0 mm, 1e9 mm]", "--fidelity", "exact"]
-    assert main(["check", spec, "--set", "analysis.preloads=[0 mm, 3500 mm]"]) == 0
-    assert main(["analyze", spec, *changes, "-o", str(tmp_path / "out"), "--no-plots"]) == 3
+    assert run_command(["check", spec, "--set", "analysis.preloads=[0 mm, 3500 mm]"]) == 0
+    assert run_command(["analyze", spec, *changes, "-o", str(tmp_path / "out"), "--no-plots"]) == 3
     reported = capsys.readouterr().err
     assert "analysis.preloads" in reported
     assert "at most 3500 mm" in reported
