@@ -15,6 +15,7 @@ import beam_networks
 import numpy as np
 import pytest
 from batch_networks import two_leaves
+from buckling_structures import cantilever
 from contact_layouts import with_pads
 from network_cases import from_json, read_cases
 
@@ -184,11 +185,8 @@ def test_an_element_that_buckles_between_its_ends_waits_for_its_neighbours() -> 
 
 
 def test_factors_under_following_loads_solve_and_count_real_eigenvalues() -> None:
-    net = el.Network(
-        {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.1, 0.0)},
-        {"x": el.Beam("a", "b", el.Section(2e9, 1e-2, 1e-3))},
-    )
-    network = discretise(net, el.Loading((el.PointLoad("b", fx=-1.0, follows=True),), np.array([30.0])), 8, pieces=2)
+    net = cantilever(el.Section(2e9, 1e-2, 1e-3))
+    network = discretise(net, el.Loading((el.PointLoad("t", fx=-1.0, follows=True),), np.array([30.0])), 8, pieces=2)
     own = equations(network)
     free = 2 * random_state(network, 1)[network.free]
     tangent = own.linearise(free, 30.0).tangent
@@ -251,13 +249,10 @@ def test_several_solutions_and_softest_modes_of_c_and_numpy_are_equal(seed: int,
 
 @pytest.mark.parametrize("kind", [equations, NumpyEquations])
 def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
-    net = el.Network(
-        {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.1, 0.0)},
-        {"x": el.Beam("a", "b", el.Section(2e9, 1e-2, 1e-3))},
-    )
-    own = kind(discretise(net, el.Loading((el.PointLoad("b", fy=1.0),), np.array([1.0])), 8))
+    net = cantilever(el.Section(2e9, 1e-2, 1e-3))
+    own = kind(discretise(net, el.Loading((el.PointLoad("t", fy=1.0),), np.array([1.0])), 8))
     border = np.zeros(own.n + 1)
-    border[np.flatnonzero(own.mesh.free == own.mesh.bodies["b"][2])] = 1.0
+    border[np.flatnonzero(own.mesh.free == own.mesh.bodies["t"][2])] = 1.0
     state = own.solve(np.zeros(own.n), 0.0, border, 0.8)
     assert state.x @ border[:-1] == pytest.approx(0.8, rel=1e-9)
     again = own.solve(state.x, state.drive)
