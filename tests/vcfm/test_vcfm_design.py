@@ -23,8 +23,9 @@ def designed(*changes, stem="vcfm_pla"):
 
 
 LIMITS = {
-    "design.stroke=5.8 mm": ("stroke_unreachable", "design.stroke"),
-    "design.min_thickness=1.2 mm": ("too_thin", "design.stroke"),
+    # change: finding, key whose nearest feasible value is stated, other keys that the message names
+    "design.stroke=5.8 mm": ("stroke_unreachable", "design.stroke", "design.rise"),
+    "design.min_thickness=1.2 mm": ("too_thin", "design.stroke", "design.min_thickness"),
     "design.max_span=50 mm": ("envelope", "design.max_span"),
     "design.max_width=8 mm": ("envelope", "design.max_width"),
     "design.leaf_length=25 mm": ("overstressed", "design.leaf_length"),
@@ -34,14 +35,21 @@ LIMITS = {
 
 @pytest.mark.parametrize("change", LIMITS)
 def test_a_limit_is_named_and_the_nearest_feasible_value_works(change):
-    name, path = LIMITS[change]
+    name, path, *others = LIMITS[change]
     more = ("design.min_thickness=0.5 mm",) if name == "stroke_unreachable" else ()
     found = designed(change, *more)
     assert found.status is Status.INFEASIBLE
     assert found.warnings[0].name == name
+    assert all(f"'{key}'" in found.message for key in others or [path])
     assert set(found.nearest_feasible) == {path}
     cured = designed(change, *more, f"{path}={found.nearest_feasible[path]}")
     assert cured.status is Status.COMPLETE, cured.message
+
+
+def test_leaves_that_no_stroke_makes_thick_enough_are_told_the_rise_too():
+    message = designed("design.min_thickness=2 mm").message
+    assert "'design.min_thickness'" in message
+    assert "'design.rise'" in message
 
 
 BARE = {
