@@ -15,7 +15,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.mechanics.march import engine
+    from cfmkit.elastica.model.beam import Beam, fit
+    from cfmkit.elastica.model.contact import (
+        BeamOnBeam,
+        BeamOnObstacle,
+        BeamSide,
+        NodeOnBeam,
+        NodeOnObstacle,
+        ObstacleEdge,
+        Stop,
+        arc_edge,
+        circle_edge,
+        line_edge,
+        polyline_edge,
+    )
     from cfmkit.elastica.model.drive import Control, Displacement, Loading, Rotation
     from cfmkit.elastica.model.network import (
         CLAMPED_SUPPORT,
@@ -33,16 +47,31 @@ if TYPE_CHECKING:
         slider_support,
     )
     from cfmkit.elastica.model.section import Section, Taper
-    from cfmkit.elastica.model.shapes import STRAIGHT_SHAPE, CosineArch, Polyline, Polynomial, Spline, arc
+    from cfmkit.elastica.model.shapes import STRAIGHT_SHAPE, Bent, CosineArch, Polyline, Polynomial, Spline, arc
     from cfmkit.elastica.results.curling_stiffening import HinderedCurling, hindered_curling
     from cfmkit.elastica.results.path import EquilibriumPath as Path
     from cfmkit.elastica.results.path import Event, PathStatus
     from cfmkit.elastica.sensitivity import Gradient, gradient
     from cfmkit.elastica.tracing.trace import trace
     from cfmkit.elastica.tracing.trace_many import NetworkOutcome, trace_many
+    from cfmkit.elastica.vibration import NetworkMasses, frequencies
 
 _NAMES_OF_MODULE = {
-    "model.beam": ("Beam",),
+    "mechanics.march": ("engine",),
+    "model.beam": ("Beam", "fit"),
+    "model.contact": (
+        "BeamOnBeam",
+        "BeamOnObstacle",
+        "BeamSide",
+        "NodeOnBeam",
+        "NodeOnObstacle",
+        "ObstacleEdge",
+        "Stop",
+        "arc_edge",
+        "circle_edge",
+        "line_edge",
+        "polyline_edge",
+    ),
     "model.drive": ("Control", "Displacement", "Loading", "Rotation"),
     "model.network": (
         "CLAMPED_SUPPORT",
@@ -60,12 +89,13 @@ _NAMES_OF_MODULE = {
         "slider_support",
     ),
     "model.section": ("Section", "Taper"),
-    "model.shapes": ("STRAIGHT_SHAPE", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
+    "model.shapes": ("STRAIGHT_SHAPE", "Bent", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
     "results.curling_stiffening": ("HinderedCurling", "hindered_curling"),
     "sensitivity": ("Gradient", "gradient"),
     "results.path": ("Event", "Path", "PathStatus"),
     "tracing.trace": ("trace",),
     "tracing.trace_many": ("NetworkOutcome", "trace_many"),
+    "vibration": ("NetworkMasses", "frequencies"),
 }
 _MODULE_OF_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_OF_MODULE.items() for name in names}
 
@@ -75,6 +105,10 @@ __all__ = [
     "PINNED_SUPPORT",
     "STRAIGHT_SHAPE",
     "Beam",
+    "BeamOnBeam",
+    "BeamOnObstacle",
+    "BeamSide",
+    "Bent",
     "Control",
     "CosineArch",
     "Displacement",
@@ -86,8 +120,12 @@ __all__ = [
     "Link",
     "Loading",
     "Network",
+    "NetworkMasses",
     "NetworkOutcome",
     "Node",
+    "NodeOnBeam",
+    "NodeOnObstacle",
+    "ObstacleEdge",
     "Path",
     "PathStatus",
     "PointLoad",
@@ -97,12 +135,20 @@ __all__ = [
     "Section",
     "SlideSpring",
     "Spline",
+    "Stop",
     "Support",
     "Taper",
     "TorsionSpring",
     "arc",
+    "arc_edge",
+    "circle_edge",
+    "engine",
+    "fit",
+    "frequencies",
     "gradient",
     "hindered_curling",
+    "line_edge",
+    "polyline_edge",
     "slider_support",
     "trace",
     "trace_many",

@@ -9,11 +9,11 @@ import secrets
 from dataclasses import replace
 from difflib import get_close_matches
 from importlib import import_module
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from cfmkit.errors import UsageError, visible
 from cfmkit.families import entry_point_plugins
-from cfmkit.families.entry_point_plugins import Unusable
+from cfmkit.families.entry_point_plugins import Unusable, forget_installed
 from cfmkit.specs import own_metrics
 
 if TYPE_CHECKING:
@@ -190,12 +190,21 @@ def origins() -> dict[str, dict[str, str]]:
     return computed | ({"metrics": {"registered": own_metrics.stamp()}} if own_metrics.stamp() else {})
 
 
+def __getattr__(name: str) -> Any:
+    """Import the type of records when it is first needed: it needs numpy."""
+    if name != "Family":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return import_module("cfmkit.families.base").Family
+
+
 __all__ = [
     "FAMILY_MODULES",
+    "Family",
     "Unusable",
     "clashing",
     "examine_families",
     "family",
+    "forget_installed",
     "list_registered",
     "list_skipped",
     "names",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from cfmkit import Run
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
-from cfmkit.runs.suggest_api import read_request
+from cfmkit.runs import read_request
 
 POM = {  # 10 N of POM over 3 mm
     "safety": "1",

@@ -7,7 +7,7 @@ import numpy as np
 from cfmkit.curves import Curve
 from cfmkit.plots.style import axes_mm, new_figure
 from cfmkit.results import Result, Status
-from cfmkit.specs.spec import Requirement, Spec
+from cfmkit.specs import Requirement, Spec
 
 
 def axes():
