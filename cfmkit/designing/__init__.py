@@ -14,3 +14,8 @@
 
 What a design is to do, the start it begins with and the words for what blocks it belong to the family.
 """
+
+from cfmkit.designing.robust_design import RobustProblem, with_margins
+from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock
+
+__all__ = ["UNLIMITED_CLOCK", "Clock", "RobustProblem", "with_margins"]

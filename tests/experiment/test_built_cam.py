@@ -334,8 +334,8 @@ def test_pictures_are_drawn(tmp_path):
 
 
 def test_measured_cams_are_no_rows(tmp_path):
+    from cfmkit.families import Variants
     from cfmkit.families.cam.cams_in_rows import solve_rows
-    from cfmkit.families.rows import Variants
 
     write(tmp_path, measured())
     spec, values = spec_of(tmp_path), {"mechanism.rolling_friction": np.array([0.001, 0.002])}

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 import cfmkit
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import ExitCode, SpecError
 from cfmkit.runs.specfile import bind
 from cfmkit.specs.yamlio import dump, read_document
@@ -58,7 +58,7 @@ def test_a_stated_spread_contains_its_value_and_has_a_width(item: Material):
 
 
 def test_the_page_says_in_words_where_no_spread_is_stated(capsys: pytest.CaptureFixture[str]):
-    assert main(["show", "materials"]) == 0
+    assert run_command(["show", "materials"]) == 0
     shown = capsys.readouterr().out
     assert shown.count("none stated") == sum(
         ends is None

@@ -6,7 +6,7 @@ import re
 import pytest
 
 import cfmkit
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import SpecError
 from cfmkit.metrics import check
 from cfmkit.stock.processes import PROCESSES_BY_NAME
@@ -41,7 +41,7 @@ def test_bearings_and_screws_have_room_for_what_is_in_them():
 )
 def test_a_size_that_is_not_sold_is_refused_in_one_line_with_the_nearest(capsys, name, changes, path, nearest):
     options = [part for change in changes for part in ("--set", f"mechanism.{change}")]
-    assert main(["check", f"configs/{name}.yaml", *options]) == 3
+    assert run_command(["check", f"configs/{name}.yaml", *options]) == 3
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert f"mechanism.{path}: no " in line
     assert nearest in line

@@ -8,9 +8,7 @@ from journal_support import damage_a_record
 
 import cfmkit
 from cfmkit.errors import OutputError, UsageError
-from cfmkit.families import family
-from cfmkit.families.cam.cams_in_rows import solve_rows
-from cfmkit.families.rows import FindingRule, Variants
+from cfmkit.families import FindingRule, Variants, family
 from cfmkit.results import Finding, Status
 from cfmkit.store import origin
 from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
@@ -228,7 +226,7 @@ def test_the_warnings_of_rows_are_theirs_and_those_of_single_analyses(monkeypatc
     def rows(variants):
         friction = variants.values["mechanism.profile.friction"]
         some = np.flatnonzero(friction < 0.0025)
-        for indices, solved in solve_rows(Variants(SPEC, {}, lambda _k: SPEC, len(some))):
+        for indices, solved in record.rows(Variants(SPEC, {}, lambda _k: SPEC, len(some))):
             own = friction[some[indices]]
             rules = (
                 FindingRule("high_pressure_angle", lambda _solution, own=own: own > 0.0015, str),

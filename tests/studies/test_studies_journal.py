@@ -8,7 +8,6 @@ import pytest
 from journal_support import damage_a_record
 
 from cfmkit.errors import OutputError
-from cfmkit.store import lock
 from cfmkit.studies.journal import Journal
 
 
@@ -178,7 +177,7 @@ KILLED = (
 @pytest.mark.parametrize("locks", ["locks", "no locks"])
 def test_what_was_acknowledged_survives_a_kill(path, locks, monkeypatch):
     if locks == "no locks":  # of the file system; the database then runs without any
-        monkeypatch.setenv(lock.NO_LOCK, "1")
+        monkeypatch.setenv("CFMKIT_NO_LOCK", "1")
     assert subprocess.run([sys.executable, "-c", KILLED, str(path)]).returncode == -9
     with Journal(path) as journal:
         assert [journal.find(key(n)) for n in range(100)] == list(range(100))
