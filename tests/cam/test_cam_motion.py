@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import asdict, dataclass, replace
-from io import BytesIO
 
 import numpy as np
 import pytest
 from cam_motion import moving, response
 from cam_support import analyze, cam
+from plot_support import picture
 
 import cfmkit
 from cfmkit.errors import SpecError
@@ -454,10 +454,7 @@ def test_every_picture_is_drawn_twice_with_the_same_bytes(changes):
     result = analyze(moving(**changes))
 
     def drawn():
-        pictures = {name: BytesIO() for name in cfmkit.figures(result)}
-        for name, draw in cfmkit.figures(result).items():
-            draw().savefig(pictures[name], format="png", metadata={"Software": None})
-        return {name: picture.getvalue() for name, picture in pictures.items()}
+        return {name: picture(draw()) for name, draw in cfmkit.figures(result).items()}
 
     assert set(drawn()) == {"motion", "motion_force", "motion_contact", "motion_rollers"}
     assert drawn() == drawn()

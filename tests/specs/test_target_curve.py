@@ -9,7 +9,6 @@ from cam_support import design_exactly
 import cfmkit
 from cfmkit.cli import run_command
 from cfmkit.errors import SpecError
-from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.metrics import check, evaluate
 from cfmkit.specs.target_curve import Target
 
@@ -124,7 +123,7 @@ def test_a_cam_follows_its_curve_to_1e_9(target):
 
 
 def test_work_on_the_slider_is_the_energy_of_the_springs():
-    assembly = assemble(designed(STEP_UP))
+    assembly = cfmkit.analyze(designed(STEP_UP)).state.assembly
     law, stiffness = assembly.profile.path.law, assembly.loads.stiffness
     x = np.linspace(law.rest_half_width, assembly.profile.end, 7)
     stored = 0.5 * stiffness * (2.0 * (x - law.rest_half_width)) ** 2

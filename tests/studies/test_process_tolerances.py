@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import pytest
@@ -16,6 +17,7 @@ from cfmkit.studies.parts.assumed_errors import assume_errors, tolerances
 from cfmkit.studies.parts.near_parts import expected_shares, expected_yield
 from cfmkit.studies.parts.outcomes import analyze_parts
 from cfmkit.studies.parts.parts import Parts
+from cfmkit.studies.stock_and_digits import decimals_of
 
 STRIP = "configs/slider_crank_strip.yaml"
 
@@ -142,3 +144,11 @@ def test_tolerances_of_a_search_of_shapes_are_those_of_its_audit_alone():
     assert Parts.of_design(spec, spec.design, 0) is None
     toleranced = spec.replace({"design.tolerances": {"mechanism.nodes.b.at.1": {"normal": "0.05 mm"}}})
     assert Parts.of_design(toleranced, toleranced.design, 0).paths == ("mechanism.nodes.b.at.1",)
+
+
+def test_the_last_digit_is_at_most_a_tenth_of_the_deviation_of_the_process():
+    for process in PROCESSES_BY_NAME.values():
+        unit = 10.0 ** -decimals_of(process) * 1e-3
+        deviation = min(process.thickness, process.position)
+        assert unit <= 0.1 * deviation * (1 + 1e-9)
+        assert unit > 0.01 * deviation or math.isclose(unit, 0.01 * deviation)

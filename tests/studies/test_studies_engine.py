@@ -1,6 +1,7 @@
 """A study point by point: failures become rows, rows are reused by content, executors agree."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -408,3 +409,15 @@ def test_small_blocks_are_computed_together_and_noted_one_by_one(tmp_path):
     with Journal(tmp_path / "journal") as journal:
         assert run(more, noting, journal).reused == 3584
     assert jobs == [(3584, 3590)]
+
+
+def test_a_study_knows_a_data_file_by_its_content(tmp_path):
+    (tmp_path / "synthetic").mkdir()
+    (tmp_path / "cam.yaml").write_bytes(Path("configs/cam_as_built.yaml").read_bytes())
+    points = Path("configs/synthetic/cam_flanks.csv").read_text()
+
+    def key(points):
+        (tmp_path / "synthetic/cam_flanks.csv").write_text(points)
+        return Study(cfmkit.load(tmp_path / "cam.yaml"), ("mechanism.rolling_friction",), ()).key((0.002,))
+
+    assert key(points) == key(points) != key(points[::-1].replace("1", "2", 1)[::-1])

@@ -19,6 +19,7 @@ from cfmkit.results import Status
 from cfmkit.specs.units import TravelShare
 from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.suggest import figures, proposal_making_and_judging, relaxed_requests, search, yield_of_proposal
+from cfmkit.studies.suggest.material_and_fastening_of_proposal import add_screws
 from cfmkit.studies.suggest.outcome_of_search import Suggestions
 from cfmkit.studies.suggest.proposal_making_and_judging import (
     ENDED_EARLY,
@@ -562,3 +563,10 @@ def test_what_only_the_largest_factor_helps_is_named_with_it(monkeypatch):
     assert made == pytest.approx([1.03, 6.0, 1.15, 1.5, 2.2, 3.6], rel=0.01)
     monkeypatch.setattr(relaxed_requests, "make_proposal", lambda _asked: Proposal("beam", "", message="none"))
     assert confirm(request(), 0, UNLIMITED_CLOCK, relaxed_requests.Edge("beam", "travel", 1.0)) is None
+
+
+@pytest.mark.parametrize(("config", "screw"), [("vcfm_pla", "M3"), ("beam_design_arch", "M1.6"), ("cam", None)])
+def test_proposals_have_the_largest_usual_screws_that_fit(config, screw):
+    spec = cfmkit.load(f"configs/{config}.yaml")
+    fastened = add_screws(family(spec.family), spec)
+    assert fastened == (spec if screw is None else spec.replace({"mechanism.part.screws": screw}))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from io import BytesIO
+
 import numpy as np
 
 from cfmkit.curves import Curve
@@ -12,6 +14,13 @@ from cfmkit.specs.spec import Requirement, Spec
 
 def axes():
     return axes_mm(new_figure(), (17, 12, 138, 80))
+
+
+def picture(figure):
+    """Return a figure as the bytes of a PNG."""
+    file = BytesIO()
+    figure.savefig(file, format="png", metadata={"Software": None})
+    return file.getvalue()
 
 
 def loop_curve(kind="force", gap=0.02):
