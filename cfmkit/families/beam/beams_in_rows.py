@@ -23,7 +23,6 @@ from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as OF_SUR
 from cfmkit.families.end_stops import DEFINITIONS as OF_CONTACTS
 from cfmkit.families.rows import ScalarQuantity, SeveralSolutions, SolvedRows, each_quantity, each_rule, or_nan
 from cfmkit.metrics import split_name
-from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 
@@ -71,7 +70,7 @@ class BeamRows:
             paths.effort,
             np.array([or_nan(one.effort_error) for one in each]),
             np.array([or_nan(target_of(one)) for one in each]),
-            MeasuringFrame.band,
+            np.array([one.spec.analysis.band for one in each]),
             (np.array([one.motion[0] for one in each]), np.array([one.motion[-1] for one in each])),
             self._part_efforts,
             StressRows(tuple, self._stress_at, allowable, paths.largest_stress),
