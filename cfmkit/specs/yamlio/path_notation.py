@@ -72,8 +72,9 @@ def with_value(tree: Any, path: Sequence[str], value: Any) -> Any:
 
 def _keep_dimension(before: Any, value: Any) -> Any:
     """Return a value; a number in SI that replaces an angle, say, is an angle, too. Of a share it cannot be known."""
-    known = isinstance(before, DimensionedFloat) and not isinstance(before, TravelShare)
-    return type(before)(value, before.dimension) if known and type(value) is float else value
+    if isinstance(before, DimensionedFloat) and not isinstance(before, TravelShare) and type(value) is float:
+        return type(before)(value, before.dimension)
+    return value
 
 
 def _parse_index(text: str, items: Sequence[Any]) -> int:
