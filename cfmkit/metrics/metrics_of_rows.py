@@ -318,7 +318,7 @@ class RowsInWindow:
         found = RANGE_FUNCTIONS[name](many)
         if not name.startswith("range_95"):
             here = np.abs(many.interpolate(many.reference[:, None])[:, 0])
-            largest = np.nanmax(np.abs(self.curves.samples.values), axis=1)
+            largest = np.nanmax(np.abs(self.curves.samples.values), axis=1, initial=0.0)
             reached &= here > np.maximum(self.curves.error, ZERO_EFFORT_SHARE * largest)
         return np.where(reached, found, np.nan)
 

@@ -133,3 +133,11 @@ def test_rows_follow_a_curve_as_runs_of_their_own_do(stem, window, last):
     together = assert_rows_equal_runs(study, plan)
     known = np.isfinite(together.values[:, names.index("deviation_from_curve")])
     assert known.tolist() == [True, True, not np.isfinite(spec.target_curve.extent[1])]
+
+
+def test_a_row_without_any_equilibrium_has_no_value_and_no_warning_of_numpy():
+    """16 mm of preload close the leaves all over the travel."""
+    vary = {"analysis.preloads.0": ["0 mm", "16 mm"]}
+    table = cfmkit.sweep("configs/vcfm_u_shape.yaml", vary=vary, metrics=["band_range_1pct", "force_mean"]).table
+    assert table["status"] == ("complete", "no_equilibrium")
+    assert np.isfinite(table["band_range_1pct"]).tolist() == [True, False]
