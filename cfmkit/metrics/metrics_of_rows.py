@@ -223,10 +223,16 @@ class RowsInWindow:
 
     @cached_property
     def _peaks(self) -> tuple[FloatArray, FloatArray]:
-        """The peaks in the window and the efforts there, (d, k), in order; for others an end of the window stands."""
+        """The peaks in the window and the efforts there, (d, k), in order; for others an end of the window stands.
+
+        (d, 0) where no row has a peak in its window.
+        """
         curves, inside = self.curves, self.inside
-        places, heights = curves.dense if curves.peaks is None else curves.peaks, curves.heights
+        places = curves.dense if curves.peaks is None else curves.peaks
         low, high = (end[:, None] for end in self._cut)
+        if not ((places > low) & (places < high)).any():
+            return places[:, :0], places[:, :0]
+        heights = curves.heights
         if not np.isfinite(heights[(places > low) & (places < high)]).all():
             places = np.where(np.isfinite(heights), places, np.nan)  # places without an effort go behind all others
             order = np.argsort(places, axis=1)
