@@ -29,9 +29,9 @@ from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
 from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES, spread
-from cfmkit.metrics import evaluate
+from cfmkit.metrics import evaluate, metrics_by_name
 from cfmkit.metrics.longest_interval_in_band import _levels, _reach, flat_window
-from cfmkit.metrics.metrics_of_rows import metric_of_branches
+from cfmkit.metrics.metrics_of_rows import CycleRows, metric_of_rows
 from cfmkit.results import Status
 from cfmkit.specs.units import window_places
 from cfmkit.studies.choose_metrics_to_note import metrics_of
@@ -610,7 +610,8 @@ def test_rows_take_windows_that_are_shares_of_the_travel():
     variants = [spec.replace({"mechanism.bistable.width": width}) for width in (6e-3, 7e-3)]
     ((_, found),) = solve_rows(variants)
     low, high = np.array([window_places(spec.analysis.window, (0.0, spec.travel)) for spec in variants]).T
-    mean = metric_of_branches("force_mean", {"load": found.branches["load"].restrict_to_window((low, high))})["load"]
+    cycle = CycleRows({"load": found.branches["load"].restrict_to_window((low, high))})
+    mean = metric_of_rows(metrics_by_name("force")["force_mean"], cycle)["load"]
     expected = [evaluate(cfmkit.analyze(one), ["force_mean"])["force_mean"].value for one in variants]
     assert mean.tolist() == pytest.approx(expected, rel=1e-12)
 
