@@ -49,9 +49,12 @@ if TYPE_CHECKING:
     Rows = NDArray[np.intp]
     Group = tuple[Rows, SolvedRows[Solution]]
 
-MAX_SAMPLES_AT_ONCE = 125_000
-"""Points that are worked on together: few enough to stay in a processor's cache, 260 curves of 481 points."""
-MIN_SHARED_CAMS = 8  # mechanisms around one cam from which on they are worth a solution of their own
+MAX_SAMPLES_AT_ONCE = 250_000
+"""Points that are worked on together: 520 curves of 481 points. A quarter of them takes twice the time a point."""
+MIN_SHARED_CAMS, MIN_SHARED_UNCHECKED = 8, 400
+"""Mechanisms around one cam from which on they are worth a solution of their own: where each other one is validated,
+and where bounds of its numbers are enough.
+"""
 BESIDE_THE_CAM = re.compile(
     r"mechanism\.(rolling_friction|springs\.(stiffness|count)(\.\d+)?|masses\.(slider|brace|roller)|contact\.width)"
     r"|design\.force"
@@ -66,15 +69,18 @@ def solve_rows(variants: Variants) -> Iterator[Group]:
     plain = _plain_numbers(variants.spec)
     rows = np.flatnonzero(variants.keep_bounds(variants.values.keys() & plain))
     moving = [path for path in variants.values if path not in plain or not BESIDE_THE_CAM.fullmatch(path)]
-    beside = [path for path in variants.values if path not in moving]
-    shared, rest = _group_shared([variants.values[path] for path in moving], rows)
+    is_checked = plain >= set(moving)
+    as_columns = partial(_with_columns, variants, tuple(variants.values), variants.spec)
+    least = MIN_SHARED_UNCHECKED if is_checked else MIN_SHARED_CAMS
+    shared, rest = _group_shared([variants.values[path] for path in moving], rows, least)
     for members in shared:
-        if plain >= set(moving):
-            yield from _solve_alike(members, partial(_with_columns, variants, [*moving, *beside], variants.spec))
+        if is_checked:
+            yield from _solve_alike(members, as_columns)
         elif (first := dict(valid(variants, members[:1].tolist()))) and not _is_left_out(first[members[0]]):
+            beside = [path for path in variants.values if path not in moving]
             yield from _solve_alike(members, partial(_with_columns, variants, beside, first[members[0]]))
-    if plain >= set(moving):
-        yield from _solve_alike(rest, partial(_with_columns, variants, [*moving, *beside], variants.spec))
+    if is_checked:
+        yield from _solve_alike(rest, as_columns)
         return
     kinds: dict[str, list[int]] = {}
     for row, spec in valid(variants, rest.tolist()):
@@ -115,10 +121,10 @@ def _plain_numbers(spec: CamSpec) -> set[str]:
     return found | {f"mechanism.profile.{name}" for name in lengths if getattr(profile, name) is not None}
 
 
-def _group_shared(columns: list[NDArray[Any]], rows: Rows) -> tuple[list[Rows], Rows]:
+def _group_shared(columns: list[NDArray[Any]], rows: Rows, least: int) -> tuple[list[Rows], Rows]:
     """Return groups of many rows with the same values in all columns, in the order of their first, and other rows."""
     if not columns or not len(rows):
-        return ([rows], rows[:0]) if len(rows) >= MIN_SHARED_CAMS else ([], rows)
+        return [], rows
     if any(column.dtype == object for column in columns):
         table: Any = [repr([column[row] for column in columns]) for row in rows.tolist()]
         _, which, count = np.unique(table, return_inverse=True, return_counts=True)
@@ -126,8 +132,8 @@ def _group_shared(columns: list[NDArray[Any]], rows: Rows) -> tuple[list[Rows], 
         table = np.stack([column[rows].astype(np.float64) for column in columns], axis=1)
         _, which, count = np.unique(table, axis=0, return_inverse=True, return_counts=True)
     which = which.ravel()
-    groups = [rows[which == kind] for kind in np.flatnonzero(count >= MIN_SHARED_CAMS)]
-    return sorted(groups, key=lambda members: int(members[0])), rows[count[which] < MIN_SHARED_CAMS]
+    groups = [rows[which == kind] for kind in np.flatnonzero(count >= least)]
+    return sorted(groups, key=lambda members: int(members[0])), rows[count[which] < least]
 
 
 def _with_columns(variants: Variants, paths: Sequence[str], spec: CamSpec, rows: Rows) -> CamSpec:
@@ -185,8 +191,8 @@ def _solve_alike(
     samples = len(rows) * assembly.spec.analysis.points
     for some in np.array_split(np.arange(len(rows)), -(-samples // MAX_SAMPLES_AT_ONCE)):
         parcel = replace(rows_of(assembly, some), track=track.of_rows(some)) if len(some) < len(rows) else assembly
-        solution = replace(solve(parcel, len(some)), windows=windows_of(rows[some]))
-        yield rows[some], _solve_group(solution, rows[some])
+        windows = windows_of(rows[some])
+        yield rows[some], _solve_group(replace(solve(parcel, len(some)), windows=windows), rows[some])
 
 
 def _solve_group(solution: Solution, chosen: Rows) -> SolvedRows[Solution]:
