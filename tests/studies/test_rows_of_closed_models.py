@@ -112,6 +112,20 @@ def test_mechanisms_with_bands_of_their_own_are_solved_together(stem):
     assert (np.diff(strokes) > 0).any()
 
 
+def test_rows_know_the_usable_stroke_of_one_branch_alone():
+    needed = {"metric": "usable_stroke[load]", "min": "30 mm"}
+    changes = {"mechanism.rolling_friction": 0.02, "analysis.band": 0.08, "requirements": [needed]}
+    spec = cfmkit.load("configs/cam.yaml").replace(changes)
+    names = ("usable_stroke[load]", "usable_stroke[unload]", "usable_stroke")
+    study = Study(spec, ("mechanism.springs.stiffness",), metrics_of(spec, names, cfmkit.analyze(spec).curve))
+    plan = GivenPoints({"mechanism.springs.stiffness": 690.0 * np.linspace(0.95, 1.05, 9)})
+    together, alone = evaluate_rows(study, plan, 0, 9), [study.evaluate(plan.point(k)) for k in range(9)]
+    np.testing.assert_allclose(together.values, np.array([one.values for one in alone]), rtol=1e-12)
+    assert together.met.tolist() == [list(one.met) for one in alone]
+    assert set(together.met.ravel().tolist()) == {True, False}
+    assert (together.values[:, 0] > together.values[:, 2]).any()
+
+
 def study_variant(study, plan):
     """Return the function that makes a variant of a study."""
     return lambda index: study.variant(plan.point(index))
