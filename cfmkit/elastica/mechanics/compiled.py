@@ -233,7 +233,7 @@ class CompiledEquations(NumpyEquations):
         mesh, bundle = self.mesh, self.mesh.fits.bundle
         if _has_more_unknowns(mesh) or bundle.others or self.follows or degree > MAX_DEGREE or mesh.elements.line.any():
             return None
-        laws = angle_laws(bundle.coefficients, mesh)
+        laws = angle_laws(bundle.coefficients[mesh.fits.number], mesh)
         return compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
 
     def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
