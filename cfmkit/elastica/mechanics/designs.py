@@ -7,7 +7,7 @@ Networks differ in places of nodes, offsets, shapes, sections, supports, springs
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     Loaded = tuple[Network, Drive]
 
+NO_OFFSET = (0.0, 0.0)
 CURLING_TABLES = ("rest", "curl", "hindrance")  # of wide strips
 
 
@@ -93,7 +94,7 @@ def fill_arrays(
     masters = spots[:, n.master]
     places = {"origin": masters / length, "arm": (spots[:, n.node] - masters) / length}
     beams = [beam for network in networks for beam in network.beams.values()]
-    if any(any(beam.start_offset) or any(beam.end_offset) for beam in beams):
+    if any(beam.start_offset != NO_OFFSET or beam.end_offset != NO_OFFSET for beam in beams):
         offsets = np.array([(beam.start_offset, beam.end_offset) for beam in beams]) / length
         places["arm"] = places["arm"].astype(np.result_type(places["arm"], offsets))
         places["arm"][:, n.beam_ends] += offsets.reshape(len(networks), -1, 2, 2)
@@ -101,12 +102,11 @@ def fill_arrays(
         _place_inside(n, tables, places)
     turned = driven.node if driven is not None and driven.motion == FRAME_OF_DRIVE else None
     angles = [
-        tuple(drive.direction if name == turned else node.support.direction for name, node in network.nodes.items())  # type: ignore[union-attr]
+        [drive.direction if name == turned else node.support.direction for name, node in network.nodes.items()]  # type: ignore[union-attr]
         for network, drive in pairs
     ]
-    places["frame"] = _frames(n, angles)
-    shape = len(pairs), len(n.row), 2
-    tables["line"], tables["gap"] = _line_loads(n, scales, pairs), np.zeros(shape)
+    places["frame"] = np.array([frame_of(n, *own) for own in angles])
+    tables["line"], tables["gap"] = _line_loads(n, scales, pairs), np.zeros((len(pairs), len(n.row), 2))
     if any(beam.closure == "raw" for beam in beams[: len(networks[0].beams)]):
         tables["gap"] = _gaps(n, tables, places, networks[0], cuts)
     return NetworkArrays(tables, places, [_hold(n, network, driven, length) for network in networks])
@@ -127,12 +127,13 @@ def _place_inside(n: Numbering, tables: dict[str, Any], places: dict[str, Any]) 
         origin[:, n.ends[own, 1]] = start + np.cumsum(ahead[:, own], axis=1)
 
 
-def _frames(n: Numbering, angles: list[tuple[Any, ...]]) -> Any:
-    """Return cosine and sine of the angles of bodies at rest, by the angles of the nodes, (d, k, 2)."""
-    angle = np.array(angles)[:, n.master] + 0.0
-    angle[:, n.inside] = 0.0
+@lru_cache(maxsize=128)
+def frame_of(n: Numbering, *angles: Any) -> Any:
+    """Return cosine and sine of the angles of bodies at rest, (k, 2), by the directions of the nodes' supports."""
+    angle = np.array(angles)[n.master] + 0.0
+    angle[n.inside] = 0.0
     both = np.empty((*angle.shape, 2), angle.dtype)
-    both[..., 0], both[..., 1] = np.cos(angle), np.sin(angle)
+    both[:, 0], both[:, 1] = np.cos(angle), np.sin(angle)
     return both
 
 
@@ -181,6 +182,8 @@ def _hold(n: Numbering, network: Network, driven: DrivenNode | None, length: flo
 
 def join_held(held: list[dict[int, Any]], size: int) -> Any:
     """Return the values of held unknowns of d networks, (d, size); zero where nothing is held."""
+    if not any(any(own.values()) for own in held):
+        return np.zeros((len(held), size))
     values = np.array([list(own.values()) for own in held]) + 0.0
     base = np.zeros((len(held), size), values.dtype)
     base[:, list(held[0])] = values

@@ -38,18 +38,13 @@ def element_tables(
 ) -> dict[str, Any]:
     """Return the tables of the elements between cuts of the beams, one beam after the other: (d, e, q) or (d, e)."""
     beams, bundle = fits[0].network.beams, fits[0].bundle
+    if not bundle.others:
+        return plain_tables(*bundle.rows(fits), scales, degree, row, cuts)
     wide = any(beam.section.wide for beam in beams.values())
     plain, together, first = [] if wide else bundle.plain, dict[str, Any](), 0
     if plain:
-        numbers = [own.number for own in fits]
-        rows = np.isin(row, plain) if bundle.others else slice(None)
-        beam_rows = np.searchsorted(plain, row[rows]) if bundle.others else row
-        shapes = bundle.coefficients[numbers], bundle.length[numbers], bundle.rigidities[:, numbers]
-        if len(fits) == 1 and not bundle.others and shapes[0].dtype == shapes[2].dtype == float and load_compiled():
-            return _compile_tables(*shapes, scales, degree, row, cuts)
-        together = plain_tables(*shapes, scales, degree, beam_rows, cuts[rows])
-        if not bundle.others:
-            return together
+        rows = np.isin(row, plain)
+        together = plain_tables(*bundle.rows(fits), scales, degree, np.searchsorted(plain, row[rows]), cuts[rows])
     parts: list[dict[str, Any]] = []
     for k, name in enumerate(beams):
         between = cuts[row == k]
@@ -74,7 +69,13 @@ def plain_tables(
     row: Any,
     cuts: FloatArray,
 ) -> dict[str, Any]:
-    """Return the tables of elements of plain beams of d networks, (d, e, q) each."""
+    """Return the tables of elements of plain beams of d networks, (d, e, q) each; of one by compiled code."""
+    compiled = load_compiled() if len(length) == 1 and coefficients.dtype == rigidities.dtype == float else None
+    if compiled is not None:
+        table, lengths = np.empty((6, 1, len(row), degree + N_EXTRA_POINTS)), np.empty((1, len(row)))
+        given = (np.ascontiguousarray(values, float) for values in (cuts, coefficients, length, rigidities))
+        compiled.tables(shape_row(degree)[0], row, *given, table, lengths, scales.length, scales.force)
+        return {**dict(zip(TABLES_AT_POINTS, table, strict=True)), "length": lengths}
     rule, force, width = basis(degree), scales.force, cuts[:, 1:] - cuts[:, :1]
     t, own, angle = cuts[:, :1] + width * rule.places, coefficients[..., row, :], 0.0
     for k in reversed(range(own.shape[-1])):
@@ -90,18 +91,6 @@ def plain_tables(
         "ahead": speed * (1 - rule.places),
         "length": speed[..., 0],
     }
-
-
-def _compile_tables(
-    coefficients: FloatArray, length: FloatArray, rigidities: FloatArray, scales: MechanicsUnits, degree: int, row: Any,
-    cuts: FloatArray,
-) -> dict[str, Any]:  # fmt: skip
-    """Return the same of one network with real numbers in compiled code, (1, e, q) each."""
-    shapes, tables = shape_row(degree)[0], np.empty((6, 1, len(row), degree + N_EXTRA_POINTS))
-    lengths = np.empty((1, len(row)))
-    given = (np.ascontiguousarray(values, float) for values in (cuts, coefficients, length, rigidities))
-    load_compiled().tables(shapes, row, *given, tables, lengths, scales.length, scales.force)
-    return {**dict(zip(TABLES_AT_POINTS, tables, strict=True)), "length": lengths}
 
 
 def _smooth_tables(

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.beam_fits import BeamFits
     from cfmkit.elastica.model.network import Network, Node
     from cfmkit.elastica.model.section import Section
 
@@ -68,6 +69,13 @@ class Bundle:
         self.coefficients, self.rotation = c if c.dtype == rotation.dtype else c + 0j, rotation
         self.coefficients[..., 0] += rotation
         self.rigidities = rigidities_of(beams).reshape(3, *shape)
+
+    def rows(self, fits: Sequence[BeamFits]) -> tuple[Any, Any, Any]:
+        """Return coefficients, length and rigidities of some of the networks."""
+        if len(fits) == len(self.length):
+            return self.coefficients, self.length, self.rigidities
+        chosen = [own.number for own in fits]
+        return self.coefficients[chosen], self.length[chosen], self.rigidities[:, chosen]
 
     @cached_property
     def nominal(self) -> Any:
