@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     Loaded = tuple[Network, Drive]
 
-NO_OFFSET = (0.0, 0.0)
 CURLING_TABLES = ("rest", "curl", "hindrance")  # of wide strips
 
 
@@ -88,28 +87,24 @@ def fill_arrays(
     driven: DrivenNode | None,  # of all of them
 ) -> NetworkArrays:
     """Return what is different in networks of one topology."""
-    n, length, networks = numbering, scales.length, [network for network, _ in pairs]
+    n, length, bundle, numbers = numbering, scales.length, fits[0].bundle, [own.number for own in fits]
     tables = element_tables(fits, scales, n.topology.degree, n.row, cuts)
-    spots = np.array([[(node.x, node.y) for node in network.nodes.values()] for network in networks])
+    spots = bundle.spots[numbers]
     masters = spots[:, n.master]
     places = {"origin": masters / length, "arm": (spots[:, n.node] - masters) / length}
-    beams = [beam for network in networks for beam in network.beams.values()]
-    if any(beam.start_offset != NO_OFFSET or beam.end_offset != NO_OFFSET for beam in beams):
-        offsets = np.array([(beam.start_offset, beam.end_offset) for beam in beams]) / length
+    if bundle.offsets is not None:
+        offsets = bundle.offsets[numbers] / length
         places["arm"] = places["arm"].astype(np.result_type(places["arm"], offsets))
-        places["arm"][:, n.beam_ends] += offsets.reshape(len(networks), -1, 2, 2)
+        places["arm"][:, n.beam_ends] += offsets
     if n.inside.size:
         _place_inside(n, tables, places)
-    turned = driven.node if driven is not None and driven.motion == FRAME_OF_DRIVE else None
-    angles = [
-        [drive.direction if name == turned else node.support.direction for name, node in network.nodes.items()]  # type: ignore[union-attr]
-        for network, drive in pairs
-    ]
-    places["frame"] = np.array([frame_of(n, *own) for own in angles])
+    frames, held = _hold_bodies(n, pairs, driven, length)
+    places["frame"] = np.array(frames)
     tables["line"], tables["gap"] = _line_loads(n, scales, pairs), np.zeros((len(pairs), len(n.row), 2))
-    if any(beam.closure == "raw" for beam in beams[: len(networks[0].beams)]):
-        tables["gap"] = _gaps(n, tables, places, networks[0], cuts)
-    return NetworkArrays(tables, places, [_hold(n, network, driven, length) for network in networks])
+    raw = [beam.closure == "raw" for beam in pairs[0][0].beams.values()]
+    if any(raw):
+        tables["gap"] = _gaps(n, tables, places, np.array(raw)[n.row] & (cuts[:, 1] == 1.0))
+    return NetworkArrays(tables, places, held)
 
 
 def _chords(tables: dict[str, Any]) -> Any:
@@ -139,13 +134,10 @@ def frame_of(n: Numbering, *angles: Any) -> Any:
 
 def _line_loads(n: Numbering, scales: MechanicsUnits, pairs: Sequence[Loaded]) -> Any:
     """Return the line loads of every element, constant and growing with the drive, (d, e, 2, 2)."""
-    given = [
-        (d, grows, load)
-        for d, (network, drive) in enumerate(pairs)
-        for grows, loads in enumerate((network.loads, drive.loads))
-        for load in loads
-        if isinstance(load, LineLoad)
-    ]
+    lines = [(d, grows, load) for d, pair in enumerate(pairs) for grows, on in enumerate(pair) for load in on.loads]
+    given = [(d, grows, load) for d, grows, load in lines if isinstance(load, LineLoad)]
+    if not given:
+        return np.zeros((len(pairs), len(n.row), 2, 2))
     kinds = {type(value) for _, _, load in given for value in (load.wx, load.wy)}
     total = np.zeros((len(pairs), len(n.row), 2, 2), np.result_type(float, *kinds))
     for d, grows, load in given:
@@ -155,37 +147,47 @@ def _line_loads(n: Numbering, scales: MechanicsUnits, pairs: Sequence[Loaded]) -
     return total
 
 
-def _gaps(n: Numbering, tables: dict[str, Any], places: dict[str, Any], network: Network, cuts: FloatArray) -> Any:
-    """Return by how much the last element of each beam that is forced into place misses its node, (d, e, 2)."""
+def _gaps(n: Numbering, tables: dict[str, Any], places: dict[str, Any], last: Any) -> Any:
+    """Return by how much the last elements of beams that are forced into place miss their nodes, (d, e, 2)."""
     place = places["origin"] + places["arm"]
     span = place[:, n.ends[:, 1]] - place[:, n.ends[:, 0]]
-    raw = np.array([beam.closure == "raw" for beam in network.beams.values()])
-    last = raw[n.row] & (cuts[:, 1] == 1.0)
     return np.where(last[:, None], span - _chords(tables), 0.0)
 
 
-def _hold(n: Numbering, network: Network, driven: DrivenNode | None, length: float) -> dict[int, Any]:
-    """Return the unknowns that supports and the drive hold, and where at a drive of zero."""
-    held = dict[int, Any]()
-    for name, (along, across, rotation) in n.bodies.items():
-        support = network.nodes[name].support
-        if support.along:
-            held[along] = support.displacement[0] / length
-        if support.across:
-            held[across] = support.displacement[1] / length
-        if support.rotation:
-            held[rotation] = support.displacement[2]
-    if driven is not None:
-        held[n.bodies[driven.node][driven.motion % FRAME_OF_DRIVE]] = 0.0
-    return held
+def _hold_bodies(
+    n: Numbering, pairs: Sequence[Loaded], driven: DrivenNode | None, length: float
+) -> tuple[list[Any], list[dict[int, Any]]]:
+    """Return the frames of the attachments, and the unknowns that supports and the drive hold, and where, of each.
+
+    What networks have in common is found once.
+    """
+    turned = driven.node if driven is not None and driven.motion == FRAME_OF_DRIVE else None
+    frames, values, before = list[Any](), list[dict[int, Any]](), None
+    for network, drive in pairs:
+        nodes = network.nodes
+        own = [nodes[name].support for name in nodes], drive.direction if turned else 0.0  # type: ignore[union-attr]
+        if own != before:
+            frame = frame_of(n, *(own[1] if name == turned else nodes[name].support.direction for name in nodes))
+            held, before = dict[int, Any](), own
+            for name, (along, across, rotation) in n.bodies.items():
+                support = nodes[name].support
+                if support.along:
+                    held[along] = support.displacement[0] / length
+                if support.across:
+                    held[across] = support.displacement[1] / length
+                if support.rotation:
+                    held[rotation] = support.displacement[2]
+            if driven is not None:
+                held[n.bodies[driven.node][driven.motion % FRAME_OF_DRIVE]] = 0.0
+        frames.append(frame)
+        values.append(held)
+    return frames, values
 
 
 def join_held(held: list[dict[int, Any]], size: int) -> Any:
     """Return the values of held unknowns of d networks, (d, size); zero where nothing is held."""
-    if not any(any(own.values()) for own in held):
-        return np.zeros((len(held), size))
-    values = np.array([list(own.values()) for own in held]) + 0.0
-    base = np.zeros((len(held), size), values.dtype)
+    values = np.array([list(own.values()) for own in held]).reshape(len(held), -1)
+    base = np.zeros((len(held), size), np.result_type(float, values.dtype))
     base[:, list(held[0])] = values
     return base
 

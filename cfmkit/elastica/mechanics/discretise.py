@@ -151,14 +151,6 @@ class Discretisation:
         return np.asarray(np.where(self.floored, self.axial[:, 0], 0.0))
 
     @property
-    def cuts(self) -> dict[str, list[float]]:
-        """Parameters between which the elements of each beam lie, ascending."""
-        cuts = {name: [0.0] for name in self.fits}
-        for name, (_, end) in zip(self.elements.beam, self.elements.cuts.tolist(), strict=True):
-            cuts[name].append(end)
-        return cuts
-
-    @property
     def n_motions(self) -> int:
         """Number of unknowns that are motions; forces come behind them."""
         return self.numbering.n_motions
@@ -173,8 +165,6 @@ def discretise(
     tension: Mapping[str, float] | None = None,  # beams under a large tension N to their L sqrt(N/EI)
     scales: MechanicsUnits | None = None,  # units; found from the beams unless given
     fits: BeamFits | None = None,  # those of the same network, if it was set up before
-    # parameters between which the elements of each beam lie; found from degree, pieces and tension unless given
-    cuts: Mapping[str, list[float]] | None = None,
     # places at which sides of beams may touch obstacles; of one beam in ascending order
     flanks: Sequence[FlankPlace] = (),
 ) -> Discretisation:
@@ -184,7 +174,7 @@ def discretise(
     pinned to an arm.
     """
     fits = fits or BeamFits(network)
-    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build(cuts, tuple(flanks))
+    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build(tuple(flanks))
 
 
 class _ArrayBuilder:
@@ -199,16 +189,14 @@ class _ArrayBuilder:
         self.scales = scales or self._scales()
         self.driven = find_driven_node(network, drive)
 
-    def build(
-        self, given_cuts: Mapping[str, list[float]] | None, flanks: tuple[FlankPlace, ...] = ()
-    ) -> Discretisation:
+    def build(self, flanks: tuple[FlankPlace, ...]) -> Discretisation:
         """Return the arrays."""
         beams = self.network.beams
         touched: dict[str, list[float]] = {}
         for flank in flanks:
             touched.setdefault(self.network.contacts[flank.number].beam, []).append(flank.parameter)  # type: ignore[union-attr]
         laws = {name: find_moving_cuts(beams[name], self.fits[name], places) for name, places in touched.items()}
-        cuts = given_cuts or {
+        cuts = {
             name: laws[name].evaluate(touched[name]) if name in laws else self._cuts(name, beam)
             for name, beam in beams.items()
         }

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.elastica.model.beam import Fit, fit
-from cfmkit.elastica.model.plain_beams_at_once import Bundle, reach_of
+from cfmkit.elastica.model.plain_beams_at_once import Bundle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -34,9 +34,9 @@ class BeamFits(Mapping[str, Fit]):
     def __getitem__(self, name: str) -> Fit:
         """Return the fit of a beam."""
         if name not in self._known:
-            beam = self.network.beams[name]
+            (xa, ya), (xb, yb) = (beam_end_at(self.network, name, side) for side in (0, 1))
             fitted = self.bundle.fit_of(self.number, name)
-            self._known[name] = fitted or fit(beam, reach_of(self.network.nodes, beam))
+            self._known[name] = fitted or fit(self.network.beams[name], (xb - xa, yb - ya))
         return self._known[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -17,14 +17,15 @@ from cfmkit.elastica.model.shapes import Polynomial, direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.beam_fits import BeamFits
-    from cfmkit.elastica.model.network import Network, Node
+    from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.model.section import Section
 
 
+NO_OFFSETS = ((0.0, 0.0), (0.0, 0.0))
 SHORTEST_CHORD = 1e-9  # of a shape of length 1 that can be fitted
 MAX_BEAM_TURN = 16.0  # turn [rad] up to which GAUSS integrates sine and cosine of the angle to about 1e-12
 
@@ -42,21 +43,33 @@ class Bundle:
         Arc length as used [m].
     rigidities : (3, d, plain) array
         Of bending, and the compliances of stretching and shearing, as `Section.rigidities` has them.
+    spots : (d, nodes, 2) array
+        Places of all nodes [m].
+    offsets : (d, beams, 2, 2) array or None
+        Of both ends of all beams [m]; None if there are none.
     """
 
     def __init__(self, networks: Sequence[Network]) -> None:
         """Fit the plain beams."""
         rows = [list(network.beams.values()) for network in networks]
-        self.names = list(networks[0].beams)
+        self.names, number = list(networks[0].beams), {name: k for k, name in enumerate(networks[0].nodes)}
+        self.spots = np.array([[(node.x, node.y) for node in network.nodes.values()] for network in networks])
+        places = self.spots[:, [(number[beam.start], number[beam.end]) for beam in rows[0]]]
+        offsets = [(beam.start_offset, beam.end_offset) for row in rows for beam in row]
+        self.offsets = np.reshape(offsets, places.shape) if any(own != NO_OFFSETS for own in offsets) else None
+        if self.offsets is not None:
+            places = places + self.offsets
         self.plain = [k for k, same in enumerate(zip(*rows, strict=True)) if all(map(is_plain, same))]
         self.others = [] if len(self.plain) == len(self.names) else sorted({*range(len(self.names))} - {*self.plain})
         if self.plain:
-            each = [(net.nodes, own[k]) for net, own in zip(networks, rows, strict=True) for k in self.plain]
-            self._fit_plain([beam for _, beam in each], np.array([reach_of(*pair) for pair in each]), len(rows))
+            reach = places[:, :, 1] - places[:, :, 0]
+            self._fit_plain(
+                [row[k] for row in rows for k in self.plain], reach[:, self.plain] if self.others else reach
+            )
 
-    def _fit_plain(self, beams: list[Beam], reach: Any, count: int) -> None:
-        shape, self.beams = (count, len(self.plain)), beams
-        c, reach = coefficients_of(beams).reshape(*shape, -1) + 0.0, reach.reshape(*shape, 2)
+    def _fit_plain(self, beams: list[Beam], reach: Any) -> None:
+        shape, self.beams = reach.shape[:2], beams
+        c = coefficients_of(beams).reshape(*shape, -1) + 0.0
         dx, dy, (cx, cy) = reach[..., 0], reach[..., 1], chords(c)
         far, own = dx * dx + dy * dy, cx * cx + cy * cy
         check_fits(beams, far, own)
@@ -99,13 +112,6 @@ class Bundle:
         return Fit(self.rotation[at], scale, gap, length, course)
 
 
-def reach_of(nodes: Mapping[str, Node], beam: Beam) -> tuple[Any, Any]:
-    """Return the way from the first to the last end of a beam before any load, x and y [m]."""
-    start, end = nodes[beam.start], nodes[beam.end]
-    (ax, ay), (bx, by) = beam.start_offset, beam.end_offset
-    return end.x + bx - (start.x + ax), end.y + by - (start.y + ay)
-
-
 def check_fits(
     beams: Sequence[Beam],  # plain ones
     # far, own: (b,) in all: squares of the distance of the ends of each [m], and of those of its shape, over its length
@@ -127,7 +133,7 @@ def check_fits(
 
 def is_plain(beam: Beam) -> bool:
     """Return True if a beam has a polynomial angle, no coil of many turns, one thickness, and is no wide strip."""
-    return not beam.section.wide and has_polynomial_angle(beam)
+    return has_polynomial_angle(beam) and not beam.section.wide
 
 
 def has_polynomial_angle(beam: Beam) -> bool:
