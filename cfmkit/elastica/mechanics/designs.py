@@ -50,7 +50,7 @@ class NetworkDesigns:
     fits: list[BeamFits]
     tables: dict[str, Any]  # (d, e, ...), as of `NetworkArrays`
     places: dict[str, Any]  # (d, k, 2)
-    base: Any  # (d, size)
+    held: list[dict[int, Any]]  # as of `NetworkArrays`
 
     @property
     def count(self) -> int:
@@ -60,7 +60,10 @@ class NetworkDesigns:
     @cached_property
     def held_slopes(self) -> FloatArray | None:
         """Derivatives of all unknowns where they are held, (d, size), by complex steps; None if none has any."""
-        return self.base.imag / COMPLEX_STEP if np.iscomplexobj(self.base) and self.base.imag.any() else None
+        if all(own is self.held[0] for own in self.held):
+            return None
+        steps = np.imag(join_held(self.held, self.template.size)) / COMPLEX_STEP
+        return steps if steps.any() else None
 
 
 def set_up(
@@ -74,8 +77,7 @@ def set_up(
     tables, places, held = fill_arrays(template.numbering, template.scales, e.cuts, pairs, fits, driven)
     if np.any(template.floored):
         tables["axial"] = tables["axial"] + template.floor[:, None]
-    base = join_held(held, template.size)
-    return NetworkDesigns(template, pairs, fits, tables, places, base)
+    return NetworkDesigns(template, pairs, fits, tables, places, held)
 
 
 def fill_arrays(
@@ -134,10 +136,10 @@ def frame_of(n: Numbering, *angles: Any) -> Any:
 
 def _line_loads(n: Numbering, scales: MechanicsUnits, pairs: Sequence[Loaded]) -> Any:
     """Return the line loads of every element, constant and growing with the drive, (d, e, 2, 2)."""
+    if not any(isinstance(load, LineLoad) for on in pairs[0] for load in on.loads):
+        return np.zeros((len(pairs), len(n.row), 2, 2))
     lines = [(d, grows, load) for d, pair in enumerate(pairs) for grows, on in enumerate(pair) for load in on.loads]
     given = [(d, grows, load) for d, grows, load in lines if isinstance(load, LineLoad)]
-    if not given:
-        return np.zeros((len(pairs), len(n.row), 2, 2))
     kinds = {type(value) for _, _, load in given for value in (load.wx, load.wy)}
     total = np.zeros((len(pairs), len(n.row), 2, 2), np.result_type(float, *kinds))
     for d, grows, load in given:
@@ -216,6 +218,6 @@ def design_of(designs: NetworkDesigns, number: int) -> Discretisation:
         springs=tuple(at._replace(item=item) for at, item in zip(template.springs, network.springs, strict=True)),
         loads=tuple(at._replace(item=item) for at, item in zip(template.loads, loads, strict=True)),
         contacts=tuple(at._replace(item=network.contacts[at.number]) for at in template.contacts),
-        base=designs.base[number],
+        base=join_held([designs.held[number]], template.size)[0],
         fits=designs.fits[number],
     )

@@ -70,8 +70,7 @@ def plain_tables(
     cuts: FloatArray,
 ) -> dict[str, Any]:
     """Return the tables of elements of plain beams of d networks, (d, e, q) each; of one by compiled code."""
-    compiled = load_compiled() if len(length) == 1 and coefficients.dtype == rigidities.dtype == float else None
-    if compiled is not None:
+    if len(length) == 1 and coefficients.dtype == rigidities.dtype == float and (compiled := load_compiled()):
         table, lengths = np.empty((6, 1, len(row), degree + N_EXTRA_POINTS)), np.empty((1, len(row)))
         given = (np.ascontiguousarray(values, float) for values in (cuts, coefficients, length, rigidities))
         compiled.tables(shape_row(degree)[0], row, *given, table, lengths, scales.length, scales.force)

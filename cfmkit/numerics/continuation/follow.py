@@ -10,7 +10,13 @@ from cfmkit.numerics.continuation.branch_ends import find_passed_end, primary_sl
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.corners import crosses_bend, mark_corners
 from cfmkit.numerics.continuation.events import locate_loss
-from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
+from cfmkit.numerics.continuation.losses import (
+    CRITICAL_STIFFNESS,
+    look_past,
+    lose_stability,
+    start_critical,
+    start_unstable,
+)
 from cfmkit.numerics.continuation.path import (
     AT_EVENT,
     MarchedSteps,
@@ -62,7 +68,7 @@ def follow(
     ----------
     problem : ContinuationProblem
         The structure. If it has a method `march`, of a `Walk`, to `MarchedSteps`, it takes steps by itself where
-        nothing happens, in compiled code, say.
+        nothing happens, in compiled code, say; if it has `march_whole`, too, all of them where nothing happens at all.
     start : PathEquilibrium
         Where the path begins.
     targets : (k,) array
@@ -119,6 +125,14 @@ def _items(
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
     step, steepest = options.first_step * options.span, max(0.0, abs(start.stiffness))
     walk = Walk(problem, options, targets, start, step, at_first, trail=(start,), branch=branch, steepest=steepest)
+    march_whole = getattr(problem, "march_whole", None)
+    if march_whole is not None and not walk.done and not start.unstable:
+        marched = march_whole(walk, (CRITICAL_STIFFNESS, NEARLY_CRITICAL))
+        if marched is not None:
+            yield Point(start, at_first - 1, branch)
+            yield marched
+            yield PathStop(WhyStopped.COMPLETE, float(marched.drive[-1]))
+            return
     beyond = None if walk.done or options.branch == "primary" else start_critical(walk)
     if beyond is not None:  # how many directions are unstable there is rounding
         yield Point(start._replace(unstable=beyond.here.unstable), at_first - 1, branch)
