@@ -186,12 +186,15 @@ class Walk(NamedTuple):
     def origin(self) -> PathEquilibrium:
         """The first equilibrium of this smooth piece."""
         first = self.trail[0]
-        return first.states[0] if isinstance(first, MarchedSteps) else first
+        return first.point_at(0) if isinstance(first, MarchedSteps) else first
 
     def look_back(self) -> Iterator[PathEquilibrium]:
         """Yield the equilibria of this smooth piece, the last first."""
         for part in reversed(self.trail):
-            yield from reversed(part.states) if isinstance(part, MarchedSteps) else (part,)
+            if isinstance(part, MarchedSteps):
+                yield from map(part.point_at, reversed(range(len(part.drive))))
+            else:
+                yield part
 
     @property
     def done(self) -> bool:
