@@ -218,7 +218,7 @@ class _ArrayBuilder:
         attachments = Attachments(numbering.places, **{name: at[0] for name, at in arrays.places.items()})
         floors = np.array([self._floor(name, beam) for name, beam in beams.items()])[numbering.row]
         tables = {name: table[0] for name, table in arrays.tables.items()}
-        if floors.any():
+        if np.count_nonzero(floors):
             tables["axial"] = tables["axial"] + floors[:, None]
         names = tuple(map(list(beams).__getitem__, numbering.row.tolist()))
         elements = BeamElements(**tables, ends=numbering.ends, unknowns=numbering.unknowns, beam=names, cuts=places)
@@ -273,10 +273,10 @@ class _ArrayBuilder:
     # -- bodies and attachments ------------------------------------------------------------------------------------
     def _scales(self) -> MechanicsUnits:
         lengths = [np.real(self.fits[name].length) for name in (self.bundle.names[k] for k in self.bundle.others)]
-        lengths += np.real(self.bundle.length[self.fits.number]).tolist() if self.bundle.plain else []
+        lengths += self.bundle.length[self.fits.number].real.tolist() if self.bundle.plain else []
         length = float(sum(lengths) / len(lengths))
         if self.bundle.plain[:1] == [0]:
-            rigidity = float(np.real(self.bundle.rigidities[0, self.fits.number, 0]))
+            rigidity = float(self.bundle.rigidities[0, self.fits.number, 0].real)
         else:
             section = next(iter(self.network.beams.values())).section
             rigidity = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
@@ -334,7 +334,7 @@ class _ArrayBuilder:
         base, rate = join_held([held], numbering.size)[0], np.zeros(numbering.size)
         if self.driven is not None:
             rate[numbering.bodies[self.driven.node][self.driven.motion % FRAME_OF_DRIVE]] = self.driven.sense
-        arms = (attachments.arm != 0).any(axis=1).tobytes()
+        arms = ((attachments.arm[:, 0] != 0) | (attachments.arm[:, 1] != 0)).tobytes()
         acts = tuple((attached.places, *_acts_on(attached.item)) for attached in acting)
         return find_free(numbering, tuple(held), arms, acts), base, rate
 

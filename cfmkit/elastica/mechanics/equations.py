@@ -326,8 +326,8 @@ class NumpyEquations:
 def force_units(mesh: Discretisation) -> FloatArray:
     """Return the unit of each free unknown that is a force, EI/L^2 of its element or 1; infinite for motions."""
     e = mesh.elements
-    length = np.real(e.length).reshape(-1, len(e.beam))[0]  # those of the first of several states
-    rigidity = np.real(e.rigidity * e.weight).reshape(-1, *e.weight.shape[-2:])[0]
+    length = e.length.real.reshape(-1, len(e.beam))[0]  # those of the first of several states
+    rigidity = (e.rigidity * e.weight).real.reshape(-1, *e.weight.shape[-2:])[0]
     bending = rigidity.sum(axis=1) * length
     unit = np.full(mesh.size, np.inf)
     unit[e.unknowns[:, -2:]] = (bending / length**2)[:, None]

@@ -122,7 +122,7 @@ def check_fits(
 
     Raises InputError if one cannot be fitted.
     """
-    if far.real.min() > 0 and own.real.min() > SHORTEST_CHORD**2:
+    if np.count_nonzero((far.real > 0) & (own.real > SHORTEST_CHORD**2)) == far.size:
         return
     for beam, distance, chord in zip(beams, far.real.flat, own.real.flat, strict=True):
         if not distance > 0:

@@ -103,7 +103,7 @@ def follow_together(
     """Yield what `follow` does, but the points of every march together, and no corners that are rounded."""
     left = options.most_points
     for item in _items(problem, start, targets, options, branch):
-        if isinstance(item, MarchedSteps) and (between := int((item.target < 0).sum())) <= left:
+        if isinstance(item, MarchedSteps) and (between := np.count_nonzero(item.target < 0)) <= left:
             yield item
             left -= between
             continue
