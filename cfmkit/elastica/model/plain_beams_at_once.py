@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.elastica.model.beam import Beam
-    from cfmkit.elastica.model.beam_fits import BeamFits
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.model.section import Section
 
@@ -72,11 +71,10 @@ class Bundle:
         # (3, d, plain): of bending, and the compliances of stretching and shearing, as `Section.rigidities` has them
         self.rigidities = rigidities_of(beams).reshape(3, *shape)
 
-    def rows(self, fits: Sequence[BeamFits]) -> tuple[Any, Any, Any]:
+    def rows(self, chosen: list[int]) -> tuple[Any, Any, Any]:
         """Return coefficients, length and rigidities of some of the networks."""
-        if len(fits) == len(self.length):
+        if len(chosen) == len(self.length):
             return self.coefficients, self.length, self.rigidities
-        chosen = [own.number for own in fits]
         return self.coefficients[chosen], self.length[chosen], self.rigidities[:, chosen]
 
     @cached_property
