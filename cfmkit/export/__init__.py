@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from cfmkit.export.arc_outlines import Outline
 
-__getattr__, _NAMES = lazy_names(
+__getattr__, _OFFERED_NAMES = lazy_names(
     __name__,
     {
         "arc_outlines": "outlines",
@@ -36,7 +36,7 @@ __all__ = [
     "files",
     "polygon",
     "polygons",
-    *_NAMES,
+    *_OFFERED_NAMES,
 ]
 FILE_FORMATS = ("dxf", "svg", "csv", "stl", "3mf", "step")  # what `files` can write
 DEFAULT_FORMATS = FILE_FORMATS[:3]  # what it writes unless told: what a cutter needs

@@ -197,7 +197,7 @@ def origins() -> dict[str, dict[str, str]]:
     return computed | ({"metrics": {"registered": own_metrics.stamp()}} if own_metrics.stamp() else {})
 
 
-__getattr__, _NAMES = lazy_names(
+__getattr__, _OFFERED_NAMES = lazy_names(
     __name__,
     {
         "base": "DesignMethod ElasticParts Family Pictures ResultNames function_named",
@@ -223,5 +223,5 @@ __all__ = [
     "origins",
     "records",
     "register",
-    *_NAMES,
+    *_OFFERED_NAMES,
 ]
