@@ -208,8 +208,8 @@ class Solution(ShortRepr):
             else:
                 parts = track, friction, states, losses
                 if len(rows) < self.count:
-                    own = states and states.combine(partial(rows_of, rows=rows))
-                    parts = track.of_rows(rows), rows_of(friction, rows), own, rows_of(losses, rows)
+                    row_states = states and states.combine(partial(rows_of, rows=rows))
+                    parts = track.of_rows(rows), rows_of(friction, rows), row_states, rows_of(losses, rows)
                 jams_and_ends = zip(jams(*parts, len(rows)), total[rows].tolist(), strict=True)
                 clipped = [_clip_intervals(jam, end) for jam, end in jams_and_ends]
             for row, jam in zip(rows.tolist(), clipped, strict=True):
@@ -240,8 +240,8 @@ class Solution(ShortRepr):
             return Several((low, high))
         windows = self.windows or [stated]
         which, lows, highs = np.broadcast_arrays(np.arange(len(windows)), low.ravel(), high.ravel())
-        own = zip(which.tolist(), zip(lows.tolist(), highs.tolist(), strict=True), strict=True)
-        ends = np.array([window_places(windows[row], pair) for row, pair in own]).T
+        ends_of_rows = zip(which.tolist(), zip(lows.tolist(), highs.tolist(), strict=True), strict=True)
+        ends = np.array([window_places(windows[row], pair) for row, pair in ends_of_rows]).T
         return Several(ends[..., None] if low.ndim > 1 or self.windows else ends)
 
     @property

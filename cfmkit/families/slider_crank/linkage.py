@@ -79,8 +79,8 @@ class Linkage:
         short, far = self.crank - self.coupler, self.stretched_position
         if abs(self.offset) > abs(short):
             return -far, far
-        near = math.sqrt((short - self.offset) * (short + self.offset))
-        return (near, far) if self.branch * self.place(angle) >= 0.0 else (-far, -near)
+        nearest = math.sqrt((short - self.offset) * (short + self.offset))
+        return (nearest, far) if self.branch * self.place(angle) >= 0.0 else (-far, -nearest)
 
     def room(self, angle: float) -> tuple[float, float]:
         """Return how far the slider is from the ends of its `way` at a crank angle [m], from the low and the high one.
@@ -209,8 +209,8 @@ def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
 
     Raises CannotBuild if the linkage does not reach it.
     """
-    given = mechanism.unloaded_angle
-    angle = given if given is not None else linkage.stretched_angle + (mechanism.unloaded_offset or 0.0)
+    stated_angle = mechanism.unloaded_angle
+    angle = stated_angle if stated_angle is not None else linkage.stretched_angle + (mechanism.unloaded_offset or 0.0)
     if not linkage.reaches(angle):
         low, high = linkage.arc(linkage.stretched_angle)
         raise finding.cannot_build(

@@ -211,15 +211,15 @@ class SliderPath:
     def unit_forces(self, travel: FloatArray) -> FloatArray:
         """Return the force of a unit spring at each joint: that of `units` without anything else, and faster."""
         travel = np.asarray(travel, dtype=np.float64)
-        found = self.forces(self.evaluate(travel))
-        found[:, self.is_unreachable(travel)] = np.nan
-        return found
+        forces = self.forces(self.evaluate(travel))
+        forces[:, self.is_unreachable(travel)] = np.nan
+        return forces
 
     def is_unreachable(self, travel: FloatArray) -> NDArray[np.bool_]:
         """Return whether the slider cannot get there."""
         slack = 1e-12 * np.abs(self.x0)
-        found: NDArray[np.bool_] = (travel > self.inward + slack) | (travel < -self.outward - slack)
-        return found
+        is_beyond: NDArray[np.bool_] = (travel > self.inward + slack) | (travel < -self.outward - slack)
+        return is_beyond
 
     def _to_stretched(self, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the distances from the stretched positions on either side, x_s - x and x_s + x, without cancellation.
@@ -227,9 +227,9 @@ class SliderPath:
         The product of both is x_s^2 - x^2.
         """
         xs, outside = self.stretched, np.asarray(self.x0) >= 0.0
-        near = np.maximum(self.gap / (xs + np.abs(self.x0)) + np.where(outside, travel, -travel), 0.0)
+        nearest = np.maximum(self.gap / (xs + np.abs(self.x0)) + np.where(outside, travel, -travel), 0.0)
         far = xs + np.where(outside, self.x0 - travel, travel - self.x0)
-        return np.where(outside, near, far), np.where(outside, far, near)
+        return np.where(outside, nearest, far), np.where(outside, far, nearest)
 
     def evaluate(self, travel: FloatArray) -> _SliderState:
         """Return the state at some travels."""
@@ -239,8 +239,10 @@ class SliderPath:
         share = np.sqrt(ahead * behind / (4.0 * link.crank * link.coupler))
         knee = 2.0 * np.arcsin(np.minimum(share, 1.0))
         if (is_folding := share > NEARLY_FOLDED).any():
-            other = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / (4.0 * link.crank * link.coupler)
-            folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(other, 0.0), 1.0)))
+            sine_squared = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / (
+                4.0 * link.crank * link.coupler
+            )
+            folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(sine_squared, 0.0), 1.0)))
             knee = np.where(is_folding, folding, knee)
         knee = self.side * knee
         e = link.offset
@@ -273,9 +275,9 @@ class SliderPath:
         """Return the squared distance of the pins at both ends, and what the first three q do by the knee angle."""
         r1, r2 = self.linkage.crank, self.linkage.coupler
         d2 = r1 * r1 + r2 * r2 + 2.0 * r1 * r2 * cosine
-        found = np.empty((3, *np.shape(cosine)))
-        found[0], found[1], found[2] = r2 * (r2 + r1 * cosine) / d2, -1.0, -r1 * (r1 + r2 * cosine) / d2
-        return d2, found
+        slopes = np.empty((3, *np.shape(cosine)))
+        slopes[0], slopes[1], slopes[2] = r2 * (r2 + r1 * cosine) / d2, -1.0, -r1 * (r1 + r2 * cosine) / d2
+        return d2, slopes
 
     def efforts(self, state: _SliderState) -> tuple[FloatArray, FloatArray]:
         """Return q q' and (q q')' by the travel, (4, n) each."""

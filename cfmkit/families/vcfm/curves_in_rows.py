@@ -195,10 +195,10 @@ class Rows(ShortRepr):
         Minus and plus infinity where the curve does not reach there.
         """
         low, high = (end[:, None] for end in window)
-        own = np.where((self.travel > low) & (self.travel < high), self.force, np.nan)
-        force = np.hstack([own, self.evaluate_within_ends(np.hstack([low, high]))])
-        known = np.isfinite(force)
-        return np.where(known, force, -np.inf).max(axis=1), np.where(known, force, np.inf).min(axis=1)
+        force_inside = np.where((self.travel > low) & (self.travel < high), self.force, np.nan)
+        force = np.hstack([force_inside, self.evaluate_within_ends(np.hstack([low, high]))])
+        is_known = np.isfinite(force)
+        return np.where(is_known, force, -np.inf).max(axis=1), np.where(is_known, force, np.inf).min(axis=1)
 
     def flat_parts(self, flatness: float) -> Ends:
         """Return from where to where (max - min)/max of the force is longest within `flatness` [m]; NaN: nowhere."""

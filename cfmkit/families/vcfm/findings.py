@@ -105,7 +105,9 @@ def _contradicts(solution: Solution) -> Any:
         return False  # such leaves push where they are flat
     balance = solution.of_mechanisms(solution.parts.balance)
     stated = [spec.analysis.measured for spec in solution.specs]
-    stiffness, force = np.array([(one.positive_stiffness, one.force) for one in stated if one is not None]).T
+    stiffness, force = np.array(
+        [(values.positive_stiffness, values.force) for values in stated if values is not None]
+    ).T
     apart = np.abs(stiffness * balance / force - 1.0) > solution.spec.analysis.flatness
     return (_slenderness(solution) >= FLAT_BUCKLED_ABOVE) & apart
 
@@ -216,10 +218,13 @@ def _is_not_flat(solution: Solution) -> Any:
 
 
 def _uneven_force(solution: Solution) -> Sentence:
-    push, (low, high), one = solution.first, solution.window_of_one, solution.character
+    push, (low, high), character = solution.first, solution.window_of_one, solution.character
     ripple, allowed = ripple_inside(solution, solution.window), solution.spec.analysis.flatness
-    alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < STIFFNESS_RTOL
-    reported = f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)}"
+    alike = (
+        character.positive_stiffness > 0
+        and abs(character.negative_stiffness / character.positive_stiffness - 1.0) < STIFFNESS_RTOL
+    )
+    reported = f"K_p = {rate(character.positive_stiffness)} and K_n = {rate(character.negative_stiffness)}"
     cause = f"{reported} cancel, but not in the whole window" if alike else f"{reported} do not cancel"
     low, high = max(low, float(push.travel[0])), min(high, float(push.travel[-1]))  # what is beyond is not known
     words, cures = flattening(solution, ripple)
@@ -391,8 +396,8 @@ def _wide(name: str) -> FindingRule[Solution]:
     """Return the rule on leaves, or a spring, that are too wide for beams."""
 
     def holds(solution: Solution) -> Any:
-        found = solution.hindered_curling
-        return found[name][0] > TOO_SOFT if name in found else False
+        curling = solution.hindered_curling
+        return curling[name][0] > TOO_SOFT if name in curling else False
 
     def sentence(solution: Solution) -> Sentence:
         share, place = (float(value[0]) for value in solution.hindered_curling[name])

@@ -126,12 +126,14 @@ class Solution(ShortRepr):
 
     def _push(self, row: int) -> Push:
         curves, size = self.curves, int(self.curves.count[row])
-        leaves = LeafSamples(*(one[row, :size] for one in vars(curves.leaves).values()))
-        force, stress = (one[row, :size] for one in vars(curves.spring_samples).values())
+        leaves = LeafSamples(*(column[row, :size] for column in vars(curves.leaves).values()))
+        force, stress = (column[row, :size] for column in vars(curves.spring_samples).values())
         travel, preload, rest = curves.travel[row, :size], float(curves.preload[row, 0]), float(curves.rest[row])
-        known = None if np.isnan(rest) else rest
+        rest_or_none = None if np.isnan(rest) else rest
         stopped = curves.stops.force(travel) if curves.stops else None
-        return Push(preload, travel, leaves, force, stress, known, stopped, curves.sampler.find_solved(travel, preload))
+        return Push(
+            preload, travel, leaves, force, stress, rest_or_none, stopped, curves.sampler.find_solved(travel, preload)
+        )
 
     # --- what characterises each mechanism, (m,) --------------------------------------------------------------------
 
@@ -239,9 +241,9 @@ class Solution(ShortRepr):
         (low, high), curves = self.flat, self.nominal
         with np.errstate(all="ignore"):
             places = np.linspace(low, high, FLAT_PLACES, axis=1)
-            known = np.isfinite(low)[:, None]
-            force = curves.force_at(np.where(known, places, curves.travel[:, :1]))
-            mean = np.trapezoid(np.where(known, force, np.nan), places, axis=1) / (places[:, -1] - places[:, 0])
+            is_known = np.isfinite(low)[:, None]
+            force = curves.force_at(np.where(is_known, places, curves.travel[:, :1]))
+            mean = np.trapezoid(np.where(is_known, force, np.nan), places, axis=1) / (places[:, -1] - places[:, 0])
         return np.where(high > low, mean, np.nan)
 
     @cached_property
@@ -269,8 +271,8 @@ class Solution(ShortRepr):
         (start, end), (low, high), alone = self.flat, self.window, self.spring_alone
         with np.errstate(all="ignore"):
             common = np.minimum(end, high) - np.maximum(start, low)
-            near = np.abs(alone - self.window_force) <= self._flatness * np.maximum(alone, self.window_force)
-            return np.where(near & (common >= 0.5 * (high - low)), alone, np.nan)
+            is_same_force = np.abs(alone - self.window_force) <= self._flatness * np.maximum(alone, self.window_force)
+            return np.where(is_same_force & (common >= 0.5 * (high - low)), alone, np.nan)
 
     @cached_property
     def least(self) -> Ends:
@@ -328,20 +330,20 @@ class Solution(ShortRepr):
         about, curves = self.spec.mechanism, self.curves
         if about.wide_beams or self.spec.analysis.fidelity in ("truss", "solid"):
             return {}
-        nu, found = self.column(lambda spec: spec.mechanism.material.poisson), {}
+        nu, shares = self.column(lambda spec: spec.mechanism.material.poisson), {}
         modulus = self.column(lambda spec: spec.mechanism.material.modulus)
         leaves = ("leaves", "bistable", self.leaf_rows, self.leaf_rows.leaves.stress)
         for name, key, rows, samples in (leaves, ("spring", "positive", curves, curves.spring_samples.stress)):
             if getattr(about, key) is None:  # a bought spring is none
                 continue
             sizes = [getattr(spec.mechanism, key) for spec in self.specs]
-            width, thickness = (np.array([getattr(one, size) for one in sizes]) for size in ("width", "thickness"))
+            width, thickness = (np.array([getattr(strip, size) for strip in sizes]) for size in ("width", "thickness"))
             stress = np.where(rows.there, samples, -np.inf).reshape(len(self), -1)
             worst = np.nanargmax(stress, axis=1)[:, None]
             curvature = 2.0 * np.take_along_axis(stress, worst, 1)[:, 0] / (modulus * thickness)
             share = np.asarray(hindered_share(width, thickness, nu, curvature))
-            found[name] = share, np.take_along_axis(rows.travel.reshape(len(self), -1), worst, 1)[:, 0]
-        return found
+            shares[name] = share, np.take_along_axis(rows.travel.reshape(len(self), -1), worst, 1)[:, 0]
+        return shares
 
     @cached_property
     def window_forces(self) -> FloatArray:
@@ -378,9 +380,9 @@ class Solution(ShortRepr):
         """
         curves, count = (self.nominal, 1) if alone else (self.curves, self.preloads)
         chosen = np.arange(len(self)) if rows is None else rows
-        each = (chosen[:, None] * count + np.arange(count)).ravel()
-        travel, (first, last) = np.repeat(places, count, axis=0), (end[each, None] for end in curves.ends)
-        spring = curves.sampler.of_rows(each).spring(travel + curves.preload[each])[1]
+        curve_numbers = (chosen[:, None] * count + np.arange(count)).ravel()
+        travel, (first, last) = np.repeat(places, count, axis=0), (end[curve_numbers, None] for end in curves.ends)
+        spring = curves.sampler.of_rows(curve_numbers).spring(travel + curves.preload[curve_numbers])[1]
         spring = np.where((travel < first) | (travel > last), 0.0, spring).reshape(len(chosen), count, -1)
         return np.asarray(np.maximum(self.nominal.sampler.of_rows(chosen).leaf_stress(places), spring.max(axis=1)))
 
@@ -388,14 +390,17 @@ class Solution(ShortRepr):
         """Return the largest stress of leaves and spring at the points of each preload, the nominal one first [Pa]."""
         curves, every = self.curves, [slice(k, None, self.preloads) for k in range(self.preloads)]
         stress = np.maximum(curves.leaves.stress, curves.spring_samples.stress)
-        return [RowSamples(curves.travel[own], stress[own], curves.count[own]) for own in every]
+        return [
+            RowSamples(curves.travel[curve_numbers], stress[curve_numbers], curves.count[curve_numbers])
+            for curve_numbers in every
+        ]
 
     @cached_property
     def branches(self) -> dict[str, CurveRows]:
         """The nominal curves by branch, as metrics see them."""
         curves = self.nominal
         low, high = (np.where(self.is_linear, *ends) for ends in zip(self.linear, curves.ends, strict=True))
-        found = CurveRows(
+        rows_of_curves = CurveRows(
             RowSamples(curves.travel, curves.force, curves.count),
             lambda: self.dense,
             curves.force_at,
@@ -407,4 +412,4 @@ class Solution(ShortRepr):
             StressRows(self._stress_samples, self.stress, self.allowable_stress),
             followed=self.spec.target_curve,
         )
-        return {"load": found}
+        return {"load": rows_of_curves}

@@ -403,12 +403,12 @@ class TrackRows(Track):
 
     def of_rows(self, rows: Any) -> TrackRows:
         """Return some of the tracks."""
-        found, own, profile = object.__new__(TrackRows), dict(vars(self)), self.profile
-        del own["profile"]
+        chosen, values, profile = object.__new__(TrackRows), dict(vars(self)), self.profile
+        del values["profile"]
         law, radius, end, corner = rows_of((profile.path.law, profile.roller_radius, profile.end, profile.corner), rows)
-        found.profile = CamProfile(RollerPath(law, end), radius, end, corner)
-        vars(found).update({name: rows_of(value, rows) for name, value in own.items()})
-        return found
+        chosen.profile = CamProfile(RollerPath(law, end), radius, end, corner)
+        vars(chosen).update({name: rows_of(value, rows) for name, value in values.items()})
+        return chosen
 
     def states(self, slider: FloatArray) -> TrackStates:
         """Return the rollers' states at slider positions of each track, (m, n) [m]."""

@@ -70,9 +70,9 @@ def _of_band(drive: str, motion: str, dimension: str) -> dict[str, ScalarQuantit
     within = f"of the interval around {_REFERENCE_TEXT} with the {drive} within `analysis.tolerance`"
     name = f"constant_{motion}"
     return {
-        name: _of_drive(drive, dimension, f"width {within}", lambda one: one.band[1] - one.band[0], reason),
-        f"{name}_start": _of_drive(drive, dimension, f"start {within}", lambda one: one.band[0], reason),
-        f"{name}_end": _of_drive(drive, dimension, f"end {within}", lambda one: one.band[1], reason),
+        name: _of_drive(drive, dimension, f"width {within}", lambda values: values.band[1] - values.band[0], reason),
+        f"{name}_start": _of_drive(drive, dimension, f"start {within}", lambda values: values.band[0], reason),
+        f"{name}_end": _of_drive(drive, dimension, f"end {within}", lambda values: values.band[1], reason),
     }
 
 
@@ -83,17 +83,17 @@ def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
 
 def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
     """Return the bought springs of a mechanism between their smallest and their largest load over the motion."""
-    springs, found = solution.specs[number].mechanism.springs, []
-    for one in springs.bought:
-        joint = JOINT_NAMES.index(one.at)
+    springs, in_use = solution.specs[number].mechanism.springs, []
+    for spring in springs.bought:
+        joint = JOINT_NAMES.index(spring.at)
         high, low = (float(np.broadcast_to(ends[joint], len(solution))[number]) for ends in solution.extremes.turns)
         least, largest = in_the_sense_of_the_larger(high, low)
         # springs of a joint turn alike: each bears its wire's share of the rate, which may be stated
-        wound = None if one.wound is None else one.wound.to_wound(one.kind)
-        each = wound.rate * springs.stated_over_wires(one.at) if wound is not None else 0.0
-        fatigue = None if one.wound is None or one.wound.fatigue is None else one.wound.fatigue.law
-        found.append(SpringInUse(wound, each * least, each * largest, fatigue, one.life))
-    return found
+        wound = None if spring.wound is None else spring.wound.to_wound(spring.kind)
+        rate_of_each = wound.rate * springs.stated_over_wires(spring.at) if wound is not None else 0.0
+        fatigue = None if spring.wound is None or spring.wound.fatigue is None else spring.wound.fatigue.law
+        in_use.append(SpringInUse(wound, rate_of_each * least, rate_of_each * largest, fatigue, spring.life))
+    return in_use
 
 
 def _of_link(name: str, function: Callable[[LinkBar, LinkLoads, FloatArray], Any]) -> ScalarQuantity[Solution]:
@@ -101,7 +101,7 @@ def _of_link(name: str, function: Callable[[LinkBar, LinkLoads, FloatArray], Any
 
     def read(solution: Solution) -> Any:
         bars = [link_of(spec) for spec in solution.specs]
-        numbers = [(one.width, one.sheet, one.hole, one.modulus) for one in bars if one is not None]
+        numbers = [(bar.width, bar.sheet, bar.hole, bar.modulus) for bar in bars if bar is not None]
         allowable = np.array([allowable_of(spec) for spec in solution.specs], dtype=float)
         motion = grid_over(solution.drive, solution.low, solution.high)
         loads = link_loads(solution.assembly, motion, solution.legs[:, 0])
@@ -122,12 +122,12 @@ def _lost_energy(solution: Solution, kind: str) -> FloatArray:
     lost = solution.broadcast(forth.lost[kind] + back.lost[kind])
     low, high = (np.broadcast_to(end, (len(solution), 1)) for end in solution.window_or_motion)
     low, high = np.maximum(low, motion[:, :1]), np.minimum(high, motion[:, -1:])
-    found = []
+    extremes = []
     for row in range(len(solution)):
         inner = motion[row][(motion[row] > low[row]) & (motion[row] < high[row])]
         at = np.concatenate([low[row], inner, high[row]])
-        found.append(np.trapezoid(np.interp(at, motion[row], lost[row]), at))
-    return np.array(found)
+        extremes.append(np.trapezoid(np.interp(at, motion[row], lost[row]), at))
+    return np.array(extremes)
 
 
 def _of_loop(name: str, dimension: str, definition: str) -> dict[str, ScalarQuantity[Solution]]:

@@ -73,8 +73,8 @@ class LawsOneByOne:
         return self._each("is_buckled", travel)
 
     def _each(self, name: str, travel: FloatArray) -> Any:
-        own = np.broadcast_to(travel, (len(self.laws), travel.shape[1]))
-        return np.stack([np.asarray(getattr(law, name)(row)) for law, row in zip(self.laws, own, strict=True)])
+        travel_rows = np.broadcast_to(travel, (len(self.laws), travel.shape[1]))
+        return np.stack([np.asarray(getattr(law, name)(row)) for law, row in zip(self.laws, travel_rows, strict=True)])
 
     def __getattr__(self, name: str) -> Any:
         """Return what the laws know of themselves: a column, or a column for each of several numbers."""
