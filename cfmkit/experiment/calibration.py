@@ -151,7 +151,7 @@ def calibrate(
     """
     before, curves = _compare_start(spec, source, parameters, window), ModelCurves(spec)
     if has_no_loss(curves, before, parameters):
-        before = before.of_the_mean()
+        before = before.compare_mean()
     return fit_samples(before, curves, parameters, loss)
 
 

@@ -126,7 +126,7 @@ class Comparison(ShortRepr):
         }
         return empty_uncovered(quantities, self.holes, kind)
 
-    def of_the_mean(self) -> Comparison:
+    def compare_mean(self) -> Comparison:
         """Return the comparison of a model without losses: with the mean of the branches, cycle by cycle."""
         up, down = (next(item for item in self.samples if item.branch == name) for name in (LOAD_BRANCH, UNLOAD_BRANCH))
         parts = [_mean_of(up, down, cycle) for cycle in sorted(set(up.cycle) & set(down.cycle))]

@@ -71,7 +71,7 @@ def number_of(curve: Curve) -> int | None:
     return int(curve.label["cycle"][0]) if "cycle" in curve.label else None
 
 
-def of_cycle(holes: Sequence[UnrecordedInterval], curve: Curve) -> list[UnrecordedInterval]:
+def select_cycle(holes: Sequence[UnrecordedInterval], curve: Curve) -> list[UnrecordedInterval]:
     """Return the holes of the cycle that is a curve."""
     return [hole for hole in holes if hole.cycle in (None, number_of(curve))]
 

@@ -31,7 +31,7 @@ from cfmkit.experiment.coverage import (
     large_holes,
     least,
     number_of,
-    of_cycle,
+    select_cycle,
 )  # fmt: skip
 from cfmkit.experiment.findings import RECORDING_FINDINGS, passages_left_out, spikes_left_out, warnings_of
 from cfmkit.experiment.loop_area_and_repeatability import repeatability, turned_loop
@@ -223,12 +223,12 @@ def _smooth(recording: Recording, strokes: Sequence[Stroke], chosen: LowPass) ->
     if any(np.ptp(over[stroke.points]) == 0 for stroke in strokes):
         raise DataError("the time is the same at all points of a branch; give the cut-off in 1/mm or 1/deg instead")
     for stroke in strokes:
-        points = stroke.points if chosen.per == "time" else stroke.points[_by_motion(recording, stroke)]
+        points = stroke.points if chosen.per == "time" else stroke.points[_sort_by_motion(recording, stroke)]
         smooth[points] = low_passed(recording.effort[points], over[points], chosen)
     return smooth
 
 
-def _by_motion(recording: Recording, stroke: Stroke) -> NDArray[np.intp]:
+def _sort_by_motion(recording: Recording, stroke: Stroke) -> NDArray[np.intp]:
     """Return the order of a stroke's points along its way."""
     motion = recording.motion[stroke.points]
     return np.argsort(motion if stroke.branch == LOAD_BRANCH else -motion, kind="stable")
@@ -236,7 +236,7 @@ def _by_motion(recording: Recording, stroke: Stroke) -> NDArray[np.intp]:
 
 def _curve(recording: Recording, cycle: Sequence[Stroke], effort: FloatArray, strokes: Strokes) -> Curve:
     """Return the curve of one cycle."""
-    points = np.concatenate([stroke.points[_by_motion(recording, stroke)] for stroke in cycle])
+    points = np.concatenate([stroke.points[_sort_by_motion(recording, stroke)] for stroke in cycle])
     branch = np.repeat([stroke.branch for stroke in cycle], [len(stroke.points) for stroke in cycle])
     extra = {} if recording.time is None else {"time": Column(recording.time[points], "time")}
     label = {"cycle": (float(cycle[0].cycle), "count")} if len(strokes.cycles) > 1 else {}
@@ -253,7 +253,9 @@ def elapsed_fraction(source: MeasuredCurves, branch: str) -> FloatArray:
     clock = np.arange(len(recording), dtype=float) if recording.time is None else recording.time
     clock = (clock - clock[0]) / (float(np.ptp(clock)) or 1.0)
     strokes = [stroke for cycle in source.strokes.measured for stroke in cycle if stroke.branch == branch]
-    passed: FloatArray = np.concatenate([clock[stroke.points[_by_motion(recording, stroke)]] for stroke in strokes])
+    passed: FloatArray = np.concatenate(
+        [clock[stroke.points[_sort_by_motion(recording, stroke)]] for stroke in strokes]
+    )
     return passed
 
 
@@ -297,9 +299,9 @@ def numbers_of(
 
     def all_metrics(curves: Sequence[Curve]) -> tuple[Mapping[str, Quantity], ...]:
         measured = ((curve, measure(curve, frame, window, _motion_definitions(kind))) for curve in curves)
-        return tuple(empty_uncovered(metrics, of_cycle(large, curve), kind) for curve, metrics in measured)
+        return tuple(empty_uncovered(metrics, select_cycle(large, curve), kind) for curve, metrics in measured)
 
-    covered_by = tuple(coverage(curve, of_cycle(holes, curve), window) for curve in source.raw)
+    covered_by = tuple(coverage(curve, select_cycle(holes, curve), window) for curve in source.raw)
     each = tuple({**metrics, **shares} for metrics, shares in zip(all_metrics(source.raw), covered_by, strict=True))
     smooth = all_metrics(source.filtered)
     repeated = empty_uncovered(repeatability(source.raw, window), large, kind)

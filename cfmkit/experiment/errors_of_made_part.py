@@ -209,7 +209,7 @@ def explain(
     ends = Window(float(result.curve.motion.min()), float(result.curve.motion.max()))
     before = compare(result, source, ends)
     if has_no_loss(curves, before, candidates):
-        before = before.of_the_mean()
+        before = before.compare_mean()
         candidates = tuple(item for item in candidates if not item.path.endswith("friction"))
     if fit is not None:
         fits = [fit_samples(before, curves, candidates, "linear", FIT_TOLERANCE)]

@@ -182,7 +182,7 @@ def overlay(
     return figure
 
 
-def _in_border(comparison: Comparison, motion: FloatArray, effort: FloatArray) -> FloatArray:
+def _convert_to_border(comparison: Comparison, motion: FloatArray, effort: FloatArray) -> FloatArray:
     curve = comparison.curve
     return np.column_stack([to_border(motion, curve.motion_dimension), to_border(effort, curve.kind)])
 
@@ -197,7 +197,7 @@ def _draw_measured(samples: Samples, comparison: Comparison, ax: Axes, prefer: f
 
 def _unbroken_runs(samples: Samples, comparison: Comparison, values: FloatArray | None = None) -> FloatArray:
     """Return points of samples in border units, with a gap between cycles and in holes."""
-    points = _in_border(comparison, samples.motion, samples.effort if values is None else values)
+    points = _convert_to_border(comparison, samples.motion, samples.effort if values is None else values)
     breaks = np.flatnonzero(np.diff(samples.cycle) != 0) + 1
     for start, stop in pairwise([0, *breaks.tolist(), len(points)]):
         step = 1 if samples.motion[stop - 1] >= samples.motion[start] else -1
@@ -212,7 +212,7 @@ def _draw_model(comparison: Comparison, ax: Axes, dashed: bool) -> list[Label]:
     labels = []
     places = np.linspace(comparison.window.lo, comparison.window.hi, 400)
     for number, samples in enumerate(comparison.samples):
-        points = _in_border(comparison, places, model_at(comparison.curve, samples.model_branch, places))
+        points = _convert_to_border(comparison, places, model_at(comparison.curve, samples.model_branch, places))
         color = LINE_COLOURS[number % len(LINE_COLOURS)]
         ax.plot(*points.T, color=color, linewidth=0.9 if dashed else 1.4, linestyle="--" if dashed else "-", zorder=3)
         if not dashed:

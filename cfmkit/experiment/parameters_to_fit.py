@@ -75,14 +75,14 @@ def parameters(
     if strange := next((name for name in bounds or {} if name not in names), None):
         raise UsageError(f"--bounds names {strange!r}, which --fit does not")
     return tuple(
-        _of_data(name, (bounds or {}).get(name), recording)
+        _make_zero_parameter(name, (bounds or {}).get(name), recording)
         if name.startswith(DATA_PREFIX)
         else _parameter(spec, name, (bounds or {}).get(name))
         for name in names
     )
 
 
-def _of_data(path: str, bounds: tuple[float, float] | None, recording: Recording | None) -> FitParameter:
+def _make_zero_parameter(path: str, bounds: tuple[float, float] | None, recording: Recording | None) -> FitParameter:
     """Return a zero of the recording to fit; it starts from none."""
     dimension = _zero(path, "--fit", recording)
     if recording and path.endswith(("displacement_offset", "angle_offset")):

@@ -86,7 +86,7 @@ class Hardware:
     slider_excess: float = 0.0  # how much the slider adds to the depth of the layers [m]
 
 
-def in_sentences(faults: Mapping[str, str]) -> tuple[str, ...]:
+def describe_faults(faults: Mapping[str, str]) -> tuple[str, ...]:
     """Return the faults of parts, by the place of each, as sentences."""
     return tuple(f"{place}: {fault}" for place, fault in faults.items())
 

@@ -148,7 +148,7 @@ def compare(
         missing = next((side for side in (compared, reference) if side.curve is None and not side.points), compared)
         return Differences({"": Difference(nothing, f"there is no {missing.name} curve")}, nothing, None, changes)
     fine, coarse = reference.curve, compared.curve
-    pairs = {name: counterpart(coarse, name, _way(fine, name)) for name in fine.branches}
+    pairs = {name: counterpart(coarse, name, _measure_direction(fine, name)) for name in fine.branches}
     parts = [part for name, its in pairs.items() for part in (fine.select_branch(name), coarse.select_branch(its))]
     window = overlap([(float(part.motion.min()), float(part.motion.max())) for part in parts], over)
     if window is None:
@@ -158,7 +158,7 @@ def compare(
     return Differences(curves, places, window, changes)
 
 
-def _way(curve: Curve, branch: str) -> float:
+def _measure_direction(curve: Curve, branch: str) -> float:
     motion = curve.select_branch(branch).motion
     return float(motion[-1] - motion[0])
 

@@ -43,7 +43,7 @@ METRIC_TABLE = (
 
 @lru_cache(maxsize=4)
 def _table(kind: Kind) -> tuple[Definition, ...]:
-    return tuple(replace(item.in_units_of(kind), name=_name_in_words(item.name, kind)) for item in METRIC_TABLE)
+    return tuple(replace(item.state_for_kind(kind), name=_name_in_words(item.name, kind)) for item in METRIC_TABLE)
 
 
 def _name_in_words(name: str, kind: Kind) -> str:
@@ -63,7 +63,7 @@ def definitions(kind: Kind | None = "force", extra: Iterable[Definition] = ()) -
     """
     own_metrics = tuple(extra)
     if kind is not None:
-        return (*_table(kind), *(item.in_units_of(kind) for item in own_metrics))
+        return (*_table(kind), *(item.state_for_kind(kind) for item in own_metrics))
     both = (*definitions("force", own_metrics), *definitions("torque", own_metrics))
     return tuple({(item.name, item.dimension): item for item in both}.values())
 

@@ -61,7 +61,7 @@ class Survey:
         """The names of the branches."""
         return tuple(branch.name for branch in self.subject.branches)
 
-    def each(self, definition: Definition, branch: str | None = None) -> tuple[Value, ...]:
+    def evaluate_each(self, definition: Definition, branch: str | None = None) -> tuple[Value, ...]:
         """Return the values of a metric: of one branch, of every branch, or of the cycle as a whole."""
         if (definition, branch) not in self._known:
             self._known[definition, branch] = self._compute_values(definition, branch)
@@ -160,10 +160,10 @@ def _entries(view: Survey, definition: Definition) -> Iterator[tuple[str, Quanti
         return
     if definition.argument:
         for text in map(hold_text, durability.holds if durability else ()):
-            worst = view.worst(definition, view.each(definition, text))
+            worst = view.worst(definition, view.evaluate_each(definition, text))
             yield f"{definition.name}[{text}]", _quantity(definition, worst)
         return
-    values = view.each(definition)
+    values = view.evaluate_each(definition)
     yield definition.name, _quantity(definition, view.worst(definition, values))
     if len(values) > 1:
         for branch, value in zip(view.branches, values, strict=True):
@@ -302,7 +302,7 @@ def _named_quantity(view: Survey | None, name: str, definitions: Mapping[str, De
     definition = definitions[metric]
     if view is None:
         return Quantity(None, definition.dimension, definition.definition, result.message)
-    return _quantity(definition, view.worst(definition, view.each(definition, branch)))
+    return _quantity(definition, view.worst(definition, view.evaluate_each(definition, branch)))
 
 
 @dataclass(frozen=True)

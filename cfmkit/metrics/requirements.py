@@ -180,13 +180,13 @@ def requirement_problems(
     branches: Sequence[str] = (),
 ) -> Iterator[Problem]:
     """Yield what is wrong with requirements: unknown metrics or branches, bounds and windows of the wrong dimension."""
-    table = _by_name(definitions)
+    table = _group_by_name(definitions)
     for index, requirement in enumerate(requirements):
         for key, message in _faults(requirement, table, kind, branches):
             yield Problem("", 0, 0, f"requirements.{index}.{key}", message)
 
 
-def _by_name(definitions: Iterable[Definition]) -> dict[str, list[Definition]]:
+def _group_by_name(definitions: Iterable[Definition]) -> dict[str, list[Definition]]:
     table: dict[str, list[Definition]] = {}
     for item in definitions:
         table.setdefault(item.name, []).append(item)
@@ -281,12 +281,12 @@ def check(
     problems = tuple(requirement_problems(requirements, definitions, kind))
     if problems:
         raise SpecError(problems)
-    table = _by_name(definitions)
+    table = _group_by_name(definitions)
     surveys = {} if surveys is None else surveys
     return tuple(_outcome(requirement, result, table, surveys) for requirement in requirements)
 
 
-def of_many(requirement: Requirement, quantity: Quantity) -> Outcome:
+def judge_part_metric(requirement: Requirement, quantity: Quantity) -> Outcome:
     """Return the outcome of a requirement on a metric of many parts, such as their yield."""
     limits = Bounds.from_requirement(requirement, quantity.dimension)
     value = Value(quantity.value, quantity.reason)
@@ -341,7 +341,7 @@ def _values(name: str, definition: Definition, view: Survey | None, result: Resu
     if name in result.values:
         quantity = result.values[name]
         return (Value(quantity.value, quantity.reason or "the mechanism has none"),)
-    return (Value(None, result.message),) if view is None else view.each(definition, split_name(name)[1])
+    return (Value(None, result.message),) if view is None else view.evaluate_each(definition, split_name(name)[1])
 
 
 def _format_window(definition: Definition, window: Window | None, kind: Kind) -> str:

@@ -83,11 +83,11 @@ class MaterialSpec(Model):
                 raise
             filled = {key: getattr(record, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
             filled |= {key: law for key, law in assumed_laws(record.name).items() if key not in self.model_fields_set}
-            filled |= self._of_layers(record.name)
+            filled |= self._read_layer_values(record.name)
         elif self.youngs_modulus is None:
             raise ValueError("needs 'name' or 'youngs_modulus'")
         else:
-            self._of_layers("these values")
+            self._read_layer_values("these values")
         for key, value in filled.items():
             if getattr(self, key) is None:
                 object.__setattr__(self, key, value)  # past the frozen model, and not counted as set
@@ -96,7 +96,7 @@ class MaterialSpec(Model):
             refuse("Material", {("law",): reported})
         return self
 
-    def _of_layers(self, name: str) -> dict[str, float]:
+    def _read_layer_values(self, name: str) -> dict[str, float]:
         """Return strength and modulus of a print in the direction that is stated, by their keys."""
         reference = LAYER_STRENGTHS.get(name)
         if self.layers is None or self.yield_strength is not None:

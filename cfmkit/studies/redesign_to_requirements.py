@@ -67,7 +67,7 @@ def move_free_values(
     target = _mean_required(outcomes, kind)
     if target is None:
         return Design(None, Status.INVALID, NO_LEVEL_MESSAGE.format(kind))
-    drawn = _by_beams(spec)
+    drawn = _choose_finest_beam_model(spec)
     begun = nominal if drawn is spec else _analyze(drawn, run)
     if not begun.curves:
         return Design(None, begun.status, begun.message)
@@ -119,7 +119,7 @@ def _mean_required(outcomes: Sequence[Outcome], kind: str) -> float | None:
     return 0.5 * (max(lows) + min(highs)) if lows and highs else None
 
 
-def _by_beams(spec: Spec) -> Spec:
+def _choose_finest_beam_model(spec: Spec) -> Spec:
     """Return a specification with the finest model of its family that is no solid."""
     if spec.fidelity != "solid":
         return spec

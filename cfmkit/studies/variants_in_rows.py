@@ -155,11 +155,13 @@ class SolvedVariants:
         for k, one in enumerate(self.study.spec.part_requirements):
             plain, branch = split_name(one.metric)
             limits = Bounds.from_requirement(one, self._definitions[plain].dimension)
-            chosen = [item for name, item in self._by_branch(plain, one.over).items() if branch in (None, name)]
+            chosen = [
+                item for name, item in self._get_values_of_branches(plain, one.over).items() if branch in (None, name)
+            ]
             met[:, k] = np.logical_and.reduce([limits.met_by(item) for item in chosen]) if chosen else False
         return ResultRows(values, met, warned=self._findings() if self.study.findings else {})
 
-    def _by_branch(self, plain: str, over: Ends | None) -> ByBranch:
+    def _get_values_of_branches(self, plain: str, over: Ends | None) -> ByBranch:
         found = self.values(plain, over)
         assert found is not None  # `known`
         return found
@@ -167,7 +169,7 @@ class SolvedVariants:
     def _worst(self, name: str, over: Ends | None) -> FloatArray:
         """Return a metric of the branch that is named, or of the worst, (m,)."""
         plain, branch = split_name(name)
-        by_branch = self._by_branch(plain, over)
+        by_branch = self._get_values_of_branches(plain, over)
         if branch is not None:
             return by_branch.get(branch, np.full(len(self), np.nan))
         if len(by_branch) == 1:

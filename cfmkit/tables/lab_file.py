@@ -157,7 +157,7 @@ class LabTable:
         cells = [row[column.index] for row in self.cells]
         plain = None if column.unit_column is not None else self._plain_numbers(cells)
         if plain is not None and not any(len(row) > self.shape.width for row in self.cells):
-            return in_si(plain, column.dimension or "", column.unit or "")
+            return convert_to_si(plain, column.dimension or "", column.unit or "")
         return np.array([self._value(number, column) for number in range(len(cells))])
 
     def _plain_numbers(self, cells: list[str]) -> FloatArray | None:
@@ -193,14 +193,14 @@ class LabTable:
         alike = column.source == CELLS_SOURCE and dimension_of(unit) == column.dimension
         if unit and unit != column.unit and not alike:
             column.with_unit(unit, "the cell", self.file, f"line {self.rows[number] + 1}: ")
-        return float(in_si(np.array(value), column.dimension or "", unit or column.unit or ""))
+        return float(convert_to_si(np.array(value), column.dimension or "", unit or column.unit or ""))
 
     def texts(self, column: ColumnInfo) -> list[str]:
         """Return the cells of a column as they are."""
         return [row[column.index] for row in self.cells]
 
 
-def in_si(values: FloatArray, dimension: str, unit: str) -> FloatArray:
+def convert_to_si(values: FloatArray, dimension: str, unit: str) -> FloatArray:
     """Return values with a unit as SI, exactly where the unit is that of cfmkit's own files."""
     from cfmkit.specs.units import from_border
     from cfmkit.specs.units.table import COMMON_UNIT_SIZES, border_unit

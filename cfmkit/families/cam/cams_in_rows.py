@@ -73,19 +73,19 @@ def solve_rows(variants: Variants) -> Iterator[Group]:
         if len(members) < MIN_SHARED_CAMS:
             mixed += members.tolist()
         elif plain >= set(moving):
-            yield from _in_parcels(members, partial(_with_columns, variants, [*moving, *beside], variants.spec))
+            yield from _split_into_parcels(members, partial(_with_columns, variants, [*moving, *beside], variants.spec))
         elif (first := dict(valid(variants, members[:1].tolist()))) and not _is_left_out(first[members[0]]):
-            yield from _in_parcels(members, partial(_with_columns, variants, beside, first[members[0]]))
+            yield from _split_into_parcels(members, partial(_with_columns, variants, beside, first[members[0]]))
     rest = np.array(sorted(mixed), dtype=np.intp)
     if plain >= set(moving):
-        yield from _in_parcels(rest, partial(_with_columns, variants, [*moving, *beside], variants.spec))
+        yield from _split_into_parcels(rest, partial(_with_columns, variants, [*moving, *beside], variants.spec))
         return
     kinds: dict[str, list[int]] = {}
     for row, spec in valid(variants, rest.tolist()):
         if not _is_left_out(spec):
             kinds.setdefault(_kind(spec), []).append(row)
     for alike in kinds.values():
-        yield from _in_parcels(np.array(alike), partial(_stack_specs, variants), partial(_windows, variants))
+        yield from _split_into_parcels(np.array(alike), partial(_stack_specs, variants), partial(_windows, variants))
 
 
 def _is_left_out(spec: CamSpec) -> bool:
@@ -171,7 +171,7 @@ def _kind(spec: CamSpec) -> str:
     return repr((settings, curves, [drop_numbers(block) for block in (spec.mechanism, analysis, spec.design)]))
 
 
-def _in_parcels(
+def _split_into_parcels(
     members: Rows, spec_of: Callable[[Rows], CamSpec], windows_of: Callable[[Rows], Sequence[Ends]] = lambda _rows: ()
 ) -> Iterator[Group]:
     """Yield mechanisms that are solved together, few at a time."""

@@ -263,7 +263,7 @@ def _from_catalogue(
         none = "the catalogue has no extension spring, which is what pulls the rollers together"
         raise finding.infeasible("no_spring_fits", f"{none} ('design.catalogue')")
     reported = f"no spring of the catalogue fits: {nearest(rejected)}; add others to 'design.catalogue'"
-    raise finding.infeasible("no_spring_fits", f"{reported}, or change {_in_the_way(reported)}")
+    raise finding.infeasible("no_spring_fits", f"{reported}, or change {_list_blocking_keys(reported)}")
 
 
 def _with_spring(
@@ -341,7 +341,7 @@ _BLOCKING_KEYS = {
 """Which key blocks a spring of the catalogue that is refused for a reason."""
 
 
-def _in_the_way(reported: str) -> str:
+def _list_blocking_keys(reported: str) -> str:
     """Return the keys that block springs of the catalogue: those of their reasons, and what all of them are to do."""
     keys = [key for word, key in _BLOCKING_KEYS.items() if f": {word}" in reported]
     return ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"

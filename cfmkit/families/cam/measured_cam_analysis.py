@@ -291,11 +291,11 @@ class LoopAsBuilt(ShortRepr):
 
     def effort(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the force on the way up or down at displacements of any shape [N]."""
-        return np.asarray(self._move_to(places).forces(_way(branch))[0].reshape(np.shape(places)))
+        return np.asarray(self._move_to(places).forces(_get_sign(branch))[0].reshape(np.shape(places)))
 
     def stress(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the stress below the more loaded contact at displacements of any shape [Pa]."""
-        return np.asarray(stress(pressure_of(self._move_to(places), _way(branch))).reshape(np.shape(places)))
+        return np.asarray(stress(pressure_of(self._move_to(places), _get_sign(branch))).reshape(np.shape(places)))
 
     def _move_to(self, places: FloatArray) -> MeasuredCam:
         """Return the mechanism at other displacements."""
@@ -305,7 +305,7 @@ class LoopAsBuilt(ShortRepr):
         return replace(built, travel=travel, sides=sides, shares={})
 
 
-def _way(branch: str) -> float:
+def _get_sign(branch: str) -> float:
     return 1.0 if branch == "load" else -1.0
 
 

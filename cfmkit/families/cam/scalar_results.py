@@ -209,10 +209,10 @@ def largest(*arrays: FloatArray) -> float | None:
 
 def _bearing_load(solution: Solution) -> FloatArray:
     """Return the largest load of one bearing of each mechanism [N]."""
-    return largest_of_each(*(_of_contact(solution) * state.contact for state in (solution.up, solution.down)))
+    return largest_of_each(*(_find_bearing_share(solution) * state.contact for state in (solution.up, solution.down)))
 
 
-def _of_contact(solution: Solution) -> Any:
+def _find_bearing_share(solution: Solution) -> Any:
     """Return the load of one bearing over the contact force of its roller."""
     mechanism, loads = solution.mechanism, solution.assembly.loads
     losses = loads.losses or Losses(roller_radius=mechanism.roller_radius)
@@ -228,9 +228,9 @@ def _bearing_life(solution: Solution) -> FloatArray:
     middles = 0.5 * (travel[..., 1:] + travel[..., :-1])
     used = 0.0
     for direction in (1.0, -1.0):
-        load = np.nan_to_num(np.maximum(solution.evaluate_travel(middles, direction)[1].contact, 0.0)) * _of_contact(
-            solution
-        )
+        load = np.nan_to_num(
+            np.maximum(solution.evaluate_travel(middles, direction)[1].contact, 0.0)
+        ) * _find_bearing_share(solution)
         used = used + (turns * (load / bearings.dynamic_rating) ** exponent).sum(axis=-1, keepdims=True)
     return np.where(used > 0, 1e6 / used, np.nan)
 
@@ -344,8 +344,8 @@ _SCALAR_FUNCTIONS: dict[str, tuple[Callable[[Solution], Any], Callable[[Solution
     "spring_stiffness": (lambda solution: solution.assembly.loads.stiffness, None),
     "theoretical_force": (lambda solution: constant_force(solution.assembly), None),
     "undercut_travel": (lambda solution: solution.corner_travel, None),
-    "roller_radius_max": (lambda solution: solution.of_each_cam(largest_roller), None),
-    "force_constant_min": (lambda solution: solution.of_each_cam(smallest_constant), None),
+    "roller_radius_max": (lambda solution: solution.read_each_cam(largest_roller), None),
+    "force_constant_min": (lambda solution: solution.read_each_cam(smallest_constant), None),
     "corner_force_max": (_corner_peak, None),
     "jam_travel": (lambda solution: solution.jam_travel, None),
     "spring_elongation_max": (lambda solution: solution.elongation.max(axis=-1, keepdims=True), None),

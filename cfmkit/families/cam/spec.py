@@ -85,7 +85,7 @@ class Stops(Model):
     upper: PositiveLength | None = Field(None, description="highest position; default: only the end of the flank")
 
     @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def _check_order(self) -> Self:
         if self.upper is not None and self.upper <= self.lower:
             raise ValueError("'upper' must be above 'lower'")
         return self

@@ -381,7 +381,7 @@ def jams(
                 np.where(begins, place_here, earlier)[:, None],
             )
             place = last_places(partial(_shortage, lever, rows), moves, rests)
-            row_track = track.of_rows(rows)
+            row_track = track.select_rows(rows)
             travel = list(row_track.stretches())[number].at(place)[0] - row_track.start
             for row, first, edge in zip(rows.tolist(), (at == 0).tolist(), travel[:, 0].tolist(), strict=True):
                 places_of_rows[row].append(0.0 if first and not places_of_rows[row] else edge)
@@ -399,7 +399,7 @@ def _lever(
     Rounding at a start without any lever is not a jam.
     """
     if rows is not None:
-        track, losses = track.of_rows(rows), rows_of(losses, rows)
+        track, losses = track.select_rows(rows), rows_of(losses, rows)
         friction = friction[rows] if np.ndim(friction) else friction
     _, x, slope = list(track.stretches())[number].at(parameter)
     if losses is not None:

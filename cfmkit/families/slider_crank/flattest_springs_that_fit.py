@@ -129,7 +129,7 @@ def flattest_springs(motion: SprungMotion, effort: float, flat: float) -> HeldEf
     step = (last - first) / (N_WINDOWS - 1)
     nearer = np.linspace(max(first, best.begin - step), min(last, best.begin + step), N_NEIGHBOUR_WINDOWS)
     finer = best if last == first else _best_of(motion, effort, nearer) or best
-    return _of_fewer(motion, effort, min(best, finer, key=lambda window: window.deviation), flat)
+    return _drop_needless_springs(motion, effort, min(best, finer, key=lambda window: window.deviation), flat)
 
 
 def _best_of(motion: SprungMotion, effort: float, begins: FloatArray) -> HeldEffort | None:
@@ -146,7 +146,7 @@ def _best_of(motion: SprungMotion, effort: float, begins: FloatArray) -> HeldEff
     return min(windows, key=lambda window: window.deviation, default=None)
 
 
-def _of_fewer(motion: SprungMotion, effort: float, best: HeldEffort, flat: float) -> HeldEffort:
+def _drop_needless_springs(motion: SprungMotion, effort: float, best: HeldEffort, flat: float) -> HeldEffort:
     """Return a window with as few springs as are flat enough, those left out first that do least."""
     does = best.rates * np.abs(motion.assembly.forces(_window(motion, best.begin))).max(axis=1)
     for k in np.argsort(does).tolist():

@@ -70,7 +70,7 @@ class Linkage:
         reach = self.crank + self.coupler
         return math.sqrt((reach - self.offset) * (reach + self.offset))
 
-    def way(self, angle: float) -> tuple[float, float]:
+    def find_path_ends(self, angle: float) -> tuple[float, float]:
         """Return the ends of the slider's path around the place it has at a crank angle [m], seen to the right.
 
         Distances along the way from the pivot's foot; of the left branch those of its mirror image. From stretched
@@ -97,7 +97,7 @@ class Linkage:
             share = math.sin(half) if abs(end) == far else math.cos(half)
             return square * share**2 / abs(end + place)
 
-        low, high = self.way(angle)
+        low, high = self.find_path_ends(angle)
         return measure_distance(low), measure_distance(high)
 
     def arc(self, angle: float) -> tuple[float, float]:

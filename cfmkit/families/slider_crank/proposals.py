@@ -82,10 +82,10 @@ FOLLOWED_TRAVEL_RATIO = 1.02
 
 def propose(request: Request, run: Run) -> FamilyOffer:
     """Return linkages that fit the envelope, to be given springs, flexures or a strip by the family's design."""
-    return turned_linkages(request) if request.kind == "torque" else _of_force(request)
+    return turned_linkages(request) if request.kind == "torque" else _propose_for_force(request)
 
 
-def _of_force(request: Request) -> FamilyOffer:
+def _propose_for_force(request: Request) -> FamilyOffer:
     if request.adjustable is not None:
         return FamilyOffer(reason="the force of a slider-crank is fixed by its springs and cannot be adjusted")
     tried = [offer for lengths in PUSHED_PROPORTIONS for offer in _offer_pushed(request, lengths)]

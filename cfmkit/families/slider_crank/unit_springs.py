@@ -256,7 +256,7 @@ class SliderPath:
 
     def forces(self, state: _SliderState) -> FloatArray:
         """Return q q' by the travel, (4, n)."""
-        return self._forces(state, *self._by_knee(state.cosine))
+        return self._forces(state, *self._differentiate_by_knee(state.cosine))
 
     def _forces(self, state: _SliderState, d2: FloatArray, by_knee: FloatArray) -> FloatArray:
         link = self.linkage
@@ -271,7 +271,7 @@ class SliderPath:
         effort[3] = -state.turn[3]
         return effort
 
-    def _by_knee(self, cosine: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _differentiate_by_knee(self, cosine: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the squared distance of the pins at both ends, and what the first three q do by the knee angle."""
         r1, r2 = self.linkage.crank, self.linkage.coupler
         d2 = r1 * r1 + r2 * r2 + 2.0 * r1 * r2 * cosine
@@ -284,7 +284,7 @@ class SliderPath:
         link, knee, x = self.linkage, state.knee, state.position
         r1, r2, e = link.crank, link.coupler, link.offset
         sine, cosine = state.sine, state.cosine
-        d2, by_knee = self._by_knee(cosine)
+        d2, by_knee = self._differentiate_by_knee(cosine)
         view1, view2 = e / d2, 2.0 * e * x / d2**2
         lever = x / (r1 * r2)
         bend = r1 * r2 * (r2**2 - r1**2) * sine / d2**2

@@ -160,7 +160,7 @@ class ExactSampler:
         """Return the largest stress of the leaves [Pa]."""
         return self.leaves(travel).stress
 
-    def of_rows(self, _rows: Any) -> Self:
+    def select_rows(self, _rows: Any) -> Self:
         """Return the same: all rows are curves of one mechanism."""
         return self
 

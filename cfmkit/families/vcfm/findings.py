@@ -94,7 +94,7 @@ EXACT_FORM = 2e-4  # share of a stress that counts for nothing: designs are fitt
 
 def _slenderness(solution: Solution) -> FloatArray:
     """Return rise over thickness of the leaves, (m,)."""
-    return solution.of_mechanisms(solution.parts.strip.slenderness)
+    return solution.spread_over_mechanisms(solution.parts.strip.slenderness)
 
 
 # --- what is reported of a built mechanism, and the spring's room ---------------------------------------------------
@@ -103,7 +103,7 @@ def _slenderness(solution: Solution) -> FloatArray:
 def _contradicts(solution: Solution) -> Any:
     if solution.spec.analysis.measured is None or not solution.leaf_kind.buckles:
         return False  # such leaves push where they are flat
-    balance = solution.of_mechanisms(solution.parts.balance)
+    balance = solution.spread_over_mechanisms(solution.parts.balance)
     stated = [spec.analysis.measured for spec in solution.specs]
     stiffness, force = np.array(
         [(values.positive_stiffness, values.force) for values in stated if values is not None]
@@ -175,7 +175,9 @@ def _negative_and_straight(solution: Solution) -> tuple[Any, Any]:
     if not solution.leaf_kind.buckles or solution.fidelity == "truss":
         return True, True
     if limits is None:  # or they depend on more than the slenderness: as the curve has it
-        return solution.of_mechanisms(solution.character.negative_stiffness) > 0, np.isfinite(solution.linear[0])
+        return solution.spread_over_mechanisms(solution.character.negative_stiffness) > 0, np.isfinite(
+            solution.linear[0]
+        )
     q = _slenderness(solution)
     return q >= limits.negative, q > limits.constant
 
@@ -297,12 +299,12 @@ def _overload(solution: Solution) -> Sentence:
 def _pulled_out_of_range(solution: Solution) -> FloatArray:
     """Return at which negative preloads no outward force remains somewhere in the window, (m, p) of bool."""
     curves = solution.curves
-    pulled = solution.by_mechanism(curves.preload[:, 0] < 0)
+    pulled = solution.split_by_mechanism(curves.preload[:, 0] < 0)
     if not pulled.any():
         return np.zeros(pulled.shape, dtype=bool)
     low, high = (np.repeat(end, solution.preloads) for end in solution.window)
     lost = ~(curves.rest <= low) | (curves.extremes_inside((low, high))[1] <= 0)
-    return np.asarray(pulled & solution.by_mechanism(lost))
+    return np.asarray(pulled & solution.split_by_mechanism(lost))
 
 
 def _pull(solution: Solution) -> Sentence:
@@ -315,7 +317,7 @@ def _pull(solution: Solution) -> Sentence:
 
 
 def _least_preload(solution: Solution) -> FloatArray:
-    return np.asarray(solution.by_mechanism(solution.curves.preload[:, 0]).min(axis=1))
+    return np.asarray(solution.split_by_mechanism(solution.curves.preload[:, 0]).min(axis=1))
 
 
 def _slack(solution: Solution) -> Sentence:

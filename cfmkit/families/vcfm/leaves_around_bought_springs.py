@@ -255,12 +255,16 @@ def _find_miss(spec: VcfmSpec, target: VcfmDesign, leaves: LeavesAroundSprings, 
         return Miss(leaves.label, float(leaf.angle) / MAX_LEAF_ANGLE - 1.0, "leaves steeper than 15 deg")
     life, safety = target.spring_life, target.spring_safety
     if offer is not None and (life is not None or safety is not None):
-        weak = [miss for use in _in_use(spec, leaves, offer) if (miss := use.why_too_weak(life, safety)) is not None]
+        weak = [
+            miss
+            for use in _list_springs_in_use(spec, leaves, offer)
+            if (miss := use.why_too_weak(life, safety)) is not None
+        ]
         return Miss(leaves.label, *max(weak)) if weak else None
     return None
 
 
-def _in_use(spec: VcfmSpec, leaves: LeavesAroundSprings, offer: Offer) -> Iterator[SpringInUse]:
+def _list_springs_in_use(spec: VcfmSpec, leaves: LeavesAroundSprings, offer: Offer) -> Iterator[SpringInUse]:
     """Yield a spring between rest and the end of the travel at each preload, by the closed form of the leaves."""
     from cfmkit.families.vcfm.model import LawSampler, rest_of
 

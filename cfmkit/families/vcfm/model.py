@@ -134,7 +134,7 @@ def solve(spec: VcfmSpec, made: LeafLaws, sampler: PartSampler) -> Solution:
         curves = replace(curves, travel=travel, count=count)
     kept = curves.count >= LEAST_POINTS
     kept[0] = True
-    return Solution((spec,), made, curves if kept.all() else curves.of_rows(np.flatnonzero(kept)), int(kept.sum()))
+    return Solution((spec,), made, curves if kept.all() else curves.select_rows(np.flatnonzero(kept)), int(kept.sum()))
 
 
 def solve_rows(specs: Sequence[VcfmSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[Solution]]]:
@@ -158,7 +158,7 @@ def _is_complete(solution: Solution) -> NDArray[np.bool_]:
     is_known = (curves.count >= LEAST_POINTS) & np.isfinite(spring)
     reached = nominal.ends[1] >= solution.travel * (1 - 1e-9)
     finite = np.isfinite(nominal.force).sum(axis=1) == nominal.count
-    return np.asarray(solution.by_mechanism(is_known).all(axis=1) & reached & finite & ~is_closed(solution))
+    return np.asarray(solution.split_by_mechanism(is_known).all(axis=1) & reached & finite & ~is_closed(solution))
 
 
 def _kind(spec: VcfmSpec) -> Hashable | None:
@@ -179,7 +179,7 @@ def _solve_kind(specs: Sequence[VcfmSpec]) -> Solution:
     grid, room = np.stack([travel_grid(spec) for spec in specs]), np.array([spring_room(spec) for spec in specs])
     made.linear  # noqa: B018  once for all preloads
     sampler = LawSampler(made)
-    sampler = sampler if count == 1 or len(specs) == 1 else sampler.of_rows(mechanism_of_row)
+    sampler = sampler if count == 1 or len(specs) == 1 else sampler.select_rows(mechanism_of_row)
     return Solution(
         tuple(specs), made, _curves(sampler, preloads, grid[mechanism_of_row], room[mechanism_of_row]), count
     )
@@ -248,7 +248,7 @@ def rests_of(
     rest = np.where(preload == 0, 0.0, np.nan)
     for rows, search in ((np.flatnonzero(preload < 0), _pulled_ahead), (np.flatnonzero(preload > 0), _pushed_back)):
         if rows.size:
-            rest[rows] = search(sampler.of_rows(rows), preload[rows], grid[rows])
+            rest[rows] = search(sampler.select_rows(rows), preload[rows], grid[rows])
     return rest
 
 
@@ -277,7 +277,9 @@ def _pulled_ahead(sampler: ForceSampler, preload: FloatArray, grid: FloatArray) 
     some = beyond.any(axis=1) & (first > 0)
 
     def excess(travel: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
-        excess_share = _force(sampler.of_rows(ends), travel, preload[ends]) / np.abs(force[ends, first[ends]])[:, None]
+        excess_share = (
+            _force(sampler.select_rows(ends), travel, preload[ends]) / np.abs(force[ends, first[ends]])[:, None]
+        )
         # no value: farther back than the leaves were followed, where they pull still harder
         return np.where(np.isfinite(excess_share), excess_share, -1.0)
 
@@ -298,7 +300,7 @@ def _pushed_back(sampler: ForceSampler, preload: FloatArray, _grid: FloatArray) 
     rests = (force_unloaded > 0) & ~(force_behind > 0)
 
     def excess(travel: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
-        return -_force(sampler.of_rows(ends), travel, preload[ends]) / force_unloaded[ends][:, None]
+        return -_force(sampler.select_rows(ends), travel, preload[ends]) / force_unloaded[ends][:, None]
 
     place = last_places(excess, nothing, np.where(rests, -preload, 0.0)[:, None])[:, 0]
     return np.where(rests, _polish_rest(sampler, preload, place, 1e-9 * preload), np.nan)
@@ -344,7 +346,7 @@ class LawSampler:
     problem = ""
     accuracy = ROUND_OFF
 
-    def of_rows(self, rows: Any) -> Self:
+    def select_rows(self, rows: Any) -> Self:
         """Return the laws of some rows."""
         return type(self)(rows_of(self.parts, rows))
 
@@ -386,9 +388,9 @@ class StoppedSampler:
     sampler: ForceSampler
     stops: EndStops
 
-    def of_rows(self, rows: Any) -> Self:
+    def select_rows(self, rows: Any) -> Self:
         """Return those of some rows."""
-        return type(self)(self.sampler.of_rows(rows), self.stops)
+        return type(self)(self.sampler.select_rows(rows), self.stops)
 
     def leaf_force(self, travel: FloatArray) -> FloatArray:
         """Return the force of leaves and stops [N]."""

@@ -20,7 +20,7 @@ from cfmkit.export.beam_sections import BeamSection
 from cfmkit.export.contours import Arc, Contour, Edge, Line, Smooth
 from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.fillets import round_inside_corners
-from cfmkit.export.posed_part import MIRROR_FACTORS, PosedBody, PosedPart, band, in_poses, rectangle
+from cfmkit.export.posed_part import MIRROR_FACTORS, PosedBody, PosedPart, band, join_poses, rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.rows import with_values
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring
@@ -79,7 +79,7 @@ def bodies(solution: Solution, poses: Sequence[tuple[float, float]]) -> tuple[Po
         sizes = frame_sizes(with_values(spec, {"mechanism.part": None}), None)
     # coils of which nothing says it are drawn as long as the farthest pose needs them
     farthest = max(push.preload for push in solution.pushes) + float(solution.first.travel[-1])
-    return in_poses([list(_pose(spec, sizes, solution.parts.leaf, *pose, farthest)) for pose in poses])
+    return join_poses([list(_pose(spec, sizes, solution.parts.leaf, *pose, farthest)) for pose in poses])
 
 
 def _pose(

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Quantity
 
 
-def _of_mesh(name: str) -> Callable[[Solution], float]:
+def _read_mesh_error(name: str) -> Callable[[Solution], float]:
     """Return what reads an error of the mesh: solids alone have one."""
 
     def read(solution: Solution) -> float:
@@ -65,13 +65,13 @@ def _rest_position(solution: Solution) -> FloatArray:
 
 
 def _rest_shift_max(solution: Solution) -> FloatArray:
-    shift = np.abs(solution.by_mechanism(solution.curves.rest))
+    shift = np.abs(solution.split_by_mechanism(solution.curves.rest))
     return np.where(np.isnan(shift).all(axis=1), np.nan, np.where(np.isnan(shift), 0.0, shift).max(axis=1))
 
 
 def _stiffness_mismatch(solution: Solution) -> FloatArray:
     character, alone = solution.character, solution.spring_alone
-    difference = solution.of_mechanisms(np.abs(character.positive_stiffness - character.negative_stiffness))
+    difference = solution.spread_over_mechanisms(np.abs(character.positive_stiffness - character.negative_stiffness))
     is_known = np.abs(alone) > solution.effort_error
     return np.where(
         is_known, difference * (solution.window[1] - solution.window[0]) / np.where(is_known, alone, 1.0), np.nan
@@ -89,14 +89,14 @@ def _travel_safety_factor(solution: Solution) -> FloatArray:
 
 def _spring_stress_max(solution: Solution) -> FloatArray:
     ends = np.repeat(solution.window[1], solution.preloads)
-    stress = solution.by_mechanism(solution.curves.spring_stress(ends)).max(axis=1)
+    stress = solution.split_by_mechanism(solution.curves.spring_stress(ends)).max(axis=1)
     return stress if solution.spec.mechanism.springs is None else np.full(len(solution), np.nan)
 
 
 def _largest_change(solution: Solution) -> tuple[FloatArray, FloatArray]:
     """Return the largest change of the mean force due to a preload [N], and the change of that preload [m]."""
     means = solution.window_forces.mean(axis=2)
-    changes, preload = means - means[:, :1], solution.by_mechanism(solution.curves.preload[:, 0])
+    changes, preload = means - means[:, :1], solution.split_by_mechanism(solution.curves.preload[:, 0])
     sizes = np.where(np.isnan(changes), -1.0, np.abs(changes))[:, 1:]
     if not sizes.shape[1]:
         return np.full(len(means), np.nan), np.full(len(means), np.nan)
@@ -118,14 +118,14 @@ def _value_over_preloads(solution: Solution, read: Callable[[FloatArray], FloatA
 
 def _spring_deflection_max(solution: Solution) -> FloatArray:
     curves = solution.curves
-    return np.asarray(np.maximum(solution.by_mechanism(curves.ends[1] + curves.preload[:, 0]).max(axis=1), 0.0))
+    return np.asarray(np.maximum(solution.split_by_mechanism(curves.ends[1] + curves.preload[:, 0]).max(axis=1), 0.0))
 
 
 def _is_bought(solution: Solution) -> bool:
     return solution.spec.mechanism.springs is not None
 
 
-def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
+def _list_springs_in_use(solution: Solution, number: int) -> list[SpringInUse]:
     """Return what bought springs of a mechanism are put through between rest and the end of the travel."""
     springs = solution.specs[number].mechanism.springs
     if springs is None:
@@ -141,14 +141,14 @@ def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
 
 def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
     """Yield the largest stress in the wire of bought springs, and their shortest life, of each mechanism."""
-    return (wire_quantities(_in_use(solution, number)) for number in range(len(solution)))
+    return (wire_quantities(_list_springs_in_use(solution, number)) for number in range(len(solution)))
 
 
 SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **{
         name: ScalarQuantity(
             *about,
-            _of_mesh(name),
+            _read_mesh_error(name),
             lambda solution: "there is none" if _is_solid(solution) else "only the model of the part as a solid has it",
         )
         for name, about in OF_SOLIDS.items()

@@ -84,11 +84,11 @@ class Solution(ShortRepr):
         """Return a number of each specification, (m,); NaN for None."""
         return np.array([read(spec) for spec in self.specs], dtype=float)
 
-    def of_mechanisms(self, value: Any) -> FloatArray:
+    def spread_over_mechanisms(self, value: Any) -> FloatArray:
         """Return what laws give, a number or a column, as (m,)."""
         return np.broadcast_to(np.ravel(value), len(self))
 
-    def by_mechanism(self, values: NDArray[Any]) -> NDArray[Any]:
+    def split_by_mechanism(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return what is known of each curve, (m p, ...), as (m, p, ...)."""
         return values.reshape(len(self), self.preloads, *values.shape[1:])
 
@@ -140,7 +140,7 @@ class Solution(ShortRepr):
     @cached_property
     def nominal(self) -> Rows:
         """The curves of the first preload, one for each mechanism."""
-        return self.curves if self.preloads == 1 else self.curves.of_rows(slice(None, None, self.preloads))
+        return self.curves if self.preloads == 1 else self.curves.select_rows(slice(None, None, self.preloads))
 
     @cached_property
     def character(self) -> Characteristics:
@@ -150,7 +150,7 @@ class Solution(ShortRepr):
     @cached_property
     def linear(self) -> Ends:
         """Range of constant negative stiffness, from and to [m]; NaN where it nowhere is."""
-        first, last = map(self.of_mechanisms, self.character.linear)
+        first, last = map(self.spread_over_mechanisms, self.character.linear)
         return first, last
 
     @cached_property
@@ -254,7 +254,7 @@ class Solution(ShortRepr):
         constant stiffness. Then no single number stands for the curve.
         """
         about, curves = self.spec.mechanism.positive, self.nominal
-        place = self.of_mechanisms(self.parts.balance)[:, None]
+        place = self.spread_over_mechanisms(self.parts.balance)[:, None]
         force = curves.sampler.spring(place + curves.preload)[0][:, 0]
         # leaves with a stated waviness carry a little there, which no flatness tells
         buckles = np.isfinite(self.linear[0]) & self.leaf_kind.buckles
@@ -296,10 +296,10 @@ class Solution(ShortRepr):
     @cached_property
     def leaf_rows(self) -> Rows:
         """Curves that go wherever the leaves go at any preload: of each mechanism one, or all where some end early."""
-        first, last = (self.by_mechanism(end) for end in self.curves.ends)
+        first, last = (self.split_by_mechanism(end) for end in self.curves.ends)
         if (last != last[:, :1]).any():
             return self.curves
-        return self.curves.of_rows(np.arange(len(self)) * self.preloads + first.argmin(axis=1))
+        return self.curves.select_rows(np.arange(len(self)) * self.preloads + first.argmin(axis=1))
 
     def leaf_stress(self, end: FloatArray | float = np.inf) -> FloatArray:
         """Return the largest stress of the leaves up to travels, (m,) or one, over all preloads, (m,) [Pa]."""
@@ -314,12 +314,12 @@ class Solution(ShortRepr):
     @cached_property
     def travel_spring_stress(self) -> FloatArray:
         """Largest stress of the spring over the whole travel at each preload, (m, p) [Pa]."""
-        return self.by_mechanism(self.curves.spring_stress())
+        return self.split_by_mechanism(self.curves.spring_stress())
 
     @property
     def overrating(self) -> FloatArray:
         """By what share the model overestimates the stress of the leaves at most, where that is known; else zero."""
-        return self.of_mechanisms(self.parts.leaf.overrating if self.fidelity == "analytic" else 0.0)
+        return self.spread_over_mechanisms(self.parts.leaf.overrating if self.fidelity == "analytic" else 0.0)
 
     @cached_property
     def hindered_curling(self) -> dict[str, Ends]:
@@ -351,9 +351,9 @@ class Solution(ShortRepr):
         places = np.linspace(*self.window, MEAN_PLACES, axis=1)
         leaves = self.nominal.sampler.leaf_force(places)[:, None]
         spring = self.curves.sampler.spring(np.repeat(places, self.preloads, axis=0) + self.curves.preload)[0]
-        first, last = (self.by_mechanism(end)[..., None] for end in self.curves.ends)
+        first, last = (self.split_by_mechanism(end)[..., None] for end in self.curves.ends)
         inside = (places[:, None] >= first) & (places[:, None] <= last)
-        force = leaves + self.by_mechanism(spring)
+        force = leaves + self.split_by_mechanism(spring)
         if self.curves.stops:
             force = force + self.curves.stops.force(places)[:, None]
         return np.where(inside, force, np.nan)
@@ -382,9 +382,9 @@ class Solution(ShortRepr):
         chosen = np.arange(len(self)) if rows is None else rows
         curve_numbers = (chosen[:, None] * count + np.arange(count)).ravel()
         travel, (first, last) = np.repeat(places, count, axis=0), (end[curve_numbers, None] for end in curves.ends)
-        spring = curves.sampler.of_rows(curve_numbers).spring(travel + curves.preload[curve_numbers])[1]
+        spring = curves.sampler.select_rows(curve_numbers).spring(travel + curves.preload[curve_numbers])[1]
         spring = np.where((travel < first) | (travel > last), 0.0, spring).reshape(len(chosen), count, -1)
-        return np.asarray(np.maximum(self.nominal.sampler.of_rows(chosen).leaf_stress(places), spring.max(axis=1)))
+        return np.asarray(np.maximum(self.nominal.sampler.select_rows(chosen).leaf_stress(places), spring.max(axis=1)))
 
     def _stress_samples(self) -> list[RowSamples]:
         """Return the largest stress of leaves and spring at the points of each preload, the nominal one first [Pa]."""

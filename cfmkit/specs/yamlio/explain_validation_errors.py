@@ -123,7 +123,7 @@ def _complaint(line: _Error) -> Complaint:
         return Complaint(line.trace.path, _unknown_key(line.trace), at_key=True)
     if line.kind.startswith("union_tag"):
         return _unknown_kind(line)
-    explainer = _EXPLAINER_BY_TYPE.get(line.kind, _in_pydantics_words)
+    explainer = _EXPLAINER_BY_TYPE.get(line.kind, _translate_pydantic_message)
     return Complaint(line.trace.path, " ".join(explainer(line).split()))
 
 
@@ -272,7 +272,7 @@ def _own_words(line: _Error) -> str:
     return str(line.context.get("error", line.text)) or "is not allowed"
 
 
-def _in_pydantics_words(line: _Error) -> str:
+def _translate_pydantic_message(line: _Error) -> str:
     return line.text.replace("Input should", f"{describe_value(line.trace.node)} should").replace("Value error, ", "")
 
 

@@ -120,7 +120,7 @@ class SpringInUse:
         return self.fatigue.life(self.wound.stress(self.largest), self.wound.stress(self.least))
 
 
-def in_the_sense_of_the_larger(high: float, low: float) -> tuple[float, float]:
+def orient_to_larger(high: float, low: float) -> tuple[float, float]:
     """Return the least and the largest of what a spring goes through between two ends, the larger of these positive."""
     return (low, high) if abs(high) >= abs(low) else (-high, -low)
 

@@ -98,7 +98,7 @@ def yield_ok(findings: Findings) -> bool:
     )
 
 
-def by_interval(findings: Findings) -> bool:
+def is_met_by_interval(findings: Findings) -> bool:
     """Return whether the yield is what was requested because its interval has that in it, and not its value."""
     wanted, share = findings.setup.block.min_yield, findings.all_met
     return wanted is not None and share is not None and share.value < wanted and yield_ok(findings)
@@ -192,7 +192,7 @@ def _requirements(findings: Findings) -> list[dict[str, Any]]:
     shown = "no value" if value is None else f"{100 * value:.4g} %"
     if value is not None and findings.all_met.failed:
         shown += f" ({findings.all_met.failed} of {findings.all_met.count} parts failed)"
-    outcome = "ok, within the 95 % interval" if by_interval(findings) else "ok" if good else "missed"
+    outcome = "ok, within the 95 % interval" if is_met_by_interval(findings) else "ok" if good else "missed"
     sentence = f"yield {shown}, required >= {100 * wanted:.4g} %: {outcome}"
     bounds = {"value": value, "min": wanted, "max": None, "unit": "1", "over": None, "over_unit": None}
     return [*records, {"metric": "yield", **bounds, "ok": good, "sentence": sentence}]

@@ -129,7 +129,7 @@ def prepare(
         raise UsageError(NOTHING_TO_VARY.replace("{path}", length_to_vary(spec)[0]))
     chosen = seed if seed is not None else block.seed or 0
     samples = block.samples or METHOD_NAMES[block.method].default_samples
-    parts = Parts.of_block(spec, block, samples, chosen)
+    parts = Parts.from_block(spec, block, samples, chosen)
     parameters, paths = parts.parameters, parts.paths
     _suits(spec, block, parameters)
     groups = together(block, paths)

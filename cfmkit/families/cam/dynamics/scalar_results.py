@@ -26,7 +26,7 @@ SLOW_DURATION = 1.0  # duration of the motion that the paper compares with [s]
 def values_of(moved: MotionSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; None if a value does not exist."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        numbers = _shared_values(moved) | _own(moved)
+        numbers = _shared_values(moved) | _compute_values(moved)
     finite = {name: value if np.isfinite(value) else None for name, value in numbers.items()}
     return {name: Quantity(value, *SCALAR_DEFINITIONS[name]) for name, value in finite.items()}
 
@@ -43,7 +43,7 @@ def _shared_values(moved: MotionSolution) -> dict[str, float]:
     }
 
 
-def _own(moved: MotionSolution) -> dict[str, float]:
+def _compute_values(moved: MotionSolution) -> dict[str, float]:
     history, machine = moved.history, moved.build.machine
     moving = respond(machine, history.moment)
     ratio = history.force / moved.static

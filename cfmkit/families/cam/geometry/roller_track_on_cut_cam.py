@@ -300,7 +300,7 @@ class Track:
             return _flat(self.states(np.atleast_1d(self.start)).x)
         return self._begins
 
-    def of_rows(self, _rows: Any) -> Track:
+    def select_rows(self, _rows: Any) -> Track:
         """Return the track itself: what many mechanisms share is the same for all of them."""
         return self
 
@@ -401,7 +401,7 @@ def _join(on_corner: NDArray[np.bool_], corner: NDArray[Any], flank: NDArray[Any
 class TrackRows(Track):
     """Tracks of one kind side by side: numbers that differ are columns (m, 1), slider positions are (m, n)."""
 
-    def of_rows(self, rows: Any) -> TrackRows:
+    def select_rows(self, rows: Any) -> TrackRows:
         """Return some of the tracks."""
         chosen, values, profile = object.__new__(TrackRows), dict(vars(self)), self.profile
         del values["profile"]

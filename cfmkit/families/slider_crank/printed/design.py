@@ -304,7 +304,7 @@ def _design_uniform_strip(
     """
     fixed = sheet_of(spec.mechanism.part) or (None if isinstance(wanted.width, tuple) else wanted.width)
     if fixed is not None:
-        return _of_width(spec, task, ranges, float(fixed), run)
+        return _design_of_width(spec, task, ranges, float(fixed), run)
     uniform = uniform_for_stroke(task)
     if uniform is None:
         return no_design(
@@ -342,7 +342,7 @@ def _design_uniform_strip(
     return _analyse_strip(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
 
 
-def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: float, run: Run) -> Design:
+def _design_of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: float, run: Run) -> Design:
     """Return the uniform strip of a stated width, its thickness from the force."""
     uniform = uniform_for_width(task, width)
     if uniform is None:

@@ -151,7 +151,7 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     first = (
         one_width(rates, lengths, turn, made_of)
         if sheet is None
-        else of_width(rates, lengths, turn, made_of, sheet, stays)
+        else size_for_width(rates, lengths, turn, made_of, sheet, stays)
     )
     stubby = next((flexure for flexure in first if flexure.length < _MIN_SLENDERNESS * flexure.thickness), None)
     if stubby is not None:
@@ -210,7 +210,7 @@ def one_width(
     return tuple(Flexure(length, float(h), widest) for length, h in zip(lengths, thickness, strict=True))
 
 
-def of_width(
+def size_for_width(
     rates: FloatArray, lengths: Sequence[float], turn: FloatArray, made_of: Elasticity, width: float, stays: bool
 ) -> tuple[Flexure, ...]:
     """Return flexures of a width [m] with the rates [N m/rad], by the closed forms.

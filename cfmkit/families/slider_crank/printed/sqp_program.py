@@ -261,14 +261,18 @@ class StripProgram(DesignProgram):
 
     def _derivatives(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray] | None:
         """Return the derivatives of force (p, n) and stress (r, n) by all variables; None if one has none."""
-        slopes = self._by_form(z, state)
+        slopes = self._differentiate_by_form(z, state)
         if slopes is None or not self.extra:
             return slopes
         force, stress = slopes
-        last = self._by_stroke(z, state) if self.task.goal == "stroke" else (0.0 * state.force, 0.0 * state.stress)
+        last = (
+            self._differentiate_by_stroke(z, state)
+            if self.task.goal == "stroke"
+            else (0.0 * state.force, 0.0 * state.stress)
+        )
         return np.column_stack([force, last[0]]), np.column_stack([stress, last[1]])
 
-    def _by_form(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray] | None:
+    def _differentiate_by_form(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray] | None:
         """Return the derivatives of force (p, k) and stress (r, k) by the form's variables; None if one has none."""
         form, path, x = self.form, state.path, z[: self.form.size]
 
@@ -283,7 +287,7 @@ class StripProgram(DesignProgram):
         if form.width is None and self.task.material.wide:
             steps.append((form.size - 1, _DIFFERENCE_STEP * float(x[-1])))
         for k, step in steps:
-            by = self._by_difference(z, k, step, state)
+            by = self._differentiate_by_difference(z, k, step, state)
             if by is None:
                 return None
             force.append(by[0][:, None])
@@ -293,7 +297,9 @@ class StripProgram(DesignProgram):
             stress.append(np.zeros((len(state.stress), 1)))
         return np.concatenate(force, axis=1), np.concatenate(stress, axis=1)
 
-    def _by_difference(self, z: FloatArray, k: int, nudge: float, state: State) -> tuple[FloatArray, FloatArray] | None:
+    def _differentiate_by_difference(
+        self, z: FloatArray, k: int, nudge: float, state: State
+    ) -> tuple[FloatArray, FloatArray] | None:
         """Return the derivatives by one variable by a difference of neighbouring equilibria; None if there is none.
 
         It is central, but where only one neighbour has equilibria. Beside a strip with a station at the end of one of
@@ -328,7 +334,7 @@ class StripProgram(DesignProgram):
         """Return the strip that is pressed along a path."""
         return State(path, path.effort[path.at_requested], stress_places(path, self.spots))
 
-    def _by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
+    def _differentiate_by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives by the stroke in cm: all points move with it, and the stress with its point."""
         travel, at = self.travel(z), state.path.at_requested
         first, last = np.sqrt(self.task.start), np.sqrt(self.stroke(z))

@@ -91,7 +91,7 @@ def uniform_thickness(task: StripTask, width: float, guess: float = INITIAL_THIC
 
     The force follows the third power of the thickness but for stretching and shear: a few corrections do.
     """
-    program = _of_one_thickness(task, width)
+    program = _make_uniform_program(task, width)
 
     def step(thickness: float) -> float | None:
         state = program.state(np.array([thickness / METRES_PER_MM, 1.0]))
@@ -116,7 +116,7 @@ def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
 
     def step(thickness: float) -> float | None:
         nonlocal width
-        state = _of_one_thickness(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
+        state = _make_uniform_program(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
         if state is None:
             return None
         factor = limit / _peak(state)
@@ -137,7 +137,7 @@ def uniform_for_width(task: StripTask, width: float) -> tuple[float, float] | No
 
     def step(thickness: float) -> float | None:
         nonlocal worst
-        state = _of_one_thickness(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
+        state = _make_uniform_program(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
         if state is None:
             return None
         worst = _peak(state)
@@ -160,7 +160,7 @@ def _iterate_thickness(step: Callable[[float], float | None], guess: float) -> f
     return thickness
 
 
-def _of_one_thickness(task: StripTask, width: float) -> StripProgram:
+def _make_uniform_program(task: StripTask, width: float) -> StripProgram:
     """Return the program of strips of one thickness and of a width [m], over the travel of a task."""
     return StripProgram(replace(task, goal="ripple"), Form(1, width=width))
 

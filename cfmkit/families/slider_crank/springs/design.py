@@ -366,7 +366,7 @@ def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
     """Return how far rates and lengths may move without harm, if they may move far."""
     if solved.bought:
         return ()
-    reported = [text for text in (_of_lengths(solved, search), _of_rates(solved)) if text]
+    reported = [text for text in (_find_length_range(solved, search), _find_rate_ranges(solved)) if text]
     if not reported:
         return ()
     wanted = solved.task.wanted
@@ -376,7 +376,7 @@ def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
     return (finding("near_optima", text),)
 
 
-def _of_rates(solved: Solved) -> str:
+def _find_rate_ranges(solved: Solved) -> str:
     """Return the range of each rate with nearly the same deviation; empty if all are well determined."""
     goal = solved.task.goal(solved.window, N_PROGRAMME_PLACES)
     if goal is None:
@@ -394,7 +394,7 @@ def _of_rates(solved: Solved) -> str:
     return ", ".join(reported) if len(reported) > 1 else ""
 
 
-def _of_lengths(solved: Solved, search: Lowest | None) -> str:
+def _find_length_range(solved: Solved, search: Lowest | None) -> str:
     """Return the range of the first free length with nearly the same deviation; empty if it is well determined."""
     wanted = solved.task.wanted
     if search is None or wanted.window is None:

@@ -201,7 +201,7 @@ class Assembly(ShortRepr):
             first, last = (held and math.isfinite(end) and end != self.unloaded for end in self.reach)
             return first, last
         link, held = self.linkage, bool(self.rates[:3].any())
-        ends = link.way(self.unloaded)[::-1]
+        ends = link.find_path_ends(self.unloaded)[::-1]
         first, last = (held and end != 0.0 and not rest for end, rest in zip(ends, self._relaxed_ends, strict=True))
         return first, last
 
@@ -229,7 +229,7 @@ class Assembly(ShortRepr):
         first, last = self.reach
         ways = [self.start - first, last - self.start]
         if self.drive == "force" and math.isnan(self.rest):
-            ends, far = self.linkage.way(self.unloaded)[::-1], self.linkage.stretched_position
+            ends, far = self.linkage.find_path_ends(self.unloaded)[::-1], self.linkage.stretched_position
             ways = [arc if abs(end) == far else last - first for arc, end in zip(ways, ends, strict=True)]
         return ways[0], ways[1]
 
@@ -238,7 +238,7 @@ class Assembly(ShortRepr):
         """The motion in the stretched position nearest to the unloaded one."""
         if self.drive == "force":
             first, last = self.reach
-            return first if self.linkage.way(self.unloaded)[1] == self.linkage.stretched_position else last
+            return first if self.linkage.find_path_ends(self.unloaded)[1] == self.linkage.stretched_position else last
         return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, FULL_TURN)
 
 
