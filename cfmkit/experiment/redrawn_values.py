@@ -114,8 +114,8 @@ def section_paths(spec: Spec) -> list[str]:
     """Return the paths of widths and thicknesses of what bends."""
     made = {f"mechanism.{key}" for key, value in spec.out_of_plane_widths.items() if value is not None}
     beside = {path.removesuffix("width") + "thickness" for path in made}
-    known = dict(spec.leaves())
-    return [path for path in known if path in made or path.removesuffix(_index(path)) in beside]
+    leaves = dict(spec.leaves())
+    return [path for path in leaves if path in made or path.removesuffix(_index(path)) in beside]
 
 
 def _index(path: str) -> str:
@@ -331,7 +331,7 @@ def largest_miss(result: Result, of_envelope: bool = False) -> float:
     for outcome in check(result.spec.part_requirements, result, values):
         if outcome.value is None or (of_envelope and outcome.metric not in ENVELOPE_METRICS):
             continue
-        for bound, way in ((outcome.max, 1.0), (outcome.min, -1.0)):
+        for bound, sign in ((outcome.max, 1.0), (outcome.min, -1.0)):
             if bound is not None:
-                shares.append(way * (outcome.value - bound) / (abs(bound) or 1.0) + REQUIREMENT_MARGIN)
+                shares.append(sign * (outcome.value - bound) / (abs(bound) or 1.0) + REQUIREMENT_MARGIN)
     return max(shares)
