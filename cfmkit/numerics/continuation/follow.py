@@ -194,7 +194,7 @@ def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[March
     if len(marched.drive):
         yield marched
         last = marched.point_at(-2) if len(marched.drive) > 1 else walk.here
-        number = walk.number + int((marched.target >= 0).sum())
+        number = walk.number + np.count_nonzero(marched.target >= 0)
         walk = walk._replace(before=last, here=marched.point_at(-1), trail=(*walk.trail, marched), number=number)
     return walk._replace(step=marched.step, rejections=ARC_AFTER if marched.stuck else 1)
 
