@@ -37,14 +37,14 @@ def element_tables(
     cuts: FloatArray,
 ) -> dict[str, Any]:
     """Return the tables of the elements between cuts of the beams, one beam after the other: (d, e, q) or (d, e)."""
-    beams, bundle = fits[0].network.beams, fits[0].bundle
+    beams, bundle, numbers = fits[0].network.beams, fits[0].bundle, [own.number for own in fits]
     if not bundle.others:
-        return plain_tables(*bundle.rows(fits), scales, degree, row, cuts)
+        return plain_tables(*bundle.rows(numbers), scales, degree, row, cuts)
     wide = any(beam.section.wide for beam in beams.values())
     plain, together, first = [] if wide else bundle.plain, dict[str, Any](), 0
     if plain:
         rows = np.isin(row, plain)
-        together = plain_tables(*bundle.rows(fits), scales, degree, np.searchsorted(plain, row[rows]), cuts[rows])
+        together = plain_tables(*bundle.rows(numbers), scales, degree, np.searchsorted(plain, row[rows]), cuts[rows])
     parts: list[dict[str, Any]] = []
     for k, name in enumerate(beams):
         between = cuts[row == k]

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.elastica.model.beam import Beam
-    from cfmkit.elastica.model.beam_fits import BeamFits
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.model.section import Section
 
@@ -31,34 +30,21 @@ MAX_BEAM_TURN = 16.0  # turn [rad] up to which GAUSS integrates sine and cosine 
 
 
 class Bundle:
-    """The beams of d networks of one make-up between their ends.
-
-    Attributes
-    ----------
-    plain : list of int
-        Beams with a polynomial angle and one thickness; `others` has the rest.
-    coefficients : (d, plain, m) array
-        Of the angle, rotation of the fit included in the first.
-    length : (d, plain) array
-        Arc length as used [m].
-    rigidities : (3, d, plain) array
-        Of bending, and the compliances of stretching and shearing, as `Section.rigidities` has them.
-    spots : (d, nodes, 2) array
-        Places of all nodes [m].
-    offsets : (d, beams, 2, 2) array or None
-        Of both ends of all beams [m]; None if there are none.
-    """
+    """The beams of d networks of one make-up between their ends."""
 
     def __init__(self, networks: Sequence[Network]) -> None:
         """Fit the plain beams."""
         rows = [list(network.beams.values()) for network in networks]
         self.names, number = list(networks[0].beams), {name: k for k, name in enumerate(networks[0].nodes)}
+        # places of all nodes (d, nodes, 2) [m]
         self.spots = np.array([[(node.x, node.y) for node in network.nodes.values()] for network in networks])
         places = self.spots[:, [(number[beam.start], number[beam.end]) for beam in rows[0]]]
         offsets = [(beam.start_offset, beam.end_offset) for row in rows for beam in row]
+        # offsets of both ends of all beams, (d, beams, 2, 2) [m]; None if there are none
         self.offsets = np.reshape(offsets, places.shape) if any(own != NO_OFFSETS for own in offsets) else None
         if self.offsets is not None:
             places = places + self.offsets
+        # beams with a polynomial angle and one thickness; `others` has the rest
         self.plain = [k for k, same in enumerate(zip(*rows, strict=True)) if all(map(is_plain, same))]
         self.others = [] if len(self.plain) == len(self.names) else sorted({*range(len(self.names))} - {*self.plain})
         if self.plain:
@@ -79,15 +65,16 @@ class Bundle:
         if any(self.raw):
             raw = np.reshape(self.raw, shape)
             rotation, self.length = np.where(raw, 0.0, rotation), np.where(raw, self.nominal, self.length)
+        # of the angle (d, plain, m), the rotation of the fit included in the first; arc `length` as used (d, plain) [m]
         self.coefficients, self.rotation = c if c.dtype == rotation.dtype else c + 0j, rotation
         self.coefficients[..., 0] += rotation
+        # (3, d, plain): of bending, and the compliances of stretching and shearing, as `Section.rigidities` has them
         self.rigidities = rigidities_of(beams).reshape(3, *shape)
 
-    def rows(self, fits: Sequence[BeamFits]) -> tuple[Any, Any, Any]:
+    def rows(self, chosen: list[int]) -> tuple[Any, Any, Any]:
         """Return coefficients, length and rigidities of some of the networks."""
-        if len(fits) == len(self.length):
+        if len(chosen) == len(self.length):
             return self.coefficients, self.length, self.rigidities
-        chosen = [own.number for own in fits]
         return self.coefficients[chosen], self.length[chosen], self.rigidities[:, chosen]
 
     @cached_property

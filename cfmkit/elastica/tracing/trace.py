@@ -19,7 +19,7 @@ from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Control, Loading
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
-from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
+from cfmkit.elastica.tracing.error_estimate import CORRECTION_ERROR, DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import DriveStart, find_start, follow_network, is_stretched
 from cfmkit.elastica.tracing.taut_beams import drop_locked_points, find_tension
@@ -277,7 +277,8 @@ def _lift(event: PathEvent, drive: float, mesh: Discretisation, fine: Discretisa
 def _with_error(attempt: TraceAttempt) -> TraceAttempt:
     path = copy(attempt.path)  # with all that is known of it
     errors = point_errors(path, pick_points(path, _event_places(attempt)))
-    object.__setattr__(path, "error", float(errors.max(initial=0.0)))
+    least = CORRECTION_ERROR * attempt.start.problem.next_correction
+    object.__setattr__(path, "error", max(float(errors.max()), least) if len(errors) else 0.0)
     return attempt._replace(path=path)
 
 
