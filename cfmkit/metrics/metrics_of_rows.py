@@ -323,7 +323,7 @@ class RowsInWindow:
         """Return the width within one of the tolerances `ranges_many.BAND_RANGES` about the reference pose."""
         many = self.branches
         here = np.abs(many.interpolate(many.reference[:, None])[:, 0])
-        largest = np.nanmax(np.abs(self.curves.samples.values), axis=1)
+        largest = np.nanmax(np.abs(self.curves.samples.values), axis=1, initial=0.0)
         known = self._reach(many.reference) & (here > np.maximum(self.curves.error, ZERO_EFFORT_SHARE * largest))
         return np.where(known, ranges_many.band_range(many, tolerance), np.nan)
 

@@ -86,13 +86,13 @@ def _usable(cycle: Cycle) -> Interval:
     return cycle.usable
 
 
-_LAN = "d is the end of the window, c where the {effort} first reaches 0.95 of that at d [Lan 2010, sec. 2]"
+_RANGE_MEANING = "d is the end of the window, c where the {effort} first reaches 0.95 of that at d [Lan 2010, sec. 2]"
 TRAVEL_METRICS = (
     *(
         Definition(
             name,
             dimension,
-            f"{formula}: {_LAN}",
+            f"{formula}: {_RANGE_MEANING}",
             function,
             methodcaller("rise_to_end", of_rows),
             worst="smallest",

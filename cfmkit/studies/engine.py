@@ -156,19 +156,7 @@ class NullMonitor:
 
 
 class Records:
-    """The rows of a study, as far as they are finished, in the order of the points.
-
-    Attributes
-    ----------
-    work : Work
-        Study and plan.
-    reused : int
-        Points whose rows were in the journal before.
-    bugs : int
-        Points that a bug ended.
-    bug : str
-        The first traceback.
-    """
+    """The rows of a study, as far as they are finished, in the order of the points."""
 
     def __init__(self, work: Work, journal: Journal | None) -> None:
         """Start without rows."""
@@ -176,8 +164,9 @@ class Records:
         self._places = np.full(len(work.plan), ROW_MISSING, dtype=np.uint8)
         self._keys = np.zeros((len(work.plan), 16), dtype=np.uint8)
         self._held: dict[int, ResultRows] = {}
-        self.reused = self.bugs = 0
-        self.bug = ""
+        self.reused = 0  # points whose rows were in the journal before
+        self.bugs = 0  # points that a bug ended
+        self.bug = ""  # the first traceback
 
     def __len__(self) -> int:
         """Return the number of points of the study."""
