@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.end_stops import FINDINGS as ON_STOPS
+from cfmkit.families.end_stops import STOP_FINDINGS
 from cfmkit.families.findings import (
     TOO_SOFT,
     Finder,
@@ -79,7 +79,7 @@ VCFM_FINDINGS = {
     "spring_buckles": "a compression spring is pressed beyond the deflection at which it buckles, without a guide",
     "spring_slack": "bought springs are slack over a part of the travel",
     "no_spring_fits": "no spring of the catalogue fits",
-    **ON_STOPS,
+    **STOP_FINDINGS,
     "stress_unreachable": "no leaf length brings the exact stress below the allowable stress",
 }
 
