@@ -441,7 +441,7 @@ class SolvedRows(Generic[RowsT]):
     quantities: Mapping[str, ScalarQuantity[RowsT]]
     rules: Sequence[FindingRule[RowsT]]
     complete: NDArray[np.bool_]  # (m,) others have curves that end early: they are analysed one by one
-    traced: bool = False  # whether the model is a path of each: then nothing of it is computed twice
+    traced: bool = False  # whether each is a path, or a search: few are done at once, and nothing is computed twice
 
     @np.errstate(all="ignore")
     def value(self, name: str) -> FloatArray | None:

@@ -148,7 +148,8 @@ def solve_rows(specs: Sequence[VcfmSpec]) -> Iterator[tuple[NDArray[np.intp], So
         for start in range(0, len(members), size):
             chosen = members[start : start + size]
             solution = _solve_kind([specs[index] for index in chosen])
-            yield np.array(chosen), SolvedRows(solution, ROW_COLUMNS, FINDING_RULES, _is_complete(solution))
+            complete, slow = _is_complete(solution), solution.parts.leaf.one_by_one
+            yield np.array(chosen), SolvedRows(solution, ROW_COLUMNS, FINDING_RULES, complete, slow)
 
 
 def _is_complete(solution: Solution) -> NDArray[np.bool_]:

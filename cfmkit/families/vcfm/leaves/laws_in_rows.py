@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -45,6 +45,7 @@ class LawsOneByOne:
     """Laws that are asked one after the other, each for its row of travels (r, n)."""
 
     column: NDArray[np.object_]  # (r, 1)
+    one_by_one: ClassVar[bool] = True
 
     @property
     def laws(self) -> list[Any]:
