@@ -118,7 +118,10 @@ def data_of(reports: Mapping[str, MeasureReport]) -> dict[str, Any]:
             for item in data["warnings"]
         ],
         "metrics_filtered": _tag_metrics(each, "metrics_filtered"),
-        "groups": {name: _describe_data(data) for name, data in each.items()},
+        "groups": {
+            name: {key: data[key] for key in ("filter", "window", "cycles", "data", "reading")}
+            for name, data in each.items()
+        },
     }
 
 
@@ -130,10 +133,6 @@ def _tag_metrics(each: Mapping[str, Mapping[str, Any]], key: str) -> dict[str, A
             metric, branch = split_name(name)
             found[f"{metric}[{','.join(part for part in (group, branch) if part)}]"] = value
     return found
-
-
-def _describe_data(data: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: data[key] for key in ("filter", "window", "cycles", "data", "reading")}
 
 
 def report_on(
