@@ -112,7 +112,10 @@ def data_of(reports: Mapping[str, MeasureReport]) -> dict[str, Any]:
             for item in data["warnings"]
         ],
         "metrics_filtered": _tag_metrics(data_by_group, "metrics_filtered"),
-        "groups": {name: _describe_data(data) for name, data in data_by_group.items()},
+        "groups": {
+            name: {key: data[key] for key in ("filter", "window", "cycles", "data", "reading")}
+            for name, data in data_by_group.items()
+        },
     }
 
 
@@ -124,10 +127,6 @@ def _tag_metrics(data_by_group: Mapping[str, Mapping[str, Any]], key: str) -> di
             metric, branch = split_name(name)
             tagged[f"{metric}[{','.join(part for part in (group, branch) if part)}]"] = value
     return tagged
-
-
-def _describe_data(data: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: data[key] for key in ("filter", "window", "cycles", "data", "reading")}
 
 
 def report_on(

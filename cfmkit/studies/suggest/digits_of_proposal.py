@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from cfmkit.specs.yamlio.path_notation import read_item_suffix
 from cfmkit.studies.stock_and_digits import lengths_and_angles, round_to_digits
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def _make_up_for_thickness(written: Mapping[str, str], rounded: Mapping[str, str
     widths = {}
     for path, text in written.items():
         block, _, key = path.rpartition(".")
-        beside = [item for item in written if item.removesuffix(_index(item)) == f"{block}.thickness"]
+        beside = [item for item in written if item.removesuffix(read_item_suffix(item)) == f"{block}.thickness"]
         if key == "width" and beside:
             # tapered leaves are in series: their compliances add up
             before, after = (sum(_number(texts[item]) ** -3 for item in beside) for texts in (written, rounded))
@@ -63,9 +64,3 @@ def _ends_of_motion(written: Mapping[str, str], request: Request, decimals: int)
 
 def _number(text: str) -> float:
     return float(text.split()[0])
-
-
-def _index(path: str) -> str:
-    """Return the number of an item at the end of a path with its dot; "" if it has none."""
-    last = path.rpartition(".")[2]
-    return f".{last}" if last.isdecimal() else ""
