@@ -9,3 +9,31 @@ remember what is finished, `engine` puts these together, `choose_metrics_to_note
 noted, `tables` writes it, `summary` sums it up, and `sweep_request_and_files` is the study that
 varies a specification.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cfmkit.studies.batch_sources_and_outcomes import Entry
+    from cfmkit.studies.comparison_of_fidelities import choices_of, compare
+    from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
+
+_MODULE_BY_NAME = {
+    "BatchComparison": "metric_changes_since_earlier_batch",
+    "Entry": "batch_sources_and_outcomes",
+    "choices_of": "comparison_of_fidelities",
+    "compare": "comparison_of_fidelities",
+}
+
+__all__ = ["BatchComparison", "Entry", "choices_of", "compare"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name when it is first needed: a check of a specification needs none."""
+    if name not in _MODULE_BY_NAME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_MODULE_BY_NAME[name]}"), name)
+    globals()[name] = value
+    return value
