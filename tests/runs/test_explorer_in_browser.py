@@ -12,7 +12,8 @@ import pytest
 
 import cfmkit
 from cfmkit.cli import run_command
-from cfmkit.runs import Explorer, ExplorerServer
+from cfmkit.runs.explorer import Explorer
+from cfmkit.runs.explorer_server import ExplorerServer
 
 sync_api = pytest.importorskip("playwright.sync_api")
 CONFIGS = Path(__file__).parents[2] / "configs"
