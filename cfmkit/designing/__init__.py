@@ -15,7 +15,12 @@
 What a design is to do, the start it begins with and the words for what blocks it belong to the family.
 """
 
-from cfmkit.designing.robust_design import RobustProblem, with_margins
-from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock
+from cfmkit.lazy_names import lazy_names
 
-__all__ = ["UNLIMITED_CLOCK", "Clock", "RobustProblem", "with_margins"]
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "robust_design": "RobustProblem with_margins",
+        "run_many_starts": "UNLIMITED_CLOCK Clock",
+    },
+)

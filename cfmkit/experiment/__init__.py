@@ -4,6 +4,6 @@
 at reversals, `low_pass` smooths each branch, `curves_and_metrics_of_recording` puts the numbers together.
 """
 
-from cfmkit.experiment.value_definitions import define_recorded_values
+from cfmkit.lazy_names import lazy_names
 
-__all__ = ["define_recorded_values"]
+__getattr__, __all__ = lazy_names(__name__, {"value_definitions": "define_recorded_values"})

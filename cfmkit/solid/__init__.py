@@ -1,8 +1,15 @@
 """Planar finite elements on the outline of a part: nodes, fillets and the true boundary, which beams leave out."""
 
-from cfmkit.solid.adaptive_solution import DrivenPart
-from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
-from cfmkit.solid.path_following import PathEnd
-from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
+from cfmkit.lazy_names import lazy_names
 
-__all__ = ["MATERIAL_LAWS", "DrivenPart", "HeldOrDriven", "Part", "PathEnd", "rings_of"]
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "adaptive_solution": "DrivenPart",
+        "equilibrium": "SolidProblem",
+        "meshed_part": "HeldOrDriven Part rings_of",
+        "path_following": "PathEnd",
+        "plane_stress_law": "MATERIAL_LAWS",
+        "stress_along_fillets": "FilletArc",
+    },
+)

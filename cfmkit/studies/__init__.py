@@ -10,30 +10,18 @@ noted, `tables` writes it, `summary` sums it up, and `sweep_request_and_files` i
 varies a specification.
 """
 
-from __future__ import annotations
+from cfmkit.lazy_names import lazy_names
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from cfmkit.studies.batch_sources_and_outcomes import Entry
-    from cfmkit.studies.comparison_of_fidelities import choices_of, compare
-    from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
-
-_MODULE_BY_NAME = {
-    "BatchComparison": "metric_changes_since_earlier_batch",
-    "Entry": "batch_sources_and_outcomes",
-    "choices_of": "comparison_of_fidelities",
-    "compare": "comparison_of_fidelities",
-}
-
-__all__ = ["BatchComparison", "Entry", "choices_of", "compare"]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name when it is first needed: a check of a specification needs none."""
-    if name not in _MODULE_BY_NAME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_MODULE_BY_NAME[name]}"), name)
-    globals()[name] = value
-    return value
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "batch_sources_and_outcomes": "Entry",
+        "choose_metrics_to_note": "metrics_of",
+        "comparison_of_fidelities": "choices_of compare",
+        "metric_changes_since_earlier_batch": "BatchComparison",
+        "point_evaluation": "Study",
+        "serial_and_cluster_executors": "Lost serial",
+        "variable_paths": "leaf paths",
+        "variants_in_rows": "are_solved_together evaluate_rows",
+    },
+)

@@ -14,8 +14,8 @@ from flexure_support import ABS, LINKAGE, MM, UNLOADED, WIDTH, corners
 import cfmkit
 from cfmkit import Run
 from cfmkit.elastica import PathStatus
+from cfmkit.families.slider_crank.printed import Elasticity, sqp_program, strip_thickness_search
 from cfmkit.families.slider_crank.printed import design as printed
-from cfmkit.families.slider_crank.printed import sqp_program, strip_thickness_search
 from cfmkit.families.slider_crank.printed.audit import judge
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import joints
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
@@ -215,3 +215,13 @@ def test_flexures_are_designed_for_the_side_to_which_they_are_to_bend(side: str)
     result = cfmkit.analyze(cfmkit.design(spec("lumped", *about)).spec)
     assert result.curve.extra["max_stress"].values.max() == pytest.approx(42.5e6, rel=1e-4)
     assert "overstressed" not in {item.name for item in result.warnings}
+
+
+def test_the_force_of_a_wide_strip_is_not_proportional_to_its_width():
+    """The derivative by the width was the force over the width: 9 % too small."""
+    material = Elasticity(1.8e9, 0.35, wide=True)
+    program = StripProgram(StripTask(corners(), np.pi, material, 8.0, 1e-3, 21e-3, 0.01), Form(2))
+    z = np.array([0.95, 1.02, 30.0, 2.1])
+    _, slopes = program.slopes(z)
+    low, high = (program.values(z + np.array([0.0, 0.0, step, 0.0]))[1] for step in (-1e-3, 1e-3))
+    assert slopes[:, 2] == pytest.approx((high - low) / 2e-3, rel=1e-5)

@@ -7,9 +7,9 @@ from io import BytesIO
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.plots.style import axes_mm, new_figure
+from cfmkit.plots import axes_mm, new_figure
 from cfmkit.results import Result, Status
-from cfmkit.specs.spec import Requirement, Spec
+from cfmkit.specs import Requirement, Spec
 
 
 def axes():

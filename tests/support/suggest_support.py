@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit import Run
 from cfmkit.families import family
-from cfmkit.runs.suggest_api import read_request
-from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, make_proposal
+from cfmkit.runs import read_request
+from cfmkit.studies.suggest import ProposalJob, make_proposal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
-    from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
+    from cfmkit.studies.suggest import Proposal
 
 POM = {  # 10 N of POM over 3 mm
     "safety": "1",

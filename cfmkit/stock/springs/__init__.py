@@ -1,6 +1,12 @@
 """Springs that can be bought: own lists, and a generic series that is computed from wire, coil and turns."""
 
-from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
-from cfmkit.stock.springs.wire_materials import WIRES_BY_NAME
+from cfmkit.lazy_names import lazy_names
 
-__all__ = ["WIRES_BY_NAME", "HelicalSpring"]
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "helical_spring_formulas": "HelicalSpring",
+        "offer_type_and_generic_series": "generic",
+        "wire_materials": "WIRES_BY_NAME",
+    },
+)
