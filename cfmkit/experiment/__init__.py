@@ -3,3 +3,7 @@
 `reading` reads a file as it comes, `branches` splits it
 at reversals, `low_pass` smooths each branch, `curves_and_metrics_of_recording` puts the numbers together.
 """
+
+from cfmkit.lazy_names import lazy_names
+
+__getattr__, __all__ = lazy_names(__name__, {"value_definitions": "define_recorded_values"})

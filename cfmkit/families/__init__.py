@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import DesignMethod, ElasticParts, Family, Pictures, ResultNames, function_named
     from cfmkit.families.findings import Finder
-    from cfmkit.families.hardware import PartStrength
+    from cfmkit.families.hardware import PIN_STRENGTH, PartStrength
     from cfmkit.families.no_mechanism import CannotBuild, Infeasible
     from cfmkit.families.rows import FindingRule, ScalarQuantity, SolvedRows, Variants
     from cfmkit.families.suggestion_request import Candidate, FamilyOffer, Request
@@ -204,7 +204,7 @@ __getattr__, _OFFERED_NAMES = lazy_names(
     {
         "base": "DesignMethod ElasticParts Family Pictures ResultNames function_named",
         "findings": "Finder",
-        "hardware": "PartStrength",
+        "hardware": "PIN_STRENGTH PartStrength",
         "no_mechanism": "CannotBuild Infeasible",
         "rows": "FindingRule ScalarQuantity SolvedRows Variants",
         "suggestion_request": "Candidate FamilyOffer Request",

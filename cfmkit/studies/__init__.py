@@ -15,7 +15,10 @@ from cfmkit.lazy_names import lazy_names
 __getattr__, __all__ = lazy_names(
     __name__,
     {
+        "batch_sources_and_outcomes": "Entry",
         "choose_metrics_to_note": "metrics_of",
+        "comparison_of_fidelities": "choices_of compare",
+        "metric_changes_since_earlier_batch": "BatchComparison",
         "point_evaluation": "Study",
         "serial_and_cluster_executors": "Lost serial",
         "variable_paths": "leaf paths",

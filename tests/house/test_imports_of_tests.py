@@ -12,26 +12,6 @@ pytestmark = pytest.mark.lists
 
 TESTS = Path(__file__).parents[1]
 FAMILIES = ("beam", "cam", "slider_crank", "vcfm")
-OPEN_FOLDERS = {
-    "browser",
-    "cam",
-    "cli",
-    "contract",
-    "documents",
-    "experiment",
-    "export",
-    "house",
-    "metrics",
-    "plots",
-    "regression",
-    "runs",
-    "slider_crank",
-    "specs",
-    "stock",
-    "store",
-    "studies",
-}
-"""Folders that still import the inside of other packages."""
 
 
 def package_of(module: str) -> str:
@@ -68,7 +48,7 @@ def test_tests_import_the_inside_of_their_own_package_alone():
         folder = path.relative_to(TESTS).parts[0]
         names = [name for name in inner_modules(path) if package_of(name) != owned_package(folder)]
         foreign.setdefault(folder, []).extend(f"{path.name}: {name}" for name in names)
-    assert {folder: names for folder, names in foreign.items() if names and folder not in OPEN_FOLDERS} == {}
+    assert {folder: names for folder, names in foreign.items() if names} == {}
 
 
 def test_helpers_of_a_package_serve_its_own_tests_alone():
