@@ -19,7 +19,8 @@ from importlib import import_module
 from typing import Any
 
 _NAMES_BY_MODULE = {
-    "run_many_starts": "Clock",
+    "robust_design": "RobustProblem with_margins",
+    "run_many_starts": "UNLIMITED_CLOCK Clock",
 }
 _MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}
 __all__ = [*_MODULE_BY_NAME]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _NAMES_BY_MODULE = {
     "arc_outlines": "outlines",
-    "contours": "Arc Contour Drawing Line Smooth circle polygon polygons",
+    "contours": "Arc Contour Curve2D Drawing Line Smooth circle polygon polygons",
     "posed_part": "PosedBody box rectangle screw_positions swept",
     "union": "OutlinePiece merge_pieces",
 }

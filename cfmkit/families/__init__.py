@@ -1,6 +1,7 @@
 """The registry of families: one line each, imported when first needed; other packages add theirs by entry points.
 
-A program adds one with `register`, and metrics of its own with `cfmkit.metric`: both hold for its process.
+A program adds one with `register`, and metrics of its own with `cfmkit.metric`: both hold for its process. What an
+author of a family needs is imported here when it is first used.
 """
 
 from __future__ import annotations
@@ -19,8 +20,22 @@ from cfmkit.specs import own_metrics
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.families.base import Family
+    from cfmkit.families.base import DesignMethod, ElasticParts, Family, Pictures, ResultNames, function_named
+    from cfmkit.families.findings import Finder
+    from cfmkit.families.hardware import PIN_STRENGTH, PartStrength
+    from cfmkit.families.no_mechanism import CannotBuild, Infeasible
+    from cfmkit.families.rows import FindingRule, ScalarQuantity, SolvedRows, Variants
+    from cfmkit.families.suggestion_request import Candidate, FamilyOffer, Request
 
+_NAMES_BY_MODULE = {
+    "base": ("DesignMethod", "ElasticParts", "Family", "Pictures", "ResultNames", "function_named"),
+    "findings": ("Finder",),
+    "hardware": ("PIN_STRENGTH", "PartStrength"),
+    "no_mechanism": ("CannotBuild", "Infeasible"),
+    "rows": ("FindingRule", "ScalarQuantity", "SolvedRows", "Variants"),
+    "suggestion_request": ("Candidate", "FamilyOffer", "Request"),
+}
+_MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names}
 FAMILY_MODULES = {
     "beam": "cfmkit.families.beam.record",
     "cam": "cfmkit.families.cam.record",
@@ -190,21 +205,31 @@ def origins() -> dict[str, dict[str, str]]:
     return computed | ({"metrics": {"registered": own_metrics.stamp()}} if own_metrics.stamp() else {})
 
 
-def __getattr__(name: str) -> Any:
-    """Import the type of records when it is first needed: it needs numpy."""
-    if name != "Family":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return import_module("cfmkit.families.base").Family
-
-
 __all__ = [
     "FAMILY_MODULES",
+    "PIN_STRENGTH",
+    "Candidate",
+    "CannotBuild",
+    "DesignMethod",
+    "ElasticParts",
     "Family",
+    "FamilyOffer",
+    "Finder",
+    "FindingRule",
+    "Infeasible",
+    "PartStrength",
+    "Pictures",
+    "Request",
+    "ResultNames",
+    "ScalarQuantity",
+    "SolvedRows",
     "Unusable",
+    "Variants",
     "clashing",
     "examine_families",
     "family",
     "forget_installed",
+    "function_named",
     "list_registered",
     "list_skipped",
     "names",
@@ -213,3 +238,12 @@ __all__ = [
     "records",
     "register",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name when it is first needed: a list of the families needs none."""
+    if name not in _MODULE_BY_NAME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_MODULE_BY_NAME[name]), name)
+    globals()[name] = value
+    return value

@@ -7,6 +7,7 @@ over a curve, `requirements` compares with bounds, `metrics_json` writes border 
 
 from cfmkit.metrics.branch_views import Branch, MeasuringFrame
 from cfmkit.metrics.branches_cut_to_window import BranchTrace, Undefined, Window, restrict, traces
+from cfmkit.metrics.compare import MetricChange
 from cfmkit.metrics.definition import Definition
 from cfmkit.metrics.metric_definitions import (
     METRIC_TABLE,
@@ -43,6 +44,7 @@ __all__ = [
     "Cycle",
     "Definition",
     "MeasuringFrame",
+    "MetricChange",
     "Outcome",
     "Survey",
     "Undefined",

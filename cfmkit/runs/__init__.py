@@ -4,6 +4,8 @@ from importlib import import_module
 from typing import Any
 
 _NAMES_BY_MODULE = {
+    "explorer": "Explorer",
+    "explorer_server": "ExplorerServer",
     "suggest_api": "read_request",
 }
 _MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}

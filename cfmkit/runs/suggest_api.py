@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import Problem, SpecError
 from cfmkit.families.run_control import Run, read_time
 from cfmkit.runs.specfile import STDIN_PATH, content, rename_source, standard_input
-from cfmkit.runs.suggestion_record import as_json, exit_code, message
+from cfmkit.runs.suggestion_record import as_json
 from cfmkit.specs.yamlio import read_document
-from cfmkit.studies.suggest.search import Suggestions
+from cfmkit.studies.suggest.outcome_of_search import Suggestions
 from cfmkit.studies.suggest.spec import SuggestBlock, SuggestFile
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ class SuggestionsView(Suggestions):
     def __repr__(self) -> str:
         """Return the proposals in a line: family and variant of the first ten."""
         listed = [f"{proposal.family} {proposal.variant}"[:100] for proposal in self.listed[:10]]
-        return f"<Suggestions: {'; '.join([message(self), *listed])}>"
+        return f"<Suggestions: {'; '.join([self.message, *listed])}>"
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
@@ -174,4 +174,4 @@ class SuggestionsView(Suggestions):
 
         assert self.block is not None  # `answering`
         figures = {"proposals": lambda: to_one_scale(self.listed, self.request)} if self.listed else {}
-        return show_html(document_of(as_json(self, self.block), exit_code(self)), figures)
+        return show_html(document_of(as_json(self, self.block), self.exit_code), figures)

@@ -4,7 +4,11 @@ from importlib import import_module
 from typing import Any
 
 _NAMES_BY_MODULE = {
+    "adaptive_solution": "DrivenPart",
     "equilibrium": "SolidProblem",
+    "meshed_part": "HeldOrDriven Part rings_of",
+    "path_following": "PathEnd",
+    "plane_stress_law": "MATERIAL_LAWS",
     "stress_along_fillets": "FilletArc",
 }
 _MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}

@@ -14,7 +14,10 @@ from importlib import import_module
 from typing import Any
 
 _NAMES_BY_MODULE = {
+    "batch_sources_and_outcomes": "Entry",
     "choose_metrics_to_note": "metrics_of",
+    "comparison_of_fidelities": "choices_of compare",
+    "metric_changes_since_earlier_batch": "BatchComparison",
     "point_evaluation": "Study",
     "serial_and_cluster_executors": "Lost serial",
     "variable_paths": "leaf paths",

@@ -7,9 +7,8 @@ import pytest
 from parts_lists import assert_assembly_has_the_numbers_of_the_list, table
 
 import cfmkit
-from cfmkit.families import family
+from cfmkit.families import PIN_STRENGTH, family
 from cfmkit.families.cam.hardware import hardware
-from cfmkit.families.hardware import PIN_STRENGTH
 
 
 def bending_stress(moment: float, diameter: float) -> float:

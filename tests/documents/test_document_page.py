@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 import cfmkit
-from cfmkit.cli.output import Terminal
 from cfmkit.documents import run_document, sweep_document
 from cfmkit.documents.document import (
     BLANK_LINE,
@@ -35,13 +34,11 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 
 
 @pytest.fixture
-def printed(monkeypatch, capsys):
+def printed():
     """What a terminal of 40 columns, or as many as are given, prints of blocks."""
 
     def show(*blocks, width=40):
-        monkeypatch.setenv("COLUMNS", str(width))
-        Terminal().show(*blocks)
-        return capsys.readouterr().out
+        return printed_blocks(blocks, width)
 
     return show
 

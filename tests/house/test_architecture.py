@@ -12,8 +12,7 @@ import pytest
 from sources import PACKAGE as ROOT
 from sources import nodes, parsed, statements
 
-from cfmkit.families import family
-from cfmkit.families.base import Family
+from cfmkit.families import Family, family
 from cfmkit.families.deferred_imports import load_deferred
 
 if TYPE_CHECKING:

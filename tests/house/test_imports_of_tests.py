@@ -12,25 +12,7 @@ pytestmark = pytest.mark.lists
 
 TESTS = Path(__file__).parents[1]
 FAMILIES = ("beam", "cam", "slider_crank", "vcfm")
-OPEN_FOLDERS = {
-    "browser",
-    "cam",
-    "cli",
-    "contract",
-    "documents",
-    "experiment",
-    "export",
-    "house",
-    "metrics",
-    "plots",
-    "regression",
-    "runs",
-    "slider_crank",
-    "specs",
-    "stock",
-    "store",
-    "studies",
-}
+OPEN_FOLDERS = {"cli", "contract", "documents", "house", "regression", "runs"}
 """Folders that still import the inside of other packages."""
 
 

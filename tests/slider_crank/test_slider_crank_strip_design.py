@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,6 @@ from cfmkit.families.slider_crank.printed.audit import judge
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import joints
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import FoundStrip, Ranges, infeasible
-from cfmkit.numerics.sqp import Optimum, SearchEnding
 from cfmkit.results import Design, Status
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -33,7 +33,7 @@ def spec(name: str, *changes: str) -> Any:
 def found(task: StripTask, z: list[float]) -> FoundStrip:
     """Return a strip of two thicknesses as where a search ended."""
     form = Form(2, width=WIDTH)
-    end = Optimum(np.array(z), 0.0, np.zeros(0), SearchEnding.OPTIMUM, 1, 0.0)
+    end: Any = SimpleNamespace(z=np.array(z), feasible=True, ending=SimpleNamespace(value="ended"))
     return FoundStrip(task, form, Ranges(np.tile([0.5, 2.0], (2, 1)), 40 * MM), StripProgram(task, form), end, None)
 
 
@@ -70,10 +70,14 @@ def test_the_force_proposed_after_a_search_is_the_middle_of_the_band_that_all_st
 def test_a_search_for_the_smallest_ripple_that_stops_on_its_way_has_a_strip(monkeypatch: pytest.MonkeyPatch) -> None:
     """It had been infeasible, being off the force by more than the number that was minimised."""
 
-    def stopped(program: StripProgram, start: Any, *_: Any, **__: Any) -> Optimum:
+    descend = strip_thickness_search.descend
+
+    def stopped(program: StripProgram, start: Any, *given: Any, **more: Any) -> Any:
         z = np.append(start[:-1], 0.1)
         objective, rows = program.values(z)  # type: ignore[misc]
-        return Optimum(z, objective, rows, SearchEnding.STUCK, 1, 5e-3)
+        return replace(
+            descend(program, start, *given, **more), z=z, objective=objective, constraints=rows, allowed=5e-3
+        )
 
     monkeypatch.setattr(strip_thickness_search, "descend", stopped)
     task, ranges = replace(TASK, goal="ripple"), Ranges(np.tile([0.5, 2.0], (2, 1)), 40 * MM)

@@ -28,7 +28,7 @@ from cfmkit.families.slider_crank.printed.strip_thickness_search import (
     uniform_for_stroke,
     uniform_thickness,
 )
-from cfmkit.numerics.sqp import SearchEnding
+from cfmkit.numerics import SearchEnding
 
 TASK = StripTask(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)
 

@@ -13,7 +13,7 @@ from cfmkit.api import load
 from cfmkit.specs.yamlio.path_notation import with_value
 
 if TYPE_CHECKING:
-    from cfmkit.specs.spec import Spec
+    from cfmkit import Spec
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 FILES = sorted([*CONFIGS.glob("*.yaml"), *CONFIGS.glob("studies/*.yaml")])

@@ -4,7 +4,9 @@ from importlib import import_module
 from typing import Any
 
 _NAMES_BY_MODULE = {
+    "helical_spring_formulas": "HelicalSpring",
     "offer_type_and_generic_series": "generic",
+    "wire_materials": "WIRES_BY_NAME",
 }
 _MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}
 __all__ = [*_MODULE_BY_NAME]

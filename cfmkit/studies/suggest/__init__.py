@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import Any
 
 _NAMES_BY_MODULE = {
+    "proposal_making_and_judging": "Proposal ProposalJob make_proposal",
     "spec": "SuggestBlock",
 }
 _MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}

@@ -1,4 +1,4 @@
-"""Which files a batch takes, where they write, and the JUnit XML that comes of it."""
+"""Which files a batch takes, where they write, its tables, what it reuses, and what changed since an earlier one."""
 
 from __future__ import annotations
 
@@ -7,18 +7,12 @@ import os
 import re
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
+from batch_entries import ENTRIES, entry, hostile_entries
 
-import cfmkit
-from cfmkit.documents import html
-from cfmkit.documents.annotations import workflow_commands
-from cfmkit.documents.batch_document import document_of
-from cfmkit.documents.junit import junit
-from cfmkit.documents.markdown import plain, summary
 from cfmkit.errors import ExitCode, UsageError
-from cfmkit.metrics.compare import MetricChange
+from cfmkit.metrics import MetricChange
 from cfmkit.store import RunFolder, file_hash, origin
 from cfmkit.studies.batch_sources_and_outcomes import (
     Entry,
@@ -31,7 +25,7 @@ from cfmkit.studies.batch_sources_and_outcomes import (
 )
 from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 from cfmkit.studies.journal import Journal
-from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, changes_table
+from cfmkit.studies.metric_changes_since_earlier_batch import Earlier, changes, changes_table
 from cfmkit.tables import to_csv
 
 
@@ -128,76 +122,6 @@ def test_folders_differ_even_where_capitals_do_not_count():
     assert len({name.lower() for name in found}) == 2
 
 
-MET = {
-    "metric": "force_ripple", "value": 0.01, "min": None, "max": 0.05, "unit": "1", "over": [2.0, 240.0],
-    "over_unit": "mm", "ok": True, "sentence": "force ripple 1 %, allowed <= 5 %: ok",
-}  # fmt: skip
-MISSED = MET | {"metric": "force_mean[load]", "min": 49.0, "max": 51.0, "unit": "N", "over": None, "ok": False}
-ENTRIES = (
-    Entry("ok.yaml", "ok", "design", "cam", "fine", "complete", ExitCode.OK, "", (MET,), seconds=1.5),
-    Entry(
-        "missed.yaml", "missed", "analyze", "cam", "weak", "complete", ExitCode.REQUIREMENT_MISSED, "x", (MET, MISSED)
-    ),
-    Entry(
-        "bad.yaml", "bad", status="invalid", code=ExitCode.INVALID, message="1 fault", errors=("bad.yaml:1:1: \x00<&",)
-    ),
-    Entry("none.yaml", "none", "design", "cam", "n", "infeasible", ExitCode.NO_SOLUTION, "too stiff", (MISSED,)),
-    Entry("part.yaml", "part", "analyze", "cam", "p", "partial", ExitCode.PARTIAL, "ends early", (MET,)),
-    Entry("bug.yaml", "bug", status="bug", code=ExitCode.BUG, message="KeyError", bug="Traceback ..."),
-    Entry("left.yaml", "left", message="not run"),
-)
-
-
-def suites():
-    return {suite.get("name"): suite for suite in ElementTree.fromstring(junit(ENTRIES))}
-
-
-def ends(suite):
-    return [next((child.tag for child in case if child.tag != "system-out"), "passed") for case in suite]
-
-
-def test_junit_has_a_suite_for_each_specification_and_a_test_for_each_requirement():
-    found = suites()
-    assert list(found) == [one.spec for one in ENTRIES]
-    assert ends(found["ok.yaml"]) == ["passed", "passed"]
-    assert ends(found["missed.yaml"]) == ["passed", "passed", "failure"]
-    assert ends(found["bad.yaml"]) == ["error"]
-    assert ends(found["none.yaml"]) == ["failure", "skipped"]
-    assert ends(found["part.yaml"]) == ["failure", "passed"]
-    assert ends(found["bug.yaml"]) == ["error"]
-    assert ends(found["left.yaml"]) == ["skipped"]
-
-
-def test_the_counts_of_junit_are_those_of_its_tests():
-    root = ElementTree.fromstring(junit(ENTRIES))
-    for element in (root, *root):
-        cases = list(element.iter("testcase"))
-        assert int(element.get("tests")) == len(cases)
-        for key, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
-            assert int(element.get(key)) == len(list(element.iter(tag)))
-        assert float(element.get("time")) == pytest.approx(sum(float(case.get("time")) for case in cases))
-    assert float(root.get("time")) == 1.5
-
-
-def test_the_name_of_a_test_holds_the_requirement_and_never_the_value():
-    _, first, second = suites()["missed.yaml"]
-    assert first.get("name") == "force_ripple <= 0.05 over 2 ... 240 mm"
-    assert second.get("name") == "force_mean[load] >= 49 N and <= 51 N"
-    assert second.find("failure").get("message") == MISSED["sentence"]
-
-
-def test_the_same_requirement_twice_gives_two_tests():
-    entry = Entry("a.yaml", "a", "analyze", "cam", "a", "complete", ExitCode.OK, "", (MET, MET))
-    names = [case.get("name") for case in ElementTree.fromstring(junit([entry])).iter("testcase")]
-    assert len(set(names)) == 3
-
-
-def test_junit_survives_characters_that_xml_cannot_hold():
-    text = ElementTree.tostring(suites()["bad.yaml"], encoding="unicode")
-    assert "\x00" not in text
-    assert "&lt;&amp;" in text
-
-
 def test_the_tables_have_a_row_for_each_specification_and_each_requirement():
     table = results_table(ENTRIES)
     assert list(table["spec"]) == [one.spec for one in ENTRIES]
@@ -210,46 +134,21 @@ def test_the_tables_have_a_row_for_each_specification_and_each_requirement():
 HOSTILE = "=cmd\x1b[31m\x07\r\n\t\x9b\u202e@.yaml"
 
 
-def test_no_table_and_no_report_holds_a_raw_control_character():
-    warned = {"name": HOSTILE, "message": HOSTILE}
-    known = {"metric": HOSTILE, "min": None, "max": 1.0, "unit": "1", "over": None, "over_unit": None}
-    missed = known | {"value": 2.0, "ok": False, "sentence": HOSTILE}
-    fields = dict.fromkeys(("spec", "folder", "verb", "family", "name", "status", "message"), HOSTILE)
-    ends = {"code": ExitCode.REQUIREMENT_MISSED, "requirements": (missed,), "warnings": (warned,)}
-    entries = [Entry(**fields, **ends), Entry(**fields, code=ExitCode.INVALID, errors=(HOSTILE,))]
-    changed = (MetricChange(HOSTILE, HOSTILE, HOSTILE, 1.0, HOSTILE, None, True),)
-    written = {
-        "results": to_csv(results_table(entries)),
-        "requirements": to_csv(requirements_table(entries)),
-        "changes": to_csv(changes_table(changed)),
-        "summary": summary(entries, BatchComparison(HOSTILE, 0.1, changed, (HOSTILE,))),
-        "junit": junit(entries),
-        "annotations": "\n".join(workflow_commands(entries, lambda name, number: (0, 0), changed)).encode(),
-        "page": html.page(document_of(entries, ExitCode.INVALID), command=HOSTILE),
-    }
-    for name, data in written.items():
-        raw = {char for char in data.decode() if not char.isprintable()}
-        assert raw <= {"\n"}, name
-    for name in ("results", "requirements", "changes"):
-        assert "'=cmd" in written[name].decode()
-        assert not re.search(r"(^|,|\")[=@]", written[name].decode(), re.MULTILINE)
+def assert_is_printable(data, name):
+    raw = {char for char in data.decode() if not char.isprintable()}
+    assert raw <= {"\n"}, name
 
 
-def test_a_summary_mentions_nobody_and_links_nowhere():
-    assert plain("@somebody") != "@somebody"
-    for hostile in (
-        "@somebody",
-        "a @b/c",
-        "https://evil.example",
-        "www.evil.example",
-        "#1",
-        "$x$",
-        "= x",
-        "- x",
-        "+ x",
-    ):
-        text = plain(hostile)
-        assert not re.search(r"@\w|://|www\.|(?<!\\)[#$](?!8203)|^[-=+]", text)
+HOSTILE_CHANGE = MetricChange(HOSTILE, HOSTILE, HOSTILE, 1.0, HOSTILE, None, True)
+
+
+def test_no_table_holds_a_raw_control_character_or_a_formula():
+    entries = hostile_entries(HOSTILE)
+    for table in (results_table(entries), requirements_table(entries), changes_table((HOSTILE_CHANGE,))):
+        written = to_csv(table)
+        assert_is_printable(written, "table")
+        assert "'=cmd" in written.decode()
+        assert not re.search(r"(^|,|\")[=@]", written.decode(), re.MULTILINE)
 
 
 def test_the_message_counts_every_end():
@@ -355,18 +254,50 @@ def test_what_was_saved_while_it_was_computed_is_not_kept(tmp_path, monkeypatch)
     assert recalled() is None
 
 
-def test_python_runs_a_batch_and_reuses_what_an_earlier_one_has_finished(tmp_path):
+def compared(tmp_path, before, after, outcome=None, **more):
+    (tmp_path / "a").mkdir(exist_ok=True)
+    (tmp_path / "a" / "metrics.json").write_text(json.dumps({"metrics": after}))
+    known = {"a": Earlier("complete", 0, before)}
+    return [(change.name, change.beyond) for change in changes(known, [outcome or entry()], str(tmp_path), **more)]
 
-    configs = Path(__file__).parents[2] / "configs"
-    (tmp_path / "good.yaml").write_text((configs / "cam.yaml").read_text())
-    (tmp_path / "bad.yaml").write_text("cfmkit: 1\nfamily: cam\n")
-    first = cfmkit.batch(tmp_path, tmp_path / "out", plots=False, changes=["analysis.points=61"])
-    again = cfmkit.batch([tmp_path / "*.yaml"], tmp_path / "out", plots=False, changes=["analysis.points=61"])
-    assert first.exit_code == cfmkit.ExitCode.INVALID
-    assert [(one.name, one.status) for one in first.entries] == [("", "invalid"), ("sanchez-salinas-2022", "complete")]
-    assert [one.reused for one in first.entries + again.entries] == [False, False, False, True]
-    assert first.table["status"] == ("invalid", "complete")
-    assert first.summary == json.loads((tmp_path / "out" / "metrics.json").read_text())
-    assert (tmp_path / "out" / "good" / "design.yaml").exists()
-    with pytest.raises(cfmkit.UsageError, match="no such file"):
-        cfmkit.batch(tmp_path / "none.yaml", tmp_path / "out")
+
+def value(number, unit="N"):
+    return {"value": number, "unit": unit}
+
+
+def test_only_what_differs_by_more_than_rounding_is_a_change(tmp_path):
+    before = {"f": value(10.0), "zero": value(1e-14), "gone": value(1.0), "kind": value("stable"), "none": value(None)}
+    after = {"f": value(10.0 * (1 + 1e-8)), "zero": value(-3e-13), "gone": value(None), "kind": value("bistable")}
+    after |= {"none": value(None), "new": value(3.0)}
+    found = compared(tmp_path, before, after)
+    assert found == [("f", False), ("gone", True), ("kind", True), ("new", True)]
+    assert compared(tmp_path, {"f": value(10.0)}, {"f": value(10.2)}, tolerance=0.05) == [("f", False)]
+    assert compared(tmp_path, {"f": value(10.0)}, {"f": value(10.2)}, tolerance=0.01) == [("f", True)]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "relative", "said"),
+    [
+        (10.0, 20.0, 1.0, "f: 10 -> 20 N (+100 %)"),
+        (10.0, 5.0, -0.5, "f: 10 -> 5 N (-50 %)"),
+        (-10.0, -5.0, 0.5, "f: -10 -> -5 N (+50 %)"),
+        (-10.0, -20.0, -1.0, "f: -10 -> -20 N (-100 %)"),
+        (0.0, 2.0, None, "f: 0 -> 2 N"),
+    ],
+)
+def test_a_change_is_a_share_of_what_it_was(tmp_path, before, after, relative, said):
+    """A force that doubled was reported as +50 %: relative to the larger of both."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "metrics.json").write_text(json.dumps({"metrics": {"f": value(after)}}))
+    (found,) = changes({"a": Earlier("complete", 0, {"f": value(before)})}, [entry()], str(tmp_path))
+    assert (found.relative, found.sentence, found.beyond) == (relative, said, True)
+
+
+def test_a_run_that_ends_otherwise_is_a_change_whatever_its_metrics(tmp_path):
+    failed = entry(status="no_equilibrium", code=ExitCode.NO_SOLUTION)
+    assert compared(tmp_path, {}, {}, failed) == [("status", True)]
+
+
+def test_a_complete_curve_that_misses_a_requirement_now_is_a_change_in_words(tmp_path):
+    (found,) = changes({"a": Earlier("complete", 0, {})}, [entry(code=ExitCode.REQUIREMENT_MISSED)], str(tmp_path))
+    assert found.sentence == "status: complete -> requirement missed"
