@@ -9,6 +9,7 @@ from typing import Any
 
 _NAMES_BY_MODULE = {
     "comparison": "compare",
+    "value_definitions": "define_recorded_values",
 }
 _MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}
 __all__ = [*_MODULE_BY_NAME]

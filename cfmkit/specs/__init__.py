@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve as TargetCurve
     from cfmkit.specs.keys_and_schema import keys as keys
+    from cfmkit.specs.keys_and_schema import schema as schema
     from cfmkit.specs.spec import Analysis as Analysis
     from cfmkit.specs.spec import Model as Model
     from cfmkit.specs.spec import PositiveForce as PositiveForce
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 _NAMES_BY_MODULE = {
     "evaluable_target_curve": "TargetCurve",
-    "keys_and_schema": "keys",
+    "keys_and_schema": "keys schema",
     "spec": "Analysis Model PositiveForce PositiveLength Requirement Spec",
     "study_spec": "Sensitivity Sweep",
 }

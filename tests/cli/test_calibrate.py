@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.experiment.calibration import resolve_spec
+import cfmkit.api
 
 FIT = ("--fit", "mechanism.rolling_friction,mechanism.rest_half_width")
 
@@ -18,7 +18,7 @@ FIT = ("--fit", "mechanism.rolling_friction,mechanism.rest_half_width")
 @pytest.fixture
 def rig(cli, cam):
     """A recording that the model made with mu = 0.00225 and 0.5 mm more rest length, and 0.1 N of normal noise."""
-    spec = resolve_spec(cfmkit.load(cli.folder / cam))
+    spec = cfmkit.api.resolve(cfmkit.load(cli.folder / cam))
     spec = spec.replace({"mechanism.rolling_friction": 0.00225, "mechanism.rest_half_width": 0.06825})
     curve = cfmkit.analyze(spec).curve
     good = np.isfinite(curve.force)

@@ -95,7 +95,6 @@ def test_quick_examples_are_run_first_and_can_be_run_alone(cli, monkeypatch):
     from types import SimpleNamespace
 
     from cfmkit.errors import ExitCode
-    from cfmkit.runs import batch
 
     ran = []
 
@@ -104,7 +103,7 @@ def test_quick_examples_are_run_first_and_can_be_run_alone(cli, monkeypatch):
         entries = tuple(SimpleNamespace(status="complete", code=ExitCode.OK, message="") for _ in files)
         return SimpleNamespace(entries=entries, exit_code=ExitCode.OK)
 
-    monkeypatch.setattr(batch, "batch", instead)
+    monkeypatch.setattr("cfmkit.runs.batch.batch", instead)
     every, quick = cli("examples", "--run", "all"), cli("examples", "--run", "quick")
     searches = {one.name for one in cfmkit.examples() if one.searches}
     assert {"beam_design_arch", "beam_design_lan", "beam_lan_rising"} == searches == set(ran[0][-3:])

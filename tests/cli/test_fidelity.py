@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit import Run
+from cfmkit.studies import choices_of, compare
 from cfmkit.tables import read_csv
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -61,9 +63,6 @@ def test_the_numbers_are_those_of_the_curves_in_the_table(cli, moving):
 
 def test_from_rest_to_rest_inertia_takes_no_work():
     """The mean times the stroke is the work of the difference: kinetic energy begins and ends at zero."""
-    from cfmkit import Run
-    from cfmkit.studies.comparison_of_fidelities import choices_of, compare
-
     spec = cfmkit.load(CONFIGS / "cam_dynamics.yaml")
     spec = spec.replace({"analysis.dynamics.points": 20001, "analysis.points": 20001})
     found = compare(cfmkit.analyze(spec), choices_of(spec), Run()).metrics()

@@ -18,8 +18,6 @@ import cfmkit
 from cfmkit import families
 from cfmkit.cli import shell_completion
 from cfmkit.cli.main import main
-from cfmkit.studies.serial_and_cluster_executors import serial
-from cfmkit.studies.suggest import search
 
 SPRINGS = str(plugin_support.PLUGINS[0] / "configs" / "oblique_carrella2007.yaml")
 
@@ -87,7 +85,7 @@ def test_a_family_has_its_article(monkeypatch):
         cfmkit.design(SPRINGS)
     with pytest.raises(cfmkit.UsageError, match=r"^an oblique mechanism has no part"):
         cfmkit.drawing(SPRINGS)
-    from cfmkit.studies.comparison_of_fidelities import choices_of
+    from cfmkit.studies import choices_of
 
     with pytest.raises(cfmkit.UsageError, match=r": an oblique mechanism has only one model"):
         choices_of(cfmkit.load(SPRINGS))
@@ -100,11 +98,16 @@ LINE = "warning  the family 'broken' of the package broken-one 1.0 cannot be use
 REQUEST = ("suggest", "--force", "10 N", "--travel", "3 mm", "--envelope", "80x60x6mm", "-o", "out", "--no-plots")
 
 
+def one_by_one(work, jobs, _stopping):
+    """Do jobs in this process."""
+    yield from ((job, work(job)) for job in jobs)
+
+
 @pytest.mark.parametrize("arguments", [("show",), ("show", "references"), ("show", "pla"), ("schema",), REQUEST])
 def test_a_verb_that_tells_of_all_families_skips_a_broken_one_with_one_line(site, arguments, capsys, monkeypatch):
     """Of the request in this process, and without the families of cfmkit, which search for seconds."""
-    monkeypatch.setattr(search, "names", lambda: ("oblique", "broken"))
-    monkeypatch.setattr(search, "give_up_at", lambda _executor, _deadline: serial)
+    monkeypatch.setattr("cfmkit.studies.suggest.search.names", lambda: ("oblique", "broken"))
+    monkeypatch.setattr("cfmkit.studies.suggest.search.give_up_at", lambda _executor, _deadline: one_by_one)
     packages.install(site, "broken-one", "import nowhere_to_be_found\n", "broken")
     code = 4 if arguments is REQUEST else 0
     assert main(list(arguments)) == code

@@ -9,7 +9,7 @@ import pytest
 from sources import calls_of
 
 from cfmkit.cli import show_topics
-from cfmkit.experiment.value_definitions import define_recorded_values
+from cfmkit.experiment import define_recorded_values
 
 pytestmark = pytest.mark.lists
 

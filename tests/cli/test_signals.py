@@ -10,10 +10,8 @@ import time
 
 import pytest
 
-from cfmkit import Run
 from cfmkit.cli.failures import Stopped
 from cfmkit.cli.run_study_in_folder import open_journal
-from cfmkit.runs.run import long_run
 from cfmkit.store import RunFolder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
@@ -74,23 +72,6 @@ def test_an_interrupted_run_is_a_json_document_too(cli, cam):
     assert process.returncode == 130
     assert b'"status": "interrupted"' in out
     assert b'"exit_code": 130' in out
-
-
-@pytest.mark.parametrize("finished", [True, False])
-def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finished):
-    """It does where a start is noted; a design that keeps nothing begins anew, and says so."""
-    reported = []
-    with RunFolder(tmp_path / "out") as folder:
-        try:
-            with long_run(1, False, folder, Run(), open_journal) as run:
-                if finished:
-                    run.notes.add("0" * 32, {"found": {}})
-                raise Stopped(signal.SIGTERM)
-        except Stopped as stop:
-            reported.append(stop.reported)
-    more = "what is finished is kept: run the same command again to continue"
-    anew = "nothing that could be reused is finished yet: the same command starts from the beginning"
-    assert reported == [f"terminated; {more if finished else anew}"]
 
 
 AT_LINE = """
@@ -290,3 +271,20 @@ def test_a_signal_in_code_that_lets_no_exception_out_still_ends_the_run():
     """As in a compiler's callbacks: nothing is printed of them, and the signal comes again when they are over."""
     done = subprocess.run([sys.executable, "-c", LOST], capture_output=True, text=True, timeout=60, check=False)
     assert (done.stdout, done.stderr) == ("went on\nterminated\n", "")
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finished):
+    """It does where a start is noted; a design that keeps nothing begins anew, and says so."""
+    reported = []
+    with RunFolder(tmp_path / "out") as folder:
+        try:
+            with open_journal(folder, fresh=False) as journal:
+                if finished:
+                    journal.add("0" * 32, {"found": {}})
+                raise Stopped(signal.SIGTERM)
+        except Stopped as stop:
+            reported.append(stop.reported)
+    more = "what is finished is kept: run the same command again to continue"
+    anew = "nothing that could be reused is finished yet: the same command starts from the beginning"
+    assert reported == [f"terminated; {more if finished else anew}"]

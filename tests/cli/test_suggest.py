@@ -9,10 +9,11 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
+from suggest_support import request_of, small_block
 
 import cfmkit
 from cfmkit.cli.main import main
-from cfmkit.cli.verbs.suggest import SuggestOptions, keys, parse_envelope, seconds
+from cfmkit.cli.verbs.suggest import REQUEST_KEYS, SuggestOptions, keys, parse_envelope, seconds
 from cfmkit.errors import UsageError
 
 REQUESTS = Path(__file__).parents[1] / "requests"
@@ -153,3 +154,16 @@ def test_a_room_and_a_time_may_be_written_short():
     assert seconds("2 min") == 120.0
     with pytest.raises(UsageError):
         seconds("0s")
+
+
+def test_every_key_of_a_request_is_an_option_and_reaches_families_under_its_name():
+    assert set(REQUEST_KEYS) == set(type(small_block()).model_fields)
+    stated = {
+        "force": "20 N", "travel": "10 mm", "ripple": "3 %", "envelope": "[100 mm, 90 mm, 20 mm]", "process": "laser",
+        "adjustable": "[15 N, 25 N]", "hysteresis": "7 %", "springs": "custom", "safety": "1.7", "cycles": "12345",
+        "overload": "60 N",
+    }  # fmt: skip
+    request = request_of(stated)
+    assert (request.travel, request.ripple, request.envelope) == (0.01, 0.03, (0.1, 0.09, 0.02))
+    assert (request.process, request.adjustable, request.hysteresis) == ("laser", (15.0, 25.0), 0.07)
+    assert (request.springs, request.safety, request.cycles, request.overload) == ("custom", 1.7, 12345, 60.0)

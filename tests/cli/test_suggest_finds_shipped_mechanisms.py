@@ -5,14 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from suggest_support import proposal_of, propose, request_of
 
 import cfmkit
-from cfmkit import Run
 from cfmkit.families import family
 from cfmkit.metrics import window_of
-from cfmkit.runs.suggest_api import read_request
-from cfmkit.studies.suggest import search
-from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, make_proposal
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SLACK = 1.01
@@ -116,10 +113,10 @@ def test_a_strip_of_half_the_size_is_found_by_its_own_numbers():
 
 def assert_suggested(name, keys):
     """Fail unless a candidate of a family does what is required by the model of its designs."""
-    request = read_request(None, keys).request()
-    offer, refused = search.offer_of(family(name), request, Run()), []
+    request = request_of(keys)
+    offer, refused = propose(name, request), []
     for candidate in offer.candidates:
-        proposal = make_proposal(ProposalJob(name, candidate, request, seed=0))
+        proposal = proposal_of(name, candidate, request)
         if proposal.passes:
             return
         refused.append((candidate.variant, *proposal.missed, proposal.message))

@@ -17,8 +17,7 @@ from cfmkit.documents.junit import junit
 from cfmkit.documents.markdown import plain, summary
 from cfmkit.errors import ExitCode
 from cfmkit.metrics import MetricChange
-from cfmkit.studies.batch_sources_and_outcomes import Entry
-from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
+from cfmkit.studies import BatchComparison, Entry
 
 
 def suites():

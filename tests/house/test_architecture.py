@@ -12,8 +12,7 @@ import pytest
 from sources import PACKAGE as ROOT
 from sources import nodes, parsed, statements
 
-from cfmkit.families import Family, family
-from cfmkit.families.deferred_imports import load_deferred
+from cfmkit.families import Family
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -178,38 +177,6 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
         assert not [name for name in top_level_imports(path) if name.startswith(heavy)], path
 
 
-ROOMS = {
-    "design.make": "design",
-    "draw.figures": "figures",
-    "outline": "outline",
-    "propose": "proposals",
-    "part": "part",
-    "free": "redesign_variables_and_process_errors",
-    "errors": "redesign_variables_and_process_errors",
-    "sample": "force_at_few_poses",
-    "elastic.solids": "plane_fem_analysis",
-}
-"""Field of a family's record -> the file that every family has it in."""
-
-
-@pytest.mark.parametrize("name", ["beam", "cam", "slider-crank", "vcfm"])
-def test_every_family_has_the_same_rooms(name):
-    record, folder = family(name), f"cfmkit.families.{name.replace('-', '_')}"
-    homes = {}
-    for field in ROOMS:
-        above, _, last = field.rpartition(".")
-        part = getattr(record, above) if above else record
-        if part is not None and getattr(part, last) is not None:
-            homes[field] = load_deferred(getattr(part, last)).__module__
-    assert len(homes) > 6
-    inner = {field: home.removeprefix(f"{folder}.").removeprefix("printed.") for field, home in homes.items()}
-    assert inner == {field: ROOMS[field] for field in homes}
-    assert record.folder == folder.replace(".", "/")
-    assert all(record.file(name) for name in ("dimensions.svg", "template.yaml", "references.bib"))
-    for room in ("spec", "findings"):
-        assert (ROOT / "families" / folder.rpartition(".")[2] / f"{room}.py").exists()
-
-
 def test_the_record_of_a_family_is_short():
     assert len(fields(Family)) <= 20
 
@@ -224,22 +191,6 @@ def test_no_one_asks_which_family_it_is():
                 )
                 literal = any(isinstance(side, ast.Constant) and isinstance(side.value, str) for side in sides)
                 assert not (named and literal), f"{path}:{node.lineno}: {ast.unparse(node)}"
-
-
-def test_no_one_asks_for_a_kind_of_leaf_or_spring_by_its_name():
-    """Kinds of the vcfm are records: a new one is its file, and its line in the tables of `leaves_spec`."""
-    from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
-
-    names = {*LEAF_KINDS, *SPRING_KINDS}
-    asked = {}
-    for path in (ROOT / "families" / "vcfm").rglob("*.py"):
-        for node in nodes(path):
-            sides = [node.left, *node.comparators] if isinstance(node, ast.Compare) else []
-            sides += [one for one in node.keys if one is not None] if isinstance(node, ast.Dict) else []
-            words = {one.value for side in sides for one in ast.walk(side) if isinstance(one, ast.Constant)}
-            if names & words:
-                asked[f"{path.name}:{node.lineno}"] = ast.unparse(node)
-    assert asked == {}
 
 
 def longest_function(path: Path) -> tuple[int, str]:
@@ -275,15 +226,3 @@ def test_kinds_of_drives_shapes_springs_and_loads_are_records_and_not_compared_b
     """A new one is its class, and its name in the union beside it."""
     compared = re.compile(r"\b(drive|shape|spring|load)\.kind (==|!=|in|not in)\b")
     assert [path.name for path in SOURCES if compared.search(path.read_text(encoding="utf-8"))] == []
-
-
-def test_every_kind_of_shape_spring_and_load_builds_what_the_engine_has():
-    from typing import get_args
-
-    from cfmkit.families.beam.network_elements_spec import Load, LoadSpec, SpringElement, SpringSpec
-    from cfmkit.families.beam.shapes_spec import Shape, ShapeSpec
-
-    for union, base in ((ShapeSpec, Shape), (SpringSpec, SpringElement), (LoadSpec, Load)):
-        kinds = get_args(get_args(union)[0])
-        assert len(kinds) > 1
-        assert all(issubclass(kind, base) and kind.build is not base.build for kind in kinds)

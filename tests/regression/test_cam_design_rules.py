@@ -7,8 +7,6 @@ import pytest
 from cam_support import MM, analyze, at, cam, fixed
 from scipy.integrate import quad
 
-from cfmkit.families.cam.mechanism_from_spec import assemble
-
 A = 9.058 * MM
 
 
@@ -68,7 +66,7 @@ def change(spec, **changes):
     """Return the change of the force in percent at the same slider positions."""
     longer = spec.replace({"mechanism.profile.stroke": 250 * MM})
     other = fixed(longer, **changes)
-    shift = assemble(spec).track.start - assemble(other).track.start
+    shift = analyze(spec).state.assembly.track.start - analyze(other).state.assembly.track.start
     return 100 * (at(other, PLACES + shift).force / at(spec, PLACES).force - 1)
 
 
@@ -123,7 +121,7 @@ def carrying_weight(force=50.0):
 
 def test_a_gravity_compensated_path_has_its_closed_form():
     spec, force = carrying_weight(), 50.0
-    path = assemble(spec).profile.path
+    path = analyze(spec).state.assembly.profile.path
     x = np.linspace(68, 130, 63) * MM
     stiffness, brace = (force - SLIDER_WEIGHT) / (4 * A), 0.2
     height, height0 = np.sqrt(brace**2 - x**2), np.sqrt(brace**2 - (68 * MM) ** 2)
@@ -173,7 +171,7 @@ def test_the_contact_force_over_the_slider_force_spans_the_tabulated_range():
 
 @pytest.fixture(scope="module")
 def flank():
-    profile = assemble(cam()).profile
+    profile = analyze(cam()).state.assembly.profile
     law = profile.path.law
 
     def radius(x):

@@ -9,10 +9,6 @@ import pytest
 from cam_support import take_gravity_of_the_note
 
 import cfmkit
-from cfmkit.studies.engine import run
-from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare, summary_of
-from cfmkit.studies.tables import results_csv
-from cfmkit.tables import read_csv
 
 FOLDER = Path(__file__).parents[2] / "configs/studies"
 EFFECT = "angle_error_effect"
@@ -25,10 +21,9 @@ def _gravity_of_the_note(monkeypatch):
 
 def swept(name, **changes):
     """Return the rows of a study of the cam in motion; every point is solved and meets the requirements."""
-    records = run(prepare(cfmkit.load(FOLDER / f"{name}.yaml").replace(changes), SweepRequest()))
-    summary = summary_of(records)
-    table = read_csv(b"".join(results_csv(records, summary.add)))
-    assert summary.exit_code() == 0
+    found = cfmkit.sweep(cfmkit.load(FOLDER / f"{name}.yaml").replace(changes))
+    assert found.summary["status"] == "complete"
+    table = found.table
     assert set(table["status"]) == {"complete"}
     return table
 

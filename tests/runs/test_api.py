@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit import families
-from cfmkit.documents import run_outcome
+from cfmkit import Run, families, specs
 from cfmkit.errors import ExitCode, SpecError
-from cfmkit.results import Design, Finding, Result, Status
+from cfmkit.results import Result, Status
 from cfmkit.runs import specfile
 from cfmkit.runs.files_a_run_writes import files
+from cfmkit.runs.run import run_design
 from cfmkit.runs.specfile import read_spec
-from cfmkit.specs import keys_and_schema as keys
 from cfmkit.specs.yamlio import read_document
 
 CAM = Path(__file__).parents[2] / "configs" / "cam.yaml"
@@ -121,50 +120,10 @@ def test_progress_never_falls_where_a_run_looks_again():
     assert [text for _, text in told] == ["0.5", "0.2", "0.05", "0.3", "0.1", "1"]
 
 
-@pytest.mark.parametrize(
-    ("codes", "first"),
-    [
-        ([], ExitCode.OK),
-        ([ExitCode.OK, ExitCode.REQUIREMENT_MISSED], ExitCode.REQUIREMENT_MISSED),
-        ([ExitCode.REQUIREMENT_MISSED, ExitCode.PARTIAL], ExitCode.PARTIAL),
-        ([ExitCode.PARTIAL, ExitCode.NO_SOLUTION], ExitCode.NO_SOLUTION),
-        ([ExitCode.NO_SOLUTION, ExitCode.INVALID], ExitCode.INVALID),
-        ([ExitCode.INVALID, ExitCode.IO], ExitCode.IO),
-        ([ExitCode.IO, ExitCode.BUG], ExitCode.BUG),
-        ([ExitCode.OK, ExitCode.INTERRUPTED], ExitCode.INTERRUPTED),
-    ],
-)
-def test_of_several_exit_codes_the_gravest_counts(codes, first):
-    assert run_outcome.worst(codes) is first
-    assert run_outcome.worst(codes[::-1]) is first
-
-
-def test_a_report_without_a_curve_has_no_metrics_and_misses_its_requirements(spec):
-    found = run_outcome.report_on(Result(spec, Status.INFEASIBLE, "too much"))
-    assert found.metrics == {}
-    assert len(found.missed) == len(spec.requirements)
-    assert found.exit_code is ExitCode.NO_SOLUTION
-    assert found.as_json()["message"] == "too much"
-    assert [name for name, _ in files(found)] == ["metrics.json", "resolved.yaml"]
-
-
-def test_warnings_of_design_and_analysis_are_told_once(spec):
-    one, other = Finding("a", "first"), Finding("b", "second")
-    result = Result(spec, Status.COMPLETE, warnings=(other, one))
-    found = run_outcome.Report(result, {}, (), Design(spec, Status.COMPLETE, warnings=(one,)))
-    assert found.warnings == (one, other)
-    assert found.as_json()["warnings"] == [{"name": "a", "message": "first"}, {"name": "b", "message": "second"}]
-
-
-def test_not_a_number_never_reaches_a_file():
-    with pytest.raises(ValueError, match="Out of range float values"):
-        run_outcome.json_bytes({"value": np.nan})
-
-
 def test_the_schema_of_several_families_keeps_their_blocks_apart():
     cam = families.family("cam").spec_type
-    alone = keys.schema({"cam": cam})
-    both = keys.schema({"cam": cam, "other": cam})
+    alone = specs.schema({"cam": cam})
+    both = specs.schema({"cam": cam, "other": cam})
     assert [one["properties"]["mechanism"]["$ref"] for one in both["oneOf"]] == [
         "#/$defs/cam.Mechanism",
         "#/$defs/other.Mechanism",
@@ -186,7 +145,7 @@ def references(node):
 
 def test_every_reference_of_a_schema_leads_somewhere():
     for names in (["cam"], list(families.names())):
-        schema = keys.schema({name: families.family(name).spec_type for name in names})
+        schema = specs.schema({name: families.family(name).spec_type for name in names})
         assert {name.removeprefix("#/$defs/") for name in references(schema)} <= set(schema["$defs"])
 
 
@@ -303,3 +262,9 @@ def test_the_place_of_what_a_base_says_is_where_the_base_is_named(tmp_path):
     (tmp_path / "own.yaml").write_text("name: mine\nbase: cam.yaml\n")
     document = read_spec(str(tmp_path / "own.yaml"))
     assert (document.place("requirements.0"), document.place("name")) == ((2, 7), (1, 7))
+
+
+def test_a_run_without_a_curve_writes_its_numbers_and_its_specification(spec):
+    report = run_design(spec.replace({"design.stroke": "2 m"}), Run())
+    assert report.status is Status.INFEASIBLE
+    assert [name for name, _ in files(report)] == ["metrics.json", "resolved.yaml"]

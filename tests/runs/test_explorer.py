@@ -14,9 +14,7 @@ from pathlib import Path
 import pytest
 
 import cfmkit
-from cfmkit.cli.failures import report_failure
-from cfmkit.cli.output import Terminal
-from cfmkit.cli.verbs.explore import ExploreOptions, run
+from cfmkit.cli import run_command
 from cfmkit.errors import OutputError, UsageError
 from cfmkit.runs import explorer_server
 from cfmkit.runs.explorer import Explorer, suggested_name
@@ -152,20 +150,32 @@ def test_a_malformed_request_is_refused_and_the_next_one_answered(served, data):
     assert asked(served, data={"changes": []}, **token)[0] == 200
 
 
-@pytest.mark.parametrize("verbose", [0, 2])
-def test_a_bug_is_one_line_for_the_page_and_its_traceback_is_not_lost(served, monkeypatch, capsys, verbose):
-    def broken(*_):
-        raise KeyError("analysis.window")
+def broken(*_):
+    raise KeyError("analysis.window")
 
-    terminal = Terminal(verbose=verbose)
+
+def test_a_bug_is_one_line_for_the_page(served, monkeypatch):
     monkeypatch.setattr(served.explorer.__class__, "answer", broken)
-    monkeypatch.setattr(served, "failed", lambda error: report_failure(error, terminal))
+    monkeypatch.setattr(served, "failed", lambda _error: None)
     status, found = asked(served, data={"changes": []}, **{"X-Token": served.token})
     assert status == 500
     assert json.loads(found) == {"problem": ["a bug in cfmkit: KeyError: 'analysis.window'"]}
+
+
+@pytest.mark.parametrize("options", [(), ("-vv",)])
+def test_the_traceback_of_a_bug_is_not_lost(explorer, monkeypatch, capsys, options):
+    def serve(server):
+        try:
+            broken()
+        except KeyError as error:
+            server.failed(error)
+
+    monkeypatch.setattr("webbrowser.open", lambda _url: True)
+    monkeypatch.setattr(ExplorerServer, "serve_forever", serve)
+    run_command(["explore", explorer.source, *options])
     err = capsys.readouterr().err
     assert err.endswith("error    this is a bug in cfmkit: KeyError: 'analysis.window'; -vv shows where\n")
-    assert ('raise KeyError("analysis.window")' in err) == (verbose == 2)
+    assert ('raise KeyError("analysis.window")' in err) == bool(options)
 
 
 def test_a_page_that_is_closed_before_its_answer_leaves_no_traceback(served, monkeypatch, capsys):
@@ -364,7 +374,7 @@ def test_the_token_is_not_on_the_command_line_of_the_browser(explorer, monkeypat
 
     monkeypatch.setattr("webbrowser.open", browse)
     monkeypatch.setattr(ExplorerServer, "serve_forever", lambda self: opened.append(self.token))
-    run(ExploreOptions(spec=explorer.source), Terminal(quiet=True))
+    assert run_command(["explore", explorer.source]) == 0
     (url, path, mode, text), token = opened
     assert mode == 0o600
     assert token not in url
@@ -390,7 +400,7 @@ def test_an_explorer_without_room_for_that_file_still_says_its_address(explorer,
     monkeypatch.setattr("tempfile.mkstemp", full)
     monkeypatch.setattr("webbrowser.open", lambda _url: pytest.fail("opened"))
     monkeypatch.setattr(ExplorerServer, "serve_forever", lambda self: None)
-    run(ExploreOptions(spec=explorer.source), Terminal())
+    assert run_command(["explore", explorer.source]) == 0
     found = capsys.readouterr()
     assert "?token=" in found.out
     assert found.err == "warning  no browser is opened (the disk is full): open the address above\n"

@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from made_parts import TAPERED, TOLERANCES, toleranced_cam
 
 import cfmkit
 from cfmkit import Run
 from cfmkit.errors import SpecError
 from cfmkit.runs.run import run_analysis, run_design
-
-TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
-
-
-def cam(**keys):
-    spec = cfmkit.load("configs/cam.yaml")
-    spec = spec.replace({f"design.{key}": value for key, value in ({"tolerances": TOLERANCES} | keys).items()})
-    return spec
 
 
 def with_yield(spec, least):
@@ -23,7 +16,7 @@ def with_yield(spec, least):
 
 
 def test_the_yield_is_that_of_the_tolerance_study_of_the_design():
-    found = run_design(cam(samples=120), Run(3))
+    found = run_design(toleranced_cam(samples=120), Run(3))
     design = found.design.spec
     study = cfmkit.sensitivity(design, method="tolerance", parameters=TOLERANCES, samples=120, seed=3)
     assert 0.05 < found.metrics["yield"].value < 0.95
@@ -32,34 +25,17 @@ def test_the_yield_is_that_of_the_tolerance_study_of_the_design():
 
 
 def test_a_requirement_on_the_yield_decides_the_exit_code_and_keeps_its_place():
-    missed = run_design(with_yield(cam(samples=60), "99 %"), Run())
+    missed = run_design(with_yield(toleranced_cam(samples=60), "99 %"), Run())
     assert [one.metric for one in missed.requirements][-1] == "yield"
     assert int(missed.exit_code) == 5
-    assert int(run_design(with_yield(cam(samples=60), "5 %"), Run()).exit_code) == 0
+    assert int(run_design(with_yield(toleranced_cam(samples=60), "5 %"), Run()).exit_code) == 0
 
 
 def test_an_analysis_does_not_judge_a_yield():
-    spec = with_yield(cam(), "99 %")
+    spec = with_yield(toleranced_cam(), "99 %")
     found = run_analysis(spec, Run())
     assert len(found.requirements) == len(spec.requirements) - 1
     assert int(found.exit_code) == 0
-
-
-TAPERED = """
-cfmkit: 1
-family: beam
-name: tapered
-mechanism:
-  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35, yield_strength: 90 MPa}
-  thickness: [[0, 1 mm], [1, 0.6 mm]]
-  width: 6 mm
-  nodes: {root: {at: [0 mm, 0 mm], support: clamped}, tip: {at: [40 mm, 0 mm], support: guided, direction: 180 deg}}
-  beams: {arch: {start: root, end: tip, shape: {kind: polynomial, coefficients: [0.5 rad, -1 rad]}}}
-  drive: {kind: displacement, node: tip, direction: 180 deg}
-analysis: {travel: 3 mm, points: 11}
-design: {rescale: {force: 2 N}, process: wire-edm}
-requirements: [{metric: force_max, max: 3 N}]
-"""
 
 
 def test_a_yield_of_a_part_that_errs_nowhere_is_refused_and_never_met():

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_parts import toleranced_cam
 
 import cfmkit
 from cfmkit import Run
@@ -24,17 +25,6 @@ from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.sensitivity.setup import prepare
 
 MODULUS = "mechanism.material.youngs_modulus"
-TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
-
-
-def cam(**keys):
-    spec = cfmkit.load("configs/cam.yaml")
-    spec = spec.replace({f"design.{key}": value for key, value in ({"tolerances": TOLERANCES} | keys).items()})
-    return spec
-
-
-def with_yield(spec, least):
-    return spec.replace({"requirements": (*spec.requirements, {"metric": "yield", "min": least})})
 
 
 def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says_so():
@@ -55,7 +45,7 @@ def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says
 
 
 def test_an_error_of_all_springs_is_common_and_a_trim_takes_it_away():
-    spec = cam(samples=100)
+    spec = toleranced_cam(samples=100)
     result = cfmkit.analyze(spec)
     made = Parts.of_design(spec, spec.design, 0)
     assert common_errors(made, result, Run()) == (0,)
@@ -72,7 +62,9 @@ def test_a_trim_without_a_window_is_to_the_mean_force_over_that_of_a_requirement
     limits = {"metric": "force_mean[load]", "min": "49.6 N", "max": "51.8 N", "over": ["5 mm", "235 mm"]}
     built = {"mechanism.roller_radius": "8 mm", "analysis.window": None, "analysis.travel": "236 mm"}
     scatter = {"mechanism.roller_radius": {"normal": "0.1 mm"}}
-    spec = cam(tolerances=scatter, samples=30).replace({**built, "analysis.points": 31, "requirements": (limits,)})
+    spec = toleranced_cam(tolerances=scatter, samples=30).replace(
+        {**built, "analysis.points": 31, "requirements": (limits,)}
+    )
     spec = cfmkit.design(spec).spec
     result = cfmkit.analyze(spec)
     made = Parts.of_design(spec, spec.design, 0)
@@ -96,7 +88,7 @@ def test_a_trim_of_springs_that_are_solved_as_arrays_brings_their_mean_force_to_
 
 
 def test_parts_without_a_result_are_bad_and_counted():
-    spec = cam(samples=20, tolerances={"mechanism.rest_half_width": {"normal": "100 mm"}})
+    spec = toleranced_cam(samples=20, tolerances={"mechanism.rest_half_width": {"normal": "100 mm"}})
     result = cfmkit.analyze(spec)
     made = Parts.of_design(spec, spec.design, 0)
     values = np.array([[made.nominal[0]], [-0.01]])
@@ -123,7 +115,7 @@ def test_bad_input_is_said_with_its_place(changes, reported):
 
 
 def test_a_tolerance_on_what_the_design_lacks_ends_with_3(tmp_path, capsys):
-    text = cfmkit.dumps(cam(tolerances={"mechanism.springs.stiffness.*": {"normal": "1 %"}}, samples=20))
+    text = cfmkit.dumps(toleranced_cam(tolerances={"mechanism.springs.stiffness.*": {"normal": "1 %"}}, samples=20))
     (tmp_path / "cam.yaml").write_text(text)
     assert run_command(["design", str(tmp_path / "cam.yaml"), "-o", str(tmp_path / "out"), "--no-plots", "--json"]) == 3
     assert "design.tolerances" in json.loads(capsys.readouterr().out)["errors"][0]["path"]
@@ -173,23 +165,6 @@ def test_a_trim_by_the_force_of_one_branch_leaves_the_perfect_part_as_it_is():
     judged = analyze_parts(made, np.array([made.nominal] * 2), nominal, Run())
     assert judged.met.all()
     assert judged.trimmed.all()
-
-
-TAPERED = """
-cfmkit: 1
-family: beam
-name: tapered
-mechanism:
-  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35, yield_strength: 90 MPa}
-  thickness: [[0, 1 mm], [1, 0.6 mm]]
-  width: 6 mm
-  nodes: {root: {at: [0 mm, 0 mm], support: clamped}, tip: {at: [40 mm, 0 mm], support: guided, direction: 180 deg}}
-  beams: {arch: {start: root, end: tip, shape: {kind: polynomial, coefficients: [0.5 rad, -1 rad]}}}
-  drive: {kind: displacement, node: tip, direction: 180 deg}
-analysis: {travel: 3 mm, points: 11}
-design: {rescale: {force: 2 N}, process: wire-edm}
-requirements: [{metric: force_max, max: 3 N}]
-"""
 
 
 def test_parts_without_common_errors_are_analysed_themselves():

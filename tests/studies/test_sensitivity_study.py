@@ -19,6 +19,7 @@ from cfmkit.studies.engine import ROW_MISSING, run
 from cfmkit.studies.parts.share import Share
 from cfmkit.studies.sensitivity import METHOD_NAMES
 from cfmkit.studies.sensitivity.evaluation import Evaluator
+from cfmkit.studies.sensitivity.method import method_named
 from cfmkit.studies.sensitivity.output import as_json, by_interval, exit_code, message, outputs, yield_ok
 from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
 from cfmkit.studies.sensitivity.setup import prepare
@@ -253,3 +254,10 @@ def test_blocks_are_numbered_on_when_more_are_drawn():
         evaluator.outputs(points, ["a", "b", "c", "d"])
     assert [piece.blocks.tolist() for piece in evaluator.pieces] == [[1] * 4 + [2] * 4, [3] * 4 + [4] * 4]
     assert evaluator.pieces[0].roles.tolist() == ["a", "b", "c", "d"] * 2
+
+
+@pytest.mark.parametrize("name", METHOD_NAMES)
+def test_a_method_of_sensitivity_has_its_module_and_its_indices(name):
+    method = method_named(name)
+    assert method.count_points(16, 3, 2) > 0
+    assert method.indices
