@@ -5,6 +5,8 @@ from cfmkit.lazy_names import lazy_names
 __getattr__, __all__ = lazy_names(
     __name__,
     {
+        "explorer": "Explorer",
+        "explorer_server": "ExplorerServer",
         "suggest_api": "read_request",
     },
 )

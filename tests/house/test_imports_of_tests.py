@@ -43,12 +43,12 @@ def inner_modules(path: Path) -> list[str]:
 
 
 def test_tests_import_the_inside_of_their_own_package_alone():
-    foreign: dict[str, list[str]] = {}
+    foreign = {}
     for path in sorted(TESTS.rglob("*.py")):
-        folder = path.relative_to(TESTS).parts[0]
-        names = [name for name in inner_modules(path) if package_of(name) != owned_package(folder)]
-        foreign.setdefault(folder, []).extend(f"{path.name}: {name}" for name in names)
-    assert {folder: names for folder, names in foreign.items() if names} == {}
+        own = owned_package(path.relative_to(TESTS).parts[0])
+        if names := [name for name in inner_modules(path) if package_of(name) != own]:
+            foreign[str(path.relative_to(TESTS))] = names
+    assert foreign == {}
 
 
 def test_helpers_of_a_package_serve_its_own_tests_alone():
