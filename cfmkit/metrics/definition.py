@@ -32,8 +32,8 @@ class Definition:
     # takes a `Branch` (or the `Cycle`, see `scope`), returns SI or raises `Undefined`; None: the family computes it and
     # puts it into `Result.values`
     function: Callable[..., float] | None = None
-    # takes a `RowsInWindow`, returns the same of many curves, (d,), NaN where there is none; None: studies analyse each
-    # curve alone
+    # takes a `RowsInWindow` (or the `CycleRows`), returns the same of many curves, (d,), NaN where there is none; None:
+    # studies analyse each curve alone
     of_rows: Callable[[Any], FloatArray] | None = None
     worst: Worst = "largest"  # which branch counts where none is named; without a target the farthest is the smallest
     # what it belongs to: one branch; all branches together, or one of them alone; the closed loop only; or no curve at

@@ -362,6 +362,7 @@ LOSS_AND_STRESS_METRICS = (
         "closed integral of the {effort} over the {motion} in the window, positive where 'load' lies above 'unload' "
         "[Sanchez-Salinas 2022, sec. 3]",
         hysteresis_area,
+        attrgetter("loop_area"),
         scope="loop",
     ),
     Definition(

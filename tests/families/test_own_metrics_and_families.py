@@ -14,7 +14,7 @@ import spare_family
 
 import cfmkit
 from cfmkit import families
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.families.base import ResultNames
 
 pytestmark = pytest.mark.lists
@@ -132,9 +132,9 @@ def test_a_registered_family_is_one_like_any_other_until_another_of_its_name_is(
 
 def test_the_page_of_a_family_names_no_command_for_which_it_has_no_file(capsys):
     cfmkit.register(spare_family.FAMILY_RECORD)
-    assert main(["show", "spare"]) == 0
+    assert run_command(["show", "spare"]) == 0
     assert "cfmkit new" not in capsys.readouterr().out
-    assert main(["show", "cam"]) == 0
+    assert run_command(["show", "cam"]) == 0
     assert "cfmkit new cam" in capsys.readouterr().out
 
 
@@ -195,8 +195,8 @@ def test_signatures_name_every_argument(name):
 
 
 def test_signatures_have_the_keys_of_the_blocks_that_they_stand_for():
-    from cfmkit.specs.study_spec import Sensitivity, Sweep
-    from cfmkit.studies.suggest.spec import SuggestBlock
+    from cfmkit.specs import Sensitivity, Sweep
+    from cfmkit.studies.suggest import SuggestBlock
 
     for function, block, others in (
         (cfmkit.sweep, Sweep, {"spec", "jobs", "seed"}),

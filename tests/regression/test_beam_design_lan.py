@@ -7,6 +7,7 @@ import pytest
 
 import cfmkit
 import cfmkit.metrics
+from cfmkit import Run
 from cfmkit.families.beam.shaping.design import missed_by, task_of
 from cfmkit.families.beam.shaping.search import ShapeCandidate
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
@@ -16,7 +17,6 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
 )
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.findings import percent
-from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.studies.pool import Pool
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.families.base import Family
+from cfmkit.families import Family
 from cfmkit.results import Result, Status
-from cfmkit.specs.spec import Analysis, Model, Spec
+from cfmkit.specs import Analysis, Model, Spec
 from cfmkit.specs.units import Stiffness  # noqa: TC001  pydantic reads the annotation
 
 if TYPE_CHECKING:

@@ -23,7 +23,6 @@ from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as OF_SUR
 from cfmkit.families.end_stops import CONTACT_QUANTITIES
 from cfmkit.families.rows import ScalarQuantity, SeveralSolutions, SolvedRows, each_quantity, each_rule, or_nan
 from cfmkit.metrics import split_name
-from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 
@@ -71,7 +70,7 @@ class BeamRows:
             paths.effort,
             np.array([or_nan(solution.effort_error) for solution in each]),
             np.array([or_nan(target_of(solution)) for solution in each]),
-            MeasuringFrame.band,
+            np.array([solution.spec.analysis.band for solution in each]),
             (np.array([solution.motion[0] for solution in each]), np.array([solution.motion[-1] for solution in each])),
             self._part_efforts,
             StressRows(tuple, self._stress_at, allowable, paths.largest_stress),

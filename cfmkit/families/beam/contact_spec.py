@@ -17,10 +17,10 @@ from cfmkit.elastica.model.contact import (
     NodeOnObstacle,
     ObstacleEdge,
     Stop,
-    arc,
-    circle,
-    line,
-    polyline,
+    arc_edge,
+    circle_edge,
+    line_edge,
+    polyline_edge,
 )
 from cfmkit.specs.spec import Model, PositiveLength
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, format_short
@@ -133,7 +133,7 @@ class LineObstacle(ObstacleBase):
 
     def outline(self) -> ObstacleEdge:
         """Return its edge."""
-        return line(self.through, self.direction)
+        return line_edge(self.through, self.direction)
 
 
 class DiscObstacle(ObstacleBase):
@@ -145,7 +145,7 @@ class DiscObstacle(ObstacleBase):
 
     def outline(self) -> ObstacleEdge:
         """Return its edge."""
-        return circle(self.centre, self.radius)
+        return circle_edge(self.centre, self.radius)
 
 
 class HoleObstacle(ObstacleBase):
@@ -157,7 +157,7 @@ class HoleObstacle(ObstacleBase):
 
     def outline(self) -> ObstacleEdge:
         """Return its edge."""
-        return circle(self.centre, self.radius, hole=True)
+        return circle_edge(self.centre, self.radius, hole=True)
 
 
 class PolylineObstacle(ObstacleBase):
@@ -182,7 +182,7 @@ class PolylineObstacle(ObstacleBase):
 
     def outline(self) -> ObstacleEdge:
         """Return its edge."""
-        return polyline(self.points, self.fillet or 0.0, self.closed)
+        return polyline_edge(self.points, self.fillet or 0.0, self.closed)
 
 
 _FROM_FIELD: Any = {"from": (Angle, Field(description="direction from the middle to one end of the arc"))}
@@ -211,7 +211,7 @@ class ArcObstacle(_BeginsAnywhere):
 
     def outline(self) -> ObstacleEdge:
         """Return its edge."""
-        return arc(self.centre, self.radius, *self.ends)
+        return arc_edge(self.centre, self.radius, *self.ends)
 
 
 ObstacleSpec = Annotated[

@@ -242,7 +242,7 @@ def _uneven_force(solution: Solution) -> Sentence:
 
 def _stays(solution: Solution) -> Any:
     """Return which mechanisms do not come back by themselves, (m,): past its peak their force is not above rounding."""
-    least, largest = solution.least[1], np.nanmax(np.abs(solution.nominal.force), axis=1)
+    least, largest = solution.least[1], np.nanmax(np.abs(solution.nominal.force), axis=1, initial=0.0)
     return np.isfinite(least) & ~(least > LIMIT_RTOL * largest)
 
 

@@ -10,3 +10,7 @@ A method is a module of its name with a record `SENSITIVITY_METHOD` (`method`), 
 `cfmkit.specs.sensitivity_methods`. `setup` says what is to be done, `run_sensitivity_method` joins method and
 engine, `result_types` and `output` say what came out.
 """
+
+from cfmkit.specs.sensitivity_methods import METHOD_NAMES
+
+__all__ = ["METHOD_NAMES"]
