@@ -9,7 +9,13 @@ if TYPE_CHECKING:
 
 
 def run_command(arguments: Sequence[str]) -> int:
-    """Run the program in this process, as a shell does with these arguments; return its exit code."""
+    """Return the exit code of a command that runs in this process: ``cfmkit ARGUMENTS``.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Verb and options, as they stand behind ``cfmkit`` on the command line.
+    """
     from cfmkit.cli.main import main
 
     return main(arguments)

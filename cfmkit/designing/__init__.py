@@ -15,19 +15,12 @@
 What a design is to do, the start it begins with and the words for what blocks it belong to the family.
 """
 
-from importlib import import_module
-from typing import Any
+from cfmkit.lazy_names import lazy_names
 
-_NAMES_BY_MODULE = {
-    "robust_design": "RobustProblem with_margins",
-    "run_many_starts": "UNLIMITED_CLOCK Clock",
-}
-_MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}
-__all__ = [*_MODULE_BY_NAME]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name when it is first needed."""
-    if name not in _MODULE_BY_NAME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULE_BY_NAME[name]), name)
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "robust_design": "RobustProblem with_margins",
+        "run_many_starts": "UNLIMITED_CLOCK Clock",
+    },
+)

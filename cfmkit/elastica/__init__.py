@@ -11,8 +11,9 @@ References
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from cfmkit.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.march import engine
@@ -56,48 +57,30 @@ if TYPE_CHECKING:
     from cfmkit.elastica.tracing.trace_many import NetworkOutcome, trace_many
     from cfmkit.elastica.vibration import NetworkMasses, frequencies
 
-_HOMES = {
-    "mechanics.march": ("engine",),
-    "model.beam": ("Beam", "fit"),
-    "model.contact": (
-        "BeamOnBeam",
-        "BeamOnObstacle",
-        "BeamSide",
-        "NodeOnBeam",
-        "NodeOnObstacle",
-        "ObstacleEdge",
-        "Stop",
-        "arc_edge",
-        "circle_edge",
-        "line_edge",
-        "polyline_edge",
-    ),
-    "model.drive": ("Control", "Displacement", "Loading", "Rotation"),
-    "model.network": (
-        "CLAMPED_SUPPORT",
-        "FREE_SUPPORT",
-        "PINNED_SUPPORT",
-        "LineLoad",
-        "LineSpring",
-        "Link",
-        "Network",
-        "Node",
-        "PointLoad",
-        "SlideSpring",
-        "Support",
-        "TorsionSpring",
-        "slider_support",
-    ),
-    "model.section": ("Section", "Taper"),
-    "model.shapes": ("STRAIGHT_SHAPE", "Bent", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
-    "results.curling_stiffening": ("HinderedCurling", "hindered_curling"),
-    "sensitivity": ("Gradient", "gradient"),
-    "results.path": ("Event", "Path", "PathStatus"),
-    "tracing.trace": ("trace",),
-    "tracing.trace_many": ("NetworkOutcome", "trace_many"),
-    "vibration": ("NetworkMasses", "frequencies"),
-}
-_HOME = {name: f"{__name__}.{module}" for module, names in _HOMES.items() for name in names}
+__getattr__, _ = lazy_names(
+    __name__,
+    {
+        "mechanics.march": "engine",
+        "model.beam": "Beam fit",
+        "model.contact": (
+            "BeamOnBeam BeamOnObstacle BeamSide NodeOnBeam NodeOnObstacle ObstacleEdge Stop arc_edge circle_edge "
+            "line_edge polyline_edge"
+        ),
+        "model.drive": "Control Displacement Loading Rotation",
+        "model.network": (
+            "CLAMPED_SUPPORT FREE_SUPPORT PINNED_SUPPORT LineLoad LineSpring Link Network Node PointLoad "
+            "SlideSpring Support TorsionSpring slider_support"
+        ),
+        "model.section": "Section Taper",
+        "model.shapes": "STRAIGHT_SHAPE Bent CosineArch Polyline Polynomial Spline arc",
+        "results.curling_stiffening": "HinderedCurling hindered_curling",
+        "sensitivity": "Gradient gradient",
+        "results.path": "Event Path PathStatus",
+        "tracing.trace": "trace",
+        "tracing.trace_many": "NetworkOutcome trace_many",
+        "vibration": "NetworkMasses frequencies",
+    },
+)
 
 __all__ = [
     "CLAMPED_SUPPORT",
@@ -153,12 +136,3 @@ __all__ = [
     "trace",
     "trace_many",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name when it is first needed: a path without its derivatives needs half of the engine."""
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value

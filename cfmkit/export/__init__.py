@@ -5,32 +5,41 @@ Nothing here touches a disk, but for a temporary folder where a library needs on
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from cfmkit.export.contours import Arc, Contour, Curve2D, Drawing, Line, Smooth, circle, polygon, polygons
+from cfmkit.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.export.arc_outlines import Outline
-    from cfmkit.export.contours import Drawing
 
-_NAMES_BY_MODULE = {
-    "arc_outlines": "outlines",
-    "contours": "Arc Contour Curve2D Drawing Line Smooth circle polygon polygons",
-    "posed_part": "PosedBody box rectangle screw_positions swept",
-    "union": "OutlinePiece merge_pieces",
-}
-_MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}
-__all__ = ["DEFAULT_FORMATS", "FILE_FORMATS", "files", *_MODULE_BY_NAME]
+__getattr__, _OFFERED_NAMES = lazy_names(
+    __name__,
+    {
+        "arc_outlines": "outlines",
+        "posed_part": "PosedBody box rectangle screw_positions swept",
+        "union": "OutlinePiece merge_pieces",
+    },
+)
+__all__ = [
+    "DEFAULT_FORMATS",
+    "FILE_FORMATS",
+    "Arc",
+    "Contour",
+    "Curve2D",
+    "Drawing",
+    "Line",
+    "Smooth",
+    "circle",
+    "files",
+    "polygon",
+    "polygons",
+    *_OFFERED_NAMES,
+]
 FILE_FORMATS = ("dxf", "svg", "csv", "stl", "3mf", "step")  # what `files` can write
 DEFAULT_FORMATS = FILE_FORMATS[:3]  # what it writes unless told: what a cutter needs
-
-
-def __getattr__(name: str) -> Any:
-    """Import what drawings are made of when it is first needed."""
-    if name not in _MODULE_BY_NAME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULE_BY_NAME[name]), name)
 
 
 def files(

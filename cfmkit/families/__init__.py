@@ -10,11 +10,12 @@ import secrets
 from dataclasses import replace
 from difflib import get_close_matches
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, get_args
 
 from cfmkit.errors import UsageError, visible
 from cfmkit.families import entry_point_plugins
 from cfmkit.families.entry_point_plugins import Unusable, forget_installed
+from cfmkit.lazy_names import lazy_names
 from cfmkit.specs import own_metrics
 
 if TYPE_CHECKING:
@@ -27,15 +28,6 @@ if TYPE_CHECKING:
     from cfmkit.families.rows import FindingRule, ScalarQuantity, SolvedRows, Variants
     from cfmkit.families.suggestion_request import Candidate, FamilyOffer, Request
 
-_NAMES_BY_MODULE = {
-    "base": ("DesignMethod", "ElasticParts", "Family", "Pictures", "ResultNames", "function_named"),
-    "findings": ("Finder",),
-    "hardware": ("PIN_STRENGTH", "PartStrength"),
-    "no_mechanism": ("CannotBuild", "Infeasible"),
-    "rows": ("FindingRule", "ScalarQuantity", "SolvedRows", "Variants"),
-    "suggestion_request": ("Candidate", "FamilyOffer", "Request"),
-}
-_MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names}
 FAMILY_MODULES = {
     "beam": "cfmkit.families.beam.record",
     "cam": "cfmkit.families.cam.record",
@@ -137,7 +129,7 @@ def _with_own_metrics(record: Family) -> Family:
 
 def _record(name: str) -> Family:
     if name in FAMILY_MODULES:
-        record: Family = import_module(FAMILY_MODULES[name]).FAMILY
+        record: Family = import_module(FAMILY_MODULES[name]).FAMILY_RECORD
         return record
     if name in _REGISTERED_FAMILIES:
         return _REGISTERED_FAMILIES[name]
@@ -205,31 +197,25 @@ def origins() -> dict[str, dict[str, str]]:
     return computed | ({"metrics": {"registered": own_metrics.stamp()}} if own_metrics.stamp() else {})
 
 
+__getattr__, _OFFERED_NAMES = lazy_names(
+    __name__,
+    {
+        "base": "DesignMethod ElasticParts Family Pictures ResultNames function_named",
+        "findings": "Finder",
+        "hardware": "PIN_STRENGTH PartStrength",
+        "no_mechanism": "CannotBuild Infeasible",
+        "rows": "FindingRule ScalarQuantity SolvedRows Variants",
+        "suggestion_request": "Candidate FamilyOffer Request",
+    },
+)
+
 __all__ = [
     "FAMILY_MODULES",
-    "PIN_STRENGTH",
-    "Candidate",
-    "CannotBuild",
-    "DesignMethod",
-    "ElasticParts",
-    "Family",
-    "FamilyOffer",
-    "Finder",
-    "FindingRule",
-    "Infeasible",
-    "PartStrength",
-    "Pictures",
-    "Request",
-    "ResultNames",
-    "ScalarQuantity",
-    "SolvedRows",
     "Unusable",
-    "Variants",
     "clashing",
     "examine_families",
     "family",
     "forget_installed",
-    "function_named",
     "list_registered",
     "list_skipped",
     "names",
@@ -237,13 +223,5 @@ __all__ = [
     "origins",
     "records",
     "register",
+    *_OFFERED_NAMES,
 ]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name when it is first needed: a list of the families needs none."""
-    if name not in _MODULE_BY_NAME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_MODULE_BY_NAME[name]), name)
-    globals()[name] = value
-    return value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
@@ -135,19 +134,19 @@ def read_request(
         reported = error
     for key in keys:
         reported = rename_source(reported, f"--set suggest.{key}", f"{mark}{key}")
-    raise reported if name is not None else _name_missing_options(reported, mark)
+    raise reported if name is not None else _name_missing_options(reported, keys, mark)
 
 
-def _name_missing_options(error: SpecError, mark: str) -> SpecError:
-    """Return the error of a request without a file with a missing key as a missing option."""
-    return SpecError(
-        [
-            Problem("", 0, 0, "", re.sub(r"^the key '(\w+)' is missing.*", rf"{mark}\1 is missing", one.message))
-            if one.source == OPTIONS_SOURCE
-            else one
-            for one in error.problems
-        ]
-    )
+def _name_missing_options(error: SpecError, keys: Mapping[str, str], mark: str) -> SpecError:
+    """Return the error of a request without a file, with all missing keys in one sentence."""
+    duty, path = ("torque", "angle") if "torque" in keys else ("force", "travel")
+    missing = [mark + key for key in (duty, path, "envelope") if key not in keys]
+    if not missing:
+        return error
+    verb = "are" if missing[1:] else "is"
+    sentence = " and ".join(filter(None, (", ".join(missing[:-1]), missing[-1])))
+    others = [problem for problem in error.problems if problem.source != OPTIONS_SOURCE]
+    return SpecError([Problem("", 0, 0, "", f"{sentence} {verb} missing"), *others])
 
 
 @dataclass(frozen=True, repr=False)

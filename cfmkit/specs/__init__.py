@@ -1,7 +1,8 @@
 """From text to a specification and back: YAML with places, quantities with units, the models of what may be said."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from cfmkit.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve as TargetCurve
@@ -16,18 +17,12 @@ if TYPE_CHECKING:
     from cfmkit.specs.study_spec import Sensitivity as Sensitivity
     from cfmkit.specs.study_spec import Sweep as Sweep
 
-_NAMES_BY_MODULE = {
-    "evaluable_target_curve": "TargetCurve",
-    "keys_and_schema": "keys schema",
-    "spec": "Analysis Model PositiveForce PositiveLength Requirement Spec",
-    "study_spec": "Sensitivity Sweep",
-}
-_MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}
-__all__ = [*_MODULE_BY_NAME]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name when it is first needed."""
-    if name not in _MODULE_BY_NAME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULE_BY_NAME[name]), name)
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "evaluable_target_curve": "TargetCurve",
+        "keys_and_schema": "keys schema",
+        "spec": "Analysis Model PositiveForce PositiveLength Requirement Spec",
+        "study_spec": "Sensitivity Sweep",
+    },
+)

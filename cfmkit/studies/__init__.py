@@ -10,25 +10,18 @@ noted, `tables` writes it, `summary` sums it up, and `sweep_request_and_files` i
 varies a specification.
 """
 
-from importlib import import_module
-from typing import Any
+from cfmkit.lazy_names import lazy_names
 
-_NAMES_BY_MODULE = {
-    "batch_sources_and_outcomes": "Entry",
-    "choose_metrics_to_note": "metrics_of",
-    "comparison_of_fidelities": "choices_of compare",
-    "metric_changes_since_earlier_batch": "BatchComparison",
-    "point_evaluation": "Study",
-    "serial_and_cluster_executors": "Lost serial",
-    "variable_paths": "leaf paths",
-    "variants_in_rows": "are_solved_together evaluate_rows",
-}
-_MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}
-__all__ = [*_MODULE_BY_NAME]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name when it is first needed."""
-    if name not in _MODULE_BY_NAME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULE_BY_NAME[name]), name)
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "batch_sources_and_outcomes": "Entry",
+        "choose_metrics_to_note": "metrics_of",
+        "comparison_of_fidelities": "choices_of compare",
+        "metric_changes_since_earlier_batch": "BatchComparison",
+        "point_evaluation": "Study",
+        "serial_and_cluster_executors": "Lost serial",
+        "variable_paths": "leaf paths",
+        "variants_in_rows": "are_solved_together evaluate_rows",
+    },
+)

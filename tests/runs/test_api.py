@@ -83,6 +83,7 @@ def test_evaluate_takes_names_and_branches(result):
     assert found["force_constant"].value == pytest.approx(0.009058)
     with pytest.raises(cfmkit.UsageError, match="did you mean 'force_mean'"):
         cfmkit.evaluate(result, ["force_men"])
+    assert cfmkit.evaluate(result, ["clearance_min"])["clearance_min"].value is None  # nothing is known of its plate
 
 
 def test_check_gives_an_outcome_for_each_requirement(spec, result):

@@ -27,6 +27,12 @@ SWITCHES = [
 ]
 
 
+def test_a_number_that_replaces_an_angle_is_an_angle() -> None:
+    """As errors of parts do, which are numbers in SI."""
+    spec = load(CONFIGS / "slider_crank_li2019.yaml").replace({"analysis.window": ("2 deg", "10 deg")})
+    assert spec.replace({"analysis.window.0": 0.1}).analysis.window[0].dimension == "angle"
+
+
 def replaced_whole(spec: Spec, path: str, value: Any) -> Spec | None:
     """Return the specification read from everything that was given, changed at a path; None if it is invalid."""
     data = with_value(spec.model_dump(exclude_unset=True) | {"family": spec.family}, path.split("."), value)

@@ -112,6 +112,20 @@ def test_mechanisms_with_bands_of_their_own_are_solved_together(stem):
     assert (np.diff(strokes) > 0).any()
 
 
+def test_rows_know_the_usable_stroke_of_one_branch_alone():
+    needed = {"metric": "usable_stroke[load]", "min": "30 mm"}
+    changes = {"mechanism.rolling_friction": 0.02, "analysis.band": 0.08, "requirements": [needed]}
+    spec = cfmkit.load("configs/cam.yaml").replace(changes)
+    names = ("usable_stroke[load]", "usable_stroke[unload]", "usable_stroke")
+    study = Study(spec, ("mechanism.springs.stiffness",), metrics_of(spec, names, cfmkit.analyze(spec).curve))
+    plan = GivenPoints({"mechanism.springs.stiffness": 690.0 * np.linspace(0.95, 1.05, 9)})
+    together, alone = evaluate_rows(study, plan, 0, 9), [study.evaluate(plan.point(k)) for k in range(9)]
+    np.testing.assert_allclose(together.values, np.array([one.values for one in alone]), rtol=1e-12)
+    assert together.met.tolist() == [list(one.met) for one in alone]
+    assert set(together.met.ravel().tolist()) == {True, False}
+    assert (together.values[:, 0] > together.values[:, 2]).any()
+
+
 def study_variant(study, plan):
     """Return the function that makes a variant of a study."""
     return lambda index: study.variant(plan.point(index))
@@ -133,3 +147,11 @@ def test_rows_follow_a_curve_as_runs_of_their_own_do(stem, window, last):
     together = assert_rows_equal_runs(study, plan)
     known = np.isfinite(together.values[:, names.index("deviation_from_curve")])
     assert known.tolist() == [True, True, not np.isfinite(spec.target_curve.extent[1])]
+
+
+def test_a_row_without_any_equilibrium_has_no_value_and_no_warning_of_numpy():
+    """16 mm of preload close the leaves all over the travel."""
+    vary = {"analysis.preloads.0": ["0 mm", "16 mm"]}
+    table = cfmkit.sweep("configs/vcfm_u_shape.yaml", vary=vary, metrics=["band_range_1pct", "force_mean"]).table
+    assert table["status"] == ("complete", "no_equilibrium")
+    assert np.isfinite(table["band_range_1pct"]).tolist() == [True, False]

@@ -186,3 +186,11 @@ def test_a_sensitivity_of_a_word_is_refused():
     block = {"metrics": ("stiffness_class",), "parameters": {"mechanism.springs.slider": ("0.09 N/mm", "0.11 N/mm")}}
     with pytest.raises(cfmkit.SpecError, match="is a word"):
         prepare(config("li2019", sensitivity=block))
+
+
+def test_rows_whose_sliders_reach_equally_far_are_runs_of_their_own():
+    """From the stretched position the travel is twice its length, whatever the offset."""
+    spec = cfmkit.load("configs/studies/slider_crank_bilancia2019_start.yaml")
+    study, plan = study_of(spec, {"mechanism.offset": np.array([0.059, 0.0595, 0.0604])})
+    assert are_solved_together(study, plan)
+    assert_rows_equal_runs(study, plan)

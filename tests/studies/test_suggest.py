@@ -525,10 +525,24 @@ def test_a_shape_whose_pads_do_not_shrink_with_it_fits_the_room():
     assert any(all("needs" not in miss for miss in misses) for misses in missed)
 
 
-def test_a_missing_option_is_named_as_an_option():
+@pytest.mark.parametrize(
+    ("left_out", "sentence"),
+    [
+        ({"envelope"}, "--envelope is missing"),
+        ({"travel", "envelope"}, "--travel and --envelope are missing"),
+        ({"force", "travel", "envelope"}, "--force, --travel and --envelope are missing"),
+    ],
+)
+def test_missing_options_are_named_at_once(left_out, sentence):
     with pytest.raises(SpecError) as caught:
-        block({key: value for key, value in POM.items() if key != "envelope"})
-    assert str(caught.value) == "--envelope is missing"
+        block({key: value for key, value in POM.items() if key not in left_out})
+    assert str(caught.value) == sentence
+
+
+def test_a_missing_option_does_not_hide_a_wrong_one():
+    with pytest.raises(SpecError) as caught:
+        block({"force": "10", "travel": "3 mm"})
+    assert [problem.source for problem in caught.value.problems] == ["", "--force"]
 
 
 @pytest.mark.parametrize(

@@ -193,6 +193,7 @@ def test_the_box_is_a_metric_where_a_requirement_names_it(config):
     assert [one.ok for one in outcomes] == [True, False, True]
     assert outcomes[0].value == pytest.approx(width)
     assert "envelope_x" not in cfmkit.analyze(spec).values
+    assert cfmkit.evaluate(spec, ["envelope_x"])["envelope_x"].value == pytest.approx(width)
 
 
 def test_the_box_of_a_metric_of_a_sweep_is_computed():

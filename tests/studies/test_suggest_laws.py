@@ -88,6 +88,16 @@ def test_the_pins_of_a_cam_with_friction_bear_its_braces():
     assert not any("slider pin" in text for one in made for text in one.missed)
 
 
+def test_closed_forms_of_a_small_cam_count_the_friction_of_its_pins():
+    """Without it the loss of a cycle was half of the true one, and 5 of 8 small cams of POM missed 3 %."""
+    keys = {"force": "10 N", "travel": "30 mm", "ripple": "10 %", "envelope": "[120 mm, 120 mm, 30 mm]"}
+    asked, candidates = offered("cam", **keys, hysteresis="3 %", material="pom", safety="1.5")
+    made = [proposal_of("cam", candidate, asked) for candidate in candidates[:8]]
+    missed = [proposal.variant for proposal in made if any("hysteresis" in text for text in proposal.missed)]
+    assert len(made) == 8
+    assert len(missed) <= 2, missed
+
+
 def test_catalogue_springs_get_a_plate_that_bears_their_rollers():
     """Over all of the travel; on a sharp corner no plate is thick enough."""
     keys = {"force": "5 N", "travel": "40 mm", "ripple": "3 %", "envelope": "[130 mm, 170 mm, 36 mm]"}

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pytest
 
 RECORD = (
-    "from dataclasses import replace\nfrom spare_family import FAMILY as SPARE\n"
+    "from dataclasses import replace\nfrom spare_family import FAMILY_RECORD as SPARE\n"
     "from cfmkit.families.base import DesignMethod, ResultNames, Pictures\n"
 )
 

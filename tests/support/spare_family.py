@@ -39,4 +39,4 @@ def analyze(spec: SpareSpec, run: Run) -> Result:
     return Result(spec, Status.COMPLETE, "", curves=(curve,))
 
 
-FAMILY = Family("spare", "a spring", SpareSpec, {"only": analyze})
+FAMILY_RECORD = Family("spare", "a spring", SpareSpec, {"only": analyze})

@@ -407,6 +407,22 @@ class ForceAndStress(LeafLaw):
         return TrussLeaf(self.strip).stress(travel)
 
 
+@dataclass(frozen=True)
+class BarInColumns(ForceAndStress):
+    """The same for leaves in columns."""
+
+    one_by_one = False
+
+
+def test_what_a_law_leaves_out_follows_from_its_force_for_leaves_in_columns():
+    leaves = [LEAF, replace(LEAF, thickness=2e-3), replace(LEAF, angle=0.1)]
+    columns = stack_laws([BarInColumns(leaf) for leaf in leaves])
+    for name in ("negative_stiffness", "first_stiffness", "balance"):
+        alone = [getattr(ForceAndStress(leaf), name) for leaf in leaves]
+        assert np.ravel(getattr(columns, name)).tolist() == pytest.approx(alone, rel=1e-12), name
+        assert np.shape(getattr(columns, name)) == (3, 1), name
+
+
 def test_a_law_of_force_and_stress_has_all_that_is_asked_of_a_leaf():
     leaf, bar = ForceAndStress(LEAF), TrussLeaf(LEAF)
     travel = np.linspace(0.0, 2.0, 9)[None] * LEAF.rise

@@ -1,4 +1,4 @@
-"""A nonlinear spring as an energy term: one function of the unknowns, and a line in `TERMS`.
+"""A nonlinear spring as an energy term: one function of the unknowns, and a line in `ENERGY_TERMS`.
 
 The force is a curve through given points, between them monotone cubics, beyond them straight on. Networks with it run
 on numpy.

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 DEGREES_MORE = 4
 MAX_POINTS = 6  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
-ERROR_SAFETY = 1.5
+ERROR_SAFETY = 2.0  # of a change: where forms converge slowly, four degrees more still miss as much again
+CORRECTION_ERROR = 300.0  # error of a stiff network's effort that a march leaves, over its next correction
 ROUNDING_ERROR = 1e-13
 MACHINE_EPSILON = float(np.finfo(float).eps)
 ROUNDED_PLACES = 4.0  # roundings of a place by which a nearly rigid network's effort is uncertain
@@ -130,4 +131,8 @@ def pick_points(path: Path, places: Sequence[float]) -> list[int]:
     if not places:
         return sorted(chosen)
     width = BESIDE_EVENT * float(np.ptp(np.append(path.drive, 0.0)))
+    for place in places:  # the nearest point that counts: errors grow towards an event
+        apart = np.abs(path.drive[at] - place)
+        apart[apart < width] = np.inf
+        chosen.add(int(at[apart.argmin()]))
     return sorted(k for k in chosen if all(abs(path.drive[k] - place) >= width for place in places))

@@ -1,18 +1,11 @@
 """Slider-crank mechanisms with springs at their joints [Li, Hao 2019; Bilancia et al. 2019]."""
 
-from importlib import import_module
-from typing import Any
+from cfmkit.lazy_names import lazy_names
 
-_NAMES_BY_MODULE = {
-    "linkage": "Linkage",
-    "unit_springs": "curves_along_crank curves_along_slider",
-}
-_MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}
-__all__ = [*_MODULE_BY_NAME]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name when it is first needed."""
-    if name not in _MODULE_BY_NAME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULE_BY_NAME[name]), name)
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "linkage": "Linkage",
+        "unit_springs": "curves_along_crank curves_along_slider",
+    },
+)

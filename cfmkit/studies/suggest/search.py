@@ -154,22 +154,14 @@ def surviving_until(run: Run, deadline: float | None, bugs: list[str]) -> Execut
 
 
 class _Making:
-    """The candidates that were made, in the order in which they were requested.
-
-    Attributes
-    ----------
-    done : list of Proposal
-        What became of them; in a round that the time ended, of some of them.
-    reused : int
-        Those that were found in the journal.
-    """
+    """The candidates that were made, in the order in which they were requested."""
 
     def __init__(self, run: Run, times: _Times, total: int, bugs: list[str]) -> None:
         self._run, self._times, self._total, self._tried, self._bugs = run, times, total, 0, bugs
         self._known: dict[int, Proposal] = {}
         self._jobs: list[ProposalJob] = []
-        self.done: list[Proposal] = []
-        self.reused = 0
+        self.done: list[Proposal] = []  # what became of them; in a round that the time ended, of some of them
+        self.reused = 0  # those that stood in the journal
 
     def late(self) -> bool:
         """Return True if the time is up, of which there is more as long as nothing is found."""

@@ -6,22 +6,15 @@ Both are planar beam networks: what the springs of the rigid-link model stand fo
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 7.
 """
 
-from importlib import import_module
-from typing import Any
+from cfmkit.lazy_names import lazy_names
 
-_NAMES_BY_MODULE = {
-    "equilibrium_path": "Chain PressingEnd",
-    "flexure_sizing": "rotations",
-    "flexures_as_beam_network": (
-        "FLEXURE_BEAMS STRIP_BEAM Elasticity Flexure Strip flexure_ends flexure_network joints spread"
-    ),
-}
-_MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}
-__all__ = [*_MODULE_BY_NAME]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name when it is first needed."""
-    if name not in _MODULE_BY_NAME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULE_BY_NAME[name]), name)
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "equilibrium_path": "Chain PressingEnd",
+        "flexure_sizing": "rotations",
+        "flexures_as_beam_network": (
+            "FLEXURE_BEAMS STRIP_BEAM Elasticity Flexure Strip flexure_ends flexure_network joints spread"
+        ),
+    },
+)

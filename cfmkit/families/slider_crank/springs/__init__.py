@@ -4,20 +4,13 @@
 [B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.1.
 """
 
-from importlib import import_module
-from typing import Any
+from cfmkit.lazy_names import lazy_names
 
-_NAMES_BY_MODULE = {
-    "bistability_class": "scale_factors small_angle_number",
-    "fit_nonnegative_rates": "RateGoal least_squares",
-    "sprung_linkage": "assemble",
-}
-_MODULE_BY_NAME = {name: f"{__name__}.{module}" for module, names in _NAMES_BY_MODULE.items() for name in names.split()}
-__all__ = [*_MODULE_BY_NAME]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name when it is first needed."""
-    if name not in _MODULE_BY_NAME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULE_BY_NAME[name]), name)
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "bistability_class": "scale_factors small_angle_number",
+        "fit_nonnegative_rates": "RateGoal least_squares",
+        "sprung_linkage": "assemble",
+    },
+)
