@@ -136,7 +136,7 @@ def main() -> None:
 def made_parts(count: int = 192) -> None:
     """Judge parts of the beams of Lan as a yield does: half band, largest stress, mean force."""
     spec = cfmkit.load(ROOT / "configs" / "studies" / "beam_lan2010_yield.yaml")
-    nominal, made = cfmkit.analyze(spec), Parts.of_design(spec, spec.design, 0)
+    nominal, made = cfmkit.analyze(spec), Parts.from_design(spec, spec.design, 0)
     values = made.draw(count, 5)
     start = time.process_time()
     analyze_parts(made, values, nominal, Run())

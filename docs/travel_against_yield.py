@@ -43,7 +43,7 @@ def row(travel: float) -> str:
     nominal, mechanism = cfmkit.analyze(found.spec), found.spec.mechanism
     if nominal.status is not Status.COMPLETE:
         return f"| {travel:g} mm | | | | none |"
-    parts = Parts.of_design(found.spec, found.spec.design, 0)
+    parts = Parts.from_design(found.spec, found.spec.design, 0)
     share = analyze_parts(parts, parts.draw(N_PARTS), nominal, Run()).share()
     low, high = share.clopper_pearson
     chosen = f"{1e3 * mechanism.beam.thickness:.4f} mm | {1e3 * mechanism.beam.width:.3f} mm | "

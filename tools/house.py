@@ -203,9 +203,7 @@ PRONOUNS = {
     "each", "found", "given", "here", "known", "near", "one", "other", "own", "there", "way",
 }  # fmt: skip
 FORBIDDEN_BEGINNINGS = ("What ", "How ", "Where ", "Tell ", "Say ")
-CONVERSIONS = {
-    "as_", "by_", "from_", "in_", "of_", "to_", "with_",
-}  # fmt: skip
+CONVERSIONS = {"as_", "from_", "to_", "with_"}
 """First words that are prepositions in the usual names of constructors and conversions: ``from_yaml``, ``to_csv``."""
 
 
@@ -229,6 +227,8 @@ def rule_of_function(node: ast.FunctionDef) -> str | None:
         return None
     if len(words) == 1 and is_participle(words[0]):
         return "functions named by a participle"
+    if len(words) == 1 and words[0] in PRONOUNS:
+        return "functions named by a pronoun"
     begins = f"{words[0]}_"
     if words[0] in PREPOSITIONS and not (begins in CONVERSIONS and len(words) > 1):
         return "functions named by a preposition"

@@ -105,7 +105,7 @@ def _entries(error: BaseException) -> Iterator[dict[str, Any]]:
 
 def _message_of(error: BaseException) -> str:
     if isinstance(error, ParserError):
-        return _of_the_parser(error)
+        return _describe_parser_error(error)
     if isinstance(error, Stopped):
         return error.reported
     return errors.sentence_of(error)
@@ -125,7 +125,7 @@ _VALUE_AS_OPTION = (
 """Values of a specification that are given as options, which `suggest` has, to a verb that reads one."""
 
 
-def _of_the_parser(error: Any) -> str:
+def _describe_parser_error(error: Any) -> str:
     """Return what is wrong with the command line, and where to look."""
     message = " ".join(error.format_message().split()).rstrip(".")
     for theirs, ours in _PARSER_WORDS:

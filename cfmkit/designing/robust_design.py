@@ -153,15 +153,15 @@ def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | No
     if middle is None:
         return None
     known = problem.slopes(x, problem.perfect)
-    by_x = _by_values(problem, x, problem.perfect, seen, known)
-    by_error = _by_errors(problem, x, seen, known)
+    by_x = _differentiate_by_values(problem, x, problem.perfect, seen, known)
+    by_error = _differentiate_by_errors(problem, x, seen, known)
     if by_x is None or by_error is None:
         return None
     matrix = problem.matrix
     return Linear(matrix @ middle + problem.constant, matrix @ by_error, x, matrix @ by_x)
 
 
-def _by_values(
+def _differentiate_by_values(
     problem: RobustProblem, x: FloatArray, errors: FloatArray, seen: SeenPart, known: PartSlopes | None
 ) -> FloatArray | None:
     """Return the derivatives of the numbers of a part by the values of its design, (q, n)."""
@@ -178,7 +178,9 @@ def _by_values(
     return differentiate(numbers, ends, None if known is None else known.by_x)
 
 
-def _by_errors(problem: RobustProblem, x: FloatArray, seen: SeenPart, known: PartSlopes | None) -> FloatArray | None:
+def _differentiate_by_errors(
+    problem: RobustProblem, x: FloatArray, seen: SeenPart, known: PartSlopes | None
+) -> FloatArray | None:
     """Return the derivatives of the numbers by the errors, (q, d); exact ones hold for errors about zero only."""
     step, about = SIGMA_STEP * problem.deviations, problem.middle
 
@@ -273,7 +275,7 @@ class _Parts:
         """Return the derivatives of those rows by the values, (k, m, n)."""
         out = []
         for error in self.errors:
-            found = _by_values(self.problem, x, error, self.seen, self.problem.slopes(x, error))
+            found = _differentiate_by_values(self.problem, x, error, self.seen, self.problem.slopes(x, error))
             if found is None:
                 return None
             out.append(self.problem.matrix @ found)

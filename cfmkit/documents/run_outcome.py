@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode
-from cfmkit.metrics.requirements import of_many
+from cfmkit.metrics.requirements import judge_part_metric
 from cfmkit.results import Result, Status
 from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 from cfmkit.tables.json_writing import json_bytes
@@ -104,12 +104,12 @@ class Report:
         both = self.supplement.plus(supplement)
         return replace(self, metrics={**self.metrics, **metrics}, supplement=both)
 
-    def of_many_parts(self) -> Report:
+    def judge_yields(self) -> Report:
         """Return the report with the outcome of requirements on a yield, which its metrics have, in their places."""
         single = iter(self.requirements)
         spec = self.result.spec
         judged = tuple(
-            of_many(one, self.metrics[one.metric])
+            judge_part_metric(one, self.metrics[one.metric])
             if one.metric in self.metrics and one.metric in OF_MANY_PARTS
             else next(single)
             for one in spec.requirements

@@ -10,7 +10,7 @@ from cfmkit.documents.document import Document, GridColumn, Note, PageTable, Ton
 from cfmkit.documents.run_document import value_and_bounds, warning_of
 from cfmkit.metrics.metric_definitions import words
 from cfmkit.studies.sensitivity.monte_carlo_yield import VARIANCE_DROP, YIELD_GAIN
-from cfmkit.studies.sensitivity.output import by_interval, exit_code, message, warnings, yield_ok
+from cfmkit.studies.sensitivity.output import exit_code, is_met_by_interval, message, warnings, yield_ok
 from cfmkit.studies.sensitivity.result_types import IN_UNITS
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _notes(found: Findings) -> Iterator[Note]:
             yield Note("missed", f"by the nominal values: {outcome.sentence}", tone=Tone.BAD)
     if found.interrupted:
         yield Note("stopped", message(found), tone=Tone.BAD, whole=True)
-    if by_interval(found):
+    if is_met_by_interval(found):
         yield Note("yield", "its 95 % interval reaches the one that is required: not missed", whole=True)
     if found.evaluator.failed:
         yield Note("first", found.evaluator.first_failure)
@@ -76,7 +76,7 @@ def _yields(found: Findings) -> Iterator[ValueRow]:
     bound = "" if wanted is None else f">= {100 * wanted:.4g} %"
     yield ValueRow("yield", share_of(found.all_met), bound, None if wanted is None else yield_ok(found))
     for outcome, one in zip(found.setup.nominal.outcomes, found.each_met, strict=True):
-        yield ValueRow(words(outcome.metric), f"{share_of(one)}  {_in_words(value_and_bounds(outcome)[1])}")
+        yield ValueRow(words(outcome.metric), f"{share_of(one)}  {_describe_label(value_and_bounds(outcome)[1])}")
 
 
 def share_of(one: Share) -> str:
@@ -91,11 +91,11 @@ def share_of(one: Share) -> str:
 
 def _rankings(found: Findings) -> Iterator[PageTable]:
     shares = {metric.label for metric in found.setup.study.metrics if metric.dimension == "ratio"}
-    for metric, each in _by_metric(found).items():
+    for metric, each in _group_by_metric(found).items():
         indices = [name for name in found.setup.record.indices if any(name in lines for lines in each.values())]
         ranked = enumerate(indices)
         heads = (
-            GridColumn(_in_words(metric)),
+            GridColumn(_describe_label(metric)),
             *(GridColumn(name_in_words(name), wraps=False, rank=rank) for rank, name in ranked),
         )
         rows = tuple(
@@ -105,7 +105,7 @@ def _rankings(found: Findings) -> Iterator[PageTable]:
         yield PageTable("", heads, rows, MAX_PARAMETERS)
 
 
-def _in_words(label: str) -> str:
+def _describe_label(label: str) -> str:
     """Return the label of a column with its window, or the limits of a requirement, as people write it."""
     return name_in_words(label).replace(" ... ", " to ")
 
@@ -115,7 +115,7 @@ def _drop_block(parameters: str) -> str:
     return ", ".join(path.removeprefix("mechanism.") for path in parameters.split(", "))
 
 
-def _by_metric(found: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:
+def _group_by_metric(found: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:
     """Return metric -> parameter -> index -> line, the parameters with the largest influence first."""
     tree: dict[str, dict[str, dict[str, IndexLine]]] = defaultdict(lambda: defaultdict(dict))
     for one in found.lines:

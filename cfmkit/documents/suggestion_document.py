@@ -75,7 +75,10 @@ def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
     )
     listed = (*record["proposals"], *record["unjudged"])
     order = f"proposals by {', '.join(record['order'])}" + ("; not judged in full last" if record["unjudged"] else "")
-    numbered = [Span(f"{k} {proposal['family']}", link=_page_of(proposal)) for k, proposal in enumerate(listed, 1)]
+    numbered = [
+        Span(f"{k} {proposal['family']}", link=quote(f"{proposal['folder']}/report.html"))
+        for k, proposal in enumerate(listed, 1)
+    ]
     near_misses = record["near_misses"]
     for heading, names, rows in (
         (order, numbered, listed),
@@ -191,7 +194,3 @@ def _cell(value: float | None, shown: Callable[[float], str]) -> str:
 def _size(proposal: Mapping[str, Any]) -> str:
     sides = [proposal[side] for side in ("across", "along", "depth") if proposal[side] is not None]
     return "x".join(f"{side:.3g}" for side in sides) + " mm"
-
-
-def _page_of(proposal: Mapping[str, Any]) -> str:
-    return quote(f"{proposal['folder']}/report.html")

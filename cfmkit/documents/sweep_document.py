@@ -49,7 +49,7 @@ def document_of(
         headline=(
             *(
                 ValueRow(
-                    _in_words(one["metric"]),
+                    _describe_label(one["metric"]),
                     f"met at {one['met']} of {one['of']}",
                     format_bounds(one),
                     bool(one["ok"]),
@@ -95,7 +95,7 @@ def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator
     metric = summary["metrics"][best["by"]]
     value = _quantity(metric["value"], metric["unit"], dimensions.get(best["by"], ""))
     tie = f" ({best['ties']} tie)" if best["ties"] > 1 else ""
-    yield ValueRow(f"{best['sense']} {_in_words(best['by'])}", f"{value}, point {best['point']}{tie}")
+    yield ValueRow(f"{best['sense']} {_describe_label(best['by'])}", f"{value}, point {best['point']}{tie}")
 
 
 def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[PageTable]:
@@ -112,9 +112,9 @@ def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterat
         at_best = summary["metrics"].get(name, {}).get("value")
         shown = "" if at_best is None else _quantity(at_best, one["unit"], dimension)
         if one["max"] - one["min"] <= NO_INFLUENCE * max(abs(one["min"]), abs(one["max"])):
-            row, others = (_in_words(name), low, "no influence", shown), constant
+            row, others = (_describe_label(name), low, "no influence", shown), constant
         else:
-            row, others = (_in_words(name), low, high, shown), rows
+            row, others = (_describe_label(name), low, high, shown), rows
         (leading if name in (*first, *asked) else others).append(row)
     if leading or rows:
         heads = ("from", "to", *(("best point",) if summary["best"] else ()))
@@ -125,12 +125,12 @@ def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterat
         yield PageTable("Results without influence", columns, tuple(row[:2] for row in constant), 0)
 
 
-def _in_words(label: str) -> str:
+def _describe_label(label: str) -> str:
     """Return the label of a result as people write it, with its branch and window.
 
     Examples
     --------
-    >>> _in_words("force_mean[load] over 5 ... 235 mm")
+    >>> _describe_label("force_mean[load] over 5 ... 235 mm")
     'force mean on load over 5 to 235 mm'
     """
     return name_in_words(label).replace("[", " on ").replace("]", "").replace(" ... ", " to ")

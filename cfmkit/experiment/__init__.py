@@ -6,10 +6,4 @@ at reversals, `low_pass` smooths each branch, `curves_and_metrics_of_recording` 
 
 from cfmkit.lazy_names import lazy_names
 
-__getattr__, __all__ = lazy_names(
-    __name__,
-    {
-        "comparison": "compare",
-        "value_definitions": "define_recorded_values",
-    },
-)
+__getattr__, __all__ = lazy_names(__name__, {"comparison": "compare", "value_definitions": "define_recorded_values"})

@@ -64,9 +64,9 @@ def middle(curve: Curve, branches: Sequence[str], places: FloatArray) -> FloatAr
 
     Raises SolutionError if a branch turns back.
     """
-    own = [name for name in branches if name in curve.branches] or list(curve.branches[:1])
+    names = [name for name in branches if name in curve.branches] or list(curve.branches[:1])
     try:
-        effort: FloatArray = np.mean([effort_at(curve, name, places) for name in own], axis=0)
+        effort: FloatArray = np.mean([effort_at(curve, name, places) for name in names], axis=0)
     except Undefined:
         raise SolutionError("the force has several values at one place: such a curve is not corrected") from None
     return effort
@@ -99,5 +99,5 @@ def aim_of(nominal: Result) -> AimedCurve:
         branches = tuple(choices[nearest])
         scale = target / means[nearest] if abs(target / means[nearest] - 1.0) <= LARGEST_RESCALING else 1.0
     efforts = [scale * middle(item, branches, places) for item in nominal.curves]
-    known = np.all(np.isfinite(efforts), axis=0)
-    return AimedCurve(places[known], tuple(effort[known] for effort in efforts), branches)
+    is_known = np.all(np.isfinite(efforts), axis=0)
+    return AimedCurve(places[is_known], tuple(effort[is_known] for effort in efforts), branches)

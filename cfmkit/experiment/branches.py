@@ -47,7 +47,7 @@ class Stroke:
     # from 1; a cycle is one way up and one way down. 0 for a short first stroke on the way to where cycles start
     cycle: int
     points: NDArray[np.intp]  # (n,) indices into the recording, in its order, pauses left out
-    way: float  # what it covers of the motion [m or rad]
+    covered: float  # what it covers of the motion [m or rad]
 
 
 @dataclass(frozen=True)
@@ -61,10 +61,10 @@ class Strokes:
     @cached_property
     def complete(self) -> tuple[tuple[Stroke, Stroke], ...]:
         """The complete cycles, two strokes each, in their order; broken-off ones only where there is no other."""
-        found = [[item for item in self.strokes if item.cycle == number] for number in self._numbers]
+        strokes_by_cycle = [[item for item in self.strokes if item.cycle == number] for number in self._numbers]
         pairs = [
             (pair[0], pair[1])
-            for pair in found
+            for pair in strokes_by_cycle
             if len(pair) == 2 and covered_fraction((pair[0], pair[1])) >= SHORT_STROKE_SHARE
         ]
         return tuple([pair for pair in pairs if covered_fraction(pair) >= COMPLETE_STROKE_SHARE] or pairs)
@@ -86,7 +86,7 @@ class Strokes:
     @property
     def measured(self) -> tuple[tuple[Stroke, ...], ...]:
         """The strokes that are measured, cycle by cycle; the longest one alone where there is no cycle."""
-        return self.cycles or ((max(self.strokes, key=lambda stroke: stroke.way),),)
+        return self.cycles or ((max(self.strokes, key=lambda stroke: stroke.covered),),)
 
     @property
     def _numbers(self) -> list[int]:
@@ -95,7 +95,7 @@ class Strokes:
 
 def travel_of(cycle: tuple[Stroke, Stroke]) -> float:
     """Return what the longer stroke of a cycle covers [m or rad]."""
-    return max(stroke.way for stroke in cycle)
+    return max(stroke.covered for stroke in cycle)
 
 
 @dataclass(frozen=True)
@@ -131,17 +131,23 @@ def choose(strokes: Strokes, cycles: Cycles | None, name: str) -> Strokes:
     """
     if cycles is None:
         return strokes
-    there = [pair[0].cycle for pair in strokes.complete]
-    missing = [number for number in (cycles.first, cycles.last) if number not in there]
+    complete = [pair[0].cycle for pair in strokes.complete]
+    missing = [number for number in (cycles.first, cycles.last) if number not in complete]
     if missing:
-        said = f"cycles {there[0]} to {there[-1]}" if len(there) > 1 else f"cycle {there[0]}" if there else "no cycle"
+        said = (
+            f"cycles {complete[0]} to {complete[-1]}"
+            if len(complete) > 1
+            else f"cycle {complete[0]}"
+            if complete
+            else "no cycle"
+        )
         raise DataError(f"{name}: --cycles {cycles.text}: cycle {missing[0]} is not there; {said} can be measured")
     return replace(strokes, chosen=cycles)
 
 
 def covered_fraction(cycle: tuple[Stroke, Stroke]) -> float:
     """Return which part of the longer stroke of a cycle the shorter one covers."""
-    ways = sorted(stroke.way for stroke in cycle)
+    ways = sorted(stroke.covered for stroke in cycle)
     return ways[0] / ways[1]
 
 
@@ -156,29 +162,29 @@ def turning_points(
     >>> turning_points(np.array([0.0, 1.0, 0.9, 2.0, 1.0, 0.0]), 0.5)
     [0, 3, 5]
     """
-    values, found = motion.tolist(), [0]
+    values, turns = motion.tolist(), [0]
     low = high = 0
-    way = 0
+    direction = 0
     for index, value in enumerate(values):
         if value > values[high]:
             high = index
         if value < values[low]:
             low = index
-        if way >= 0 and values[high] - value > threshold:
-            if way > 0 or high > low:
-                found.append(high)
-            way, low = -1, index
-        elif way <= 0 and value - values[low] > threshold:
-            if way < 0 or low > high:
-                found.append(low)
-            way, high = 1, index
-        if way > 0:
+        if direction >= 0 and values[high] - value > threshold:
+            if direction > 0 or high > low:
+                turns.append(high)
+            direction, low = -1, index
+        elif direction <= 0 and value - values[low] > threshold:
+            if direction < 0 or low > high:
+                turns.append(low)
+            direction, high = 1, index
+        if direction > 0:
             low = high
-        elif way < 0:
+        elif direction < 0:
             high = low
-    last = high if way > 0 else low if way < 0 else len(values) - 1
+    last = high if direction > 0 else low if direction < 0 else len(values) - 1
     # What follows the last extreme without being a reversal is a pause or the release of the machine.
-    return sorted({*found, last})
+    return sorted({*turns, last})
 
 
 def split(
@@ -217,16 +223,18 @@ def _number_strokes(pieces: Sequence[NDArray[np.intp]], motion: FloatArray) -> t
     """
     ups = [bool(motion[piece[-1]] > motion[piece[0]]) for piece in pieces]
     ways = [float(np.ptp(motion[piece])) for piece in pieces]
-    found = [
+    cycles_of_strokes = [
         tuple(
-            Stroke(LOAD_BRANCH if up else UNLOAD_BRANCH, cycle, piece, way)
-            for up, cycle, piece, way in zip(ups, np.cumsum(np.equal(ups, first)).tolist(), pieces, ways, strict=True)
+            Stroke(LOAD_BRANCH if up else UNLOAD_BRANCH, cycle, piece, covered)
+            for up, cycle, piece, covered in zip(
+                ups, np.cumsum(np.equal(ups, first)).tolist(), pieces, ways, strict=True
+            )
         )
         for first in ups[:2]
     ]
     if len(ways) < 3 or ways[0] >= COMPLETE_STROKE_SHARE * ways[1]:
-        return found[0]
-    return max(found, key=_whole_cycles)
+        return cycles_of_strokes[0]
+    return max(cycles_of_strokes, key=_whole_cycles)
 
 
 def _whole_cycles(strokes: tuple[Stroke, ...]) -> int:

@@ -151,7 +151,7 @@ def calibrate(
     """
     before, curves = _compare_start(spec, source, parameters, window), ModelCurves(spec)
     if has_no_loss(curves, before, parameters):
-        before = before.of_the_mean()
+        before = before.compare_mean()
     return fit_samples(before, curves, parameters, loss)
 
 
@@ -174,7 +174,9 @@ def fit_samples(
     fitted = curves.spec_with(parameters, fit.values)
     result = _analyse(fitted)
     zeros = _zeros(parameters, fit.values)
-    samples, branches = (tuple(item.less(zeros) for item in measured) for measured in (before.samples, before.branches))
+    samples, branches = (
+        tuple(item.correct_zeros(zeros) for item in measured) for measured in (before.samples, before.branches)
+    )
     after = Comparison(samples, before.window, result.curve, before.holes, branches)
     warnings = (*_warnings(parameters, fit), *_misfit(parameters, fit, after))
     return Calibration(fitted, tuple(parameters), fit, before, after, result, zeros, warnings)
@@ -185,13 +187,13 @@ def _compare_start(
 ) -> Comparison:
     """Return the start beside the measurement, where the model exists for every zero that is tried."""
     result = _analyse(spec)
-    found = compare(result, source, window)
+    comparison = compare(result, source, window)
     shift = next((item for item in parameters if _is_shift(item)), None)
     if shift is None:
-        return found
-    parts = [found.curve.select_branch(item.model_branch).motion for item in found.samples]
-    low = max(found.window.lo, max(float(part.min()) for part in parts) + shift.high)
-    high = min(found.window.hi, min(float(part.max()) for part in parts) + shift.low)
+        return comparison
+    parts = [comparison.curve.select_branch(item.model_branch).motion for item in comparison.samples]
+    low = max(comparison.window.lo, max(float(part.min()) for part in parts) + shift.high)
+    high = min(comparison.window.hi, min(float(part.max()) for part in parts) + shift.low)
     if not low < high:
         raise UsageError(
             f"--bounds: within the bounds of {shift.path} there is no travel that the model covers for every value"
@@ -230,12 +232,12 @@ def _is_shift(item: FitParameter) -> bool:
 
 def _zeros(parameters: Sequence[FitParameter], values: FloatArray) -> Zeros:
     """Return what the parameters say of the recording."""
-    found = {"effort": 0.0, "motion": 0.0, "drift": 0.0}
+    totals = {"effort": 0.0, "motion": 0.0, "drift": 0.0}
     for item, value in zip(parameters, values, strict=True):
         if item.path.startswith(DATA_PREFIX):
             name = "motion" if _is_shift(item) else "drift" if item.path.endswith("drift") else "effort"
-            found[name] = float(value)
-    return Zeros(**found)
+            totals[name] = float(value)
+    return Zeros(**totals)
 
 
 def _analyse(spec: Spec) -> Result:
@@ -257,7 +259,7 @@ def _problem(curves: ModelCurves, before: Comparison, parameters: Sequence[FitPa
         except CfmError:
             return nothing  # the solver then takes a shorter step
         zeros = _zeros(parameters, values)
-        errors: FloatArray = root * np.concatenate([item.less(zeros).errors(curve) for item in before.samples])
+        errors: FloatArray = root * np.concatenate([item.correct_zeros(zeros).errors(curve) for item in before.samples])
         return errors
 
     effect = float(np.mean(weight**2) / np.mean(weight) ** 2)
@@ -297,30 +299,32 @@ def _name_undetermined(paths: Sequence[str]) -> str:
 
 def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Finding]:
     """Return what is doubtful about a fit."""
-    found, half = [], fit.half_widths()
+    warnings, half = [], fit.half_widths()
     for k, item in enumerate(parameters):
         if fit.at_bound[k]:
-            found.append(Finding("at_bound", f"{item.label} is at its bound: the data require a value beyond"))
+            warnings.append(Finding("at_bound", f"{item.label} is at its bound: the data require a value beyond"))
         elif half[k] > MAX_HALF_INTERVAL * item.size:
-            found.append(
+            warnings.append(
                 Finding(
                     "weakly_identified", f"{item.label} {UNDETERMINED_MESSAGE}: fit fewer values, or give it with --set"
                 )
             )
         elif half[k] > POORLY_DETERMINED * item.size:
-            found.append(
+            warnings.append(
                 Finding(
                     "weakly_identified",
                     f"{item.label} cannot be determined from this recording (± {100 * half[k] / item.size:.0f} %)",
                 )
             )
-        for other in range(k):
-            if abs(fit.correlation[k, other]) > TIED_CORRELATION:
-                reported = f"{parameters[other].label} and {item.label} are poorly distinguished"
-                found.append(Finding("weakly_identified", f"{reported} (correlation {fit.correlation[k, other]:.5f})"))
+        for earlier in range(k):
+            if abs(fit.correlation[k, earlier]) > TIED_CORRELATION:
+                reported = f"{parameters[earlier].label} and {item.label} are poorly distinguished"
+                warnings.append(
+                    Finding("weakly_identified", f"{reported} (correlation {fit.correlation[k, earlier]:.5f})")
+                )
     if not fit.converged:
-        found.append(Finding("not_converged", "the fit stopped before it converged; start from other values"))
-    return found
+        warnings.append(Finding("not_converged", "the fit stopped before it converged; start from other values"))
+    return warnings
 
 
 def _misfit(parameters: Sequence[FitParameter], fit: FittedValues, after: Comparison) -> list[Finding]:
@@ -328,15 +332,17 @@ def _misfit(parameters: Sequence[FitParameter], fit: FittedValues, after: Compar
     if fit.at_bound.any() or not len(fit.residuals):
         return []
     ordered = [item.errors(after.curve)[np.argsort(item.motion, kind="stable")] for item in after.samples]
-    found = lack_of_fit(ordered, len(parameters))
+    lack = lack_of_fit(ordered, len(parameters))
     level = float(np.abs(np.concatenate([item.effort for item in after.samples])).max())
-    if found.chance > BY_CHANCE or found.swing < max(NEGLIGIBLE_SWING * found.noise, 1e-5 * level):
+    if lack.chance > BY_CHANCE or lack.swing < max(NEGLIGIBLE_SWING * lack.noise, 1e-5 * level):
         return []
     kind = after.curve.kind
-    swing, noise = (format_short(value, kind, 3) for value in (found.swing, found.noise))
+    swing, noise = (format_short(value, kind, 3) for value in (lack.swing, lack.noise))
     fitted = {item.path for item in parameters}
-    other = ", ".join(path for path in (DATA_PREFIX + name for name in ZERO_OFFSETS[kind]) if path not in fitted)
-    cure = f"zeros of the recording can be fitted, too: {other}" if other else "another value or the model is wrong"
+    unfitted = ", ".join(path for path in (DATA_PREFIX + name for name in ZERO_OFFSETS[kind]) if path not in fitted)
+    cure = (
+        f"zeros of the recording can be fitted, too: {unfitted}" if unfitted else "another value or the model is wrong"
+    )
     return [
         Finding(
             "lack_of_fit",

@@ -52,7 +52,7 @@ class Samples:
     weight: FloatArray  # (n,) the way that each stands for, over that of all on average
     cycle: NDArray[np.intp]  # (n,) which cycle each is of, counted from 0
 
-    def less(self, zeros: Zeros) -> Samples:
+    def correct_zeros(self, zeros: Zeros) -> Samples:
         """Return the samples with the errors of the zeros taken out."""
         motion, effort = self.motion - zeros.motion, self.effort - zeros.effort - zeros.drift * self.elapsed
         return replace(self, motion=motion, effort=effort)
@@ -86,11 +86,11 @@ class Comparison(ShortRepr):
     @property
     def loop(self) -> MeasuredLoop | None:
         """Both measured branches at even places of the window; None if one way only was measured."""
-        found = {item.branch: item for item in self.branches or self.samples}
-        if set(found) != {LOAD_BRANCH, UNLOAD_BRANCH}:
+        by_branch = {item.branch: item for item in self.branches or self.samples}
+        if set(by_branch) != {LOAD_BRANCH, UNLOAD_BRANCH}:
             return None
         places = np.linspace(self.window.lo, self.window.hi, N_COMPARED_PLACES)
-        up, down = (_average_effort(found[branch], places) for branch in (LOAD_BRANCH, UNLOAD_BRANCH))
+        up, down = (_average_effort(by_branch[branch], places) for branch in (LOAD_BRANCH, UNLOAD_BRANCH))
         return MeasuredLoop(places, up, down)
 
     def causes(self, result: Result) -> Mapping[str, Quantity]:
@@ -106,8 +106,8 @@ class Comparison(ShortRepr):
         points = {
             item.branch: Points(item.motion, item.effort, item.model_branch, item.weight) for item in self.samples
         }
-        found = compare_sides(Compared("measured", points=points), Compared("model", self.curve), self.window)
-        return empty_uncovered(found.summarize(_ERROR_METRICS, self.curve.kind), self.holes, self.curve.kind)
+        differences = compare_sides(Compared("measured", points=points), Compared("model", self.curve), self.window)
+        return empty_uncovered(differences.summarize(_ERROR_METRICS, self.curve.kind), self.holes, self.curve.kind)
 
     def loss(self) -> dict[str, Quantity]:
         """Return what a cycle loses, its loss factor, and half the gap of the branches; nothing without a loop."""
@@ -119,14 +119,14 @@ class Comparison(ShortRepr):
         meant = define_recorded_values(kind)
         stored = float(np.trapezoid(0.5 * (loop.up + loop.down), loop.places))
         factor = area / (2.0 * np.pi * stored) if stored > 0.0 else None
-        found = {
+        quantities = {
             "data_loss": Quantity(area, *meant["data_loss"]),
             "data_loss_factor": Quantity(factor, *meant["data_loss_factor"], "" if factor else "no energy is stored"),
             "data_half_gap": Quantity(0.5 * area / width, *meant["data_half_gap"]),
         }
-        return empty_uncovered(found, self.holes, kind)
+        return empty_uncovered(quantities, self.holes, kind)
 
-    def of_the_mean(self) -> Comparison:
+    def compare_mean(self) -> Comparison:
         """Return the comparison of a model without losses: with the mean of the branches, cycle by cycle."""
         up, down = (next(item for item in self.samples if item.branch == name) for name in (LOAD_BRANCH, UNLOAD_BRANCH))
         parts = [_mean_of(up, down, cycle) for cycle in sorted(set(up.cycle) & set(down.cycle))]
@@ -143,18 +143,20 @@ MEAN_BRANCH = "mean"  # name of the samples that are the mean of both branches
 
 def _mean_of(up: Samples, down: Samples, cycle: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     """Return places, mean effort and time of the branches of one cycle, where both were recorded."""
-    one, other = ({name: getattr(item, name)[item.cycle == cycle] for name in ("motion", "effort", "elapsed")}
+    first, second = ({name: getattr(item, name)[item.cycle == cycle] for name in ("motion", "effort", "elapsed")}
                   for item in (up, down))  # fmt: skip
-    one, other = ({name: values[np.argsort(part["motion"])] for name, values in part.items()} for part in (one, other))
-    low, high = (way(part["motion"][end] for part in (one, other)) for way, end in ((max, 0), (min, -1)))
-    places = np.linspace(low, high, min(len(one["motion"]), len(other["motion"])))
-    known = np.ones(len(places), dtype=bool)
-    for part in (one, other):
+    first, second = (
+        {name: values[np.argsort(part["motion"])] for name, values in part.items()} for part in (first, second)
+    )
+    low, high = (extreme(part["motion"][end] for part in (first, second)) for extreme, end in ((max, 0), (min, -1)))
+    places = np.linspace(low, high, min(len(first["motion"]), len(second["motion"])))
+    is_known = np.ones(len(places), dtype=bool)
+    for part in (first, second):
         for start, stop in holes_between(part["motion"], low, high):
-            known &= (places <= start) | (places >= stop)
-    places = places[known]
+            is_known &= (places <= start) | (places >= stop)
+    places = places[is_known]
     effort, passed = (
-        0.5 * sum(np.interp(places, part["motion"], part[name]) for part in (one, other))
+        0.5 * sum(np.interp(places, part["motion"], part[name]) for part in (first, second))
         for name in ("effort", "elapsed")
     )
     return places, effort, passed, cycle
@@ -250,8 +252,8 @@ def _samples(source: MeasuredCurves, branch: str, mine: str, window: Window) -> 
     # Cycle by cycle: the end of one and the start of the next have nothing to do with each other.
     grouped = []
     for number, (part, inside, passed) in enumerate(zip(parts, keep, times, strict=True)):
-        way = 1 if part.motion[-1] >= part.motion[0] else -1
-        stands_for = sample_weights(part.motion[inside][::way])[::way]
+        step = 1 if part.motion[-1] >= part.motion[0] else -1
+        stands_for = sample_weights(part.motion[inside][::step])[::step]
         motion = np.clip(part.motion[inside], window.lo, window.hi)
         columns = _average_groups((motion, part.effort[inside], passed[inside], stands_for), size)
         grouped.append((*columns, np.full(len(columns[0]), number)))

@@ -172,16 +172,16 @@ def _interval(explanation: Explanation, drawn: Spec, aim: AimedCurve, zero: floa
         return aim.mean(analyze_part(explanation.part_of(drawn, values)).curves)
 
     values, spread = explanation.values, np.sqrt(np.diag(explanation.covariance))
-    here = mean(values)
+    mean_now = mean(values)
     slopes = np.zeros(len(values))
     for k, item in enumerate(explanation.errors):
         step = float(np.clip(spread[k], 1e-5 * item.size, 0.02 * item.size))
         step = -step if values[k] + step > item.high else step
         moved = values.copy()
         moved[k] += step
-        slopes[k] = (mean(moved) - here) / step
+        slopes[k] = (mean(moved) - mean_now) / step
     half = explanation.quantile * float(np.sqrt(slopes @ explanation.covariance @ slopes + zero**2))
-    return PredictedForce(here, here - half, here + half)
+    return PredictedForce(mean_now, mean_now - half, mean_now + half)
 
 
 def _state_modulus(corrected: Spec, best: Explanation) -> Spec:
@@ -201,11 +201,10 @@ def _warnings(spec: Spec, explanations: Sequence[Explanation]) -> Iterator[Findi
     best = explanations[0]
     for item, value in zip(best.errors, best.values, strict=True):
         material = spec.get_value(item.path.rpartition(".")[0]) if item.path.endswith(".youngs_modulus") else None
-        known = MATERIALS_BY_NAME.get(getattr(material, "name", None) or "")
-        if known is None or known.scatter.youngs_modulus[0] <= value <= known.scatter.youngs_modulus[1]:
+        usual = MATERIALS_BY_NAME.get(getattr(material, "name", None) or "")
+        if usual is None or usual.scatter.youngs_modulus[0] <= value <= usual.scatter.youngs_modulus[1]:
             continue
-        low, high = (format_short(end, "stress", 4) for end in known.scatter.youngs_modulus)
-        reported = (
-            f"a modulus of {format_short(float(value), 'stress', 4)} is fitted, and {known.name} has {low} to {high}"
-        )
+        low, high = (format_short(end, "stress", 4) for end in usual.scatter.youngs_modulus)
+        modulus = format_short(float(value), "stress", 4)
+        reported = f"a modulus of {modulus} is fitted, and {usual.name} has {low} to {high}"
         yield Finding("modulus_outside", f"{reported}: is it that material, and are the sizes those of the drawing?")

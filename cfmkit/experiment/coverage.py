@@ -49,16 +49,16 @@ class UnrecordedInterval:
 
 def holes_of(curves: Sequence[Curve], window: Window) -> tuple[UnrecordedInterval, ...]:
     """Return the holes of all branches of all cycles in a window, in their order."""
-    found = []
+    holes = []
     for curve in curves:
         cycle = int(curve.label["cycle"][0]) if len(curves) > 1 else None
         for branch in curve.branches:
             places = np.sort(curve.select_branch(branch).motion)
-            found += [
+            holes += [
                 UnrecordedInterval(low, high, branch, cycle)
                 for low, high in holes_between(places, window.lo, window.hi)
             ]
-    return tuple(found)
+    return tuple(holes)
 
 
 def share_covered(holes: Sequence[UnrecordedInterval], window: Window) -> float:
@@ -71,7 +71,7 @@ def number_of(curve: Curve) -> int | None:
     return int(curve.label["cycle"][0]) if "cycle" in curve.label else None
 
 
-def of_cycle(holes: Sequence[UnrecordedInterval], curve: Curve) -> list[UnrecordedInterval]:
+def select_cycle(holes: Sequence[UnrecordedInterval], curve: Curve) -> list[UnrecordedInterval]:
     """Return the holes of the cycle that is a curve."""
     return [hole for hole in holes if hole.cycle in (None, number_of(curve))]
 
@@ -113,26 +113,29 @@ def empty_uncovered(
 ) -> dict[str, Quantity]:
     """Return metrics, without a value for branches with a large hole and for what needs all branches."""
     branches = {hole.branch: hole for hole in reversed(large)}
-    found = dict(metrics)
+    covered = dict(metrics)
     for name, item in metrics.items():
         branch = split_name(name)[1]
         hole = branches.get(branch) if branch is not None else next(iter(large), None)
         if hole is not None and item.value is not None:
-            found[name] = replace(item, value=None, reason=f"{NOT_RECORDED_TEXT}: {hole.text(kind)}")
-    return found
+            covered[name] = replace(item, value=None, reason=f"{NOT_RECORDED_TEXT}: {hole.text(kind)}")
+    return covered
 
 
 def coverage(curve: Curve, holes: Sequence[UnrecordedInterval], window: Window) -> dict[str, Quantity]:
     """Return which part of the window each branch of a curve covers, and the least of them."""
     shares = {name: share_covered([hole for hole in holes if hole.branch == name], window) for name in curve.branches}
     named = {f"coverage[{name}]": share for name, share in shares.items()} if len(shares) > 1 else {}
-    found = {"coverage": min(shares.values()), **named}
-    return {name: Quantity(value, *RECORDED_VALUES["coverage"]) for name, value in found.items()}
+    shares_by_name = {"coverage": min(shares.values()), **named}
+    return {name: Quantity(value, *RECORDED_VALUES["coverage"]) for name, value in shares_by_name.items()}
 
 
-def least(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
+def least(metrics_of_cycles: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
     """Return the least value of each quantity."""
-    return {name: min((item[name] for item in each), key=lambda one: one.value or 0.0) for name in each[0]}
+    return {
+        name: min((item[name] for item in metrics_of_cycles), key=lambda quantity: quantity.value or 0.0)
+        for name in metrics_of_cycles[0]
+    }
 
 
 def read_largest_hole(text: str | float | None) -> float:

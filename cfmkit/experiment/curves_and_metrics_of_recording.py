@@ -31,7 +31,7 @@ from cfmkit.experiment.coverage import (
     large_holes,
     least,
     number_of,
-    of_cycle,
+    select_cycle,
 )  # fmt: skip
 from cfmkit.experiment.findings import RECORDING_FINDINGS, passages_left_out, spikes_left_out, warnings_of
 from cfmkit.experiment.loop_area_and_repeatability import repeatability, turned_loop
@@ -96,10 +96,10 @@ def measure_recording(
     """
     _check_words(low_pass, leave_out)
     strokes, reached, passage, left_out = _strokes(recording, leave_out, cycles)
-    each = strokes.measured
+    measured = strokes.measured
     warnings = (*warnings_of(recording, strokes), *left_out)
     chosen = _default(recording) if low_pass == "default" else low_pass
-    raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in each)
+    raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in measured)
     if turned_loop(raw):
         reported = (
             f"the {recording.kind} on the way up is smaller than on the way back, and every cycle would deliver energy"
@@ -109,12 +109,12 @@ def measure_recording(
     if chosen is None:
         return plain
     try:
-        smooth = _smooth(recording, [stroke for cycle in each for stroke in cycle], chosen)
+        smooth = _smooth(recording, [stroke for cycle in measured for stroke in cycle], chosen)
     except DataError as problem:
         if low_pass != "default":
             raise DataError(f"{recording.name}: {problem}") from None
         return replace(plain, warnings=(*warnings, Finding("not_filtered", str(problem))))
-    filtered = tuple(_curve(recording, cycle, smooth, strokes) for cycle in each)
+    filtered = tuple(_curve(recording, cycle, smooth, strokes) for cycle in measured)
     return replace(plain, filtered=filtered, low_pass=chosen)
 
 
@@ -153,8 +153,8 @@ def _strokes(
     reached, reported = _common_range(recording, strokes), spikes_left_out(recording, spiky)
     if "reversals" not in leave_out:
         return strokes, reached, 0.0, reported
-    found = remove_transitions(recording, strokes)
-    return found.strokes, reached, found.length, (*reported, *passages_left_out(recording, found))
+    settled = remove_transitions(recording, strokes)
+    return settled.strokes, reached, settled.length, (*reported, *passages_left_out(recording, settled))
 
 
 def _spiky(recording: Recording) -> NDArray[np.bool_]:
@@ -164,13 +164,13 @@ def _spiky(recording: Recording) -> NDArray[np.bool_]:
     """
     jumps = spikes(recording.motion) != 0
     heights = np.where(jumps, 0.0, spikes(recording.effort))
-    found: NDArray[np.bool_] = heights != 0
+    is_outlier: NDArray[np.bool_] = heights != 0
     strokes = _remove_points(recording, jumps).strokes
-    for run in np.split(np.flatnonzero(found), np.flatnonzero(np.diff(np.flatnonzero(found)) > 1) + 1):
+    for run in np.split(np.flatnonzero(is_outlier), np.flatnonzero(np.diff(np.flatnonzero(is_outlier)) > 1) + 1):
         if len(run) and any(_is_of_the_mechanism(recording.motion, heights, strokes, int(k)) for k in run):
-            found[run] = False
-    found |= jumps
-    return found
+            is_outlier[run] = False
+    is_outlier |= jumps
+    return is_outlier
 
 
 def _is_of_the_mechanism(motion: FloatArray, heights: FloatArray, strokes: Sequence[Stroke], point: int) -> bool:
@@ -178,9 +178,9 @@ def _is_of_the_mechanism(motion: FloatArray, heights: FloatArray, strokes: Seque
     alike = passing = 0
     for stroke in strokes:
         away = np.abs(motion[stroke.points] - motion[point])
-        near = away <= 1.5 * stroke.way / len(stroke.points)
-        passing += bool(near.any())
-        ratio = heights[stroke.points[near]] / heights[point]
+        is_near = away <= 1.5 * stroke.covered / len(stroke.points)
+        passing += bool(is_near.any())
+        ratio = heights[stroke.points[is_near]] / heights[point]
         alike += bool(((ratio > 0.5) & (ratio < 2.0)).any())
     return alike >= 2 and 2 * alike > passing
 
@@ -189,8 +189,8 @@ def _remove_points(recording: Recording, spiky: NDArray[np.bool_]) -> Strokes:
     """Return the strokes of a recording without some of its points."""
     kept = np.flatnonzero(~spiky)
     time = None if recording.time is None else recording.time[kept]
-    found = split(replace(recording, motion=recording.motion[kept], effort=recording.effort[kept], time=time))
-    return replace(found, strokes=tuple(replace(item, points=kept[item.points]) for item in found.strokes))
+    split_again = split(replace(recording, motion=recording.motion[kept], effort=recording.effort[kept], time=time))
+    return replace(split_again, strokes=tuple(replace(item, points=kept[item.points]) for item in split_again.strokes))
 
 
 def _common_range(recording: Recording, strokes: Strokes) -> Window:
@@ -223,12 +223,12 @@ def _smooth(recording: Recording, strokes: Sequence[Stroke], chosen: LowPass) ->
     if any(np.ptp(over[stroke.points]) == 0 for stroke in strokes):
         raise DataError("the time is the same at all points of a branch; give the cut-off in 1/mm or 1/deg instead")
     for stroke in strokes:
-        points = stroke.points if chosen.per == "time" else stroke.points[_by_motion(recording, stroke)]
+        points = stroke.points if chosen.per == "time" else stroke.points[_sort_by_motion(recording, stroke)]
         smooth[points] = low_passed(recording.effort[points], over[points], chosen)
     return smooth
 
 
-def _by_motion(recording: Recording, stroke: Stroke) -> NDArray[np.intp]:
+def _sort_by_motion(recording: Recording, stroke: Stroke) -> NDArray[np.intp]:
     """Return the order of a stroke's points along its way."""
     motion = recording.motion[stroke.points]
     return np.argsort(motion if stroke.branch == LOAD_BRANCH else -motion, kind="stable")
@@ -236,7 +236,7 @@ def _by_motion(recording: Recording, stroke: Stroke) -> NDArray[np.intp]:
 
 def _curve(recording: Recording, cycle: Sequence[Stroke], effort: FloatArray, strokes: Strokes) -> Curve:
     """Return the curve of one cycle."""
-    points = np.concatenate([stroke.points[_by_motion(recording, stroke)] for stroke in cycle])
+    points = np.concatenate([stroke.points[_sort_by_motion(recording, stroke)] for stroke in cycle])
     branch = np.repeat([stroke.branch for stroke in cycle], [len(stroke.points) for stroke in cycle])
     extra = {} if recording.time is None else {"time": Column(recording.time[points], "time")}
     label = {"cycle": (float(cycle[0].cycle), "count")} if len(strokes.cycles) > 1 else {}
@@ -253,7 +253,9 @@ def elapsed_fraction(source: MeasuredCurves, branch: str) -> FloatArray:
     clock = np.arange(len(recording), dtype=float) if recording.time is None else recording.time
     clock = (clock - clock[0]) / (float(np.ptp(clock)) or 1.0)
     strokes = [stroke for cycle in source.strokes.measured for stroke in cycle if stroke.branch == branch]
-    passed: FloatArray = np.concatenate([clock[stroke.points[_by_motion(recording, stroke)]] for stroke in strokes])
+    passed: FloatArray = np.concatenate(
+        [clock[stroke.points[_sort_by_motion(recording, stroke)]] for stroke in strokes]
+    )
     return passed
 
 
@@ -296,10 +298,10 @@ def numbers_of(
         )
 
     def all_metrics(curves: Sequence[Curve]) -> tuple[Mapping[str, Quantity], ...]:
-        each = ((curve, measure(curve, frame, window, _motion_definitions(kind))) for curve in curves)
-        return tuple(empty_uncovered(metrics, of_cycle(large, curve), kind) for curve, metrics in each)
+        measured = ((curve, measure(curve, frame, window, _motion_definitions(kind))) for curve in curves)
+        return tuple(empty_uncovered(metrics, select_cycle(large, curve), kind) for curve, metrics in measured)
 
-    covered_by = tuple(coverage(curve, of_cycle(holes, curve), window) for curve in source.raw)
+    covered_by = tuple(coverage(curve, select_cycle(holes, curve), window) for curve in source.raw)
     each = tuple({**metrics, **shares} for metrics, shares in zip(all_metrics(source.raw), covered_by, strict=True))
     smooth = all_metrics(source.filtered)
     repeated = empty_uncovered(repeatability(source.raw, window), large, kind)
@@ -309,10 +311,10 @@ def numbers_of(
 
 def _motion_definitions(kind: Kind) -> tuple[Definition, ...]:
     """Return mean and standard deviation as they are of a recording."""
-    own = {f"{kind}_mean": "mean {effort}", f"{kind}_sd": "standard deviation of the {effort}"}
-    known = metrics_by_name(kind)
+    meanings = {f"{kind}_mean": "mean {effort}", f"{kind}_sd": "standard deviation of the {effort}"}
+    definitions = metrics_by_name(kind)
     how = "over the {motion} in the window, each sample weighted by the way that it stands for (trapezoids)"
-    return tuple(replace(known[name], definition=f"{words} {how}") for name, words in own.items())
+    return tuple(replace(definitions[name], definition=f"{words} {how}") for name, words in meanings.items())
 
 
 def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tuple[Finding, ...]]:
@@ -370,10 +372,10 @@ def common_window(curves: Sequence[Curve]) -> Window:
     parts = [curve.motion[curve.branch == name] for curve in curves for name in curve.branches]
     lo, hi = max(float(part.min()) for part in parts), min(float(part.max()) for part in parts)
     if not lo < hi:
-        one, what = (
+        quantity, what = (
             ("angle", "angle and torque") if curves[0].kind == "torque" else ("travel", "displacement and force")
         )
-        raise DataError(f"no {one} is measured on every branch; are the columns or units of {what} swapped?")
+        raise DataError(f"no {quantity} is measured on every branch; are the columns or units of {what} swapped?")
     return Window(lo + 0.0, hi + 0.0)  # no -0
 
 
@@ -390,18 +392,18 @@ def require_loop(source: MeasuredCurves) -> None:
         )
 
 
-def _mean(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
+def _mean(metrics_of_cycles: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
     """Return the mean of every metric over cycles; undefined where it is on one of them."""
-    found = {}
-    for name, first in each[0].items():
-        values = [item[name].value for item in each]
-        known = [value for value in values if value is not None]
-        if len(known) < len(values):
-            found[name] = next(item[name] for item in each if item[name].value is None)
+    means = {}
+    for name, first in metrics_of_cycles[0].items():
+        values = [item[name].value for item in metrics_of_cycles]
+        numbers = [value for value in values if value is not None]
+        if len(numbers) < len(values):
+            means[name] = next(item[name] for item in metrics_of_cycles if item[name].value is None)
         else:
-            suffix = f"; mean of {len(each)} cycles" if len(each) > 1 else ""
-            found[name] = replace(first, value=float(np.mean(known)), definition=first.definition + suffix)
-    return found
+            suffix = f"; mean of {len(metrics_of_cycles)} cycles" if len(metrics_of_cycles) > 1 else ""
+            means[name] = replace(first, value=float(np.mean(numbers)), definition=first.definition + suffix)
+    return means
 
 
 __all__ = [

@@ -209,7 +209,7 @@ def explain(
     ends = Window(float(result.curve.motion.min()), float(result.curve.motion.max()))
     before = compare(result, source, ends)
     if has_no_loss(curves, before, candidates):
-        before = before.of_the_mean()
+        before = before.compare_mean()
         candidates = tuple(item for item in candidates if not item.path.endswith("friction"))
     if fit is not None:
         fits = [fit_samples(before, curves, candidates, "linear", FIT_TOLERANCE)]
@@ -234,10 +234,10 @@ def _check_travel(motion: FloatArray, source: MeasuredCurves, spec: Spec) -> Non
     if beyond <= (LARGEST_OVERTRAVEL - 1.0) * travel and inside >= 0.5 * travel:
         return
     ends = " to ".join(format_short(float(end), kind, 4) for end in (recorded.min(), recorded.max()))
-    own = " to ".join(format_short(end, kind, 4) for end in (low, high))
+    spanned = " to ".join(format_short(end, kind, 4) for end in (low, high))
     raise DataError(
-        f"{source.recording.name}: goes over {ends}, {spec.name!r} over {own}: a recording of another part? Else set "
-        "--zero or --units"
+        f"{source.recording.name}: goes over {ends}, {spec.name!r} over {spanned}: a recording of another part? Else "
+        "set --zero or --units"
     )
 
 
@@ -378,15 +378,15 @@ def _irreducible(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
             yield explanation
 
 
-def _check_best(best: Explanation, before: Comparison, source: MeasuredCurves, own: float) -> None:
-    """Raise if even the best explanation says that another part was measured; `own` is the part's usual force."""
+def _check_best(best: Explanation, before: Comparison, source: MeasuredCurves, usual_force: float) -> None:
+    """Raise if even the best explanation says that another part was measured; `usual_force` is that of the part."""
     calibration, name = best.calibration, source.recording.name
     bounds = calibration.fit.at_bound
     zero = f"{DATA_PREFIX}{next(iter(ZERO_OFFSETS[before.curve.kind]))}"
     for k, item in enumerate(calibration.parameters):
         value = abs(float(calibration.fit.values[k]))
-        if item.path == zero and value > own:
-            shown, usual = (format_short(one, before.curve.kind, 3) for one in (value, own))
+        if item.path == zero and value > usual_force:
+            shown, usual = (format_short(force, before.curve.kind, 3) for force in (value, usual_force))
             raise DataError(
                 f"{name}: without load the sensor would show {shown}, more than the {usual} of the part: a recording "
                 "of another part? If it does, state it with --tare"

@@ -113,7 +113,7 @@ def _range_in(curves: tuple[Curve, ...], window: tuple[float, float]) -> tuple[f
         [curve.effort[(curve.motion >= window[0]) & (curve.motion <= window[1])] for curve in curves]
     )
     low, high = float(inside.min()), float(inside.max())
-    lowest, highest = (float(way([way(curve.effort) for curve in curves])) for way in (np.min, np.max))
+    lowest, highest = (float(extreme([extreme(curve.effort) for curve in curves])) for extreme in (np.min, np.max))
     if highest - lowest <= LITTLE_MORE * (high - low):
         low, high = lowest, highest
     room = 0.18 * (high - low) or 1e-3 * (abs(high) or 1.0)
@@ -145,8 +145,10 @@ def thin_curve(curve: Curve, bins: int = MAX_DRAWN_BINS) -> Curve:
             keep.append(index)
             continue
         parts = np.array_split(index, bins)
-        found = [part[[0, int(curve.effort[part].argmin()), int(curve.effort[part].argmax()), -1]] for part in parts]
-        keep.append(np.unique(np.concatenate(found)))
+        kept_points = [
+            part[[0, int(curve.effort[part].argmin()), int(curve.effort[part].argmax()), -1]] for part in parts
+        ]
+        keep.append(np.unique(np.concatenate(kept_points)))
     return curve.take(np.concatenate(keep))
 
 
@@ -163,14 +165,14 @@ def overlay(
     shown = comparison.branches or comparison.samples
     efforts = np.concatenate([item.effort for item in shown])
     models = [comparison, *([before] if before else [])]
-    values = [efforts, *(item.errors(one.curve) + item.effort for one in models for item in one.samples)]
+    values = [efforts, *(item.errors(model.curve) + item.effort for model in models for item in model.samples)]
     labels = [_draw_measured(item, comparison, upper, 0.25 - 0.12 * k) for k, item in enumerate(shown)]
     if comparison.branches:
         mean = _unbroken_runs(comparison.samples[0], comparison)
         upper.plot(*mean.T, color=TEXT_GREY, linewidth=0.8, dashes=(4, 2), zorder=2.5)
         labels.append(Label("mean of the branches", TEXT_GREY, mean, prefer=0.9))
-    for one in models:
-        labels += _draw_model(one, upper, dashed=one is before)
+    for model in models:
+        labels += _draw_model(model, upper, dashed=model is before)
     _fit_limits(upper, np.concatenate(values), comparison)
     upper.tick_params(labelbottom=False)
     upper.set_ylabel(axis_label(comparison.curve.kind, comparison.curve.kind))
@@ -180,7 +182,7 @@ def overlay(
     return figure
 
 
-def _in_border(comparison: Comparison, motion: FloatArray, effort: FloatArray) -> FloatArray:
+def _convert_to_border(comparison: Comparison, motion: FloatArray, effort: FloatArray) -> FloatArray:
     curve = comparison.curve
     return np.column_stack([to_border(motion, curve.motion_dimension), to_border(effort, curve.kind)])
 
@@ -195,11 +197,13 @@ def _draw_measured(samples: Samples, comparison: Comparison, ax: Axes, prefer: f
 
 def _unbroken_runs(samples: Samples, comparison: Comparison, values: FloatArray | None = None) -> FloatArray:
     """Return points of samples in border units, with a gap between cycles and in holes."""
-    points = _in_border(comparison, samples.motion, samples.effort if values is None else values)
+    points = _convert_to_border(comparison, samples.motion, samples.effort if values is None else values)
     breaks = np.flatnonzero(np.diff(samples.cycle) != 0) + 1
     for start, stop in pairwise([0, *breaks.tolist(), len(points)]):
-        way = 1 if samples.motion[stop - 1] >= samples.motion[start] else -1
-        breaks = np.append(breaks, start + 1 + np.flatnonzero(is_hole_after(samples.motion[start:stop][::way])[::way]))
+        step = 1 if samples.motion[stop - 1] >= samples.motion[start] else -1
+        breaks = np.append(
+            breaks, start + 1 + np.flatnonzero(is_hole_after(samples.motion[start:stop][::step])[::step])
+        )
     return np.insert(points, breaks.astype(int), np.nan, axis=0)
 
 
@@ -208,7 +212,7 @@ def _draw_model(comparison: Comparison, ax: Axes, dashed: bool) -> list[Label]:
     labels = []
     places = np.linspace(comparison.window.lo, comparison.window.hi, 400)
     for number, samples in enumerate(comparison.samples):
-        points = _in_border(comparison, places, model_at(comparison.curve, samples.model_branch, places))
+        points = _convert_to_border(comparison, places, model_at(comparison.curve, samples.model_branch, places))
         color = LINE_COLOURS[number % len(LINE_COLOURS)]
         ax.plot(*points.T, color=color, linewidth=0.9 if dashed else 1.4, linestyle="--" if dashed else "-", zorder=3)
         if not dashed:

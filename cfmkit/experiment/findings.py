@@ -36,28 +36,28 @@ RECORDING_FINDINGS = {
 
 def warnings_of(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
     """Return what is said of strokes and of the sign of a recording."""
-    found = []
+    warnings = []
     cycles = strokes.cycles
     if not cycles:
         only = strokes.measured[0][0].branch
-        found.append(Finding("one_branch", f"there is only the branch {only!r}: no loop, and no hysteresis"))
+        warnings.append(Finding("one_branch", f"there is only the branch {only!r}: no loop, and no hysteresis"))
     left = len(strokes.strokes) - (2 * len(strokes.complete) or 1)
     if cycles and covered_fraction(cycles[0]) < COMPLETE_STROKE_SHARE:
         reported = f"the shorter stroke covers only {100 * covered_fraction(cycles[0]):.0f} % of the longer one"
-        found.append(Finding("unfinished_cycle", f"{reported}: the loop is not closed"))
+        warnings.append(Finding("unfinished_cycle", f"{reported}: the loop is not closed"))
     if left:
-        found.append(
+        warnings.append(
             Finding("unfinished_cycle", f"{left} of {len(strokes.strokes)} strokes complete no cycle: left out")
         )
     if strokes.shorter:
-        found.append(_shorter(recording, strokes))
+        warnings.append(_shorter(recording, strokes))
     if strokes.pauses:
         reported = f"{strokes.pauses} of {len(recording)} points at which the machine stood are left out"
-        found.append(Finding("pauses", reported))
+        warnings.append(Finding("pauses", reported))
     if float(recording.effort.mean()) < 0:
         reported = f"the mean {recording.kind} is negative: is the sensor's sign reversed?"
-        found.append(Finding("negative_force", reported))
-    return tuple(found)
+        warnings.append(Finding("negative_force", reported))
+    return tuple(warnings)
 
 
 def _shorter(recording: Recording, strokes: Strokes) -> Finding:
@@ -70,14 +70,14 @@ def _shorter(recording: Recording, strokes: Strokes) -> Finding:
         ends = recording.motion[int(cycle[0].points[0]) : int(cycle[1].points[-1]) + 1]
         return span_text(float(ends.min()), float(ends.max()), recording.kind)
 
-    each = ", ".join(f"{cycle[0].cycle} ({span(cycle)})" for cycle in strokes.shorter[:4])
+    cycle_texts = ", ".join(f"{cycle[0].cycle} ({span(cycle)})" for cycle in strokes.shorter[:4])
     more = f" and {len(numbers) - 4} more" if len(numbers) > 4 else ""
-    there = [cycle[0].cycle for cycle in strokes.complete]
+    complete = [cycle[0].cycle for cycle in strokes.complete]
     cycles, verb = ("cycles", "are") if len(numbers) > 1 else ("cycle", "is")
     what = "seating " if seating else ""
     reported = (
-        f"{what}{cycles} {each}{more} {verb} left out, as others cover {span(strokes.cycles[0])}; "
-        f"--cycles {there[0]}:{there[-1]} keeps all"
+        f"{what}{cycles} {cycle_texts}{more} {verb} left out, as others cover {span(strokes.cycles[0])}; "
+        f"--cycles {complete[0]}:{complete[-1]} keeps all"
     )
     return Finding("seating_cycles" if seating else "short_cycles", reported)
 
@@ -90,11 +90,11 @@ def spikes_left_out(recording: Recording, spiky: NDArray[np.bool_]) -> tuple[Fin
     return (Finding("spikes", f"{count} of {len(recording)} points are far from their neighbours and are omitted"),)
 
 
-def passages_left_out(recording: Recording, found: Settled) -> tuple[Finding, ...]:
+def passages_left_out(recording: Recording, settled: Settled) -> tuple[Finding, ...]:
     """Return what is said of the points next to reversals."""
-    if not found.length:
+    if not settled.length:
         return ()
-    length = format_short(found.length, recording.motion_dimension, 3)
-    points = f"{found.points} point{'s' * (found.points > 1)} within {length} of the ends of strokes"
+    length = format_short(settled.length, recording.motion_dimension, 3)
+    points = f"{settled.points} point{'s' * (settled.points > 1)} within {length} of the ends of strokes"
     reported = f"{points} are left out: there the {recording.kind} passes from one branch to the other"
     return (Finding("reversals", reported),)

@@ -28,8 +28,8 @@ def branch_at(
 ) -> FloatArray:
     """Return the effort of one branch at some places, by linear interpolation."""
     part = curve.select_branch(branch)
-    way = 1 if part.motion[-1] >= part.motion[0] else -1
-    values: FloatArray = np.interp(places, part.motion[::way], part.effort[::way])
+    step = 1 if part.motion[-1] >= part.motion[0] else -1
+    values: FloatArray = np.interp(places, part.motion[::step], part.effort[::step])
     return values
 
 
@@ -84,12 +84,12 @@ def repeatability(curves: Sequence[Curve], window: Window) -> dict[str, Quantity
     kind = curves[0].kind
     meant = define_recorded_values(kind)[f"{kind}_repeatability"]
     places = np.linspace(window.lo, window.hi, N_CYCLE_PLACES)
-    found = {}
+    quantities = {}
     for branch in curves[0].branches:
         name = f"{kind}_repeatability[{branch}]"
         if len(curves) < 2:
-            found[name] = Quantity(None, *meant, "there is one cycle only")
+            quantities[name] = Quantity(None, *meant, "there is one cycle only")
             continue
         forces = np.array([branch_at(curve, branch, places) for curve in curves])
-        found[name] = Quantity(float(np.sqrt(forces.var(axis=0, ddof=1).mean())), *meant)
-    return found
+        quantities[name] = Quantity(float(np.sqrt(forces.var(axis=0, ddof=1).mean())), *meant)
+    return quantities

@@ -62,8 +62,8 @@ class LowPass:
             tangent /= (math.sqrt(2.0) - 1.0) ** (1.0 / (2 * self.order))
         from scipy.signal import butter
 
-        found: FloatArray = butter(self.order, math.atan(tangent) / math.pi, fs=1.0, output="sos")
-        return found
+        sections: FloatArray = butter(self.order, math.atan(tangent) / math.pi, fs=1.0, output="sos")
+        return sections
 
     @property
     def reported(self) -> str:
@@ -135,10 +135,10 @@ def low_passed(
         raise DataError("there is no travel to filter over: all points are at one position")
     if np.abs(steps - step).max() <= _STEP_RTOL * abs(step):
         return _both_ways(values, abs(step), filtered_by)
-    way = 1 if step > 0 else -1
+    sign = 1 if step > 0 else -1
     even = np.linspace(over[0], over[-1], len(over))
-    smooth = _both_ways(np.interp(way * even, way * over, values), abs(step), filtered_by)
-    back: FloatArray = np.interp(way * over, way * even, smooth)
+    smooth = _both_ways(np.interp(sign * even, sign * over, values), abs(step), filtered_by)
+    back: FloatArray = np.interp(sign * over, sign * even, smooth)
     return back
 
 

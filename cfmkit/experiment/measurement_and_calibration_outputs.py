@@ -99,35 +99,34 @@ def data_of(reports: Mapping[str, MeasureReport]) -> dict[str, Any]:
     """Return what metrics.json says of one specimen, or of several: their metrics by name as ``force_mean[A,load]``."""
     if len(reports) == 1:
         return next(iter(reports.values())).data
-    each = {name: report.data for name, report in reports.items()}
-    short = {name: data["message"] for name, data in each.items() if data["message"]}
+    data_by_group = {name: report.data for name, report in reports.items()}
+    short = {name: data["message"] for name, data in data_by_group.items() if data["message"]}
     return {
         "status": (Status.PARTIAL if short else Status.COMPLETE).key,
         "message": "; ".join(f"{name}: {message}" for name, message in short.items()),
-        "metrics": _tag_metrics(each, "metrics"),
+        "metrics": _tag_metrics(data_by_group, "metrics"),
         "requirements": [],
         "warnings": [
             {"name": item["name"], "message": f"{name}: {item['message']}"}
-            for name, data in each.items()
+            for name, data in data_by_group.items()
             for item in data["warnings"]
         ],
-        "metrics_filtered": _tag_metrics(each, "metrics_filtered"),
-        "groups": {name: _describe_data(data) for name, data in each.items()},
+        "metrics_filtered": _tag_metrics(data_by_group, "metrics_filtered"),
+        "groups": {
+            name: {key: data[key] for key in ("filter", "window", "cycles", "data", "reading")}
+            for name, data in data_by_group.items()
+        },
     }
 
 
-def _tag_metrics(each: Mapping[str, Mapping[str, Any]], key: str) -> dict[str, Any]:
+def _tag_metrics(data_by_group: Mapping[str, Mapping[str, Any]], key: str) -> dict[str, Any]:
     """Return the metrics of all specimens, each with its specimen in brackets."""
-    found = {}
-    for group, data in each.items():
+    tagged = {}
+    for group, data in data_by_group.items():
         for name, value in flat_metrics(data[key]).items():
             metric, branch = split_name(name)
-            found[f"{metric}[{','.join(part for part in (group, branch) if part)}]"] = value
-    return found
-
-
-def _describe_data(data: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: data[key] for key in ("filter", "window", "cycles", "data", "reading")}
+            tagged[f"{metric}[{','.join(part for part in (group, branch) if part)}]"] = value
+    return tagged
 
 
 def report_on(
@@ -148,9 +147,9 @@ def _stack_tables(tables: Mapping[str, Table]) -> Table:
     columns = [TableColumn("group", tuple(name for name, table in tables.items() for _ in range(_rows(table))))]
     for name in names:
         values: list[Any] = []
-        for one in tables.values():
-            found = next((column.values for column in one.columns if column.name == name), None)
-            values += [""] * _rows(one) if found is None else list(found)
+        for part_table in tables.values():
+            values_of_column = next((column.values for column in part_table.columns if column.name == name), None)
+            values += [""] * _rows(part_table) if values_of_column is None else list(values_of_column)
         columns.append(TableColumn(name, tuple(values)))
     return Table(tuple(columns))
 
@@ -178,13 +177,13 @@ def _with_filtered(raw: Curve, number: int, source: MeasuredCurves) -> Curve:
 
 def cycles_table(report: MeasureReport) -> Table:
     """Return the raw metrics that have a value, one row per cycle."""
-    each = report.numbers.each
-    names = [name for name in each[0] if any(item[name].value is not None for item in each)]
+    cycles = report.numbers.each
+    names = [name for name in cycles[0] if any(item[name].value is not None for item in cycles)]
     numbers = [int(curve.label["cycle"][0]) if curve.label else 1 for curve in report.source.raw]
     columns = [
         border_column(
-            _column_name(name), [np.nan if item[name].value is None else item[name].value for item in each],
-            each[0][name].dimension,
+            _column_name(name), [np.nan if item[name].value is None else item[name].value for item in cycles],
+            cycles[0][name].dimension,
         )
         for name in names
     ]  # fmt: skip

@@ -75,14 +75,14 @@ def parameters(
     if strange := next((name for name in bounds or {} if name not in names), None):
         raise UsageError(f"--bounds names {strange!r}, which --fit does not")
     return tuple(
-        _of_data(name, (bounds or {}).get(name), recording)
+        _make_zero_parameter(name, (bounds or {}).get(name), recording)
         if name.startswith(DATA_PREFIX)
         else _parameter(spec, name, (bounds or {}).get(name))
         for name in names
     )
 
 
-def _of_data(path: str, bounds: tuple[float, float] | None, recording: Recording | None) -> FitParameter:
+def _make_zero_parameter(path: str, bounds: tuple[float, float] | None, recording: Recording | None) -> FitParameter:
     """Return a zero of the recording to fit; it starts from none."""
     dimension = _zero(path, "--fit", recording)
     if recording and path.endswith(("displacement_offset", "angle_offset")):
@@ -98,23 +98,23 @@ def _of_data(path: str, bounds: tuple[float, float] | None, recording: Recording
 
 def _zero(path: str, option: str, recording: Recording | None) -> str:
     """Return the dimension of a value of the recording."""
-    known = ZERO_OFFSETS[recording.kind if recording else "force"]
+    offsets = ZERO_OFFSETS[recording.kind if recording else "force"]
     name = path.removeprefix(DATA_PREFIX)
-    if name not in known:
-        there = ", ".join(DATA_PREFIX + item for item in known)
-        raise UsageError(f"{option}: there is no {path!r}; a recording has {there}")
-    return known[name]
+    if name not in offsets:
+        listed = ", ".join(DATA_PREFIX + item for item in offsets)
+        raise UsageError(f"{option}: there is no {path!r}; a recording has {listed}")
+    return offsets[name]
 
 
 def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> FitParameter:
     try:
-        found = leaf(type(spec), path)
+        place = leaf(type(spec), path)
     except CannotVary as problem:
         raise UsageError(f"--fit: {problem}") from None
-    if found.kind not in ("quantity", "number"):
+    if place.kind not in ("quantity", "number"):
         raise UsageError(f"--fit: {path!r} is not a number that varies continuously")
     value = _value(spec, path)
-    dimension = found.quantity.dimensions[0] if found.quantity else "ratio"
+    dimension = place.quantity.dimensions[0] if place.quantity else "ratio"
     low, high = _limits(type(spec), path)
     asked_low, asked_high = bounds or (-math.inf, math.inf)
     size = _size(value, (max(low, asked_low), min(high, asked_high)), dimension)
@@ -142,11 +142,11 @@ def _value(spec: Spec, path: str) -> float:
 
 
 def _slots(spec_type: type[Spec], path: str) -> tuple[Slot, ...]:
-    here: tuple[Slot, ...] = (Slot(spec_type),)
+    allowed: tuple[Slot, ...] = (Slot(spec_type),)
     for part in path.split("."):
         key: str | int = int(part) if part.isdecimal() else part
-        here = tuple(inner for slot in here for inner in slot.child(key))
-    return here
+        allowed = tuple(inner for slot in allowed for inner in slot.child(key))
+    return allowed
 
 
 def _limits(spec_type: type[Spec], path: str) -> tuple[float, float]:
@@ -190,7 +190,7 @@ def read_bounds(
 
     Raises UsageError if one is malformed.
     """
-    found = {}
+    parameters = {}
     for option in options:
         path, equals, text = (part.strip() for part in option.partition("="))
         ends = text.split(":")
@@ -202,8 +202,8 @@ def read_bounds(
             raise UsageError(f"--bounds: {option!r}: {problem}") from None
         if not low < high:
             raise UsageError(f"--bounds: {option!r} must be increasing")
-        found[path] = (low, high)
-    return found
+        parameters[path] = (low, high)
+    return parameters
 
 
 def split_bounds(options: Iterable[str]) -> dict[str, str]:
@@ -211,13 +211,13 @@ def split_bounds(options: Iterable[str]) -> dict[str, str]:
 
     Raises UsageError if one has no ``=``.
     """
-    found = {}
+    fixed = {}
     for option in options:
         path, equals, text = (part.strip() for part in option.partition("="))
         if not equals:
             raise UsageError(f"--bounds: {option!r} is not 'a.b=low:high'")
-        found[path] = text
-    return found
+        fixed[path] = text
+    return fixed
 
 
 def _bound(text: str, path: str, spec: Spec, recording: Recording | None) -> float:

@@ -105,8 +105,8 @@ class Recording(ShortRepr):
     @cached_property
     def travel(self) -> float:
         """From the least to the largest motion [m or rad], samples far off their neighbours not counted."""
-        near = self.motion[spikes(self.motion) == 0]
-        return float(np.ptp(near)) or float(np.ptp(self.motion))
+        regular = self.motion[spikes(self.motion) == 0]
+        return float(np.ptp(regular)) or float(np.ptp(self.motion))
 
     @property
     def lines(self) -> list[str]:
@@ -126,11 +126,13 @@ def read_recording(
     Raises UsageError if the file cannot be read, or `units` is malformed; DataError if it holds no curve, or those of
     several specimens.
     """
-    found = read_recordings(path, units, group)
-    if len(found) > 1:
+    recordings = read_recordings(path, units, group)
+    if len(recordings) > 1:
         column = (group or "").strip()
-        raise DataError(f"{Path(path).name}: {column!r} has {len(found)} values; choose {_options(column, found)}")
-    return next(iter(found.values()))
+        raise DataError(
+            f"{Path(path).name}: {column!r} has {len(recordings)} values; choose {_options(column, recordings)}"
+        )
+    return next(iter(recordings.values()))
 
 
 def read_recordings(
@@ -160,12 +162,12 @@ def read_recordings(
     table = tables[0]
     roles = roles_of(table.numeric, table.columns, name)
     if key in ("", NO_COLUMN_WORD):
-        found = None if key else _specimens(table, roles)
-        if found is not None:
-            values = list(dict.fromkeys(_labels(table, found)))
+        specimens = None if key else _specimens(table, roles)
+        if specimens is not None:
+            values = list(dict.fromkeys(_labels(table, specimens)))
             raise DataError(
-                f"{name}: {quote(found.name)} tells {len(values)} specimens apart, which no single curve describes; "
-                f"choose {_options(found.name, values)}, or --group {NO_COLUMN_WORD} if all rows are of one"
+                f"{name}: {quote(specimens.name)} tells {len(values)} specimens apart, which no single curve "
+                f"describes; choose {_options(specimens.name, values)}, or --group {NO_COLUMN_WORD} for rows of one"
             )
         return {"": _recording(table, roles, encoding, name)}
     column = column_named(key, table.columns, name)
@@ -202,12 +204,14 @@ def _each_table(tables: Sequence[LabTable], group: str | None, encoding: str, na
             f"{name}: there are {len(tables)} tables, with numbers from lines {places} on; choose {choices}"
         )
     chosen = [value] if value else names
-    found = {}
+    recordings = {}
     for item in chosen:
         table = tables[int(item) - 1]
         roles = roles_of(table.numeric, table.columns, name)
-        found[item] = _recording(table, roles, encoding, f"{name}, table {item}", sum(len(one.rows) for one in tables))
-    return found
+        recordings[item] = _recording(
+            table, roles, encoding, f"{name}, table {item}", sum(len(table_of_all.rows) for table_of_all in tables)
+        )
+    return recordings
 
 
 def _options(column: str, values: Iterable[str]) -> str:
@@ -222,10 +226,10 @@ MOST_LISTED = 6  # so many values are listed to choose from
 
 def _labels(table: LabTable, column: ColumnInfo) -> list[str]:
     """Return the cells of a column; an empty one is as the one above it, as spreadsheets merge them."""
-    found: list[str] = []
+    cells: list[str] = []
     for text in table.texts(column):
-        found.append(text or (found[-1] if found else ""))
-    return found
+        cells.append(text or (cells[-1] if cells else ""))
+    return cells
 
 
 def _parts(table: LabTable, column: ColumnInfo) -> dict[str, LabTable]:

@@ -20,6 +20,7 @@ from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE_METRICS
 from cfmkit.metrics import check, values_of_family
 from cfmkit.specs.units import format_short, from_border, to_border
+from cfmkit.specs.yamlio.path_notation import read_item_suffix
 from cfmkit.stock.material_and_part_spec import sheet_of
 from cfmkit.studies.parts.assumed_errors import accuracy_of, assume_errors
 from cfmkit.studies.parts.redesign import free_of
@@ -93,7 +94,7 @@ def limits_of(spec: Spec) -> dict[str, DrawnRange]:
         if path in fixed:
             continue
         limit = DrawnRange(low, high)
-        if process is not None and _is_section(path) and process.process.least_feature > low:
+        if process is not None and _kind(path) in SECTION_RELUCTANCE and process.process.least_feature > low:
             thinnest = min(process.process.least_feature, float(spec.get_value(path)))
             limit = DrawnRange(thinnest, max(high, thinnest), f"the least that {process.process.name} makes")
         if limit.low < limit.high:
@@ -114,22 +115,12 @@ def section_paths(spec: Spec) -> list[str]:
     """Return the paths of widths and thicknesses of what bends."""
     made = {f"mechanism.{key}" for key, value in spec.out_of_plane_widths.items() if value is not None}
     beside = {path.removesuffix("width") + "thickness" for path in made}
-    known = dict(spec.leaves())
-    return [path for path in known if path in made or path.removesuffix(_index(path)) in beside]
-
-
-def _index(path: str) -> str:
-    """Return the number of an item at the end of a path with its dot; "" if it has none."""
-    last = path.rpartition(".")[2]
-    return f".{last}" if last.isdecimal() else ""
-
-
-def _is_section(path: str) -> bool:
-    return _kind(path) in SECTION_RELUCTANCE
+    leaves = dict(spec.leaves())
+    return [path for path in leaves if path in made or path.removesuffix(read_item_suffix(path)) in beside]
 
 
 def _kind(path: str) -> str:
-    return path.removesuffix(_index(path)).rpartition(".")[2]
+    return path.removesuffix(read_item_suffix(path)).rpartition(".")[2]
 
 
 class MadeAs(Protocol):
@@ -331,7 +322,7 @@ def largest_miss(result: Result, of_envelope: bool = False) -> float:
     for outcome in check(result.spec.part_requirements, result, values):
         if outcome.value is None or (of_envelope and outcome.metric not in ENVELOPE_METRICS):
             continue
-        for bound, way in ((outcome.max, 1.0), (outcome.min, -1.0)):
+        for bound, sign in ((outcome.max, 1.0), (outcome.min, -1.0)):
             if bound is not None:
-                shares.append(way * (outcome.value - bound) / (abs(bound) or 1.0) + REQUIREMENT_MARGIN)
+                shares.append(sign * (outcome.value - bound) / (abs(bound) or 1.0) + REQUIREMENT_MARGIN)
     return max(shares)

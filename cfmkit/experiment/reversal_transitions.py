@@ -75,17 +75,17 @@ def remove_transitions(recording: Recording, strokes: Strokes) -> Settled:
     """
     ends = list(_ends(recording, strokes.strokes))
     # Every reversal at one end of the travel is of the same machine: together they show what noise hides in one.
-    alike = {way: passage([end for end in ends if end.way == way and end.reversal]) for way in (1.0, -1.0)}
-    lengths = [max(passage([end]), alike[end.way] if end.reversal else 0.0) for end in ends]
-    found = [
+    alike = {side: passage([end for end in ends if end.side == side and end.reversal]) for side in (1.0, -1.0)}
+    lengths = [max(passage([end]), alike[end.side] if end.reversal else 0.0) for end in ends]
+    shortened = [
         _shorten_stroke(
             recording, stroke, [(e, length) for e, length in zip(ends, lengths, strict=True) if number in e.at]
         )
         for number, stroke in enumerate(strokes.strokes)
     ]
-    left_out = sum(len(old.points) - len(new.points) for old, new in zip(strokes.strokes, found, strict=True))
+    left_out = sum(len(old.points) - len(new.points) for old, new in zip(strokes.strokes, shortened, strict=True))
     passages = [length for end, length in zip(ends, lengths, strict=True) if length > end.next_sample]
-    return Settled(replace(strokes, strokes=tuple(found)), left_out, max(passages, default=0.0))
+    return Settled(replace(strokes, strokes=tuple(shortened)), left_out, max(passages, default=0.0))
 
 
 @dataclass(frozen=True)
@@ -93,9 +93,9 @@ class End:
     """An end of the travel with the two strokes that meet there, seen from it."""
 
     at: tuple[int, ...]  # which strokes end here; the first and the last of a recording do so alone
-    # place, way: where it is [m or rad], and the sign of the motion away from it
+    # place, side: where it is [m or rad], and the sign of the motion away from it
     place: float
-    way: float
+    side: float
     # up, down, ((n,), (n,): distance from the end [m or rad], increasing, and effort of the way up and the way down [N
     # or N m]
     up: tuple[FloatArray, FloatArray]
@@ -123,22 +123,22 @@ def _ends(recording: Recording, strokes: tuple[Stroke, ...]) -> Iterator[End]:
     last = len(strokes) - 1
     pairs = [(k, k + 1, (k, k + 1)) for k in range(last)]
     outer = [(0, 1, (0,)), (last, last - 1, (last,))] if last else []
-    for one, other, at in (*pairs, *outer):
-        if strokes[one].branch == strokes[other].branch:
+    for number, neighbour, at in (*pairs, *outer):
+        if strokes[number].branch == strokes[neighbour].branch:
             continue
         first = at == (0,)
-        way = 1.0 if (strokes[one].branch == LOAD_BRANCH) == first else -1.0
+        side = 1.0 if (strokes[number].branch == LOAD_BRANCH) == first else -1.0
         places = np.concatenate([recording.motion[strokes[k].points] for k in at])
-        place = float(places.min() if way > 0 else places.max())
-        seen = {strokes[k].branch: _seen_from(recording, strokes[k], place, way) for k in (one, other)}
+        place = float(places.min() if side > 0 else places.max())
+        seen = {strokes[k].branch: _seen_from(recording, strokes[k], place, side) for k in (number, neighbour)}
         up, down = seen[LOAD_BRANCH], seen[UNLOAD_BRANCH]
         if min(len(up[0]), len(down[0])) >= _MIN_SAMPLES:
-            yield End(at, place, way, up, down)
+            yield End(at, place, side, up, down)
 
 
-def _seen_from(recording: Recording, stroke: Stroke, place: float, way: float) -> tuple[FloatArray, FloatArray]:
+def _seen_from(recording: Recording, stroke: Stroke, place: float, side: float) -> tuple[FloatArray, FloatArray]:
     """Return distances from a place, increasing, and the mean effort of a stroke at each."""
-    distance = way * (recording.motion[stroke.points] - place)
+    distance = side * (recording.motion[stroke.points] - place)
     places, inverse = np.unique(distance, return_inverse=True)
     return places, np.bincount(inverse, recording.effort[stroke.points]) / np.bincount(inverse)
 
@@ -148,7 +148,7 @@ def _shorten_stroke(recording: Recording, stroke: Stroke, ends: Sequence[tuple[E
     motion = recording.motion[stroke.points]
     keep = np.ones(len(motion), dtype=bool)
     for end, length in ends:
-        keep &= end.way * (motion - end.place) >= length
+        keep &= end.side * (motion - end.place) >= length
     return replace(stroke, points=stroke.points[keep]) if keep.sum() >= _MIN_SAMPLES else stroke
 
 
@@ -181,12 +181,12 @@ def passage(
 
 def _gap(end: End, reach: float) -> tuple[FloatArray, FloatArray]:
     """Return distances from an end where both strokes have a force, and the way up less the way down there."""
-    near = [part[0][(part[0] >= 0) & (part[0] <= reach)] for part in (end.up, end.down)]
-    if min(map(len, near)) < _MIN_SAMPLES // 2:
+    distances = [part[0][(part[0] >= 0) & (part[0] <= reach)] for part in (end.up, end.down)]
+    if min(map(len, distances)) < _MIN_SAMPLES // 2:
         return np.empty(0), np.empty(0)
-    places = np.union1d(*near)
+    places = np.union1d(*distances)
     # The sample at the reversal belongs to one stroke only: the other one starts a sample further in.
-    slack = 1.5 * max(float(np.median(np.diff(part))) for part in near)
+    slack = 1.5 * max(float(np.median(np.diff(part))) for part in distances)
     places = places[places >= max(float(part[0][0]) for part in (end.up, end.down)) - slack]
     return places, np.interp(places, *end.up) - np.interp(places, *end.down)
 

@@ -62,7 +62,7 @@ def check_outline(
         cut = section.cut(starts, ends)
         if np.isfinite(cut).all():
             met = {owner[k] for k in tree.query(LineString(section.line(cut)), "intersects").tolist()}
-            if any(abs(k - number) > 1 or not _is_of(pieces[k], section.beam) for k in met):
+            if any(abs(k - number) > 1 or all(other.beam != section.beam for other in pieces[k].sections) for k in met):
                 continue
         smaller = format_short(min(0.5 * section.thickness, 0.125 * section.length, 0.5 * fillet), "length", 2)
         remedy = f"--set 'mechanism.part.fillet={smaller}'" if fillet > 0 else "move its neighbours away"
@@ -82,10 +82,6 @@ def _measurable(pieces: Sequence[SpecifiedPiece], fillet: float) -> Iterator[tup
     for _, one in sections:
         longest[one.beam] = max(one.length, longest.get(one.beam, 0.0))
     return ((number, one) for number, one in sections if one.length >= min(longest[one.beam], MIN_FREE_RADII * fillet))
-
-
-def _is_of(piece: SpecifiedPiece, beam: str) -> bool:
-    return any(one.beam == beam for one in piece.sections)
 
 
 def _check_area(measured: float, least: float, largest: float) -> None:

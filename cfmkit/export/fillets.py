@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.contours import Arc, Contour, Line, Smooth, signed_area
+from cfmkit.export.traced_edges import pair
 from cfmkit.numerics.biarcs import cubic, slope
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def _round_between_lines(before: Line, after: Line, radius: float, side: float) 
     center = corner - trim * one - 1j * side * radius * one
     arc = _arc(center, radius, corner - trim * one, corner + trim * other, side)
     first, last = arc.ends
-    return Line(before.start, _pair(first)), arc, Line(_pair(last), after.end)
+    return Line(before.start, pair(first)), arc, Line(pair(last), after.end)
 
 
 def _round_onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -> tuple[Line, Arc, Smooth] | None:
@@ -124,10 +125,10 @@ def _round_onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -
     arc = _arc(center, radius, touch, center + 1j * side * radius * tangent, side)
     first, last = arc.ends
     rest = slice(k + 1 if share < 0.999 else k + 2, None)
-    kept = np.vstack([_pair(last), smooth.points[rest]])
+    kept = np.vstack([pair(last), smooth.points[rest]])
     if len(kept) < 2:
         return None
-    return Line(line.start, _pair(first)), arc, Smooth(kept, np.vstack([_pair(tangent), smooth.tangents[rest]]))
+    return Line(line.start, pair(first)), arc, Smooth(kept, np.vstack([pair(tangent), smooth.tangents[rest]]))
 
 
 def _zero(over: Callable[[float], float]) -> float:
@@ -146,11 +147,7 @@ def _zero(over: Callable[[float], float]) -> float:
 def _arc(center: complex, radius: float, first: complex, last: complex, side: float) -> Arc:
     """Return the arc that turns towards the waste: clockwise where the material is on the left."""
     start, turn = float(np.angle(first - center)), float(np.angle((last - center) / (first - center)))
-    return Arc(_pair(center), radius, start, start - side * abs(turn))
-
-
-def _pair(point: complex) -> tuple[float, float]:
-    return float(point.real), float(point.imag)
+    return Arc(pair(center), radius, start, start - side * abs(turn))
 
 
 def sharp_notes(places: Sequence[complex], radius: float) -> tuple[str, ...]:

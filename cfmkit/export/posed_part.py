@@ -114,7 +114,7 @@ def band(line: FloatArray, half: Any) -> FloatArray:
     return np.concatenate([line + aside, (line - aside)[::-1]])
 
 
-def in_poses(each: Sequence[Sequence[PosedBody]]) -> tuple[PosedBody, ...]:
+def join_poses(each: Sequence[Sequence[PosedBody]]) -> tuple[PosedBody, ...]:
     """Return the bodies of several poses, each given as the same bodies in the same order, as bodies in all poses."""
     found = []
     for same in zip(*each, strict=True):

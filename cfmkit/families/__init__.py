@@ -93,8 +93,8 @@ def names() -> tuple[str, ...]:
 
 def clashing() -> tuple[str, ...]:
     """Return the names that more than one other package offers: none of those families can be used."""
-    known = names()
-    return tuple(dict.fromkeys(one.name for one in entry_point_plugins.offers() if one.name not in known))
+    family_names = names()
+    return tuple(dict.fromkeys(offer.name for offer in entry_point_plugins.offers() if offer.name not in family_names))
 
 
 def family(name: str) -> Family:
@@ -136,8 +136,8 @@ def _record(name: str) -> Family:
     for offer in entry_point_plugins.offers():
         if offer.name == name:
             return entry_point_plugins.record_of(offer, FAMILY_MODULES)
-    near = get_close_matches(name, names(), n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    close = get_close_matches(name, names(), n=1)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
     raise UsageError(f"unknown family {name!r}; known are {', '.join(names())}{hint}")
 
 
@@ -149,18 +149,18 @@ def examine_families() -> tuple[tuple[entry_point_plugins.InstalledFamily | None
     tuple of (InstalledFamily or None, Family or str)
         Those of this package and of this process come first, without an offer. All others are imported.
     """
-    own = tuple((None, family(name)) for name in (*FAMILY_MODULES, *_REGISTERED_FAMILIES))
-    return own + tuple((offer, _try_family(offer)) for offer in entry_point_plugins.offers())
+    loaded = tuple((None, family(name)) for name in (*FAMILY_MODULES, *_REGISTERED_FAMILIES))
+    return loaded + tuple((offer, _try_family(offer)) for offer in entry_point_plugins.offers())
 
 
 def records() -> tuple[Family, ...]:
     """Return all families that can be used, in the order of `names`; `list_skipped` says which cannot."""
-    return tuple(found for _, found in examine_families() if not isinstance(found, str))
+    return tuple(examined for _, examined in examine_families() if not isinstance(examined, str))
 
 
 def list_skipped() -> tuple[str, ...]:
     """Return one line for each family of another package that cannot be used, with the reason."""
-    return tuple(found for _, found in examine_families() if isinstance(found, str))
+    return tuple(examined for _, examined in examine_families() if isinstance(examined, str))
 
 
 def _try_family(offer: entry_point_plugins.InstalledFamily) -> Family | str:
@@ -192,7 +192,9 @@ def _package_of(name: str) -> dict[str, str]:
 
 def origins() -> dict[str, dict[str, str]]:
     """Return what computes each family of another package or of this process, and metrics of the user."""
-    computed = {one.name: origin(one.name) for one in entry_point_plugins.offers() if one.name not in FAMILY_MODULES}
+    computed = {
+        offer.name: origin(offer.name) for offer in entry_point_plugins.offers() if offer.name not in FAMILY_MODULES
+    }
     computed |= {name: origin(name) for name in _REGISTERED_FAMILIES}
     return computed | ({"metrics": {"registered": own_metrics.stamp()}} if own_metrics.stamp() else {})
 

@@ -94,8 +94,8 @@ def function_named(name: str) -> Any:
     'ab'
     """
     module, function, *words = name.split(":")
-    found = getattr(import_module(module), function)
-    return partial(found, *words) if words else found
+    chosen = getattr(import_module(module), function)
+    return partial(chosen, *words) if words else chosen
 
 
 _VOWEL_SOUND_LETTERS = "aefhilmnorsx"  # letters whose names begin with a vowel
@@ -308,7 +308,7 @@ class Family:
     def analyze(self, spec: Spec, run: Run) -> Result:
         """Return the result of the model that a specification picks, with the user's metrics and, if asked, its box."""
         result = with_own_metrics(self.model_of(spec)(spec, run))
-        return self.with_envelope(result, {one.metric for one in spec.requirements})
+        return self.with_envelope(result, {requirement.metric for requirement in spec.requirements})
 
     def with_envelope(self, result: Result, names: Collection[str]) -> Result:
         """Return a result with the sizes of its box among its values, if one of some names asks for them."""
@@ -357,8 +357,8 @@ def add_size(result: Result, space: BoundingBox | None) -> Result:
     """Return a result with the sizes of its box among its values; without a value where the box is not known."""
     sides = (None, None, None) if space is None else space.sides
     reason = (space.assumed if space else "") or "the box is not known"
-    found = {
+    quantities = {
         name: Quantity(value, *about, "" if value is not None else reason)
         for (name, about), value in zip(ENVELOPE_METRICS.items(), sides, strict=True)
     }
-    return replace(result, values=result.values | found)  # type: ignore[operator]
+    return replace(result, values=result.values | quantities)  # type: ignore[operator]

@@ -104,29 +104,29 @@ class EndStops:
 
         `pressed`: whether it begins with a force, which a rigid stop bears before the drive does.
         """
-        start, end, found = float(motion[0]), float(motion[-1]), list[StopEvent]()
+        start, end, events = float(motion[0]), float(motion[-1]), list[StopEvent]()
         for name, stop in self.stops:
             low, high = stop.ends
             rigid = stop.stiffness is None
             at_rest = rigid and pressed and abs(start - low) <= SAME_PLACE
             if math.isfinite(low) and (start < low - SAME_PLACE or at_rest):
-                found.append(StopEvent(name, "ends", max(start, low)))
+                events.append(StopEvent(name, "ends", max(start, low)))
             if rigid and self.blocking(end) == name:
-                found.append(StopEvent(name, "blocks", high))
+                events.append(StopEvent(name, "blocks", high))
             elif start <= high < end:
-                found.append(StopEvent(name, "begins", high))
-        return sorted(found, key=lambda event: event.place)
+                events.append(StopEvent(name, "begins", high))
+        return sorted(events, key=lambda event: event.place)
 
     def columns(self, motion: FloatArray, pressed: bool) -> dict[str, Column]:
         """Return the force of each stop at the points of a curve, and what happens there."""
         if not self.stops:
             return {}
-        found = {f"stop_{name}_force": Column(self.elastic_force(name, motion), "force") for name, _ in self.stops}
+        columns = {f"stop_{name}_force": Column(self.elastic_force(name, motion), "force") for name, _ in self.stops}
         marks = np.full(len(motion), "", dtype=object)
         for event in self.events(motion, pressed):
             point = int(np.abs(motion - event.place).argmin())
             marks[point] = f"{marks[point]}; {event.name} {event.kind}".removeprefix("; ")
-        return found | {"event": Column(np.array([str(mark) for mark in marks], np.str_), "text")}
+        return columns | {"event": Column(np.array([str(mark) for mark in marks], np.str_), "text")}
 
     def values(self, motion: FloatArray, pressed: bool, window: tuple[float, float]) -> dict[str, Quantity]:
         """Return the scalar results on stops of a curve over motions (n,), in a window [m]."""
@@ -134,25 +134,25 @@ class EndStops:
             return {}
         start, end = float(motion[0]), float(motion[-1])
         reached = [event.place if event.kind != "ends" else start for event in self.events(motion, pressed)]
-        found = {"first_contact": Quantity(min(reached, default=None), *CONTACT_QUANTITIES["first_contact"])}
+        quantities = {"first_contact": Quantity(min(reached, default=None), *CONTACT_QUANTITIES["first_contact"])}
         low, high = max(window[0], start), min(window[1], end)
-        known = high > low and high - low >= (1 - 1e-9) * (window[1] - window[0])
-        reason = "" if known else "the window is not on the curve"
+        covers = high > low and high - low >= (1 - 1e-9) * (window[1] - window[0])
+        reason = "" if covers else "the window is not on the curve"
         inside = np.array([low, *(mark for mark in self.marks.tolist() if low < mark < high), high])
         tops = list[float]()
         for name, _ in self.stops:
             force = self.elastic_force(name, inside)
-            mean = float(np.trapezoid(force, inside) / (high - low)) if known else None
-            ripple = float(np.ptp(force) / force.max()) if known and force.max() > 0 else None
+            mean = float(np.trapezoid(force, inside) / (high - low)) if covers else None
+            ripple = float(np.ptp(force) / force.max()) if covers and force.max() > 0 else None
             untouched = "" if ripple is not None else reason or "there is no contact in the window"
             tops.append(float(np.abs(force).max()))
-            found |= {
+            quantities |= {
                 f"contact_force[{name}]": Quantity(mean, *CONTACT_QUANTITIES["contact_force[contact]"], reason=reason),
                 f"contact_force_ripple[{name}]": Quantity(
                     ripple, *CONTACT_QUANTITIES["contact_force_ripple[contact]"], reason=untouched
                 ),
             }
-        return found | {"contact_force_max": Quantity(max(tops) if known else None, "force", LARGEST_FORCE)}
+        return quantities | {"contact_force_max": Quantity(max(tops) if covers else None, "force", LARGEST_FORCE)}
 
     def sentences(self, motion: FloatArray, first: float) -> Iterator[tuple[str, str]]:
         """Yield name and message of each finding on a curve over motions that begins with a force [N], or zero."""
@@ -179,13 +179,13 @@ class EndStops:
     def mark_rows(self, rows: Iterable[FloatArray]) -> list[FloatArray]:
         """Return increasing motions of curves (n,) up to rigid stops, with those at which a stop is reached [m]."""
         low, high = self.rigid_ends
-        found = []
+        rows_between = []
         for row in rows:
             kept = row[(row >= low) & (row <= high)]
             marks = self.marks[(self.marks > row[0]) & (self.marks <= min(row[-1], high))]
             every = np.union1d(kept, marks)
-            found.append(every[np.append(True, np.diff(every) > SAME_PLACE)] if len(every) else every)
-        return found
+            rows_between.append(every[np.append(True, np.diff(every) > SAME_PLACE)] if len(every) else every)
+        return rows_between
 
 
 NO_STOPS = EndStops()

@@ -61,14 +61,14 @@ def offers() -> tuple[InstalledFamily, ...]:
 
 @lru_cache(maxsize=8)
 def _offers_on(path: Sequence[str]) -> tuple[InstalledFamily, ...]:
-    found: list[InstalledFamily] = []
+    families: list[InstalledFamily] = []
     seen: set[str] = set()
     for folder in path:
         for info, package, version in _installed_in(folder or "."):
             if package not in seen:
                 seen.add(package)
-                found += (InstalledFamily(name, target, package, version) for name, target in _entries(info))
-    return tuple(sorted(found, key=lambda one: (one.name, one.package)))
+                families += (InstalledFamily(name, target, package, version) for name, target in _entries(info))
+    return tuple(sorted(families, key=lambda family: (family.name, family.package)))
 
 
 def _installed_in(folder: str) -> Iterator[tuple[str, str, str]]:
@@ -78,9 +78,9 @@ def _installed_in(folder: str) -> Iterator[tuple[str, str, str]]:
     except OSError:  # not a folder: a zip file, or the hook of an editable install
         return
     for name in names:
-        if name.endswith("-info") and (known := _INFO_PATTERN.fullmatch(name)):
-            package = re.sub(r"[-_.]+", "-", known["package"]).lower()
-            yield os.path.join(folder, name), package, known["version"] or ""
+        if name.endswith("-info") and (match := _INFO_PATTERN.fullmatch(name)):
+            package = re.sub(r"[-_.]+", "-", match["package"]).lower()
+            yield os.path.join(folder, name), package, match["version"] or ""
 
 
 def _entries(info: str) -> Iterator[tuple[str, str]]:
@@ -101,8 +101,8 @@ def _entries(info: str) -> Iterator[tuple[str, str]]:
 
 def usable_names(taken: Iterable[str]) -> tuple[str, ...]:
     """Return the names of families that one package offers and cfmkit has not taken; nothing is imported."""
-    own = [one.name for one in offers()]
-    return tuple(name for name in own if own.count(name) == 1 and name not in set(taken))
+    offer_names = [offer.name for offer in offers()]
+    return tuple(name for name in offer_names if offer_names.count(name) == 1 and name not in set(taken))
 
 
 def record_of(offer: InstalledFamily, taken: Iterable[str]) -> Family:
@@ -110,10 +110,10 @@ def record_of(offer: InstalledFamily, taken: Iterable[str]) -> Family:
 
     Raises Unusable with the reason in one line, if it cannot be used.
     """
-    found = _clash(offer, taken) or _import_record(offer)
-    if isinstance(found, str):
-        raise Unusable(f"the family {visible(offer.name)!r} of the package {offer.source} cannot be used: {found}")
-    return found
+    record = _clash(offer, taken) or _import_record(offer)
+    if isinstance(record, str):
+        raise Unusable(f"the family {visible(offer.name)!r} of the package {offer.source} cannot be used: {record}")
+    return record
 
 
 def forget_installed() -> None:
@@ -126,7 +126,7 @@ def _clash(offer: InstalledFamily, taken: Iterable[str]) -> str:
     """Return why a name is not free; empty if it is."""
     if offer.name in taken:
         return "cfmkit itself has a family of this name"
-    others = [one.package for one in offers() if one.name == offer.name and one != offer]
+    others = [candidate.package for candidate in offers() if candidate.name == offer.name and candidate != offer]
     return f"{' and '.join(others)} offers one of this name, too; uninstall one of them" if others else ""
 
 
@@ -249,7 +249,7 @@ def _is_of_kind(value: Any, kind: str) -> bool:
         if "tuple" in kind:
             pairs = "..." not in kind
             return are(value.values(), tuple) and all(
-                are(one, str) and (not pairs or len(one) == 2) for one in value.values()
+                are(item, str) and (not pairs or len(item) == 2) for item in value.values()
             )
         return are(value.values(), str)
     if kind.startswith("Callable") or kind in ("Sampler", "Outliner"):
@@ -264,12 +264,12 @@ def code_identity(offer: InstalledFamily) -> dict[str, str]:
     from cfmkit.store.content_hashes_and_versions import file_hash, tree_hash
 
     try:
-        found = find_spec(offer.target.partition(":")[0].partition(".")[0])
+        module_spec = find_spec(offer.target.partition(":")[0].partition(".")[0])
     except (ImportError, ValueError):  # no name of a module: then nothing is computed by it either
-        found = None
+        module_spec = None
     content = ""
-    if found is not None and found.submodule_search_locations:
-        content = "".join(tree_hash(Path(folder)) for folder in found.submodule_search_locations)
-    elif found is not None and found.origin:
-        content = file_hash(Path(found.origin).resolve()) or ""
+    if module_spec is not None and module_spec.submodule_search_locations:
+        content = "".join(tree_hash(Path(folder)) for folder in module_spec.submodule_search_locations)
+    elif module_spec is not None and module_spec.origin:
+        content = file_hash(Path(module_spec.origin).resolve()) or ""
     return {"package": offer.package, "version": offer.version, "content": content}

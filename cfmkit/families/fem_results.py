@@ -110,8 +110,8 @@ def remove_frame(spec: SpecT, frame: Sequence[FloatArray], pads: Sequence[FloatA
 
 def drop_repeats(travels: FloatArray, end: float) -> FloatArray:
     """Return travels in increasing order, without those that are the one before but for rounding."""
-    found = np.unique(travels)
-    return np.delete(found, np.flatnonzero(np.diff(found) < 1e-9 * abs(end)) + 1)
+    places = np.unique(travels)
+    return np.delete(places, np.flatnonzero(np.diff(places) < 1e-9 * abs(end)) + 1)
 
 
 def not_meshed(spec: Spec, error: GeometryError) -> Result:
@@ -159,9 +159,9 @@ def with_nominal(rows: Sequence[FilletRow], stresses: FloatArray) -> tuple[Fille
 
 def largest_concentration(rows: Sequence[FilletRow]) -> dict[str, Quantity]:
     """Return the largest stress concentration of some fillets by its name, without a value where none has one."""
-    found = max((row.concentration for row in rows if not math.isnan(row.concentration)), default=None)
+    largest = max((row.concentration for row in rows if not math.isnan(row.concentration)), default=None)
     name = "stress_concentration_max"
-    return {name: Quantity(found, *FEM_DEFINITIONS[name], "" if found else "beams have no stress at any fillet")}
+    return {name: Quantity(largest, *FEM_DEFINITIONS[name], "" if largest else "beams have no stress at any fillet")}
 
 
 def number_fillets(rows: Sequence[FilletRow], before: int = 0) -> dict[int, FilletArc]:
@@ -182,8 +182,8 @@ def fillet_table(rows: Sequence[FilletRow], motion: tuple[str, str] = ("displace
         border_column(motion[0], np.array([row.motion for row in rows]), motion[1]),
     ]
     if any(row.preload is not None for row in rows):
-        known = [np.nan if row.preload is None else row.preload for row in rows]
-        columns.append(border_column("preload", np.array(known), "length"))
+        preloads = [np.nan if row.preload is None else row.preload for row in rows]
+        columns.append(border_column("preload", np.array(preloads), "length"))
     columns += [
         border_column("nominal_stress", np.abs([row.nominal for row in rows]), "stress"),
         border_column("stress_concentration", np.array([row.concentration for row in rows]), "factor"),
@@ -216,17 +216,17 @@ def nominal_stresses(
     NaN where no beam carries the fillet, the beams have no path, or the stress is negligible. Of two paths that one
     counts whose stresses have the solid's signs.
     """
-    found = np.full(len(rows), np.nan)
+    ratios = np.full(len(rows), np.nan)
     for sense in (1.0, -1.0):
-        own = np.flatnonzero(sense * travel > 0.0).tolist()
-        solid = np.array([rows[k].stress for k in own])
+        numbers = np.flatnonzero(sense * travel > 0.0).tolist()
+        solid = np.array([rows[k].stress for k in numbers])
         reported = [
-            np.array([beams.evaluate_stress(placed(rows[k].arc.ends), float(travel[k])) for k in own])
-            for beams in (map(SolvedBeams, images(travel[own])) if len(own) else ())
+            np.array([beams.evaluate_stress(placed(rows[k].arc.ends), float(travel[k])) for k in numbers])
+            for beams in (map(SolvedBeams, images(travel[numbers])) if len(numbers) else ())
         ]
         if reported:
-            found[own] = max(reported, key=lambda stress: float(np.nansum(stress * solid)))
-    return found
+            ratios[numbers] = max(reported, key=lambda stress: float(np.nansum(stress * solid)))
+    return ratios
 
 
 def both_images(
@@ -293,28 +293,28 @@ class SolvedBeams:
 
     def _point(self, travel: float) -> int | None:
         """Return the point of the path at a travel; None if there is none that is accurate."""
-        known = self.path.at_requested
-        off = np.abs(self.path.drive[known] - travel)
-        if not len(known) or off.min() > STEP_RTOL * float(np.abs(self.path.drive).max()):
+        requested = self.path.at_requested
+        off = np.abs(self.path.drive[requested] - travel)
+        if not len(requested) or off.min() > STEP_RTOL * float(np.abs(self.path.drive).max()):
             return None
-        point = int(known[off.argmin()])
+        point = int(requested[off.argmin()])
         return point if self.path.accurate[point] else None
 
     def _evaluate_edge_stress(self, name: str, beam: Beam, place: FloatArray, point: int) -> float | None:
         """Return the stress of a beam at a place on its edge (2,) [m]; None if it is not on it."""
-        axis, found = self.axes[name], self.sections[name]
+        axis, sections = self.axes[name], self.sections[name]
         k, share, off = _foot(axis, place)
-        way = (axis[k + 1] - axis[k]) / np.hypot(*(axis[k + 1] - axis[k]))
-        along, aside = float(off @ way), float(way[0] * off[1] - way[1] * off[0])
-        middle = 0.5 * float(found.place[point, k] + found.place[point, k + 1])
-        at = found.place[point, k] + share * (found.place[point, k + 1] - found.place[point, k])
+        along_axis = (axis[k + 1] - axis[k]) / np.hypot(*(axis[k + 1] - axis[k]))
+        along, aside = float(off @ along_axis), float(along_axis[0] * off[1] - along_axis[1] * off[0])
+        middle = 0.5 * float(sections.place[point, k] + sections.place[point, k + 1])
+        at = sections.place[point, k] + share * (sections.place[point, k + 1] - sections.place[point, k])
         thickness = float(np.real(beam.section.thickness_at(at, middle)))
         allowed = CHORD_TOLERANCE * thickness
         if abs(along) > allowed or abs(abs(aside) - 0.5 * thickness) > allowed:
             return None
         bending, axial = (
             float(values[point, k] + share * (values[point, k + 1] - values[point, k]))
-            for values in (found.bending_stress, found.axial_stress)
+            for values in (sections.bending_stress, sections.axial_stress)
         )
         return axial - float(np.sign(aside)) * bending
 

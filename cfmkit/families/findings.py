@@ -149,8 +149,8 @@ def format_at_least(length: float) -> str:
     return _round_digits(length, math.ceil)
 
 
-def _round_digits(length: float, way: Callable[[float], int]) -> str:
+def _round_digits(length: float, round_to: Callable[[float], int]) -> str:
     if length < 1e-300:
         return "0 mm"
     digits = 3 - math.floor(math.log10(length * 1e3))
-    return f"{way(length * 1e3 * 10.0**digits) / 10.0**digits:.4g} mm"
+    return f"{round_to(length * 1e3 * 10.0**digits) / 10.0**digits:.4g} mm"

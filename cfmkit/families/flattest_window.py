@@ -44,5 +44,5 @@ def ripples(places: FloatArray, effort: FloatArray, starts: FloatArray, length: 
     outside = (places <= starts[:, None]) | (places >= starts[:, None] + length)
     highest = np.maximum(ends.max(axis=0), np.where(outside, -np.inf, effort).max(axis=1))
     lowest = np.minimum(ends.min(axis=0), np.where(outside, np.inf, effort).min(axis=1))
-    known = np.isfinite(highest) & np.isfinite(lowest) & (highest > 0.0)
-    return np.where(known, 1.0 - lowest / np.where(known, highest, 1.0), np.inf)
+    is_known = np.isfinite(highest) & np.isfinite(lowest) & (highest > 0.0)
+    return np.where(is_known, 1.0 - lowest / np.where(is_known, highest, 1.0), np.inf)

@@ -44,7 +44,7 @@ class GuideFriction:
         # across, off_plane: load across the way in the plane of the mechanism, (n,), and out of that plane [N]
         across: FloatArray,
         off_plane: float,
-        way: float,  # 1 while the slider moves against the force, -1 on the way back
+        direction: float,  # 1 while the slider moves against the force, -1 on the way back
     ) -> FloatArray:
         """Return the force that moves the slider against the friction of its guide, (n,) [N].
 
@@ -56,7 +56,7 @@ class GuideFriction:
         """
         numbers = (free, self.drag, self.friction, self.tilt, off_plane)
         shape = np.broadcast_shapes(*(np.shape(number) for number in numbers))
-        force = still = np.broadcast_to(free + way * self.drag, shape)
+        force = still = np.broadcast_to(free + direction * self.drag, shape)
         if not np.any(self.friction):
             return force
         for _ in range(MAX_NEWTON_STEPS):
@@ -66,7 +66,7 @@ class GuideFriction:
                 end = np.hypot(inside, off_plane)
                 sums += 0.5 * end
                 slopes += 0.5 * sign * self.tilt * np.divide(inside, end, out=np.zeros_like(end), where=end > 0.0)
-            step = (still + way * self.friction * sums - force) / (1.0 - way * self.friction * slopes)
+            step = (still + direction * self.friction * sums - force) / (1.0 - direction * self.friction * slopes)
             force = force + step
             if np.nanmax(np.abs(step), initial=0.0) <= 1e-15 * np.nanmax(np.abs(force), initial=0.0):
                 break

@@ -82,11 +82,11 @@ class Hardware:
     # what rubs, by its block of the mechanism, with the sizes that the block needs beside `friction` [m]
     rubbing: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     faults: tuple[str, ...] = ()  # parts that do not bear their loads, or cannot be made, each in a sentence
-    heads: float = 0.0  # how far heads of screws stand out of the plate or the ground [m]
+    screw_head_height: float = 0.0  # how far heads of screws stand out of the plate or the ground [m]
     slider_excess: float = 0.0  # how much the slider adds to the depth of the layers [m]
 
 
-def in_sentences(faults: Mapping[str, str]) -> tuple[str, ...]:
+def describe_faults(faults: Mapping[str, str]) -> tuple[str, ...]:
     """Return the faults of parts, by the place of each, as sentences."""
     return tuple(f"{place}: {fault}" for place, fault in faults.items())
 
@@ -143,13 +143,13 @@ class GuideRods:
     load: float  # across all of them [N]
     pressure: float  # of the bushes on the rods, the load over their shadow [Pa]
 
-    def apart(self, pin: float) -> float:
+    def axis_distance(self, pin: float) -> float:
         """Return the distance between the axes of a pair, with walls around the slider's pin of a diameter [m]."""
         return pin + self.diameter + 2.0 * LEAST_WALL * max(pin, self.diameter)
 
     def slider_width(self, pin: float) -> float:
         """Return the width of a slider with walls around a pair [m]."""
-        return self.apart(pin) + self.slider_thickness
+        return self.axis_distance(pin) + self.slider_thickness
 
     @property
     def slider_thickness(self) -> float:
@@ -159,7 +159,7 @@ class GuideRods:
     def bodies(self, ends: FloatArray, pin: float) -> tuple[PosedBody, PosedBody]:
         """Return a pair beside a line (2, 2) [m]."""
         x, y = (ends[1] - ends[0]) / math.dist(*ends)
-        aside = 0.5 * self.apart(pin) * np.array([-y, x])
+        aside = 0.5 * self.axis_distance(pin) * np.array([-y, x])
         left, right = (
             PosedBody.line("guide", "held", ends + side * aside, 0.5 * self.diameter) for side in (1.0, -1.0)
         )
@@ -224,8 +224,9 @@ def guide_part(rods: GuideRods, pin: float, assumed: bool) -> ListedPart:
     """Return the guides of the list beside a pin, with what is assumed of them."""
     said = ", side load and friction assumed" if assumed else ""
     data = (
-        f"rod for the slider, {mm(rods.apart(pin))} beside the other, {format_short(rods.load, 'force', 3)} across all,"
-        f" {format_short(rods.pressure, 'stress', 3)} in the bushes{said}"
+        f"rod for the slider, {mm(rods.axis_distance(pin))} beside the other, "
+        f"{format_short(rods.load, 'force', 3)} across all, "
+        f"{format_short(rods.pressure, 'stress', 3)} in the bushes{said}"
     )
     return ListedPart(
         "guide of the slider", "guide", rods.count, data, "make", mm(rods.diameter, rods.length), "", "guide"

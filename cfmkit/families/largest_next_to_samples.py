@@ -56,5 +56,5 @@ def _largest(values: FloatArray) -> FloatArray:
 
 def largest_of_each(*arrays: FloatArray) -> FloatArray:
     """Return the largest finite value of each row of all arrays, (..., 1); NaN where there is none."""
-    found = reduce(np.maximum, map(_largest, arrays))
-    return np.where(np.isfinite(found), found, np.nan)
+    largest = reduce(np.maximum, map(_largest, arrays))
+    return np.where(np.isfinite(largest), largest, np.nan)

@@ -19,9 +19,9 @@ Given = ParamSpec("Given")
 class CannotBuild(SolutionError):
     """The mechanism cannot exist as described; carries the finding that says why."""
 
-    def __init__(self, found: Finding) -> None:
-        self.finding = found
-        super().__init__(found.message)
+    def __init__(self, reason: Finding) -> None:
+        self.finding = reason
+        super().__init__(reason.message)
 
     def __reduce__(self) -> tuple[type[CannotBuild], tuple[Finding]]:
         """Return what pickling needs: worker processes hand these errors back."""
@@ -31,19 +31,19 @@ class CannotBuild(SolutionError):
 class Infeasible(Exception):
     """Nothing meets the targets of a design; carries the finding that says why, and what would be feasible."""
 
-    def __init__(self, found: Finding, nearest: Mapping[str, str] | None = None) -> None:
+    def __init__(self, reason: Finding, nearest: Mapping[str, str] | None = None) -> None:
         """Keep the reason and the nearest feasible values by path."""
-        self.finding, self.nearest = found, dict(nearest or {})
-        super().__init__(found.message)
+        self.finding, self.nearest = reason, dict(nearest or {})
+        super().__init__(reason.message)
 
 
 def refusals_answered(design: Callable[Given, Design]) -> Callable[Given, Design]:
     """Return a design function whose answer is the reason where it raises `Infeasible` or `CannotBuild`."""
 
     @wraps(design)
-    def answer(*given: Given.args, **named: Given.kwargs) -> Design:
+    def answer(*arguments: Given.args, **options: Given.kwargs) -> Design:
         try:
-            return design(*given, **named)
+            return design(*arguments, **options)
         except Infeasible as problem:
             return no_design(problem.finding, problem.nearest)
         except CannotBuild as problem:
@@ -52,11 +52,11 @@ def refusals_answered(design: Callable[Given, Design]) -> Callable[Given, Design
     return answer
 
 
-def no_result(spec: Spec, found: Finding) -> Result:
+def no_result(spec: Spec, reason: Finding) -> Result:
     """Return the result of a mechanism that cannot exist, with the reason."""
-    return Result(spec, Status.NO_EQUILIBRIUM, found.message, warnings=(found,))
+    return Result(spec, Status.NO_EQUILIBRIUM, reason.message, warnings=(reason,))
 
 
-def no_design(found: Finding, nearest: Mapping[str, str] | None = None) -> Design:
+def no_design(reason: Finding, nearest: Mapping[str, str] | None = None) -> Design:
     """Return the outcome of targets that cannot be met, with the reason and the nearest feasible values by path."""
-    return Design(None, Status.INFEASIBLE, found.message, nearest_feasible=dict(nearest or {}), warnings=(found,))
+    return Design(None, Status.INFEASIBLE, reason.message, nearest_feasible=dict(nearest or {}), warnings=(reason,))

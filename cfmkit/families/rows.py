@@ -43,21 +43,21 @@ def stack(items: Sequence[ItemT]) -> ItemT:
     knows more of itself than its fields names it in `also_stacked`.
     """
     first: Any = items[0]
-    found: Any = first
+    stacked: Any = first
     if len(items) == 1:
         return items[0]
     if isinstance(first, Model):
         columns = {name: stack([vars(item)[name] for item in items]) for name in vars(first)}
-        found = first.model_copy(update=columns)
+        stacked = first.model_copy(update=columns)
     elif is_dataclass(first):
-        found = object.__new__(type(first))  # without what is known of the first one
+        stacked = object.__new__(type(first))  # without what is known of the first one
         for name in (*(item.name for item in fields(first)), *getattr(first, "also_stacked", ())):
-            vars(found)[name] = stack([getattr(one, name) for one in items])
+            vars(stacked)[name] = stack([getattr(one, name) for one in items])
     elif isinstance(first, tuple):
-        found = tuple(stack(one) for one in zip(*items, strict=True))
+        stacked = tuple(stack(column) for column in zip(*items, strict=True))
     elif not ((values := np.array(items)) == values[0]).all():
-        found = np.moveaxis(values, 0, -1)[..., None]
-    return found  # type: ignore[no-any-return]
+        stacked = np.moveaxis(values, 0, -1)[..., None]
+    return stacked  # type: ignore[no-any-return]
 
 
 class RowsDiffer(Exception):
@@ -99,12 +99,12 @@ def remember_plain(count: int) -> Callable[[Callable[..., ItemT]], Callable[...,
         kept = lru_cache(maxsize=count)(function)
 
         @wraps(function)
-        def call(*given: Any) -> ItemT:
+        def call(*arguments: Any) -> ItemT:
             try:
-                hash(given)
+                hash(arguments)
             except TypeError:
-                return function(*given)
-            return kept(*given)
+                return function(*arguments)
+            return kept(*arguments)
 
         return call
 
@@ -157,8 +157,8 @@ class PlacesKept(Generic[ItemT]):
 
     def __call__(self, places: FloatArray) -> ItemT:
         """Return the result at places."""
-        for known, result in self._kept:
-            if known is places or (known.shape == places.shape and (known == places).all()):
+        for places_kept, result in self._kept:
+            if places_kept is places or (places_kept.shape == places.shape and (places_kept == places).all()):
                 return result
         result = self._function(places)
         self._kept = [(places, result), *self._kept[:1]]
@@ -177,19 +177,19 @@ def rows_of(item: ItemT, rows: Any) -> ItemT:
 
 def _map_columns(item: ItemT, function: Callable[[FloatArray], Any]) -> ItemT:
     """Return what is stacked with a function of each of its columns in place of that."""
-    found: Any = item
+    mapped: Any = item
     if isinstance(item, np.ndarray):
-        found = function(item) if item.ndim > 1 else item
+        mapped = function(item) if item.ndim > 1 else item
     elif isinstance(item, tuple):
-        found = tuple(_map_columns(value, function) for value in item)
+        mapped = tuple(_map_columns(value, function) for value in item)
     elif isinstance(item, Model) or is_dataclass(item):
-        own = {name: _map_columns(value, function) for name, value in vars(item).items()}
+        columns = {name: _map_columns(value, function) for name, value in vars(item).items()}
         if isinstance(item, Model):
-            found = item.model_copy(update=own)
+            mapped = item.model_copy(update=columns)
         else:
-            found = object.__new__(type(found))
-            vars(found).update(own)
-    return found  # type: ignore[no-any-return]
+            mapped = object.__new__(type(mapped))
+            vars(mapped).update(columns)
+    return mapped  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)
@@ -222,8 +222,10 @@ def quantity_of_each(
     """Return a result that is computed of one mechanism after the other, and that not all of them have."""
 
     def function(solution: SolutionT) -> FloatArray:
-        found = [quantities.get(name) for quantities in of_each(solution)]
-        return np.array([np.nan if one is None or one.value is None else one.value for one in found])
+        of_all = [quantities.get(name) for quantities in of_each(solution)]
+        return np.array(
+            [np.nan if quantity is None or quantity.value is None else quantity.value for quantity in of_all]
+        )
 
     def first(solution: SolutionT) -> Mapping[str, Quantity]:
         return next(iter(of_each(solution)))
@@ -300,7 +302,7 @@ def each_quantity(quantity: ScalarQuantity[SolutionT]) -> ScalarQuantity[Any]:
     """Return a quantity of one solution as that of several."""
 
     def function(several: SeveralSolutions[SolutionT]) -> FloatArray:
-        return np.array([float(np.ravel(quantity.function(one))[0]) for one in several.each])
+        return np.array([float(np.ravel(quantity.function(solution))[0]) for solution in several.each])
 
     return ScalarQuantity(*quantity.about, function, words=quantity.words)
 
@@ -309,7 +311,7 @@ def each_rule(rule: FindingRule[SolutionT]) -> FindingRule[Any]:
     """Return a rule on one solution as that on several."""
 
     def holds(several: SeveralSolutions[SolutionT]) -> NDArray[np.bool_]:
-        return np.array([bool(np.ravel(rule.holds(one))[0]) for one in several.each])
+        return np.array([bool(np.ravel(rule.holds(solution))[0]) for solution in several.each])
 
     return FindingRule(rule.name, holds, lambda several: rule.sentence(several.each[0]))
 
@@ -416,11 +418,11 @@ def with_values(block: ItemT, values: Mapping[str, Any]) -> ItemT:
             inner.setdefault(head, {})[rest] = value
         else:
             changes[head] = value
-    own: Any = block
-    if isinstance(own, tuple):
-        return tuple(changes.get(str(k), one) for k, one in enumerate(own))  # type: ignore[return-value]
-    changes |= {head: with_values(getattr(own, head), below) for head, below in inner.items()}
-    return own.model_copy(update=changes)  # type: ignore[no-any-return]
+    items: Any = block
+    if isinstance(items, tuple):
+        return tuple(changes.get(str(k), item) for k, item in enumerate(items))  # type: ignore[return-value]
+    changes |= {head: with_values(getattr(items, head), below) for head, below in inner.items()}
+    return items.model_copy(update=changes)  # type: ignore[no-any-return]
 
 
 def drop_numbers(value: Any) -> Any:
@@ -439,7 +441,7 @@ class SolvedRows(Generic[RowsT]):
     quantities: Mapping[str, ScalarQuantity[RowsT]]
     rules: Sequence[FindingRule[RowsT]]
     complete: NDArray[np.bool_]  # (m,) others have curves that end early: they are analysed one by one
-    traced: bool = False  # whether the model is a path of each: then nothing of it is computed twice
+    traced: bool = False  # whether each is a path, or a search: few are done at once, and nothing is computed twice
 
     @np.errstate(all="ignore")
     def value(self, name: str) -> FloatArray | None:

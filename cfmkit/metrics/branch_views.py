@@ -199,9 +199,9 @@ class Branch:
         effort, known = part.effort.copy(), dict[int, int]()
         slack = WINDOW_RTOL * (part.extent[1] - part.extent[0])
         for end in (0, -1):
-            there = np.flatnonzero((np.abs(stated.motion - part.motion[end]) <= slack) & (stated.branch == self.name))
-            if len(there) == 1 and not (self.trace.motion == part.motion[end]).any():
-                known[end] = int(there[0])
+            at_end = np.flatnonzero((np.abs(stated.motion - part.motion[end]) <= slack) & (stated.branch == self.name))
+            if len(at_end) == 1 and not (self.trace.motion == part.motion[end]).any():
+                known[end] = int(at_end[0])
         effort[list(known)] = stated.effort[list(known.values())]
 
         def replace_ends(stress: FloatArray) -> FloatArray:
@@ -215,14 +215,16 @@ class Branch:
     @cached_property
     def beside(self) -> tuple[BranchTrace, ...]:
         """The same branch in the other load cases."""
-        return tuple(one for curve in self.frame.load_cases for one in traces(curve) if one.name == self.name)
+        return tuple(trace for curve in self.frame.load_cases for trace in traces(curve) if trace.name == self.name)
 
     @property
     def inside_beside(self) -> tuple[BranchTrace, ...]:
         """Parts in the window of the other load cases, as far as each of them goes."""
         if self.window is None:
             return self.beside
-        clipped = ((one, max(one.extent[0], self.window.lo), min(one.extent[1], self.window.hi)) for one in self.beside)
+        clipped = (
+            (trace, max(trace.extent[0], self.window.lo), min(trace.extent[1], self.window.hi)) for trace in self.beside
+        )
         return tuple(restrict(one, Window(low, high)) for one, low, high in clipped if low < high)
 
     @property
@@ -244,7 +246,8 @@ class Branch:
         if between.any():
             heights = function(peaks)
             motion, values = (
-                np.concatenate([own, more[between]]) for own, more in ((motion, peaks), (values, heights))
+                np.concatenate([values_here, more[between]])
+                for values_here, more in ((motion, peaks), (values, heights))
             )
             motion, chosen = np.unique(motion, return_index=True)
             motion, values = motion[np.isfinite(values[chosen])], values[chosen][np.isfinite(values[chosen])]
@@ -325,10 +328,10 @@ class Branch:
         Undefined
             If it folds back: a many-valued branch is never sorted.
         """
-        way = self.trace.way
-        if not way:
+        direction = self.trace.way
+        if not direction:
             raise Undefined(f"branch {self.name!r} turns back: its {self.kind} is many-valued")
-        return Function(self.trace.motion[::way], self.trace.effort[::way])
+        return Function(self.trace.motion[::direction], self.trace.effort[::direction])
 
     @property
     def effort_at_reference(self) -> float:
@@ -340,12 +343,12 @@ class Branch:
             If the branch does not reach the reference pose, is many-valued, or has no effort there.
         """
         place, model = self.reference, self.frame.closed
-        here = self.evaluate(place)
+        effort = self.evaluate(place)
         if model is not None:  # an interpolated value may hide that there is no effort
-            here = float(model.effort(self.name, np.array([place]))[0])
-        if abs(here) <= max(self.error, ZERO_EFFORT_SHARE * float(np.nanmax(np.abs(self.function.effort)))):
+            effort = float(model.effort(self.name, np.array([place]))[0])
+        if abs(effort) <= max(self.error, ZERO_EFFORT_SHARE * float(np.nanmax(np.abs(self.function.effort)))):
             raise Undefined(f"the {self.kind} at the reference pose is zero within its numerical error")
-        return here
+        return effort
 
     @cached_property
     def many(self) -> ManyBranches:

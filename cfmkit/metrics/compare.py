@@ -120,35 +120,35 @@ class Differences:
         `measures`: name -> (function of a difference, definition; ``{}`` in it becomes the kind); `tag`: which curve,
         where there are several: ``name[tag]`` and ``name[tag,branch]``.
         """
-        several, found = len(self.curves) > 1, {}
+        several, changes = len(self.curves) > 1, {}
         whole = {"": _join_differences(self.curves)} if several else {}
         for branch, item in (whole | dict(self.curves)).items():
             inside = ",".join(part for part in (tag, branch if several else "") if part)
             for name, (function, words) in measures.items():
                 value = function(item) if len(item.values) and np.isfinite(item.values).all() else None
                 reason = item.reason if value is None else ""
-                found[f"{name}[{inside}]" if inside else name] = Quantity(value, kind, words.format(kind), reason)
-        return found
+                changes[f"{name}[{inside}]" if inside else name] = Quantity(value, kind, words.format(kind), reason)
+        return changes
 
 
 def compare(
-    reference: Compared, other: Compared, over: Window | None = None, tolerance: float = COMPARISON_RTOL
+    reference: Compared, compared: Compared, over: Window | None = None, tolerance: float = COMPARISON_RTOL
 ) -> Differences:
     """Return what something has more than its reference: its curve inside a window, and its metrics.
 
     `tolerance`: relative change of a metric up to which it counts as the same.
     """
-    changes = tuple(_changes(reference.metrics, other, tolerance))
+    changes = tuple(_changes(reference.metrics, compared, tolerance))
     nothing: FloatArray = np.empty(0)
-    if reference.points and other.curve is not None:
-        gap = f"the {other.name} has no equilibrium at some of the points"
-        curves = {branch: _less(points, other.curve, gap) for branch, points in reference.points.items()}
+    if reference.points and compared.curve is not None:
+        gap = f"the {compared.name} has no equilibrium at some of the points"
+        curves = {branch: _less(points, compared.curve, gap) for branch, points in reference.points.items()}
         return Differences(curves, nothing, over, changes)
-    if reference.curve is None or other.curve is None:
-        missing = next((one for one in (other, reference) if one.curve is None and not one.points), other)
+    if reference.curve is None or compared.curve is None:
+        missing = next((side for side in (compared, reference) if side.curve is None and not side.points), compared)
         return Differences({"": Difference(nothing, f"there is no {missing.name} curve")}, nothing, None, changes)
-    fine, coarse = reference.curve, other.curve
-    pairs = {name: counterpart(coarse, name, _way(fine, name)) for name in fine.branches}
+    fine, coarse = reference.curve, compared.curve
+    pairs = {name: counterpart(coarse, name, _measure_direction(fine, name)) for name in fine.branches}
     parts = [part for name, its in pairs.items() for part in (fine.select_branch(name), coarse.select_branch(its))]
     window = overlap([(float(part.motion.min()), float(part.motion.max())) for part in parts], over)
     if window is None:
@@ -158,7 +158,7 @@ def compare(
     return Differences(curves, places, window, changes)
 
 
-def _way(curve: Curve, branch: str) -> float:
+def _measure_direction(curve: Curve, branch: str) -> float:
     motion = curve.select_branch(branch).motion
     return float(motion[-1] - motion[0])
 
@@ -184,19 +184,19 @@ def _is_number(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and math.isfinite(value)
 
 
-def _changes(before: Metrics, other: Compared, tolerance: float) -> Iterator[MetricChange]:
-    after = other.metrics
+def _changes(before: Metrics, compared: Compared, tolerance: float) -> Iterator[MetricChange]:
+    after = compared.metrics
     for name in dict.fromkeys((*before, *after)):
         old, new = (side.get(name, {}).get("value") for side in (before, after))
         unit = str((after.get(name) or before.get(name) or {}).get("unit", ""))
         if old == new:
             continue
         if not (_is_number(old) and _is_number(new)):
-            yield MetricChange(other.name, name, old, new, unit, None, True)
+            yield MetricChange(compared.name, name, old, new, unit, None, True)
         elif abs(new - old) > NO_CHANGE:
             relative = (new - old) / abs(old) if old else None
             beyond = relative is None or abs(relative) > tolerance
-            yield MetricChange(other.name, name, old, new, unit, relative, beyond)
+            yield MetricChange(compared.name, name, old, new, unit, relative, beyond)
 
 
 def _join_differences(differences: Mapping[str, Difference]) -> Difference:
@@ -211,14 +211,14 @@ def _join_differences(differences: Mapping[str, Difference]) -> Difference:
 def counterpart(
     curve: Curve,  # where the branch is looked for
     branch: str,  # name of the other curve's branch
-    way: float,  # positive if the motion grows along the other curve's branch
+    direction: float,  # positive if the motion grows along the other curve's branch
 ) -> str:
     """Return the branch of a curve to compare with one of another: by name, else by its direction."""
     if branch in curve.branches or len(curve.branches) == 1:
         return branch if branch in curve.branches else curve.branches[0]
     for name in curve.branches:
         motion = curve.select_branch(name).motion
-        if way * (motion[-1] - motion[0]) > 0:
+        if direction * (motion[-1] - motion[0]) > 0:
             return name
     return curve.branches[0]
 

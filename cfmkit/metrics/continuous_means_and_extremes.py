@@ -85,9 +85,9 @@ def extremes(
     end = np.full(len(effort), effort.shape[1] - 1) if last is None else last
     highest = np.stack([effort.argmax(axis=1), effort.argmin(axis=1)], axis=1)
     middle = np.maximum(np.minimum(highest, end[:, None] - 1), 1)
-    near = np.minimum(middle[..., None] + np.arange(-1, 2), effort.shape[1] - 1)
+    neighbours = np.minimum(middle[..., None] + np.arange(-1, 2), effort.shape[1] - 1)
     rows = np.arange(len(effort))[:, None, None]
-    x, y = np.broadcast_to(motion, effort.shape)[rows, near], EXTREME_SIGNS[:, None] * effort[rows, near]
+    x, y = np.broadcast_to(motion, effort.shape)[rows, neighbours], EXTREME_SIGNS[:, None] * effort[rows, neighbours]
     return _refine_extremes(function, x, y, EXTREME_SIGNS * effort[rows[..., 0], highest], end, uneven)
 
 
@@ -106,17 +106,17 @@ def extremes_of_all(
     motion, effort, last = samples
     motion, rows = np.broadcast_to(motion, effort.shape), np.arange(len(effort))[:, None]
     highest = np.stack([effort.argmax(axis=1), effort.argmin(axis=1)], axis=1)
-    other = np.stack([values.argmax(axis=1), values.argmin(axis=1)], axis=1)
-    own_x, other_x = motion[rows, highest], places[rows, other]
-    own, others = EXTREME_SIGNS * effort[rows, highest], EXTREME_SIGNS * values[rows, other]
-    is_other = (others > own) | ((others == own) & (other_x < own_x))
+    other_places = np.stack([values.argmax(axis=1), values.argmin(axis=1)], axis=1)
+    own_x, other_x = motion[rows, highest], places[rows, other_places]
+    first_values, second_values = EXTREME_SIGNS * effort[rows, highest], EXTREME_SIGNS * values[rows, other_places]
+    is_other = (second_values > first_values) | ((second_values == first_values) & (other_x < own_x))
     some, _ = np.nonzero(is_other)
     highest[is_other] = (motion[some] < other_x[is_other][:, None]).sum(axis=1)
-    near = np.clip(highest[..., None] + np.arange(-2, 3), 0, last[:, None, None])
+    neighbours = np.clip(highest[..., None] + np.arange(-2, 3), 0, last[:, None, None])
     beside = _find_neighbours(places, np.where(is_other, other_x, own_x))
     rows = rows[..., None]
-    x = np.concatenate([motion[rows, near], places[rows, beside]], axis=2)
-    y = EXTREME_SIGNS[:, None] * np.concatenate([effort[rows, near], values[rows, beside]], axis=2)
+    x = np.concatenate([motion[rows, neighbours], places[rows, beside]], axis=2)
+    y = EXTREME_SIGNS[:, None] * np.concatenate([effort[rows, neighbours], values[rows, beside]], axis=2)
     order = np.argsort(x, axis=2, kind="stable")
     x, y = np.take_along_axis(x, order, 2), np.take_along_axis(y, order, 2)
     double = np.zeros(x.shape, dtype=bool)
@@ -125,10 +125,10 @@ def extremes_of_all(
     x, y = np.take_along_axis(x, order, 2), np.take_along_axis(np.where(double, -np.inf, y), order, 2)
     count = x.shape[2] - double.sum(axis=2)
     middle = np.maximum(np.minimum(y.argmax(axis=2), count - 2), 1)
-    near = np.minimum(middle[..., None] + np.arange(-1, 2), count[..., None] - 1)
-    x, y = np.take_along_axis(x, near, 2), np.take_along_axis(y, near, 2)
+    neighbours = np.minimum(middle[..., None] + np.arange(-1, 2), count[..., None] - 1)
+    x, y = np.take_along_axis(x, neighbours, 2), np.take_along_axis(y, neighbours, 2)
     ends = _count_distinct(motion, last, places) - 1
-    return _refine_extremes(function, x, y, np.maximum(own, others), ends, uneven)
+    return _refine_extremes(function, x, y, np.maximum(first_values, second_values), ends, uneven)
 
 
 def _find_neighbours(places: FloatArray, x: FloatArray) -> NDArray[np.intp]:
@@ -174,12 +174,12 @@ def _refine_extremes(
     beside = np.where(few[:, None, None], beside, 0.0)
     for number in range(rounds):
         places = _vertex_places(x, y, beside)
-        found = EXTREME_SIGNS[:, None] * function(places.reshape(len(places), -1)).reshape(places.shape)
-        found = np.where(np.isfinite(found), found, -np.inf)
+        refined = EXTREME_SIGNS[:, None] * function(places.reshape(len(places), -1)).reshape(places.shape)
+        refined = np.where(np.isfinite(refined), refined, -np.inf)
         counts = few[:, None] if number else True  # of many samples one parabola is enough
-        best = np.where(counts, np.maximum(best, found.max(axis=-1)), best)
+        best = np.where(counts, np.maximum(best, refined.max(axis=-1)), best)
         if number < rounds - 1:
-            x, y = _points_around_largest(np.concatenate([x, places], axis=-1), np.concatenate([y, found], axis=-1))
+            x, y = _points_around_largest(np.concatenate([x, places], axis=-1), np.concatenate([y, refined], axis=-1))
     curved = end >= 2
     return np.where(curved, best[:, 0], top), np.where(curved, -best[:, 1], bottom)
 
@@ -198,5 +198,5 @@ def _points_around_largest(x: FloatArray, y: FloatArray) -> tuple[FloatArray, Fl
     """Return the three of all points that surround the largest."""
     order = np.argsort(x, axis=-1)
     x, y = np.take_along_axis(x, order, -1), np.take_along_axis(y, order, -1)
-    near = np.clip(y.argmax(axis=-1), 1, x.shape[-1] - 2)[..., None] + np.arange(-1, 2)
-    return np.take_along_axis(x, near, -1), np.take_along_axis(y, near, -1)
+    neighbours = np.clip(y.argmax(axis=-1), 1, x.shape[-1] - 2)[..., None] + np.arange(-1, 2)
+    return np.take_along_axis(x, neighbours, -1), np.take_along_axis(y, neighbours, -1)

@@ -50,7 +50,7 @@ class Definition:
         """Whether ``name[branch]`` means something."""
         return self.scope in ("branch", "cycle") and not self.argument
 
-    def in_units_of(self, kind: Kind) -> Definition:
+    def state_for_kind(self, kind: Kind) -> Definition:
         """Return the definition in the words and units of one kind of curve."""
         text = self.definition.replace("{effort}", kind).replace("{motion}", _MOTION_WORDS[kind])
         return replace(

@@ -38,8 +38,8 @@ def extremes(
     """Return where functions are largest near places, (k,), within spans; `step` says how far off these may be."""
     (low, high), rows = span, np.arange(len(place))
     for _ in range(N_MODEL_ZOOMS):
-        near = np.clip(place[:, None] + MODEL_ZOOM_STEPS * step, low[:, None], high[:, None])
-        place, step = near[rows, function(near).argmax(axis=1)], step / MODEL_ZOOM_FACTOR
+        places = np.clip(place[:, None] + MODEL_ZOOM_STEPS * step, low[:, None], high[:, None])
+        place, step = places[rows, function(places).argmax(axis=1)], step / MODEL_ZOOM_FACTOR
     return place
 
 
@@ -83,10 +83,10 @@ def flat_window(
         centres = np.stack([start, end, top, bottom], axis=1)
         more = (centres[:, :, None] + ZOOM_STEPS * step[:, None, None]).reshape(len(force), -1)
         more = np.clip(np.where(np.isfinite(more), more, low), low, high)
-        known = force_at(more)
-        known = np.where(np.isfinite(known), known, -1.0)
+        more_force = force_at(more)
+        more_force = np.where(np.isfinite(more_force), more_force, -1.0)
         whole = zoom < N_WHOLE_ZOOMS
-        places, force = (np.hstack([places, more]), np.hstack([force, known])) if whole else (more, known)
+        places, force = (np.hstack([places, more]), np.hstack([force, more_force])) if whole else (more, more_force)
         order = np.argsort(places, axis=1, kind="stable")
         places, force = np.take_along_axis(places, order, 1), np.take_along_axis(force, order, 1)
         step = step / ZOOM_FACTOR
@@ -105,11 +105,11 @@ def _longest(places: FloatArray, force: FloatArray, flatness: float) -> tuple[Fl
     last = np.arange(n) + reach
     after = np.minimum(last + 1, n - 1)
     high, low = _extremes(levels, last)
-    here, there = np.take_along_axis(force, last, 1), np.take_along_axis(force, after, 1)
+    force_here, force_after = np.take_along_axis(force, last, 1), np.take_along_axis(force, after, 1)
     # it leaves the band over its upper end, or over its lower one
-    level = np.where(there > high, low / (1.0 - flatness), (1.0 - flatness) * high)
+    level = np.where(force_after > high, low / (1.0 - flatness), (1.0 - flatness) * high)
     with np.errstate(all="ignore"):
-        share = np.where(last < n - 1, np.clip((level - here) / (there - here), 0.0, 1.0), 0.0)
+        share = np.where(last < n - 1, np.clip((level - force_here) / (force_after - force_here), 0.0, 1.0), 0.0)
     at_last, at_after = np.take_along_axis(places, last, 1), np.take_along_axis(places, after, 1)
     end = at_last + np.where(np.isfinite(share), share, 0.0) * (at_after - at_last)
     length = np.where(force > 0, end - places, -1.0)
@@ -118,7 +118,7 @@ def _longest(places: FloatArray, force: FloatArray, flatness: float) -> tuple[Fl
     inside = (np.arange(n) >= first[:, None]) & (np.arange(n) <= last[rows, first][:, None])
     top = places[rows, np.where(inside, force, -np.inf).argmax(axis=1)]
     bottom = places[rows, np.where(inside, force, np.inf).argmin(axis=1)]
-    at_end = here[rows, first] + np.nan_to_num(share[rows, first] * (there - here)[rows, first])
+    at_end = force_here[rows, first] + np.nan_to_num(share[rows, first] * (force_after - force_here)[rows, first])
     most, least = np.maximum(high[rows, first], at_end), np.minimum(low[rows, first], at_end)
     before = np.maximum(first - 1, 0)
     level = np.where(force[rows, before] > most, least / (1.0 - flatness), (1.0 - flatness) * most)
@@ -126,8 +126,8 @@ def _longest(places: FloatArray, force: FloatArray, flatness: float) -> tuple[Fl
         back = (level - force[rows, first]) / (force[rows, before] - force[rows, first])
     back = np.clip(np.where(np.isfinite(back), back, 0.0), 0.0, 1.0)
     start = places[rows, first] + back * (places[rows, before] - places[rows, first])
-    found = start, end[rows, first], top, bottom
-    return tuple(np.where(none, np.nan, one) for one in found)
+    interval = start, end[rows, first], top, bottom
+    return tuple(np.where(none, np.nan, column) for column in interval)
 
 
 def _extremes(levels: Levels, last: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
@@ -162,14 +162,14 @@ def _reach(levels: Levels, flatness: float) -> NDArray[np.intp]:
 
 def _levels(force: FloatArray) -> Levels:
     """Return largest and smallest of 1, 2, 4, ... samples from each on; beyond the end, of what is there."""
-    found, size = [(force, force)], 1
+    intervals, size = [(force, force)], 1
     while 2 * size <= force.shape[1]:
-        high, low = found[-1]
+        high, low = intervals[-1]
         top, bottom = high.copy(), low.copy()
         top[:, :-size], bottom[:, :-size] = (
             np.maximum(high[:, :-size], high[:, size:]),
             np.minimum(low[:, :-size], low[:, size:]),
         )
-        found.append((top, bottom))
+        intervals.append((top, bottom))
         size *= 2
-    return found
+    return intervals

@@ -43,7 +43,7 @@ METRIC_TABLE = (
 
 @lru_cache(maxsize=4)
 def _table(kind: Kind) -> tuple[Definition, ...]:
-    return tuple(replace(item.in_units_of(kind), name=_name_in_words(item.name, kind)) for item in METRIC_TABLE)
+    return tuple(replace(item.state_for_kind(kind), name=_name_in_words(item.name, kind)) for item in METRIC_TABLE)
 
 
 def _name_in_words(name: str, kind: Kind) -> str:
@@ -61,10 +61,10 @@ def definitions(kind: Kind | None = "force", extra: Iterable[Definition] = ()) -
     extra : iterable of Definition
         A family's own (see `values_of_family`).
     """
-    own = tuple(extra)
+    own_metrics = tuple(extra)
     if kind is not None:
-        return (*_table(kind), *(item.in_units_of(kind) for item in own))
-    both = (*definitions("force", own), *definitions("torque", own))
+        return (*_table(kind), *(item.state_for_kind(kind) for item in own_metrics))
+    both = (*definitions("force", own_metrics), *definitions("torque", own_metrics))
     return tuple({(item.name, item.dimension): item for item in both}.values())
 
 
@@ -95,19 +95,21 @@ def words(name: str) -> str:
     """
     metric, rest = split_name(name)
     after_kind = metric.partition("_")[2]
-    argument = any(one.argument and one.name.partition("_")[2] == after_kind for one in METRIC_TABLE)
+    argument = any(
+        definition.argument and definition.name.partition("_")[2] == after_kind for definition in METRIC_TABLE
+    )
     return metric.replace("_", " ") + (f" {'' if argument else 'on '}{rest}" if rest else "")
 
 
-def unknown_metric(name: str, known: Iterable[str]) -> str:
+def unknown_metric(name: str, known_names: Iterable[str]) -> str:
     """Return an error that there is no such metric, and which one could be meant."""
-    names = list(dict.fromkeys(known))
-    other = {"force": "torque", "torque": "force"}.get(name.split("_")[0])
-    swapped = f"{other}_{name.partition('_')[2]}" if other else ""
+    names = list(dict.fromkeys(known_names))
+    other_kind = {"force": "torque", "torque": "force"}.get(name.split("_")[0])
+    swapped = f"{other_kind}_{name.partition('_')[2]}" if other_kind else ""
     if swapped in names:
-        return f"there is no metric {name!r} on a {other} curve; did you mean {swapped!r}?"
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    hint = f"did you mean {near[0]!r}?" if near else "`cfmkit show metrics` lists them"
+        return f"there is no metric {name!r} on a {other_kind} curve; did you mean {swapped!r}?"
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    hint = f"did you mean {close[0]!r}?" if close else "`cfmkit show metrics` lists them"
     return f"there is no metric {name!r}; {hint}"
 
 
@@ -159,14 +161,14 @@ def other_name(name: str) -> str:
     return _TORQUE_NAMES.get(plain, plain) + bracket + branch
 
 
-def definition_of(name: str, known: Mapping[str, Definition], branches: Sequence[str] = ()) -> Definition:
+def definition_of(name: str, definitions: Mapping[str, Definition], branches: Sequence[str] = ()) -> Definition:
     """Return what a metric is.
 
     Parameters
     ----------
     name : str
         With ``[branch]`` where wanted.
-    known : mapping
+    definitions : mapping
         `metrics_by_name`.
     branches : sequence of str
         That curves may have; none if any name may occur.
@@ -177,11 +179,11 @@ def definition_of(name: str, known: Mapping[str, Definition], branches: Sequence
         If there is no such metric, or no such branch.
     """
     plain, branch = split_name(name)
-    if plain not in known:
-        raise UsageError(unknown_metric(plain, known))
-    if branch is not None and (reported := branch_fault(known[plain], branch, branches)):
+    if plain not in definitions:
+        raise UsageError(unknown_metric(plain, definitions))
+    if branch is not None and (reported := branch_fault(definitions[plain], branch, branches)):
         raise UsageError(reported)
-    return known[plain]
+    return definitions[plain]
 
 
 def time_of(text: str) -> float:
@@ -189,10 +191,10 @@ def time_of(text: str) -> float:
 
     Raises QuantityError if it is none, or not above 0.
     """
-    found = read_quantity(text, "time")
-    if found <= 0:
+    duration = read_quantity(text, "time")
+    if duration <= 0:
         raise QuantityError(f"{text!r} is not a time of a hold: it must be above 0")
-    return found
+    return duration
 
 
 def branch_fault(meant: Definition, branch: str, branches: Sequence[str]) -> str:

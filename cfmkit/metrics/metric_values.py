@@ -61,7 +61,7 @@ class Survey:
         """The names of the branches."""
         return tuple(branch.name for branch in self.subject.branches)
 
-    def each(self, definition: Definition, branch: str | None = None) -> tuple[Value, ...]:
+    def evaluate_each(self, definition: Definition, branch: str | None = None) -> tuple[Value, ...]:
         """Return the values of a metric: of one branch, of every branch, or of the cycle as a whole."""
         if (definition, branch) not in self._known:
             self._known[definition, branch] = self._compute_values(definition, branch)
@@ -92,11 +92,11 @@ class Survey:
         """Return the value that counts where no branch is named; undefined if it is so on any branch."""
         if len(values) == 1:
             return values[0]
-        known = [item for item in values if item.value is not None]
-        if len(known) < len(values):
+        with_value = [item for item in values if item.value is not None]
+        if len(with_value) < len(values):
             return next(item for item in values if item.value is None)
-        heights = np.array([[item.value] for item in known])
-        return known[worst_branch(definition.worst, heights, self.subject.frame.target).item()]
+        heights = np.array([[item.value] for item in with_value])
+        return with_value[worst_branch(definition.worst, heights, self.subject.frame.target).item()]
 
 
 def worst_branch(
@@ -151,19 +151,19 @@ def _all(view: Survey, table: Iterable[Definition]) -> dict[str, Quantity]:
 
 def _entries(view: Survey, definition: Definition) -> Iterator[tuple[str, Quantity]]:
     """Yield the worst branch's value under the plain name, then each branch's."""
-    known = view.subject.frame.durability
-    if definition.function is None or (definition.of_material and known is None):
+    durability = view.subject.frame.durability
+    if definition.function is None or (definition.of_material and durability is None):
         return
     if definition.of_curve and view.subject.frame.curve is None:
         return
     if definition.of_parts and view.subject.frame.part_efforts is None:
         return
     if definition.argument:
-        for text in map(hold_text, known.holds if known else ()):
-            found = view.worst(definition, view.each(definition, text))
-            yield f"{definition.name}[{text}]", _quantity(definition, found)
+        for text in map(hold_text, durability.holds if durability else ()):
+            worst = view.worst(definition, view.evaluate_each(definition, text))
+            yield f"{definition.name}[{text}]", _quantity(definition, worst)
         return
-    values = view.each(definition)
+    values = view.evaluate_each(definition)
     yield definition.name, _quantity(definition, view.worst(definition, values))
     if len(values) > 1:
         for branch, value in zip(view.branches, values, strict=True):
@@ -230,10 +230,10 @@ Surveys = dict[Window | None, Survey | None]
 
 def survey_of(result: Result, window: Window | None, surveys: Surveys | None = None) -> Survey | None:
     """Return the metrics of the nominal curve over a window; None without a curve."""
-    known: Surveys = {} if surveys is None else surveys
-    if window not in known:
-        known[window] = survey(result.curves[0], frame_of(result), window) if result.curves else None
-    return known[window]
+    known_surveys: Surveys = {} if surveys is None else surveys
+    if window not in known_surveys:
+        known_surveys[window] = survey(result.curves[0], frame_of(result), window) if result.curves else None
+    return known_surveys[window]
 
 
 def left_of(window: Window | None, result: Result) -> Window | None:
@@ -281,8 +281,8 @@ def evaluate(
     view = survey_of(result, left_of(window or window_of(result), result), surveys)
     kind, extra = kind_of(result), tuple(extra_definitions)
     if names is not None:
-        known = metrics_by_name(kind, extra)
-        return {name: result.values.get(name) or _named_quantity(view, name, known, result) for name in names}
+        by_name = metrics_by_name(kind, extra)
+        return {name: result.values.get(name) or _named_quantity(view, name, by_name, result) for name in names}
     return ({} if view is None else _all(view, definitions(kind, extra))) | dict(result.values)
 
 
@@ -295,14 +295,14 @@ def mean_effort(result: Result) -> float | None:
 
 
 @np.errstate(all="ignore")
-def _named_quantity(view: Survey | None, name: str, known: Mapping[str, Definition], result: Result) -> Quantity:
+def _named_quantity(view: Survey | None, name: str, definitions: Mapping[str, Definition], result: Result) -> Quantity:
     metric, branch = split_name(name)
-    if metric not in known:
-        raise UsageError(unknown_metric(metric, [*known, *result.values]))
-    definition = known[metric]
+    if metric not in definitions:
+        raise UsageError(unknown_metric(metric, [*definitions, *result.values]))
+    definition = definitions[metric]
     if view is None:
         return Quantity(None, definition.dimension, definition.definition, result.message)
-    return _quantity(definition, view.worst(definition, view.each(definition, branch)))
+    return _quantity(definition, view.worst(definition, view.evaluate_each(definition, branch)))
 
 
 @dataclass(frozen=True)
@@ -317,8 +317,8 @@ class UncoveredWindow:
     @property
     def short(self) -> str:
         """Why there is no value, for the row of a table."""
-        wanted, there = span_text(self.window.lo, self.window.hi, self.kind), span_text(*self.common, self.kind)
-        return f"no value over {wanted} ({', '.join(self.paths)}): the curve covers only {there}"
+        wanted, covered = span_text(self.window.lo, self.window.hi, self.kind), span_text(*self.common, self.kind)
+        return f"no value over {wanted} ({', '.join(self.paths)}): the curve covers only {covered}"
 
 
 def gaps(result: Result) -> tuple[UncoveredWindow, ...]:
@@ -339,8 +339,8 @@ def gaps(result: Result) -> tuple[UncoveredWindow, ...]:
 
 def windows_judged(result: Result) -> Result:
     """Return a result that warns of windows that its nominal curve does not cover."""
-    found = tuple(Finding(WINDOW_OUTSIDE, _report_gap(gap, result)) for gap in gaps(result))
-    return replace(result, warnings=LazySequence(lambda: (*result.warnings, *found))) if found else result
+    warnings = tuple(Finding(WINDOW_OUTSIDE, _report_gap(gap, result)) for gap in gaps(result))
+    return replace(result, warnings=LazySequence(lambda: (*result.warnings, *warnings))) if warnings else result
 
 
 def _report_gap(gap: UncoveredWindow, result: Result) -> str:

@@ -25,8 +25,8 @@ def as_json(quantity: Quantity) -> dict[str, Any]:
     """
     unit, definition = border_unit(quantity.dimension), quantity.definition
     if quantity.value is None:
-        found: dict[str, Any] = {"value": None, "unit": unit, "definition": definition}
-        return found | {"reason": quantity.reason} if quantity.reason else found
+        entry: dict[str, Any] = {"value": None, "unit": unit, "definition": definition}
+        return entry | {"reason": quantity.reason} if quantity.reason else entry
     value = finite_border(quantity.value, quantity.dimension) if quantity.word is None else quantity.word
     return {"value": value, "unit": unit, "definition": definition}
 
@@ -47,20 +47,20 @@ def metrics_json(quantities: Mapping[str, Quantity]) -> dict[str, dict[str, Any]
     >>> metrics_json({name: Quantity(value, "force", "largest") for name, value in values.items()})["force_max"]
     {'value': 2.0, 'unit': 'N', 'definition': 'largest', 'branches': {'load': {'value': 2.0}, 'unload': {'value': 1.0}}}
     """
-    found: dict[str, dict[str, Any]] = {}
+    entries: dict[str, dict[str, Any]] = {}
     branches: dict[str, dict[str, dict[str, Any]]] = {}
     for name, quantity in quantities.items():
         metric, branch = split_name(name)
         if branch is None or metric not in quantities:
-            found[name] = as_json(quantity)
+            entries[name] = as_json(quantity)
         else:
             shown = as_json(quantity)
             branches.setdefault(metric, {})[branch] = {key: shown[key] for key in OF_BRANCH if key in shown}
-    for metric, each in branches.items():
-        plain = {key: found[metric][key] for key in OF_BRANCH if key in found[metric]}
-        if any(one != plain for one in each.values()):
-            found[metric]["branches"] = each
-    return found
+    for metric, entries_of_branches in branches.items():
+        plain = {key: entries[metric][key] for key in OF_BRANCH if key in entries[metric]}
+        if any(entry != plain for entry in entries_of_branches.values()):
+            entries[metric]["branches"] = entries_of_branches
+    return entries
 
 
 OF_BRANCH = ("value", "reason")  # keys of a metric that may differ between branches
@@ -75,16 +75,18 @@ def flat_metrics(block: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, 
     >>> {name: one["value"] for name, one in found.items()}
     {'force_max': 2.0, 'force_max[unload]': 1.0}
     """
-    found: dict[str, dict[str, Any]] = {}
+    metrics: dict[str, dict[str, Any]] = {}
     for name, entry in block.items():
         plain = {key: value for key, value in entry.items() if key != "branches"}
-        found[name] = plain
-        for branch, own in entry.get("branches", {}).items():
-            found[f"{name}[{branch}]"] = {key: value for key, value in plain.items() if key not in OF_BRANCH} | own
-    return found
+        metrics[name] = plain
+        for branch, branch_entry in entry.get("branches", {}).items():
+            metrics[f"{name}[{branch}]"] = {
+                key: value for key, value in plain.items() if key not in OF_BRANCH
+            } | branch_entry
+    return metrics
 
 
-def search_json(found: Mapping[str, Searched]) -> dict[str, dict[str, Any]]:
+def search_json(searched: Mapping[str, Searched]) -> dict[str, dict[str, Any]]:
     """Return the block ``search`` of metrics.json: what a design search knows, with its model and window.
 
     Examples
@@ -94,10 +96,10 @@ def search_json(found: Mapping[str, Searched]) -> dict[str, dict[str, Any]]:
     {'starts': {'value': 20.0, 'unit': '1', 'definition': 'random starts', 'model': 'inextensible', \
 'window': [0.0, 10.0], 'window_unit': 'mm'}}
     """
-    return {name: as_json(one.quantity) | _model_and_window(one) for name, one in found.items()}
+    return {name: as_json(item.quantity) | _model_and_window(item) for name, item in searched.items()}
 
 
-def _model_and_window(found: Searched) -> dict[str, Any]:
+def _model_and_window(searched: Searched) -> dict[str, Any]:
     """Return model and window in border units."""
-    window = None if found.window is None else [finite_border(end, found.motion) for end in found.window]
-    return {"model": found.model, "window": window, "window_unit": window and border_unit(found.motion)}
+    window = None if searched.window is None else [finite_border(end, searched.motion) for end in searched.window]
+    return {"model": searched.model, "window": window, "window_unit": window and border_unit(searched.motion)}

@@ -174,9 +174,9 @@ def _edge(
 
 
 def _solve_ends(many: ManyBranches, with_rise: bool = True, with_bands: bool = True) -> tuple[FloatArray, FloatArray]:
-    """Return `ManyBranches.solved`: all ends are looked for together, as calls of the model are what takes the time.
+    """Return where each branch first reaches 95 %, (d,), and the widths of its bands, (d, 3), solved by the model.
 
-    Without the rise, or the bands, these are NaN.
+    All ends are looked for together: calls of the model are what takes the time. NaN without the rise, or the bands.
     """
     nominal, first, (start, stop), _ = _rise(many)
     start, some = np.where(first == 0, many.motion[:, 0], start), np.isfinite(nominal) & (np.abs(nominal) > many.error)

@@ -151,14 +151,14 @@ class Outcome(ShortRepr):
         return None if value is None else finite_border(value, dimension)
 
 
-def validate_requirements(spec: Spec, known: Iterable[Definition], kind: Kind | None = None) -> None:
+def validate_requirements(spec: Spec, definitions: Iterable[Definition], kind: Kind | None = None) -> None:
     """Check the requirements of a specification as far as that needs no curve.
 
     Parameters
     ----------
     spec : Spec
         Its ``requirements``.
-    known : iterable of Definition
+    definitions : iterable of Definition
         Every metric there is: ``known_metrics(kind, family's)``.
     kind : {"force", "torque"} or None
         Of the curve, if it is known: then windows in the wrong dimension are found too.
@@ -168,27 +168,27 @@ def validate_requirements(spec: Spec, known: Iterable[Definition], kind: Kind | 
     cfmkit.errors.SpecError
         One problem for each fault, at ``requirements.N.metric`` and so on.
     """
-    problems = tuple(requirement_problems(spec.requirements, known, kind))
+    problems = tuple(requirement_problems(spec.requirements, definitions, kind))
     if problems:
         raise SpecError(problems)
 
 
 def requirement_problems(
     requirements: Sequence[Requirement],
-    known: Iterable[Definition],
+    definitions: Iterable[Definition],
     kind: Kind | None = None,
     branches: Sequence[str] = (),
 ) -> Iterator[Problem]:
     """Yield what is wrong with requirements: unknown metrics or branches, bounds and windows of the wrong dimension."""
-    table = _by_name(known)
+    table = _group_by_name(definitions)
     for index, requirement in enumerate(requirements):
         for key, message in _faults(requirement, table, kind, branches):
             yield Problem("", 0, 0, f"requirements.{index}.{key}", message)
 
 
-def _by_name(known: Iterable[Definition]) -> dict[str, list[Definition]]:
+def _group_by_name(definitions: Iterable[Definition]) -> dict[str, list[Definition]]:
     table: dict[str, list[Definition]] = {}
-    for item in known:
+    for item in definitions:
         table.setdefault(item.name, []).append(item)
     return table
 
@@ -243,13 +243,13 @@ def _window_faults(over: tuple[float, float], meant: Definition, kind: Kind | No
     if meant.scope == "value":
         yield "over", f"{meant.name!r} is not measured over a window; remove 'over'"
         return
-    given = {getattr(end, "dimension", _MOTION_DIMENSIONS.get(kind or "", "length")) for end in over} - {
+    dimensions = {getattr(end, "dimension", _MOTION_DIMENSIONS.get(kind or "", "length")) for end in over} - {
         SHARE_DIMENSION
     }
-    if len(given) > 1:
+    if len(dimensions) > 1:
         yield "over", "one end is a length and the other an angle"
-    elif kind is not None and given - {_MOTION_DIMENSIONS[kind]}:
-        right, wrong = DIMENSIONS_BY_NAME[_MOTION_DIMENSIONS[kind]].phrase, DIMENSIONS_BY_NAME[given.pop()].phrase
+    elif kind is not None and dimensions - {_MOTION_DIMENSIONS[kind]}:
+        right, wrong = DIMENSIONS_BY_NAME[_MOTION_DIMENSIONS[kind]].phrase, DIMENSIONS_BY_NAME[dimensions.pop()].phrase
         yield "over", f"the curve is a {kind} curve: its window is {right}, not {wrong}"
 
 
@@ -272,26 +272,35 @@ def check(
     """
     kind = kind_of(result)
     extra = tuple(extra_definitions)
-    named = {one.name for one in extra}  # of these the value need not be computed to know its dimension
-    own = {name: result.values[name] for name in result.values if name not in named}
-    values = values_of_family({name: (one.dimension, one.definition) for name, one in own.items()})
-    known = [*known_metrics(kind, extra), *values]
-    problems = tuple(requirement_problems(requirements, known, kind))
+    named = {definition.name for definition in extra}  # of these the value need not be computed to know its dimension
+    family_values = {name: result.values[name] for name in result.values if name not in named}
+    values = values_of_family(
+        {name: (quantity.dimension, quantity.definition) for name, quantity in family_values.items()}
+    )
+    definitions = [*known_metrics(kind, extra), *values]
+    problems = tuple(requirement_problems(requirements, definitions, kind))
     if problems:
         raise SpecError(problems)
-    table = _by_name(known)
+    table = _group_by_name(definitions)
     surveys = {} if surveys is None else surveys
     return tuple(_outcome(requirement, result, table, surveys) for requirement in requirements)
 
 
-def of_many(requirement: Requirement, found: Quantity) -> Outcome:
+def judge_part_metric(requirement: Requirement, quantity: Quantity) -> Outcome:
     """Return the outcome of a requirement on a metric of many parts, such as their yield."""
-    limits = Bounds.from_requirement(requirement, found.dimension)
-    value = Value(found.value, found.reason)
+    limits = Bounds.from_requirement(requirement, quantity.dimension)
+    value = Value(quantity.value, quantity.reason)
     reported = limits.sentence(requirement.metric, value, "")
     ends = limits.min, limits.max
     return Outcome(
-        requirement.metric, found.dimension, found.value, *ends, None, "force", limits.is_met(found.value), reported
+        requirement.metric,
+        quantity.dimension,
+        quantity.value,
+        *ends,
+        None,
+        "force",
+        limits.is_met(quantity.value),
+        reported,
     )
 
 
@@ -332,7 +341,7 @@ def _values(name: str, definition: Definition, view: Survey | None, result: Resu
     if name in result.values:
         quantity = result.values[name]
         return (Value(quantity.value, quantity.reason or "the mechanism has none"),)
-    return (Value(None, result.message),) if view is None else view.each(definition, split_name(name)[1])
+    return (Value(None, result.message),) if view is None else view.evaluate_each(definition, split_name(name)[1])
 
 
 def _format_window(definition: Definition, window: Window | None, kind: Kind) -> str:

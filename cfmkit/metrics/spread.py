@@ -55,46 +55,46 @@ class Spread(NamedTuple):
         return cls(np.abs(mean), high, low, np.where(down, -1.0, 1.0), error)
 
 
-def level(found: Spread) -> Number:
+def level(summary: Spread) -> Number:
     """Return the mean effort."""
-    return found.sign * found.mean + 0.0  # no minus before a zero
+    return summary.sign * summary.mean + 0.0  # no minus before a zero
 
 
-def largest(found: Spread) -> Number:
+def largest(summary: Spread) -> Number:
     """Return the largest effort."""
-    return _either(found.sign > 0, found.max, -found.min)
+    return _either(summary.sign > 0, summary.max, -summary.min)
 
 
-def smallest(found: Spread) -> Number:
+def smallest(summary: Spread) -> Number:
     """Return the smallest effort."""
-    return _either(found.sign > 0, found.min, -found.max)
+    return _either(summary.sign > 0, summary.min, -summary.max)
 
 
-def ripple(found: Spread) -> Number:
+def ripple(summary: Spread) -> Number:
     """Return (max - min) / max."""
-    return _share(found.max - found.min, found.max, found.error)
+    return _share(summary.max - summary.min, summary.max, summary.error)
 
 
-def half_band(found: Spread) -> Number:
+def half_band(summary: Spread) -> Number:
     """Return (max - min) / (max + min)."""
-    width = found.max - found.min
-    return _share(width, found.max + found.min, _larger(EXTREME_RTOL * width, found.error))
+    width = summary.max - summary.min
+    return _share(width, summary.max + summary.min, _larger(EXTREME_RTOL * width, summary.error))
 
 
-def deviation_from_mean(found: Spread) -> Number:
+def deviation_from_mean(summary: Spread) -> Number:
     """Return the largest ``|F - mean| / mean``."""
-    return _share(_larger(found.max - found.mean, found.mean - found.min), found.mean, found.error)
+    return _share(_larger(summary.max - summary.mean, summary.mean - summary.min), summary.mean, summary.error)
 
 
-def deviation_from_target(found: Spread, target: Number) -> Number:
+def deviation_from_target(summary: Spread, target: Number) -> Number:
     """Return the largest ``|F - target| / |target|``; NaN where the target is zero."""
-    away = _larger(abs(largest(found) - target), abs(smallest(found) - target))
-    return _share(away, abs(target), found.error)
+    away = _larger(abs(largest(summary) - target), abs(smallest(summary) - target))
+    return _share(away, abs(target), summary.error)
 
 
-def static_balance(found: Spread, part: Number) -> Number:
+def static_balance(summary: Spread, part: Number) -> Number:
     """Return the largest effort over the largest of one spring or member, `part`, whatever their signs."""
-    return _share(_larger(abs(found.max), abs(found.min)), part, found.error)
+    return _share(_larger(abs(summary.max), abs(summary.min)), part, summary.error)
 
 
 def deviation(effort: FloatArray, mean: Number) -> Number:
@@ -103,21 +103,21 @@ def deviation(effort: FloatArray, mean: Number) -> Number:
     return np.sqrt(np.einsum("...j,...j->...", offset, offset) / (effort.shape[-1] - 1))
 
 
-def _either(which: Number, one: Number, other: Number) -> Number:
-    if isinstance(one, float):
-        return one if which else other
-    return np.where(which, one, other)
+def _either(which: Number, first: Number, second: Number) -> Number:
+    if isinstance(first, float):
+        return first if which else second
+    return np.where(which, first, second)
 
 
-def _larger(one: Number, other: Number) -> Number:
-    return max(one, other) if isinstance(one, float) and isinstance(other, float) else np.maximum(one, other)
+def _larger(first: Number, second: Number) -> Number:
+    return max(first, second) if isinstance(first, float) and isinstance(second, float) else np.maximum(first, second)
 
 
 def _share(part: Number, whole: Number, error: Number) -> Number:
     if isinstance(part, float):
         return part / whole if whole > error else np.nan
-    known = whole > error
-    return np.where(known, part / np.where(known, whole, 1.0), np.nan)
+    is_known = whole > error
+    return np.where(is_known, part / np.where(is_known, whole, 1.0), np.nan)
 
 
 class ManyWindows:

@@ -144,9 +144,9 @@ def _bad(branch: Branch, reference: float, curve: TargetCurve | None) -> list[In
     band = frame.band * (1 + BAND_RTOL)
     # two one-sided limits: the absolute value has a kink that linear interpolation would miss
     broken = _excess(trace, ratio - band) + _excess(trace, -band - ratio)
-    for one in (trace, *branch.beside):
-        if frame.allowable_stress is not None and one.stress is not None:
-            broken += _excess(one, one.stress - frame.allowable_stress * (1 + BAND_RTOL))
+    for each_trace in (trace, *branch.beside):
+        if frame.allowable_stress is not None and each_trace.stress is not None:
+            broken += _excess(each_trace, each_trace.stress - frame.allowable_stress * (1 + BAND_RTOL))
     return broken
 
 

@@ -42,7 +42,7 @@ def reach(path: WindingPath) -> Interval:
 def places_inside(path: WindingPath, low: float, high: float) -> FloatArray:
     """Return the places `ways` of a path with those where its motion enters and leaves a window, increasing."""
     ways = path.ways
-    motion, found = path.states(ways)[0], [ways]
+    motion, ways_of_pieces = path.states(ways)[0], [ways]
     for level in (low, high):
         at = np.flatnonzero((motion[1:] - level) * (motion[:-1] - level) < 0)
         sense = np.sign(motion[at + 1] - motion[at])[:, None]
@@ -52,8 +52,8 @@ def places_inside(path: WindingPath, low: float, high: float) -> FloatArray:
         ) -> FloatArray:
             return np.asarray(sense[ends] * (path.states(places)[0] - level) / (high - low))
 
-        found.append(last_places(measure_excess, ways[at][:, None], ways[at + 1][:, None]).ravel())
-    return distinct(np.concatenate(found))
+        ways_of_pieces.append(last_places(measure_excess, ways[at][:, None], ways[at + 1][:, None]).ravel())
+    return distinct(np.concatenate(ways_of_pieces))
 
 
 def mean(path: WindingPath, low: float, high: float) -> float:
@@ -95,10 +95,10 @@ def list_broken_intervals(path: WindingPath, height: Callable[[FloatArray], Floa
     ends = last_places(lambda at, _ends: height(at), ways[good][:, None], ways[spoilt][:, None]).ravel()
     motion, of_ends = path.states(ways)[0], path.states(ends)[0]
     numbers = np.arange(len(edges))
-    found = []
+    branches = []
     for number, run in enumerate(np.split(np.arange(len(ways)), edges + 1)):
         if bad[run[0]]:
             around = [of_ends[k] for k in (number - 1, number) if k in numbers]
-            own = [*motion[run].tolist(), *around]
-            found.append((float(min(own)), float(max(own))))
-    return found
+            motions = [*motion[run].tolist(), *around]
+            branches.append((float(min(motions)), float(max(motions))))
+    return branches

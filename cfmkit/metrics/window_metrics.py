@@ -245,7 +245,7 @@ def _extreme(which: int, rows: Any) -> FloatArray:
     return np.asarray(rows.many.extremes[which])
 
 
-def _of_spread(function: Callable[[spread.Spread], FloatArray], rows: Any) -> FloatArray:
+def _read_spread(function: Callable[[spread.Spread], FloatArray], rows: Any) -> FloatArray:
     return function(rows.many.spread)
 
 
@@ -295,21 +295,21 @@ IN_WINDOW = (
         "ratio",
         f"(max - min)/max of the {{effort}} in the window: the fluctuation of {_DING_SECTION}",
         ripple,
-        partial(_of_spread, spread.ripple),
+        partial(_read_spread, spread.ripple),
     ),
     Definition(
         "half_band",
         "ratio",
         "(max - min)/(max + min) of the {effort} in the window: half the width of the narrowest band that holds it",
         half_band,
-        partial(_of_spread, spread.half_band),
+        partial(_read_spread, spread.half_band),
     ),
     Definition(
         "deviation_from_mean",
         "ratio",
         f"largest |F - mean|/mean of the {{effort}} in the window {_DING_SECTION}",
         deviation_from_mean,
-        partial(_of_spread, spread.deviation_from_mean),
+        partial(_read_spread, spread.deviation_from_mean),
     ),
     Definition(
         "deviation_from_target",

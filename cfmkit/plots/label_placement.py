@@ -88,7 +88,7 @@ def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray])
     covered = float(ground.count_covered(center[None, :], box)[0])
     if covered > 0:
         chosen, cost = label.text, cost + 2.0 * COVERING_COST * covered
-        for words in (label.text, _in_two_lines(label.text)):
+        for words in (label.text, _break_in_two(label.text)):
             text.set_text(words)
             other = ground.size_of(text)
             place, price = _best(ground, label, (points, together), other, FINER_GAPS)
@@ -108,12 +108,12 @@ def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray])
     return text
 
 
-def _in_two_lines(text: str) -> str:
+def _break_in_two(text: str) -> str:
     """Return a text broken at the space that is nearest to its middle; a text of one line and one word as it is.
 
     Examples
     --------
-    >>> _in_two_lines("ripple 6.86 % ≤ 6.9 %")
+    >>> _break_in_two("ripple 6.86 % ≤ 6.9 %")
     'ripple 6.86 %\\n≤ 6.9 %'
     """
     # a number stays beside its unit, and behind its sign

@@ -135,13 +135,13 @@ def _entry_of(entry: Entry, outcome: FinishedRun) -> Entry:
 
 
 def _failed_entry(entry: Entry, error: Exception) -> Entry:
-    code, complaints = code_of(error), tuple(_of_one(entry, error))
+    code, complaints = code_of(error), tuple(_describe_fault(entry, error))
     first, *more = complaints
     message = first.removeprefix("error    ") + (f" (and {len(more)} more)" if more else "")
     return replace(entry, status=code.name.lower(), code=code, message=message, errors=complaints)
 
 
-def _of_one(entry: Entry, error: Exception) -> Iterator[str]:
+def _describe_fault(entry: Entry, error: Exception) -> Iterator[str]:
     """Yield what standard error shows of a fault; of one in an option, too, which specification has it."""
     if not isinstance(error, SpecError):
         yield from lines_of(error)

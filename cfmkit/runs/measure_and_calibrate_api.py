@@ -87,7 +87,7 @@ def measure(
 
     recording = data if isinstance(data, Recording) else read_recording(_file(data), units, group)
     options = MeasurementSettings(
-        window, filter, target, tare, zero, _each(flip), as_recorded, one_branch, cycles, max_hole
+        window, filter, target, tare, zero, _as_tuple(flip), as_recorded, one_branch, cycles, max_hole
     )
     return options.report_on(recording)
 
@@ -145,7 +145,7 @@ def _file(data: str | os.PathLike[str]) -> str:
     raise UsageError(f"the path of a data file or a cfmkit.Recording of arrays is needed, not {type(data).__name__}")
 
 
-def _each(names: str | Iterable[str]) -> tuple[str, ...]:
+def _as_tuple(names: str | Iterable[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
@@ -287,5 +287,7 @@ def _read_curves(
     if isinstance(data, MeasuredCurves):
         return data
     if isinstance(data, Recording):
-        return measure_recording(correct_recording(data, tare, zero, _each(flip)), None, LEFT_OUT, read_cycles(cycles))
-    return read_measured(_file(data), units, tare, zero, _each(flip), cycles, group)
+        return measure_recording(
+            correct_recording(data, tare, zero, _as_tuple(flip)), None, LEFT_OUT, read_cycles(cycles)
+        )
+    return read_measured(_file(data), units, tare, zero, _as_tuple(flip), cycles, group)

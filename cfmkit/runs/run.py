@@ -247,10 +247,10 @@ def run_design(spec: Spec, run: Run) -> Report:
     if design.spec is None or result.status is not Status.COMPLETE:
         return found
     # as it was written: what follows from other values follows from those of each part
-    return _of_many_parts(found, replace(result, spec=design.spec), spec, run.part(0.6, 1.0))
+    return _judge_many_parts(found, replace(result, spec=design.spec), spec, run.part(0.6, 1.0))
 
 
-def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
+def _judge_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, and its test plan."""
     from cfmkit.studies.assumed_friction import friction_note
     from cfmkit.studies.parts.expected_forces import expected_forces
@@ -270,9 +270,9 @@ def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report
 
         reported = expected_yield(nominal, run)
         more = run_outcome.Supplement(lines=(("yield", reported),) if reported else ())
-        return found.extend(no_yields(given), more).of_many_parts()
+        return found.extend(no_yields(given), more).judge_yields()
     more = run_outcome.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
-    return found.extend(yields.quantities(), more).of_many_parts()
+    return found.extend(yields.quantities(), more).judge_yields()
 
 
 def _csv(table: Callable[[], Table]) -> bytes:

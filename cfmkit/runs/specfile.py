@@ -203,14 +203,15 @@ def _design_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
 
     design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys
     lacking = "is a share of manufactured parts: state their tolerances in 'design.tolerances'"
-    if isinstance(design, DesignKeys):
+    asked = [one for one in enumerate(spec.requirements) if one[1].metric in OF_MANY_PARTS]
+    of_parts = {"tolerances", "free", "robust", "yield"}
+    if isinstance(design, DesignKeys) and (asked or of_parts & design.model_fields_set):
         from cfmkit.studies.parts.parts import NO_TOLERANCE, errs_nowhere, faults, is_made
 
         if is_made(spec, design):
             lacking = f"is a share of manufactured parts: {NO_TOLERANCE}" if errs_nowhere(spec, design) else ""
         for path, message in faults(spec, design):
             yield document.problem(path, message)
-    asked = (one for one in enumerate(spec.requirements) if one[1].metric in OF_MANY_PARTS)
     for index, one in asked if lacking else ():
         yield document.problem(("requirements", index, "metric"), f"{one.metric!r} {lacking}")
 

@@ -88,7 +88,7 @@ def sweep(
 
     spec = spec_of(spec)
     if isinstance(vary, Mapping):
-        vary = {path: in_words(values, spec, path) for path, values in vary.items()}
+        vary = {path: write_values(values, spec, path) for path, values in vary.items()}
     block = given_arguments(
         vary=vary, combine=combine, samples=samples, metrics=names_of(metrics), design=design, curves=curves
     )
@@ -172,7 +172,7 @@ def sensitivity(
 
     spec = spec_of(spec)
     if isinstance(parameters, Mapping):
-        parameters = {path: in_words(values, spec, path) for path, values in parameters.items()}
+        parameters = {path: write_values(values, spec, path) for path, values in parameters.items()}
     block = given_arguments(
         method=method,
         parameters=parameters,
@@ -197,7 +197,7 @@ def _run_work(executor: Executor, work: Work) -> Records:
     return run(work, executor)
 
 
-def in_words(values: Any, spec: Spec, path: str) -> Any:
+def write_values(values: Any, spec: Spec, path: str) -> Any:
     """Return what a file would say for values from NumPy: numbers of a dimension are in SI units, as in results.
 
     A range is the list of its numbers. What is not from NumPy has no unit where it is a bare number, as in a file.
@@ -210,15 +210,15 @@ def in_words(values: Any, spec: Spec, path: str) -> Any:
             raise UsageError(f"{path}: a range of more than {MOST_POINTS} values; take fewer")
         return list(values)
     if isinstance(values, Mapping):
-        return {key: in_words(value, spec, path) for key, value in values.items()}
+        return {key: write_values(value, spec, path) for key, value in values.items()}
     if isinstance(values, list | tuple) and any(isinstance(value, np.generic | np.ndarray) for value in values):
-        return [in_words(value, spec, path) for value in values]
+        return [write_values(value, spec, path) for value in values]
     if isinstance(values, np.ndarray):
         if values.ndim > 1:
             raise UsageError(f"{path}: an array of {values.ndim} dimensions is not a list of values; flatten it")
         values = values[()]
     if isinstance(values, np.ndarray):
-        return [in_words(value, spec, path) for value in values]
+        return [write_values(value, spec, path) for value in values]
     if not isinstance(values, np.generic):
         return values
     dimension = _dimension(spec, path)

@@ -359,7 +359,10 @@ def refine_path(problem: SolidProblem, course: PosePath, allowed: float = MAX_EF
 
 
 def _check_interval(problem: SolidProblem, course: PosePath, skipped: set[float]) -> tuple[PosePath, float] | None:
-    """Return the path with a pose in the middle of its worst interval, and how far the curve was from it [N or N m]."""
+    """Return the path with a pose in the middle of its worst interval, and how far the curve was from it [N or N m].
+
+    None if there is no interval left that a pose could be put into.
+    """
     travel = course.travel
     span = abs(travel[-1] - travel[0])
     corners = course.bifurcations

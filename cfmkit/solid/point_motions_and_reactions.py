@@ -41,11 +41,11 @@ def motion(solved: MeshSolution, place: FloatArray, name: str) -> Callable[[Floa
         number = groups.index(name)
         arm = place - solved.problem.supports.groups[number].center
 
-        def of_group(unknowns: FloatArray, travel: float) -> FloatArray:
+        def read_group(unknowns: FloatArray, travel: float) -> FloatArray:
             x, y, turn = solved.problem.supports.motions(unknowns, travel)[number]
             return np.array([*(np.array([x, y]) + (rotation_matrix(turn) - np.eye(2)) @ arm), turn])
 
-        return _reading_between(solved, of_group)
+        return _reading_between(solved, read_group)
     found = MaterialPoint.from_place(solved.problem.elements, place)
     if found is None:
         return lambda travel: np.full((len(travel), 3), np.nan)

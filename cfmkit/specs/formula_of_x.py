@@ -107,7 +107,7 @@ def _slope(node: ast.expr, x: FloatArray) -> Any:
         by_power = np.where(np.asarray(dv) == 0, 0.0, np.power(np.asarray(u, dtype=float), v) * np.log(u) * dv)
         return by_base + by_power
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-        inner, slopes = [_value(one, x) for one in node.args], [_slope(one, x) for one in node.args]
+        inner, slopes = [_value(argument, x) for argument in node.args], [_slope(argument, x) for argument in node.args]
         if len(inner) == 2:
             first = inner[0] <= inner[1] if node.func.id == "min" else inner[0] >= inner[1]
             return np.where(first, *slopes)
@@ -130,7 +130,7 @@ def _value(node: ast.expr, x: FloatArray) -> Any:
         if len(node.args) != wanted or node.keywords:
             raise ValueError(f"{node.func.id}() takes {wanted} value{'s' if wanted > 1 else ''}")
         with np.errstate(all="ignore"):
-            return _NUMPY_FUNCTIONS[node.func.id](*(_value(one, x) for one in node.args))
+            return _NUMPY_FUNCTIONS[node.func.id](*(_value(argument, x) for argument in node.args))
     reported = quote(ast.unparse(node))
     raise ValueError(
         f"{reported} is unknown here; a formula may hold numbers, x, pi, + - * / ** and {', '.join(_NUMPY_FUNCTIONS)}"

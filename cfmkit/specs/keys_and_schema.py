@@ -49,15 +49,17 @@ def schema(
     models: Mapping[str, type[Spec]],
 ) -> dict[str, Any]:
     """Return the JSON schema of one family's specifications, or of any one of several."""
-    each = {name: json_schema(model) for name, model in models.items()}
-    if len(each) == 1:
-        return {"$schema": SCHEMA_DIALECT} | next(iter(each.values()))
+    schemas = {name: json_schema(model) for name, model in models.items()}
+    if len(schemas) == 1:
+        return {"$schema": SCHEMA_DIALECT} | next(iter(schemas.values()))
     shared = {
-        f"{name}.{key}": _rename_references(block, name) for name, one in each.items() for key, block in _blocks(one)
+        f"{name}.{key}": _rename_references(block, name)
+        for name, schema in schemas.items()
+        for key, block in _blocks(schema)
     }
     choices = [
-        {key: value for key, value in _rename_references(one, name).items() if key != "$defs"}
-        for name, one in each.items()
+        {key: value for key, value in _rename_references(schema, name).items() if key != "$defs"}
+        for name, schema in schemas.items()
     ]
     return {"$schema": SCHEMA_DIALECT, "title": "cfmkit specification", "oneOf": choices, "$defs": shared}
 
@@ -88,7 +90,7 @@ def _default_as_written(node: dict[str, Any], value: Any) -> Any:
         inner: dict[str, Any] = node.get("items") or next(iter(node.get("prefixItems", ())), {})
         return [_default_as_written(inner, item) for item in value]
     choices = (node, *node.get("anyOf", ()))
-    dimension = next((one["x-dimension"] for one in choices if "x-dimension" in one), None)
+    dimension = next((choice["x-dimension"] for choice in choices if "x-dimension" in choice), None)
     if (
         not isinstance(value, int | float)
         or isinstance(value, bool)
@@ -112,8 +114,8 @@ def keys(model: type[Spec]) -> tuple[Key, ...]:
 
 
 def _blocks(whole: dict[str, Any]) -> Iterable[tuple[str, Any]]:
-    found: dict[str, Any] = whole.get("$defs", {})
-    return found.items()
+    blocks: dict[str, Any] = whole.get("$defs", {})
+    return blocks.items()
 
 
 def _rename_references(node: Any, prefix: str) -> Any:
@@ -132,14 +134,14 @@ def _rename_references(node: Any, prefix: str) -> Any:
 def _keys_below(block: dict[str, Any], blocks: dict[str, Any], path: str) -> Iterator[Key]:
     required = block.get("required", ())
     for name, node in block.get("properties", {}).items():
-        here = f"{path}.{name}" if path else name
-        key = _key(here, node, blocks, name in required)
+        key_path = f"{path}.{name}" if path else name
+        key = _key(key_path, node, blocks, name in required)
         if path and "const" in node and not key.description:
             # the one word that makes a block the kind it is means what the block means
             key = replace(key, description=block.get("description", ""))
         yield key
         for inner, marker in _inner_blocks(node, blocks):
-            yield from _keys_below(inner, blocks, here + marker)
+            yield from _keys_below(inner, blocks, key_path + marker)
 
 
 def _inner_blocks(node: dict[str, Any], blocks: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
@@ -159,22 +161,22 @@ def _members(node: dict[str, Any], blocks: dict[str, Any]) -> list[dict[str, Any
         return [blocks[node["$ref"].rpartition("/")[2]]]
     choices = node.get("anyOf") or node.get("oneOf") or node.get("allOf")
     if choices:
-        return [one for choice in choices for one in _members(choice, blocks)]
+        return [member for choice in choices for member in _members(choice, blocks)]
     return [] if node.get("type") == "null" else [node]
 
 
 def _key(path: str, node: dict[str, Any], blocks: dict[str, Any], required: bool) -> Key:
     members = _members(node, blocks)
-    quantities = [one for one in members if "x-dimension" in one]
+    quantities = [member for member in members if "x-dimension" in member]
     default = node.get("default", _NO_VALUE)
     return Key(
         path,
-        " or ".join(dict.fromkeys(_kind(one, blocks) for one in members)),
-        next((one["examples"][0] for one in quantities if one.get("examples")), ""),
+        " or ".join(dict.fromkeys(_kind(member, blocks) for member in members)),
+        next((quantity["examples"][0] for quantity in quantities if quantity.get("examples")), ""),
         "; ".join(dict.fromkeys(filter(None, map(_describe_allowed, members)))),
         _default(default) if default not in (_NO_VALUE, None, "", []) else "",
         required,
-        node.get("description") or next((one["description"] for one in members if "description" in one), ""),
+        node.get("description") or next((member["description"] for member in members if "description" in member), ""),
     )
 
 
@@ -193,7 +195,7 @@ def _kind(node: dict[str, Any], blocks: dict[str, Any]) -> str:
 
 def _items(node: dict[str, Any], blocks: dict[str, Any]) -> str:
     inner = node.get("prefixItems") or [node.get("items", {})]
-    kinds = dict.fromkeys(_kind(one, blocks) for item in inner for one in _members(item, blocks))
+    kinds = dict.fromkeys(_kind(member, blocks) for item in inner for member in _members(item, blocks))
     count = f"{len(inner)} x " if "prefixItems" in node else ""
     return count + " or ".join(kinds)
 

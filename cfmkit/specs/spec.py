@@ -213,8 +213,8 @@ class Spec(Model):
     @property
     def fidelity(self) -> str | None:
         """The model that the analysis uses; None if its family has one only."""
-        found: str | None = getattr(getattr(self, "analysis", None), "fidelity", None)
-        return found
+        fidelity: str | None = getattr(getattr(self, "analysis", None), "fidelity", None)
+        return fidelity
 
     def end_stop_changes(self, end: float) -> Mapping[str, Any]:
         """Return what puts a rigid stop at a motion [m] and ends the analysis there; empty if it can have none."""
@@ -223,7 +223,7 @@ class Spec(Model):
     @property
     def part_requirements(self) -> tuple[Requirement, ...]:
         """The requirements that a single part meets or misses: all but those on a yield."""
-        return tuple(one for one in self.requirements if one.metric not in OF_MANY_PARTS)
+        return tuple(requirement for requirement in self.requirements if requirement.metric not in OF_MANY_PARTS)
 
     @property
     def motion(self) -> Literal["length", "angle"]:
@@ -280,9 +280,9 @@ class Spec(Model):
         window = getattr(getattr(self, "analysis", None), "window", None)
         if window is not None:
             yield ("analysis", "window"), window
-        for index, one in enumerate(self.requirements):
-            if one.over is not None:
-                yield ("requirements", index, "over"), one.over
+        for index, requirement in enumerate(self.requirements):
+            if requirement.over is not None:
+                yield ("requirements", index, "over"), requirement.over
 
     def get_value(self, path: str) -> Any:
         """Return the value at a dotted path, SI for quantities: ``spec.get_value("mechanism.springs.stiffness")``.

@@ -68,7 +68,7 @@ class Target(Model):
 
     @model_validator(mode="after")
     def _said_once(self) -> Self:
-        if sum(one is not None for one in (self.points, self.file, self.stiffness)) != 1:
+        if sum(source is not None for source in (self.points, self.file, self.stiffness)) != 1:
             raise ValueError("give one of 'points', 'file' and 'stiffness'")
         if self.start is not None and self.stiffness is None:
             raise ValueError("'start' belongs to 'stiffness': points say where they start")
@@ -139,7 +139,7 @@ def _check(points: tuple[tuple[float, float], ...]) -> None:
             )
     efforts = {_dim(effort) for _, effort in points if effort} or {_dim(effort) for _, effort in points}
     motions = {_dim(place) for place, _ in points if place}
-    if len(efforts) > 1 or len(motions) > 1 or (efforts and motions - {MOTION_OF[one] for one in efforts}):
+    if len(efforts) > 1 or len(motions) > 1 or (efforts and motions - {MOTION_OF[effort] for effort in efforts}):
         raise ValueError("points are forces over displacements, or torques over angles; these are mixed")
 
 

@@ -77,17 +77,17 @@ class MaterialSpec(Model):
         filled: dict[str, Any] = {"poisson_ratio": _POISSON_RATIO}
         if self.name is not None:
             try:
-                known = material(self.name)
+                record = material(self.name)
             except UnknownMaterial as error:
                 refuse("Material", {("name",): f"{error}; one of your own has 'youngs_modulus' in place of 'name'"})
                 raise
-            filled = {key: getattr(known, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
-            filled |= {key: law for key, law in assumed_laws(known.name).items() if key not in self.model_fields_set}
-            filled |= self._of_layers(known.name)
+            filled = {key: getattr(record, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
+            filled |= {key: law for key, law in assumed_laws(record.name).items() if key not in self.model_fields_set}
+            filled |= self._read_layer_values(record.name)
         elif self.youngs_modulus is None:
             raise ValueError("needs 'name' or 'youngs_modulus'")
         else:
-            self._of_layers("these values")
+            self._read_layer_values("these values")
         for key, value in filled.items():
             if getattr(self, key) is None:
                 object.__setattr__(self, key, value)  # past the frozen model, and not counted as set
@@ -96,7 +96,7 @@ class MaterialSpec(Model):
             refuse("Material", {("law",): reported})
         return self
 
-    def _of_layers(self, name: str) -> dict[str, float]:
+    def _read_layer_values(self, name: str) -> dict[str, float]:
         """Return strength and modulus of a print in the direction that is stated, by their keys."""
         reference = LAYER_STRENGTHS.get(name)
         if self.layers is None or self.yield_strength is not None:
@@ -260,13 +260,13 @@ class PartProcess(Model):
 
     def accuracy(self, usual: ProcessAccuracy) -> ProcessAccuracy:
         """Return what the process holds, and what the usual one does where it has no name."""
-        known = PROCESSES_BY_NAME[self.name] if self.name else usual
-        own = {
-            one: value
-            for one in ("kerf", "thickness", "position", "least_feature", "least_radius")
-            if (value := getattr(self, one)) is not None
+        accuracy = PROCESSES_BY_NAME[self.name] if self.name else usual
+        stated = {
+            key: value
+            for key in ("kerf", "thickness", "position", "least_feature", "least_radius")
+            if (value := getattr(self, key)) is not None
         }
-        return replace(known, **own, reason="values of 'mechanism.part.process'") if own else known
+        return replace(accuracy, **stated, reason="values of 'mechanism.part.process'") if stated else accuracy
 
 
 def _process_block(value: Any) -> Any:
@@ -407,7 +407,9 @@ def sheet_faults(part: CutPart | None, widths: Mapping[str, float | None]) -> di
     if part is None or part.sheet is None:
         return {}
     sheet = float(part.sheet)
-    other = {key: width for key, width in widths.items() if width is not None and abs(width - sheet) > 1e-9 * sheet}
-    listed = ", ".join(f"'mechanism.{key}' is {format_short(width, 'length')}" for key, width in other.items())
+    other_widths = {
+        key: width for key, width in widths.items() if width is not None and abs(width - sheet) > 1e-9 * sheet
+    }
+    listed = ", ".join(f"'mechanism.{key}' is {format_short(width, 'length')}" for key, width in other_widths.items())
     text = f"the sheet is {format_short(sheet, 'length')}, but {listed}: make them equal"
-    return {("mechanism", "part", "sheet"): text} if other else {}
+    return {("mechanism", "part", "sheet"): text} if other_widths else {}

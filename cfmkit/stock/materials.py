@@ -266,8 +266,8 @@ def material(name: str) -> Material:
     """
     if name in MATERIALS_BY_NAME:
         return MATERIALS_BY_NAME[name]
-    near = _nearest(name)
-    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else "`cfmkit show materials` lists them"
+    close = _nearest(name)
+    hint = f"did you mean {' or '.join(map(repr, close))}?" if close else "`cfmkit show materials` lists them"
     raise UnknownMaterial(f"there is no material {name!r}; {hint}")
 
 

@@ -29,11 +29,11 @@ class ListedPart:
 def parts_table(parts: Sequence[ListedPart]) -> Table:
     """Return the list as a table: item, place, name, count, data, source, size, standard."""
     columns = {
-        key: text_column(key, (getattr(one, key) for one in parts))
+        key: text_column(key, (getattr(part, key) for part in parts))
         for key in ("place", "name", "data", "source", "size", "standard")
     }
     item = TableColumn("item", tuple(range(1, len(parts) + 1)))
-    count = TableColumn("count", tuple(one.count for one in parts))
+    count = TableColumn("count", tuple(part.count for part in parts))
     first = [columns.pop(key) for key in ("place", "name")]
     return Table((item, *first, count, *columns.values()))
 

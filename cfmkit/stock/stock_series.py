@@ -50,9 +50,9 @@ class StockSeries:
         >>> series_of("pin", "metric").nearest(0.0033)
         0.003
         """
-        return self.by_distance(size)[0]
+        return self.sort_by_distance(size)[0]
 
-    def by_distance(self, size: float) -> tuple[float, ...]:
+    def sort_by_distance(self, size: float) -> tuple[float, ...]:
         """Return all sizes, those first whose ratio to another size [m] is nearest to 1."""
         return tuple(sorted(self.sizes, key=lambda entry: abs(math.log(entry / size))))
 

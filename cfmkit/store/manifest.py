@@ -48,7 +48,7 @@ class Manifest:
     data: Mapping[str, Any]
 
     @classmethod
-    def of_run(
+    def from_run(
         cls,
         # what the run says about itself (arguments, seed, hash of the spec, status, exit code); JSON values
         info: Mapping[str, Any],

@@ -140,7 +140,7 @@ class RunFolder:
         self._owner = 0
         self.check(*self._staged)
         duration = timedelta(seconds=time.monotonic() - self._clock)
-        manifest = Manifest.of_run(info, self._staged, self._started, duration)
+        manifest = Manifest.from_run(info, self._staged, self._started, duration)
         with reporting(self.path):
             removed, kept = self._list_outdated()
             new = {name: record.sha256 for name, record in self._staged.items()}

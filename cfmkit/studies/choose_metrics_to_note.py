@@ -39,15 +39,18 @@ def metrics_of(
     Raises UsageError if a metric or its branch is not known.
     """
     outputs, kind = family(spec.family).outputs, sample.kind if sample is not None else "force"
-    own = values_of_family(outputs.values)
+    family_values = values_of_family(outputs.values)
     asked = tuple(dict.fromkeys(names))
     if not asked:
         left_out = _left_out(spec, sample)
-        listed = (item.name for item in definitions(kind, own))
+        listed = (item.name for item in definitions(kind, family_values))
         asked = tuple(name for name in dict.fromkeys(listed) if name not in left_out)
-    known = metrics_by_name(kind, own)
+    known = metrics_by_name(kind, family_values)
     meant = [(name, definition_of(name, known, outputs.branches)) for name in asked]
-    return tuple(Metric(name, one.dimension, one.definition, words=outputs.words.get(name, ())) for name, one in meant)
+    return tuple(
+        Metric(name, definition.dimension, definition.definition, words=outputs.words.get(name, ()))
+        for name, definition in meant
+    )
 
 
 def _left_out(spec: Spec, sample: Curve | None) -> frozenset[str]:
@@ -65,11 +68,11 @@ def sample_curve(spec: Spec, plan: Plan, design: bool) -> Curve | None:
     probe = Study(spec, plan.paths, (), design)
     for variant in _candidates(probe, plan):
         try:
-            found = probe.solve(variant)
+            outcome = probe.solve(variant)
         except CfmError:
             continue
-        if found.curves:
-            return found.curves[0]
+        if outcome.curves:
+            return outcome.curves[0]
     return None
 
 

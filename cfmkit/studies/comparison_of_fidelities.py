@@ -90,10 +90,10 @@ class FidelityComparison:
         reported = {item.name for item in self.variants[0].result.warnings}
         gone = [Finding("fidelity_left_out", f"{name!r} cannot run here: {why}") for name, why in self.left_out.items()]
         more = [
-            replace(found, message=f"with fidelity {item.name}: {found.message}")
+            replace(warning, message=f"with fidelity {item.name}: {warning.message}")
             for item in self.variants[1:]
-            for found in item.result.warnings
-            if found.name not in reported and found.message != item.result.message
+            for warning in item.result.warnings
+            if warning.name not in reported and warning.message != item.result.message
         ]
         return (*gone, *more)
 
@@ -109,10 +109,10 @@ class FidelityComparison:
 
     def metrics(self) -> dict[str, Quantity]:
         """Return root mean square, largest and mean difference of each fidelity, by name, SI."""
-        found: dict[str, Quantity] = {}
+        quantities: dict[str, Quantity] = {}
         for item in self.compared:
-            found |= self.differences(item).summarize(self._measures(item), self.kind, item.name)
-        return found
+            quantities |= self.differences(item).summarize(self._measures(item), self.kind, item.name)
+        return quantities
 
     @property
     def kind(self) -> Kind:
@@ -161,10 +161,14 @@ def compare(
     run: Run,  # for the other models
 ) -> FidelityComparison:
     """Return a result beside those of all other models that can run."""
-    own = fidelity_of(nominal)
+    own_fidelity = fidelity_of(nominal)
     analyze = family(nominal.spec.family).analyze
-    others = (Variant(name, windows_judged(analyze(spec, run))) for name, spec in choices.specs.items() if name != own)
-    return FidelityComparison((Variant(own, nominal), *others), list(choices.specs)[-1], choices.obstacles)
+    others = (
+        Variant(name, windows_judged(analyze(spec, run)))
+        for name, spec in choices.specs.items()
+        if name != own_fidelity
+    )
+    return FidelityComparison((Variant(own_fidelity, nominal), *others), list(choices.specs)[-1], choices.obstacles)
 
 
 def fidelity_of(result: Result) -> str:
@@ -179,35 +183,35 @@ def fidelity_of(result: Result) -> str:
     return name
 
 
-def data_of(found: FidelityComparison) -> dict[str, object]:
+def data_of(comparison: FidelityComparison) -> dict[str, object]:
     """Return what metrics.json says besides the differences, which are metrics."""
-    return {"fidelity": {"reference": found.finest, "curves": list(_records(found))}}
+    return {"fidelity": {"reference": comparison.finest, "curves": list(_records(comparison))}}
 
 
-def _records(found: FidelityComparison) -> Iterator[dict[str, object]]:
-    for item in found.variants:
+def _records(comparison: FidelityComparison) -> Iterator[dict[str, object]]:
+    for item in comparison.variants:
         points = sum(map(len, item.result.curves))
         about = {"fidelity": item.name, "status": item.result.status.key, "message": item.result.message}
         yield about | {"points": points}
 
 
-def lines_of(found: FidelityComparison) -> tuple[tuple[str, str], ...]:
+def lines_of(comparison: FidelityComparison) -> tuple[tuple[str, str], ...]:
     """Return the paragraphs that a page shows: one for each curve and branch."""
-    return tuple(("fidelity", line) for item in found.compared for line in _lines(found, item))
+    return tuple(("fidelity", line) for item in comparison.compared for line in _lines(comparison, item))
 
 
-def _lines(found: FidelityComparison, item: Variant) -> Iterator[str]:
+def _lines(comparison: FidelityComparison, item: Variant) -> Iterator[str]:
     from cfmkit.specs.units import format_short
 
-    metrics, differences = found.metrics(), found.differences(item)
+    metrics, differences = comparison.metrics(), comparison.differences(item)
     window = differences.window
     for branch in differences.curves:
         tag = f"[{item.name},{branch}]" if len(differences.curves) > 1 else f"[{item.name}]"
         values = [metrics[f"fidelity_{name}{tag}"] for name in ("rms", "mean", "max")]
-        title = f"{item.name} - {found.finest}" + (f" on {branch}" if branch else "")
+        title = f"{item.name} - {comparison.finest}" + (f" on {branch}" if branch else "")
         if window is None or values[0].value is None:
             yield f"{title}: undefined: {values[0].reason}"
             continue
-        reported = [format_short(one.value or 0.0, one.dimension) for one in values]
-        over = span_text(window.lo, window.hi, found.kind)
+        reported = [format_short(value.value or 0.0, value.dimension) for value in values]
+        over = span_text(window.lo, window.hi, comparison.kind)
         yield f"{title}: rms {reported[0]}, mean {reported[1]}, largest {reported[2]} over {over}"

@@ -29,13 +29,13 @@ def run_design(
     """Return the design of a specification, with all that its block `design` asks for, or why there is none."""
     from cfmkit.studies.stock_and_digits import with_digits_of_process, with_stock_sheet, with_whole_strands
 
-    found = _finished_design(spec, designer, run)
+    rounded = _finished_design(spec, designer, run)
 
     def finish(variant: Spec) -> Design:
         return _finished_design(variant, designer, run)
 
-    found = with_whole_strands(spec, with_stock_sheet(spec, found, finish, run), finish, run)
-    return with_digits_of_process(spec, found, finish, run)
+    rounded = with_whole_strands(spec, with_stock_sheet(spec, rounded, finish, run), finish, run)
+    return with_digits_of_process(spec, rounded, finish, run)
 
 
 def _finished_design(spec: Spec, designer: Designer, run: Run) -> Design:
@@ -61,5 +61,5 @@ def _with_yield(spec: Spec, designer: Designer, run: Run) -> Design:
 
     clock = Clock.from_budgets(run.time_budget)
     half = None if run.time_budget is None else 0.5 * run.time_budget
-    found = designer(spec, replace(run.part(0.0, 0.5), time_budget=half))
-    return with_design_margins(spec, found, replace(run.part(0.5, 1.0), time_budget=clock.get_time_left()))
+    design = designer(spec, replace(run.part(0.0, 0.5), time_budget=half))
+    return with_design_margins(spec, design, replace(run.part(0.5, 1.0), time_budget=clock.get_time_left()))

@@ -42,11 +42,11 @@ class BatchComparison:
     @property
     def changes_beyond_tolerance(self) -> tuple[MetricChange, ...]:
         """The changes that are larger than the tolerance."""
-        return tuple(one for one in self.changes if one.beyond)
+        return tuple(change for change in self.changes if change.beyond)
 
     def as_json(self) -> dict[str, Any]:
         """Return what metrics.json says about it."""
-        changes = [asdict(one) for one in self.changes]
+        changes = [asdict(change) for change in self.changes]
         return {"with": self.folder, "tolerance": self.tolerance, "changes": changes, "gone": list(self.gone)}
 
 
@@ -58,45 +58,45 @@ def read_earlier_batch(folder: str) -> Known:
     whole = _read_json(os.path.join(folder, "metrics.json"))
     if whole is None or not isinstance(listed := whole.get("specs"), list):
         raise UsageError(f"--compare: {visible(folder)} is not the folder of a batch: it has no metrics.json of one")
-    known = {}
-    for one in listed:
-        if isinstance(one, dict) and isinstance(name := one.get("folder"), str):
+    folders = {}
+    for entry in listed:
+        if isinstance(entry, dict) and isinstance(name := entry.get("folder"), str):
             own = _read_json(os.path.join(folder, name, "metrics.json")) or {}
             metrics = flat_metrics(own.get("metrics", {}))
-            known[name] = Earlier(str(one.get("status", "")), int(one.get("exit_code", 0)), metrics)
-    return known
+            folders[name] = Earlier(str(entry.get("status", "")), int(entry.get("exit_code", 0)), metrics)
+    return folders
 
 
 def _read_json(path: str) -> dict[str, Any] | None:
     try:
         with open(path, encoding="utf-8") as file:
-            found = json.load(file)
+            content = json.load(file)
     except (OSError, ValueError):
         return None
-    return found if isinstance(found, dict) else None
+    return content if isinstance(content, dict) else None
 
 
 def changes(
-    known: Known,  # the earlier results, from `read_earlier_batch`
+    earlier: Known,  # the earlier results, from `read_earlier_batch`
     entries: Sequence[Entry],  # what was found now; those that the earlier batch did not have are new, and no change
     folder: str,  # where they have their folders
     tolerance: float = COMPARISON_RTOL,  # relative change of a metric up to which it counts as the same
 ) -> tuple[MetricChange, ...]:
     """Return what is not as it was, in the order of the specifications and their metrics."""
-    found: list[MetricChange] = []
+    changes: list[MetricChange] = []
     for entry in entries:
-        before = known.get(entry.folder)
+        before = earlier.get(entry.folder)
         if before is None or entry.skipped:
             continue
         if (before.status, before.exit_code) != (entry.status, int(entry.code)):
             ends = _outcome_text(before.status, before.exit_code), _outcome_text(entry.status, int(entry.code))
-            found.append(MetricChange(entry.spec, "status", *ends, "", None, True))
+            changes.append(MetricChange(entry.spec, "status", *ends, "", None, True))
         if entry.written:
             own = _read_json(os.path.join(folder, entry.folder, "metrics.json")) or {}
             now = flat_metrics(own.get("metrics", {}))
             sides = Compared("the earlier batch", metrics=before.metrics), Compared(entry.spec, metrics=now)
-            found += compare(*sides, tolerance=tolerance).changes
-    return tuple(found)
+            changes += compare(*sides, tolerance=tolerance).changes
+    return tuple(changes)
 
 
 def _outcome_text(status: str, code: int) -> str:
@@ -105,23 +105,23 @@ def _outcome_text(status: str, code: int) -> str:
     return "requirement missed" if missed else status
 
 
-def list_gone(known: Known, entries: Sequence[Entry]) -> tuple[str, ...]:
+def list_gone(earlier: Known, entries: Sequence[Entry]) -> tuple[str, ...]:
     """Return the folders of specifications that the earlier batch had and this one has not."""
-    there = {entry.folder for entry in entries}
-    return tuple(name for name in known if name not in there)
+    folders = {entry.folder for entry in entries}
+    return tuple(name for name in earlier if name not in folders)
 
 
-def changes_table(found: Sequence[MetricChange]) -> Table:
+def changes_table(changes: Sequence[MetricChange]) -> Table:
     """Return changes.csv: one row per value that is not as it was."""
     return Table(
         (
-            text_column("spec", (one.spec for one in found)),
-            text_column("metric", (one.name for one in found)),
-            text_column("before", (_cell(one.before) for one in found)),
-            text_column("after", (_cell(one.after) for one in found)),
-            text_column("unit", (one.unit for one in found)),
-            TableColumn("relative_change", tuple(one.relative for one in found)),
-            TableColumn("beyond_tolerance", tuple(one.beyond for one in found)),
+            text_column("spec", (change.spec for change in changes)),
+            text_column("metric", (change.name for change in changes)),
+            text_column("before", (_cell(change.before) for change in changes)),
+            text_column("after", (_cell(change.after) for change in changes)),
+            text_column("unit", (change.unit for change in changes)),
+            TableColumn("relative_change", tuple(change.relative for change in changes)),
+            TableColumn("beyond_tolerance", tuple(change.beyond for change in changes)),
         )
     )
 

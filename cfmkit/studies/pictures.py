@@ -32,9 +32,9 @@ def makers(records: Records, summary: Summary) -> dict[str, Callable[[], Figure]
     """Return what draws each picture of a study, by name; nothing for one that was not finished."""
     if records.finished < len(records) or not summary.usable:
         return {}
-    found = findings(records, summary)
-    lines, labels = curves(records, found) if len(found.varied) <= 2 else ([], ("", ""))
-    return figures(found, lines, labels)
+    study_findings = findings(records, summary)
+    lines, labels = curves(records, study_findings) if len(study_findings.varied) <= 2 else ([], ("", ""))
+    return figures(study_findings, lines, labels)
 
 
 def findings(records: Records, summary: Summary) -> StudyMarks:
@@ -46,7 +46,10 @@ def findings(records: Records, summary: Summary) -> StudyMarks:
     drawn = [metric for metric in metrics if np.isfinite(metric.values).any()]
     kinds = [(item.path, item.dimension) for item in plan.variables]
     varied = scales(
-        study.spec, kinds, [*plan.list_shown_values(0, len(plan))], [[*map(str, one.shown)] for one in plan.variables]
+        study.spec,
+        kinds,
+        [*plan.list_shown_values(0, len(plan))],
+        [[*map(str, variable.shown)] for variable in plan.variables],
     )
     best = "" if summary.best_by is None else best_words(*summary.best_by, summary.ties)
     return StudyMarks(varied, tuple(drawn), shape_of(plan), meets, summary.best, study.spec.name, best)
@@ -62,8 +65,8 @@ def scales(
     about = {key.path: key.description for key in keys(type(spec))}
     names = short_names([path for path, _ in varied])
     return tuple(
-        _scale(kind, values, tuple(dict.fromkeys(known)), (name, about.get(_place(kind[0]), "")))
-        for kind, values, known, name in zip(varied, shown, words, names, strict=True)
+        _scale(kind, values, tuple(dict.fromkeys(names_of_values)), (name, about.get(_place(kind[0]), "")))
+        for kind, values, names_of_values, name in zip(varied, shown, words, names, strict=True)
     )
 
 
@@ -96,7 +99,7 @@ def _scale(kind: tuple[str, str], shown: Any, words: tuple[str, ...], reported: 
     name, about = reported
     if dimension != "text":
         return DrawnScale(path, dimension, np.asarray(shown, dtype=np.float64), short=name, about=about)
-    return DrawnScale(path, dimension, np.array([float(words.index(str(one))) for one in shown]), words, name, about)
+    return DrawnScale(path, dimension, np.array([float(words.index(str(word))) for word in shown]), words, name, about)
 
 
 def shape_of(plan: Plan) -> tuple[int, ...]:
@@ -104,22 +107,22 @@ def shape_of(plan: Plan) -> tuple[int, ...]:
     return () if plan.joint else tuple(len(item.values) for item in plan.variables)
 
 
-def curves(records: Records, found: StudyMarks) -> tuple[list[StudyCurve], tuple[str, str]]:
+def curves(records: Records, marks: StudyMarks) -> tuple[list[StudyCurve], tuple[str, str]]:
     """Return the curves that the study kept, with the labels of their axes."""
     lines: list[StudyCurve] = []
     labels = ("", "")
     for indices, rows in records.batches():
         for k, text in rows.curves.items():
-            line, labels = study_curve(read_csv(text), found, int(indices[k]))
+            line, labels = study_curve(read_csv(text), marks, int(indices[k]))
             lines.append(line)
     return lines, labels
 
 
-def study_curve(curve: Table, found: StudyMarks, point: int) -> tuple[StudyCurve, tuple[str, str]]:
+def study_curve(curve: Table, marks: StudyMarks, point: int) -> tuple[StudyCurve, tuple[str, str]]:
     """Return the curve of one point of a study, with the labels of its axes."""
     table = _nominal(curve)
     motion, effort = (column.header.replace("_", " ") for column in table.columns[1:3])
-    *panel, parameter = (float(one.values[point]) for one in found.varied)
+    *panel, parameter = (float(parameter_marks.values[point]) for parameter_marks in marks.varied)
     return StudyCurve(parameter, _branches(table), *panel), (motion, effort)
 
 
@@ -129,7 +132,7 @@ def _nominal(table: Table) -> Table:
     rows = list(zip(*(column.cells() for column in table.columns[:labels]), strict=True)) or [()] * len(table)
     first = [number for number, row in enumerate(rows) if row == rows[0]]
     # the cells of a column once, not once a row: a study has thousands of these
-    return Table(tuple(_take_column(one, first) for one in table.columns[labels : labels + 3]))
+    return Table(tuple(_take_column(column, first) for column in table.columns[labels : labels + 3]))
 
 
 def _take_column(column: TableColumn, rows: list[int]) -> TableColumn:
@@ -152,22 +155,22 @@ def makers_of_tables(
     curves: Table | None,
 ) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a sweep, by name."""
-    found = _marks(spec, summary, table)
-    lines, labels = _curves(curves, found)
-    return figures(found, lines, labels)
+    marks = _marks(spec, summary, table)
+    lines, labels = _curves(curves, marks)
+    return figures(marks, lines, labels)
 
 
 def _marks(spec: Spec, summary: Mapping[str, Any], table: Table) -> StudyMarks:
     """Return what the pictures show."""
     drawn = summary["drawn"]
     columns = {column.name: column for column in table.columns}
-    varied = [(one["path"], one["dimension"]) for one in drawn["varied"]]
+    varied = [(parameter["path"], parameter["dimension"]) for parameter in drawn["varied"]]
     shown = [columns[path].cells() for path, _ in varied]
-    metrics = [_metric(one, columns[one["column"]]) for one in drawn["metrics"]]
+    metrics = [_metric(metric, columns[metric["column"]]) for metric in drawn["metrics"]]
     best = summary["best"]
     return StudyMarks(
-        scales(spec, varied, shown, [one["words"] for one in drawn["varied"]]),
-        tuple(one for one in metrics if np.isfinite(one.values).any()),
+        scales(spec, varied, shown, [parameter["words"] for parameter in drawn["varied"]]),
+        tuple(metric for metric in metrics if np.isfinite(metric.values).any()),
         tuple(drawn["grid"]),
         _meets(columns),
         None if best is None else best["point"] - 1,
@@ -194,34 +197,37 @@ def _meets(columns: Mapping[str, TableColumn]) -> NDArray[np.bool_]:
     usable = {status.key for status in Status if status.usable}
     solved = [cell in usable for cell in columns["status"].cells()]
     met = columns["requirements_met"].cells() if "requirements_met" in columns else ["true"] * len(solved)
-    return np.array([good and one == "true" for good, one in zip(solved, met, strict=True)], dtype=bool)
+    return np.array([good and answer == "true" for good, answer in zip(solved, met, strict=True)], dtype=bool)
 
 
-def _curves(table: Table | None, found: StudyMarks) -> tuple[list[StudyCurve], tuple[str, str]]:
+def _curves(table: Table | None, marks: StudyMarks) -> tuple[list[StudyCurve], tuple[str, str]]:
     """Return the curves in a table; none where there is none, or where more than two values vary."""
     lines: list[StudyCurve] = []
     labels = ("", "")
-    if len(found.varied) > 2 or table is None:
+    if len(marks.varied) > 2 or table is None:
         return lines, labels
-    own = [next(column for column in table.columns if column.name == one.name) for one in found.varied]
-    points = {values: at for at, values in enumerate(zip(*map(_spoken, found.varied), strict=True))}
+    parameter_columns = [
+        next(column for column in table.columns if column.name == parameter_marks.name)
+        for parameter_marks in marks.varied
+    ]
+    points = {values: at for at, values in enumerate(zip(*map(_spoken, marks.varied), strict=True))}
     rows: dict[int, list[int]] = {}
-    for row, values in enumerate(zip(*(column.cells() for column in own), strict=True)):
+    for row, values in enumerate(zip(*(column.cells() for column in parameter_columns), strict=True)):
         rows.setdefault(points[values], []).append(row)
     for point, chosen in sorted(rows.items()):
         curve = Table(
             tuple(
                 TableColumn(
-                    one.name,
-                    one.values[chosen]
-                    if isinstance(one.values, np.ndarray)
-                    else tuple(one.values[row] for row in chosen),
-                    one.unit,
+                    column.name,
+                    column.values[chosen]
+                    if isinstance(column.values, np.ndarray)
+                    else tuple(column.values[row] for row in chosen),
+                    column.unit,
                 )
-                for one in table.columns
+                for column in table.columns
             )
         )
-        line, labels = study_curve(curve, found, point)
+        line, labels = study_curve(curve, marks, point)
         lines.append(line)
     return lines, labels
 

@@ -113,10 +113,10 @@ class Study:
 
     def format_metric(self, column: int, value: float) -> float | str | None:
         """Return a metric's value as files say it: in the border unit, or a word; None if there is none."""
-        one = self.metrics[column]
+        metric = self.metrics[column]
         if not isfinite(value):
             return None
-        return one.words[int(value)] if one.words else float(to_border(value, one.dimension))
+        return metric.words[int(value)] if metric.words else float(to_border(value, metric.dimension))
 
     @cached_property
     def identity(self) -> bytes:
@@ -125,7 +125,7 @@ class Study:
         Of data files the content counts, and so does that of cfmkit: its version does not change with each commit.
         """
         spec = self.spec.model_dump(mode="json", exclude=NOT_DECIDING)
-        noted = [(one.name, one.over) for one in self.metrics]
+        noted = [(metric.name, metric.over) for metric in self.metrics]
         data = [[str(source), file_hash(source.path.resolve())] for source in list_data_files(self.spec.model_dump())]
         computing = [origin(), family_origin(self.spec.family)]
         about = [
@@ -202,12 +202,12 @@ class Study:
         """
         surveys = {} if surveys is None else surveys
         extra = values_of_family(family(result.spec.family).outputs.values)
-        found: dict[tuple[str, Ends | None], Quantity] = {}
-        for over in dict.fromkeys(one.over for one in self.metrics):
-            names = [one.name for one in self.metrics if one.over == over]
+        quantities: dict[tuple[str, Ends | None], Quantity] = {}
+        for over in dict.fromkeys(metric.over for metric in self.metrics):
+            names = [metric.name for metric in self.metrics if metric.over == over]
             window = None if over is None else window_of(result, over)
-            found |= {(name, over): item for name, item in evaluate(result, names, window, extra, surveys).items()}
-        return tuple(found[one.name, one.over] for one in self.metrics)
+            quantities |= {(name, over): item for name, item in evaluate(result, names, window, extra, surveys).items()}
+        return tuple(quantities[metric.name, metric.over] for metric in self.metrics)
 
 
 def _finite(value: float | None) -> float | None:
@@ -223,7 +223,7 @@ def _curve(result: Result) -> bytes:
 def _error_line(error: CfmError) -> str:
     """Return an error in one line; of a specification, paths and messages without the empty source."""
     if isinstance(error, SpecError):
-        return "; ".join(": ".join(filter(None, (one.path, one.message))) for one in error.problems)
+        return "; ".join(": ".join(filter(None, (problem.path, problem.message))) for problem in error.problems)
     return " ".join(str(error).split())
 
 

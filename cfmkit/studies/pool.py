@@ -134,19 +134,19 @@ class _Crew:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for one in self.workers:
-            one.end()
+        for worker in self.workers:
+            worker.end()
 
     def hire(self) -> bool:
         """Hand out jobs, to new workers where there are too few; tell whether anything is going on."""
-        for one in self.workers:
-            while len(one.given) < self._ahead() and (job := self._next()) is not None:
-                one.give(job)
+        for worker in self.workers:
+            while len(worker.given) < self._ahead() and (job := self._next()) is not None:
+                worker.give(job)
         while len(self.workers) < self.pool.processes and (job := self._next()) is not None:
             self.workers.append(_start_worker())
             self.workers[-1].give(job)
             self.workers[-1].listen(self.what, self.messages)
-        return any(one.given for one in self.workers)
+        return any(worker.given for worker in self.workers)
 
     def _ahead(self) -> int:
         return JOBS_AHEAD if self.pace is not None and self.pace < QUICK_JOB_DURATION else 1
@@ -164,52 +164,52 @@ class _Crew:
     def collect_finished(self) -> Iterator[tuple[Any, Any]]:
         """Yield what has finished since the last look, or nothing after a short while."""
         with suppress(Empty):
-            one, message = self.messages.get(timeout=POLL_INTERVAL)
+            worker, message = self.messages.get(timeout=POLL_INTERVAL)
             while True:
-                if one in self.workers:
-                    yield from self._remove_worker(one) if message is None else self._handle_message(one, message)
-                one, message = self.messages.get_nowait()
+                if worker in self.workers:
+                    yield from self._remove_worker(worker) if message is None else self._handle_message(worker, message)
+                worker, message = self.messages.get_nowait()
         yield from self._late()
 
-    def _handle_message(self, one: _Worker, message: bytes) -> Iterator[tuple[Any, Any]]:
+    def _handle_message(self, worker: _Worker, message: bytes) -> Iterator[tuple[Any, Any]]:
         kind, rest = message[:1], message[1:]
         if kind == worker_process.READY_MESSAGE:
-            one.begin()
+            worker.begin()
         elif kind == worker_process.STARTED_MESSAGE:
-            one.started, self.stillborn = time.monotonic(), 0
+            worker.started, self.stillborn = time.monotonic(), 0
         else:
-            took = time.monotonic() - (one.started or 0.0)
+            took = time.monotonic() - (worker.started or 0.0)
             self.pace = took if self.pace is None else 0.9 * self.pace + 0.1 * took
-            one.started = None
-            job, outcome = one.given.popleft(), pickle.loads(rest)
+            worker.started = None
+            job, outcome = worker.given.popleft(), pickle.loads(rest)
             if kind == worker_process.BROKEN_MESSAGE:
                 outcome = Lost(Status.CRASHED, f"{BUG_PREFIX}{outcome[0]}", outcome[1])
             yield job, outcome
 
-    def _remove_worker(self, one: _Worker) -> Iterator[tuple[Any, Any]]:
+    def _remove_worker(self, worker: _Worker) -> Iterator[tuple[Any, Any]]:
         """Yield the job that a dead worker took with it, if it was the second time; do the rest again."""
-        self.workers.remove(one)
-        one.end()
-        self._count_stillborn(one)
-        if one.started is not None:
-            job = one.given.popleft()
+        self.workers.remove(worker)
+        worker.end()
+        self._count_stillborn(worker)
+        if worker.started is not None:
+            job = worker.given.popleft()
             self.deaths[job] += 1
             if self.deaths[job] < MAX_WORKER_DEATHS:
                 self.again.appendleft(job)
             else:
                 reported = (
                     f"the process that worked on this point died {MAX_WORKER_DEATHS} times "
-                    f"({_cause(one.process.returncode)})"
+                    f"({_cause(worker.process.returncode)})"
                 )
                 yield job, Lost(Status.CRASHED, reported)
-        self.again.extend(one.given)
+        self.again.extend(worker.given)
 
-    def _count_stillborn(self, one: _Worker) -> None:
-        if one.started is not None or one.ready:
+    def _count_stillborn(self, worker: _Worker) -> None:
+        if worker.started is not None or worker.ready:
             return
         self.stillborn += 1
-        if self.stillborn >= MOST_STILLBORN[one.process.returncode < 0]:
-            raise CfmError(f"worker processes end before they begin ({_cause(one.process.returncode)})")
+        if self.stillborn >= MOST_STILLBORN[worker.process.returncode < 0]:
+            raise CfmError(f"worker processes end before they begin ({_cause(worker.process.returncode)})")
 
     def _late(self) -> Iterator[tuple[Any, Any]]:
         """Yield the jobs that have used up their time, and end their workers."""
@@ -221,14 +221,14 @@ class _Crew:
             return
         now, allowed = time.monotonic(), self.pool.timeout
         # a worker that has not begun yet is still loading: with all time up nobody waits for it
-        for one in [one for one in self.workers if one.given and (over or one.started is not None)]:
-            late = over or (allowed is not None and now - (one.started or now) > allowed)
+        for worker in [worker for worker in self.workers if worker.given and (over or worker.started is not None)]:
+            late = over or (allowed is not None and now - (worker.started or now) > allowed)
             if late:
-                self.workers.remove(one)
-                one.end()
-                job = one.given.popleft()
+                self.workers.remove(worker)
+                worker.end()
+                job = worker.given.popleft()
                 if not over:
-                    self.again.extend(one.given)
+                    self.again.extend(worker.given)
                 yield job, Lost(Status.TIMEOUT, OUT_OF_TIME_MESSAGE if over else f"not finished within {allowed:g} s")
 
 
@@ -281,10 +281,10 @@ def _start_worker() -> _Worker:
     if not sys.executable:
         raise UsageError("this Python cannot start other processes; use one job (-j 1)")
     parent = os.getpid() if threading.current_thread() is threading.main_thread() else 0
-    given = json.dumps({"path": sys.path, "parent": parent})
+    setup = json.dumps({"path": sys.path, "parent": parent})
     return _Worker(
         subprocess.Popen(
-            [sys.executable, "-P", "-c", worker_process.WORKER_PROGRAM, given],
+            [sys.executable, "-P", "-c", worker_process.WORKER_PROGRAM, setup],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=os.environ | ONE_THREAD,

@@ -67,12 +67,12 @@ def move_free_values(
     target = _mean_required(outcomes, kind)
     if target is None:
         return Design(None, Status.INVALID, NO_LEVEL_MESSAGE.format(kind))
-    drawn = _by_beams(spec)
+    drawn = _choose_finest_beam_model(spec)
     begun = nominal if drawn is spec else _analyze(drawn, run)
     if not begun.curves:
         return Design(None, begun.status, begun.message)
-    own = aim_of(begun)
-    aim = replace(own, efforts=tuple(target / own.mean_effort * effort for effort in own.efforts))
+    own_aim = aim_of(begun)
+    aim = replace(own_aim, efforts=tuple(target / own_aim.mean_effort * effort for effort in own_aim.efforts))
     redesign = Redesign(drawn, (AsDrawn(),), aim, limits_of(drawn))
     try:
         moved = redesign.drawing(redesign.solve())
@@ -106,12 +106,20 @@ def _judge(design: Design, run: Run) -> Design:
 
 def _mean_required(outcomes: Sequence[Outcome], kind: str) -> float | None:
     """Return the middle of what requirements allow for the effort [N or N m]; None if they do not bound it twice."""
-    lows = [one.min for one in outcomes if one.metric in (f"{kind}_mean", f"{kind}_min") and one.min is not None]
-    highs = [one.max for one in outcomes if one.metric in (f"{kind}_mean", f"{kind}_max") and one.max is not None]
+    lows = [
+        outcome.min
+        for outcome in outcomes
+        if outcome.metric in (f"{kind}_mean", f"{kind}_min") and outcome.min is not None
+    ]
+    highs = [
+        outcome.max
+        for outcome in outcomes
+        if outcome.metric in (f"{kind}_mean", f"{kind}_max") and outcome.max is not None
+    ]
     return 0.5 * (max(lows) + min(highs)) if lows and highs else None
 
 
-def _by_beams(spec: Spec) -> Spec:
+def _choose_finest_beam_model(spec: Spec) -> Spec:
     """Return a specification with the finest model of its family that is no solid."""
     if spec.fidelity != "solid":
         return spec

@@ -184,9 +184,9 @@ def squeeze(values: FloatArray) -> str:
     tried = [bits]
     while len(tried) < N_DIFFERENCE_ORDERS:
         tried.append(np.diff(tried[-1], axis=1, prepend=np.uint64(0)))
-    folded = [_fold_sign(one) for one in tried]
+    folded = [_fold_sign(column) for column in tried]
     middle = slice(bits.shape[1] // 2, bits.shape[1] // 2 + _N_PROBED_ROWS)
-    lengths = [np.log2(one[:, middle].astype(np.float64) + 1.0).sum(axis=1) for one in folded]
+    lengths = [np.log2(column[:, middle].astype(np.float64) + 1.0).sum(axis=1) for column in folded]
     order = np.argmin(lengths, axis=0).astype(np.uint8)
     chosen = np.choose(order[:, None], folded)
     planes = chosen.view(np.uint8).reshape(*chosen.shape, 8).transpose(0, 2, 1)

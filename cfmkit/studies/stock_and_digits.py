@@ -77,7 +77,7 @@ def with_stock_sheet(original: Spec, outcome: Design, finish: Callable[[Spec], D
         return replace(outcome, notes=(*outcome.notes, ("stock", text)))
     middle = math.exp(float(np.mean([math.log(width) for width in widths.values()])))
     reasons = []
-    for sheet in series.by_distance(middle)[:MAX_SHEETS]:
+    for sheet in series.sort_by_distance(middle)[:MAX_SHEETS]:
         try:
             again = finish(original.replace({"mechanism.part.sheet": sheet, **dict.fromkeys(widths, sheet)}))
         except SpecError as error:
@@ -201,7 +201,7 @@ def with_digits_of_process(original: Spec, outcome: Design, finish: Callable[[Sp
     chosen = {path: text for path, text in written.items() if text not in kept}
     decimals, before = decimals_of(accuracy_of(outcome.spec)), None
     for refined in range(FINER_DIGITS):
-        rounded = {path: in_digits(text, decimals + refined) for path, text in chosen.items()}
+        rounded = {path: round_to_digits(text, decimals + refined) for path, text in chosen.items()}
         changes = {path: text for path, text in rounded.items() if text != chosen[path]}
         if not changes:
             return outcome
@@ -248,10 +248,10 @@ def lengths_and_angles(value: Any, blocks: Sequence[str] = ("mechanism",), path:
         yield path, value
 
 
-def in_digits(text: str, decimals: int) -> str:
+def round_to_digits(text: str, decimals: int) -> str:
     """Return a length or an angle with so many decimals: 0.001 deg move the end of 57 mm by 0.001 mm.
 
-    >>> in_digits("44.4195213186294 mm", 3), in_digits("6.3793702084428034 deg", 3), in_digits("6 mm", 3)
+    >>> round_to_digits("44.41952131863 mm", 3), round_to_digits("6.37937020844 deg", 3), round_to_digits("6 mm", 3)
     ('44.42 mm', '6.379 deg', '6 mm')
     """
     number, unit = text.split()

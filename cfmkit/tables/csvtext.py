@@ -58,8 +58,8 @@ def _encode_rows(columns: Sequence[Sequence[str]]) -> bytes:
 def _format_column(values: Values) -> list[str]:
     if isinstance(values, tuple):
         if set(map(type, values)) <= {str, type(None)}:  # names of branches and states: few, many times
-            known = {cell: _format_cell(cell) for cell in set(values)}
-            return [known[cell] for cell in values]
+            cell_texts = {cell: _format_cell(cell) for cell in set(values)}
+            return [cell_texts[cell] for cell in values]
         return list(map(_format_cell, values))
     texts = list(map(repr, values.tolist()))
     if values.dtype.kind == "f" and np.isnan(values).any():

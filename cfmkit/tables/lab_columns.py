@@ -94,20 +94,20 @@ def read_units(text: str | None) -> dict[str, str]:
 
     Raises UsageError if it is malformed or names a unit that there is not.
     """
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     for part in (text or "").split(","):
         name, equals, unit = (piece.strip() for piece in part.rpartition("="))
         if not part.strip() and not (text or "").strip():
             continue
-        if not equals or not name or not unit or name in found:
+        if not equals or not name or not unit or name in units:
             raise UsageError(
                 f'--units: {quote(part)} is not \'column=unit\'; write e.g. --units "s=mm,F=N", or --units "1=mm,2=N" '
                 "by number"
             )
         if dimension_of(unit) is None:
             raise UsageError(f"--units: {quote(unit)} is not a unit of a time, displacement, angle, force or torque")
-        found[name] = standard_spelling(unit)
-    return found
+        units[name] = standard_spelling(unit)
+    return units
 
 
 def describe(
@@ -144,8 +144,8 @@ def column_named(key: str, columns: Sequence[ColumnInfo], file: str) -> ColumnIn
         raise DataError(f"{file}: columns {numbers} are both called {quote(key)}; name the one that is meant by number")
     if key.isdecimal() and 1 <= int(key) <= len(columns):
         return columns[int(key) - 1]
-    near = get_close_matches(key, [column.name for column in columns], n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(quote(c.name) for c in columns)}"
+    close = get_close_matches(key, [column.name for column in columns], n=1)
+    hint = f"; did you mean {close[0]!r}?" if close else f"; there are {', '.join(quote(c.name) for c in columns)}"
     raise DataError(f"{file}: there is no column {quote(key)}{hint}")
 
 
@@ -185,8 +185,10 @@ def is_unit_row(cells: Iterable[str]) -> bool:
     cells = [cell.strip(' "') for cell in cells]
     if len(cells) > 1 and _LABEL_OF_UNITS.fullmatch(cells[0]):
         cells = cells[1:]
-    known = [(unit := _bare_unit(cell)) is not None and is_known(unit) for cell in cells]
-    return any(known) and all(good or not cell or _is_bracketed(cell) for good, cell in zip(known, cells, strict=True))
+    is_unit_cell = [(unit := _bare_unit(cell)) is not None and is_known(unit) for cell in cells]
+    return any(is_unit_cell) and all(
+        good or not cell or _is_bracketed(cell) for good, cell in zip(is_unit_cell, cells, strict=True)
+    )
 
 
 def _is_bracketed(cell: str) -> bool:
@@ -201,12 +203,12 @@ def _bare_unit(cell: str) -> str | None:
 @lru_cache(maxsize=1)
 def _words() -> dict[str, str]:
     """Return the symbols of units of forces, lengths, angles and times by what else people write, folded."""
-    found: dict[str, str] = {}
+    symbols: dict[str, str] = {}
     for unit in UNIT_TABLE:
         if unit.dimension in COLUMN_ROLES:
             names = (unit.symbol, *unit.aliases, unit.name, unit.name + "s", unit.name.replace("meter", "metre"))
-            found |= {_fold_case(word): unit.symbol for word in names if len(word) > 1}
-    return {word: symbol for word, symbol in (found | _OTHER_WORDS).items() if word not in _AMBIGUOUS_UNITS}
+            symbols |= {_fold_case(word): unit.symbol for word in names if len(word) > 1}
+    return {word: symbol for word, symbol in (symbols | _OTHER_WORDS).items() if word not in _AMBIGUOUS_UNITS}
 
 
 def _fold_case(unit: str) -> str:
@@ -261,8 +263,8 @@ def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
     choices.
     """
     pairs = (("length", "force"), ("angle", "torque"))
-    there = {item.dimension for item in numeric}
-    complete = [pair for pair in pairs if set(pair) <= there]
+    dimensions = {item.dimension for item in numeric}
+    complete = [pair for pair in pairs if set(pair) <= dimensions]
     if len(complete) > 1:
         named_by_option = {item.dimension for item in numeric if item.named_by_option}
         complete = [pair for pair in pairs if set(pair) <= named_by_option] or complete
@@ -278,23 +280,25 @@ def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
     beside = [item for item in times if item.index < candidates[complete[0][0]][0].index]
     if len(times) == len(motions) > 1 and beside:
         candidates["time"] = beside[-1:]  # each displacement has its time
-    if several := [candidates[one] for one in (*complete[0], "time") if len(candidates[one]) > 1]:
+    if several := [candidates[dimension] for dimension in (*complete[0], "time") if len(candidates[dimension]) > 1]:
         raise DataError(_choices(several, name))
-    return {COLUMN_ROLES[dimension]: found[0] for dimension, found in candidates.items() if found}
+    return {
+        COLUMN_ROLES[dimension]: columns_found[0] for dimension, columns_found in candidates.items() if columns_found
+    }
 
 
 def _candidates(columns: Sequence[ColumnInfo], dimension: str) -> list[ColumnInfo]:
     """Return the columns that could be of a dimension's role: those of --units, else of the usual name, else all."""
-    found = [column for column in columns if column.dimension == dimension]
-    found = [column for column in found if column.named_by_option] or found
-    words = [re.sub(r"[\W_\d]+", " ", column.name).strip().lower() for column in found]
-    named = [column for column, word in zip(found, words, strict=True) if word in _COLUMN_WORDS[dimension]]
-    return named if len(found) > 1 and named else found
+    matching = [column for column in columns if column.dimension == dimension]
+    matching = [column for column in matching if column.named_by_option] or matching
+    words = [re.sub(r"[\W_\d]+", " ", column.name).strip().lower() for column in matching]
+    named = [column for column, word in zip(matching, words, strict=True) if word in _COLUMN_WORDS[dimension]]
+    return named if len(matching) > 1 and named else matching
 
 
 def _choices(several: Sequence[Sequence[ColumnInfo]], name: str) -> str:
     """Return what to choose from where several columns could have a role: of columns side by side the pairs."""
-    titles = [column.name for found in several for column in found]
+    titles = [column.name for candidates_of_role in several for column in candidates_of_role]
 
     def key(column: ColumnInfo) -> str:
         unique = titles.count(column.name) == 1 and not set(column.name) & set(",=")
@@ -304,9 +308,9 @@ def _choices(several: Sequence[Sequence[ColumnInfo]], name: str) -> str:
     sets = list(zip(*several, strict=True)) if side_by_side else [(column,) for column in several[0]]
     options = " or ".join(f'--units "{",".join(map(key, chosen))}"' for chosen in sets)
     many = "; ".join(
-        f"{len(found)} columns could be the {COLUMN_ROLES[found[0].dimension or 'time']}: "
-        f"{', '.join(column.label for column in found)}"
-        for found in several
+        f"{len(candidates_of_role)} columns could be the {COLUMN_ROLES[candidates_of_role[0].dimension or 'time']}: "
+        f"{', '.join(column.label for column in candidates_of_role)}"
+        for candidates_of_role in several
     )
     return f"{name}: {many}; choose with {options}"
 
@@ -321,11 +325,13 @@ def _missing(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
     if not any(column.unit for column in columns):
         example = ",".join(f"{key(column)}=..." for column in numeric[:3])
         return f'{name}: the header names no units, and they are never guessed; state them with --units "{example}"'
-    there = {item.dimension for item in numeric}
-    lacking = "force" if "length" in there else "displacement" if "force" in there else "displacement and force"
-    lacking = "torque" if "angle" in there and "force" not in there else lacking
+    dimensions = {item.dimension for item in numeric}
+    lacking = (
+        "force" if "length" in dimensions else "displacement" if "force" in dimensions else "displacement and force"
+    )
+    lacking = "torque" if "angle" in dimensions and "force" not in dimensions else lacking
     weighed = next((item for item in numeric if item.unit and item.dimension is None and _is_mass(item.unit)), None)
-    if weighed is not None and "force" not in there:
+    if weighed is not None and "force" not in dimensions:
         return (
             f"{name}: {weighed.label} is a mass; if the gauge shows the force of that mass, say so: --units "
             f'"{key(weighed)}={_fold_case(weighed.unit or "").removesuffix("s")}f"'

@@ -157,7 +157,7 @@ class LabTable:
         cells = [row[column.index] for row in self.cells]
         plain = None if column.unit_column is not None else self._plain_numbers(cells)
         if plain is not None and not any(len(row) > self.shape.width for row in self.cells):
-            return in_si(plain, column.dimension or "", column.unit or "")
+            return convert_to_si(plain, column.dimension or "", column.unit or "")
         return np.array([self._value(number, column) for number in range(len(cells))])
 
     def _plain_numbers(self, cells: list[str]) -> FloatArray | None:
@@ -181,26 +181,26 @@ class LabTable:
         if column.index >= filled or any(map(self.shape.dialect.is_number, row[self.shape.width :])):
             raise DataError(f"{place} has {filled} cells, the others have {self.shape.width}")
         cell = row[column.index]
-        found = self.shape.dialect.number(cell)
-        if found is None:
+        reading = self.shape.dialect.number(cell)
+        if reading is None:
             refuse_group(cell, self.file)
             what = "is empty" if not cell else f"holds {quote(cell)}, which is not a number"
             raise DataError(f"{place}: column {column.label} {what}; remove the line or correct it")
-        value, unit = found
+        value, unit = reading
         if column.unit_column is not None:
             unit = standard_spelling(row[column.unit_column])
         # a gauge that changes its range on the way shows the same kind of quantity in another unit
         alike = column.source == CELLS_SOURCE and dimension_of(unit) == column.dimension
         if unit and unit != column.unit and not alike:
             column.with_unit(unit, "the cell", self.file, f"line {self.rows[number] + 1}: ")
-        return float(in_si(np.array(value), column.dimension or "", unit or column.unit or ""))
+        return float(convert_to_si(np.array(value), column.dimension or "", unit or column.unit or ""))
 
     def texts(self, column: ColumnInfo) -> list[str]:
         """Return the cells of a column as they are."""
         return [row[column.index] for row in self.cells]
 
 
-def in_si(values: FloatArray, dimension: str, unit: str) -> FloatArray:
+def convert_to_si(values: FloatArray, dimension: str, unit: str) -> FloatArray:
     """Return values with a unit as SI, exactly where the unit is that of cfmkit's own files."""
     from cfmkit.specs.units import from_border
     from cfmkit.specs.units.table import COMMON_UNIT_SIZES, border_unit
@@ -331,8 +331,8 @@ def _table(
     beside = _unit_columns(rows, shape, names)
     inside = {k: next(standard_spelling(row[unit]) for row in rows if row[unit]) for k, unit in beside.items()}
     for k in shape.numeric:
-        found = [number[1] for row in rows if (number := shape.dialect.number(row[k]))]
-        inside |= {k: found[0]} if found and found[0] else {}
+        numbers = [number[1] for row in rows if (number := shape.dialect.number(row[k]))]
+        inside |= {k: numbers[0]} if numbers and numbers[0] else {}
     columns = describe(names, unit_row, inside, units, name)
     placed = tuple(replace(item, unit_column=beside.get(item.index)) for item in columns)
     return LabTable(name, shape, lines, tuple(run), placed, header)
@@ -344,14 +344,14 @@ _COUNTER_PATTERN = re.compile(r"(?i)(no|nr|n|#|idx|index|reading|row|point|count
 
 def _unit_columns(rows: list[list[str]], shape: RowPattern, names: Sequence[str]) -> dict[int, int]:
     """Return the columns of numbers beside which the unit of each cell stands, and where: to their right, else left."""
-    found: dict[int, int] = {}
+    positions: dict[int, int] = {}
     for k in sorted(set(range(shape.width)).difference(shape.numeric)):
         filled = [row[k] for row in rows if any(row[column] for column in shape.numeric)]
         if filled and all(map(dimension_of, filled)):
             left = [k - 1] if not _COUNTER_PATTERN.fullmatch(names[k - 1].strip(' "')) else []
-            beside = [c for c in (*left, k + 1) if c in shape.numeric and c not in found]
-            found |= {beside[0]: k} if beside else {}
-    return found
+            beside = [c for c in (*left, k + 1) if c in shape.numeric and c not in positions]
+            positions |= {beside[0]: k} if beside else {}
+    return positions
 
 
 def _header(
@@ -360,16 +360,16 @@ def _header(
     """Return the names, the units and the index of the line with the names."""
     filled = [index for index in above if lines[index].strip(EMPTY_CHARACTERS)]
     rows = [(index, _header_cells(lines[index], shape)) for index in reversed(filled[-UNIT_LINES:])]
-    near = rows[:HEADER_LINES]
-    fitting = [(index, cells) for index, cells in near if len(cells) == shape.width]
+    first_rows = rows[:HEADER_LINES]
+    fitting = [(index, cells) for index, cells in first_rows if len(cells) == shape.width]
     # A column of remarks that stayed empty: its title stands beyond the numbers and has no unit.
     fitting = fitting or [
         (index, cells[: shape.width])
-        for index, cells in near
+        for index, cells in first_rows
         if len(cells) > shape.width and not any(split_header(cell)[1] for cell in cells[shape.width :])
     ]
     if not fitting:
-        titles = near[0][1] if near and shape.dialect.separator == "," else []
+        titles = first_rows[0][1] if first_rows and shape.dialect.separator == "," else []
         # half the cells of the numbers below it, and not just a title
         if shape.width == 2 * len(titles) and (len(titles) > 1 or split_header(titles[0])[1]):
             raise DataError(
@@ -396,7 +396,9 @@ def _header_cells(line: str, shape: RowPattern) -> list[str]:
     if separator != " ":
         cells = Dialect(separator, ".", '"' in line).cells(line)
         if len(cells) == 2 * shape.width and all(dimension_of(cell) for cell in cells[1::2]):
-            return [f"{one} [{unit}]" for one, unit in zip(cells[::2], cells[1::2], strict=True)]  # Travel, mm, Load, N
+            return [
+                f"{title} [{unit}]" for title, unit in zip(cells[::2], cells[1::2], strict=True)
+            ]  # Travel, mm, Load, N
         short = range(len(cells), shape.width)
         return cells + [""] * len(short) if len(cells) > 1 and not set(short) & set(shape.numeric) else cells
     ways = (line.split(), re.split(r"\s{2,}|\t", line.strip()), re.findall(r"[^\[(]*[\[(][^\])]*[\])]", line))

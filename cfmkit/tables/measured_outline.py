@@ -82,12 +82,12 @@ def _points(path: Path) -> tuple[FloatArray, LabTable]:
 
 def _axis(columns: Sequence[ColumnInfo], axis: str, name: str) -> ColumnInfo:
     """Return the column of a coordinate."""
-    found = next((column for column in columns if column.name.lower() == axis), None)
-    if found is None:
+    column_of_axis = next((column for column in columns if column.name.lower() == axis), None)
+    if column_of_axis is None:
         raise DataError(f"{name}: needs a header with columns 'x [mm]' and 'y [mm]', and perhaps 'side'")
-    if found.dimension != "length":
+    if column_of_axis.dimension != "length":
         raise DataError(f"{name}: the column {axis!r} needs a unit of length in the header: '{axis} [mm]'")
-    return found
+    return column_of_axis
 
 
 def _sides(table: LabTable, column: ColumnInfo) -> NDArray[np.str_]:

@@ -156,7 +156,10 @@ def curve_table(
     or angle, force or torque, ``stable``, and the extras. A column that a curve
     does not have is empty in its rows.
     """
-    labels: list[Part] = [(_label_columns(curve), len(curve)) for curve in curves]
+    labels: list[Part] = [
+        ({name: Column(np.full(len(curve), value), kind) for name, (value, kind) in curve.label.items()}, len(curve))
+        for curve in curves
+    ]
     columns: list[Part] = [(dict(curve.columns()), len(curve)) for curve in curves]
     return Table((*_stack_columns(labels), *_stack_columns(columns)))
 
@@ -204,10 +207,6 @@ def border_values(
     if factor == float(f"1e{power}"):
         return shift_decimal(values, power)
     return np.asarray(to_border(np.asarray(values, dtype=np.float64), dimension))
-
-
-def _label_columns(curve: Curve) -> dict[str, Column]:
-    return {name: Column(np.full(len(curve), value), kind) for name, (value, kind) in curve.label.items()}
 
 
 def _stack_columns(parts: Sequence[Part]) -> list[TableColumn]:

@@ -307,7 +307,7 @@ def test_a_leaf_that_is_clamped_on_a_drum_wraps_around_it_and_its_stress_stays()
     first, last = (result.curve.extra[f"drum_leaf_{end}"].values for end in ("from", "to"))
     assert first[-1] == 0
     assert 0.05 < last[-1] < 0.9
-    bent = 0.5 * 0.5e-3 / 150.25e-3 * result.spec.mechanism.of_beams("material")["leaf"].youngs_modulus
+    bent = 0.5 * 0.5e-3 / 150.25e-3 * result.spec.mechanism.collect_beam_values("material")["leaf"].youngs_modulus
     assert result.curve.extra["max_stress"].values[-1] == pytest.approx(bent, rel=1e-6)
     assert "lies along 'drum'" in warned(result)["contact_begins"]
 

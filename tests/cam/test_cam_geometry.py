@@ -259,7 +259,7 @@ def test_tracks_side_by_side_have_the_states_of_each():
     together = track_of(profile, radius[:, None], brace[:, None])
     slider = together.start + np.linspace(0.0, 0.23, 60)
     for some in (np.arange(8), np.array([5, 2])):
-        found = together.of_rows(some).states(slider[some])
+        found = together.select_rows(some).states(slider[some])
         for row, track in enumerate(some):
             alone = tracks[track].states(slider[track])
             for one, own in zip((*found.fields(), found.bend), (*alone.fields(), alone.bend), strict=True):

@@ -139,7 +139,7 @@ def test_heads_of_screws_count_in_the_depth_of_a_cam():
     flat = cfmkit.load("configs/cam.yaml", ["mechanism.plate.hole_diameter=17.5 mm"])  # heads of M16 are 16 mm high
     result = cfmkit.analyze(flat)
     found = hardware(result.state)
-    assert found.heads == pytest.approx(16e-3)
+    assert found.screw_head_height == pytest.approx(16e-3)
     plain = cfmkit.analyze(cfmkit.load("configs/cam.yaml"))
     deep, less = (family("cam").part(one).depth for one in (result, plain))
     assert deep == pytest.approx(max(less, 0.5 * less + 4e-3 + 16e-3))

@@ -661,14 +661,16 @@ def test_what_bends_is_in_every_pose_as_thick_as_specified(name: str, thickness:
     np.testing.assert_allclose(halves, 0.5 * MM * np.array(thickness)[:, None])
 
 
-def test_forces_are_as_accurate_as_asked_for() -> None:
-    fine, usual, rough = (
-        api.analyze(spec("strip", f"analysis.accuracy={accuracy}", "analysis.points=7")).state
-        for accuracy in ("1e-10", "1e-7", "1e-3")
-    )
-    off = [np.abs(state.force - fine.force).max() for state in (usual, rough)]
-    assert off[0] < usual.effort_error < rough.effort_error
-    assert off[0] < off[1] < rough.effort_error
+@pytest.mark.parametrize("name", ["strip", "lumped"])
+def test_forces_are_within_their_stated_error(name: str) -> None:
+    solution = api.analyze(spec(name, "analysis.points=7")).state
+    fine = solution.chain.press(solution.travel, solution.side, tolerance=1e-10)
+    assert np.abs(solution.leg_force - solution.legs * fine.force).max() < solution.effort_error < 1e-8
+
+
+def test_the_accuracy_that_changed_nothing_is_refused_with_the_remedy() -> None:
+    with pytest.raises(cfmkit.errors.SpecError, match=r"accuracy.*forces are always solved to 1e-7: delete the line"):
+        spec("strip", "analysis.accuracy=1e-9")
 
 
 def test_printing_allowance_is_not_drawn() -> None:

@@ -62,7 +62,7 @@ def test_a_linkage_and_its_mirror_image_have_the_same_springs(link, start, place
 def test_the_force_is_the_torque_over_the_velocity_ratio(link, start, _place):
     """Both drives of one mechanism, on either side of the stretched position, at the same places."""
     way = link.branch * float(link.slider_position(np.array(start)))
-    low, high = link.way(start)
+    low, high = link.find_path_ends(start)
     reach = way - high, way - low
     travel = reach[0] + (reach[1] - reach[0]) * np.array([0.2, 0.5, 0.8])
     for side in (1, -1):

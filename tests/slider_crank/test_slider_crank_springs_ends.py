@@ -111,7 +111,7 @@ def test_forces_have_those_of_the_energy_whatever_the_lengths_and_the_side_of_th
         if not link.reaches(start):
             continue
         place = link.branch * float(link.slider_position(np.array(start)))
-        low, high = link.way(start)
+        low, high = link.find_path_ends(start)
         past += place < 0.0
         travel = place - high + (high - low) * np.array([0.1, 0.35, 0.6, 0.9])
         rates = random.uniform(0.0, 1.0, 4)

@@ -47,7 +47,7 @@ def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says
 def test_an_error_of_all_springs_is_common_and_a_trim_takes_it_away():
     spec = toleranced_cam(samples=100)
     result = cfmkit.analyze(spec)
-    made = Parts.of_design(spec, spec.design, 0)
+    made = Parts.from_design(spec, spec.design, 0)
     assert common_errors(made, result, Run()) == (0,)
     values = made.draw()
     judged = analyze_parts(made, values, result, Run())
@@ -67,7 +67,7 @@ def test_a_trim_without_a_window_is_to_the_mean_force_over_that_of_a_requirement
     )
     spec = cfmkit.design(spec).spec
     result = cfmkit.analyze(spec)
-    made = Parts.of_design(spec, spec.design, 0)
+    made = Parts.from_design(spec, spec.design, 0)
     judged = analyze_parts(made, made.draw(), result, Run())
     assert judged.share(judged.trimmed).good == judged.share().good == 30
 
@@ -75,7 +75,7 @@ def test_a_trim_without_a_window_is_to_the_mean_force_over_that_of_a_requirement
 def test_a_trim_of_springs_that_are_solved_as_arrays_brings_their_mean_force_to_that_of_the_design():
     tolerances = {f"mechanism.springs.{name}": {"normal": "5 %"} for name in ("pivot", "crank_pin", "slider_pin")}
     spec = cfmkit.load("configs/slider_crank_bought.yaml").replace({"design.tolerances": tolerances})
-    made = Parts.of_design(spec, spec.design, 0)
+    made = Parts.from_design(spec, spec.design, 0)
     values = made.draw(40)
     judged = analyze_parts(made, values, cfmkit.analyze(spec), Run())
     goods = []
@@ -90,7 +90,7 @@ def test_a_trim_of_springs_that_are_solved_as_arrays_brings_their_mean_force_to_
 def test_parts_without_a_result_are_bad_and_counted():
     spec = toleranced_cam(samples=20, tolerances={"mechanism.rest_half_width": {"normal": "100 mm"}})
     result = cfmkit.analyze(spec)
-    made = Parts.of_design(spec, spec.design, 0)
+    made = Parts.from_design(spec, spec.design, 0)
     values = np.array([[made.nominal[0]], [-0.01]])
     judged = analyze_parts(made, values, result, Run())
     assert judged.failed.tolist() == [False, True]
@@ -161,7 +161,7 @@ def test_a_trim_by_the_force_of_one_branch_leaves_the_perfect_part_as_it_is():
     requirement = {"metric": "deviation_from_target[load]", "max": "3 %", "over": ("3 mm", "35 mm")}
     spec = cfmkit.design("configs/slider_crank_friction.yaml").spec.replace({"requirements": (requirement,)})
     spec = spec.replace({"design.tolerances": {"mechanism.unloaded_angle": {"normal": "0.3 deg"}}})
-    nominal, made = family("slider-crank").analyze(spec, Run()), Parts.of_design(spec, spec.design, 0)
+    nominal, made = family("slider-crank").analyze(spec, Run()), Parts.from_design(spec, spec.design, 0)
     judged = analyze_parts(made, np.array([made.nominal] * 2), nominal, Run())
     assert judged.met.all()
     assert judged.trimmed.all()
@@ -173,7 +173,7 @@ def test_parts_without_common_errors_are_analysed_themselves():
     tolerances = {"mechanism.bistable.thickness": {"normal": "0.01 mm"}, MODULUS: {"normal": "3 %"}}
     spec = spec.replace({"design.tolerances": tolerances, "design.samples": 60})
     nominal = cfmkit.analyze(spec)
-    found, parts = yields_of(nominal, None, Run()), Parts.of_design(spec, spec.design, 0)
+    found, parts = yields_of(nominal, None, Run()), Parts.from_design(spec, spec.design, 0)
     assert found.common == (MODULUS,)
     values = parts.draw()
     values[:, parts.paths.index(MODULUS)] = spec.get_value(MODULUS)

@@ -48,7 +48,7 @@ def test_a_part_that_ends_before_a_stated_window_is_bad_for_the_search_as_for_th
     nominal = cfmkit.analyze(design)
     places = places_of(nominal)
     rows = rows_of(nominal, sampled_of(design, places, Run()), places)
-    part = redesign.PartNumbers(Parts.of_design(design, design.design, 0), (), rows)
+    part = redesign.PartNumbers(Parts.from_design(design, design.design, 0), (), rows)
     larger, smaller = np.array([5e-5]), np.array([-5e-5])
     assert part.are_good(np.empty(0), np.array([larger, smaller])).tolist() in ([False, True], [True, False])
     assert all(part(np.empty(0), one) is not None for one in (larger, smaller))
@@ -112,7 +112,7 @@ LAN = "configs/studies/beam_lan2010_yield.yaml"
 def test_margins_of_beams_look_at_few_parts():
     # with differences it would be 61 of them at each step
     spec = cfmkit.load(LAN)
-    nominal, made = cfmkit.analyze(spec), Parts.of_design(spec, spec.design, 0)
+    nominal, made = cfmkit.analyze(spec), Parts.from_design(spec, spec.design, 0)
     free, places = redesign.free_of(spec, spec), places_of(nominal)
     rows = rows_of(nominal, sampled_of(spec, places, Run()), places)
     part = redesign.PartNumbers(made, tuple(free), rows)

@@ -35,7 +35,7 @@ def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
     spec = spec.replace({"design.process": "wire-edm", "design.samples": 20})
     result = cfmkit.analyze(spec)
     shares = expected_shares(result, Parts.from_assumed_errors(spec, 0), Run())
-    made = Parts.of_design(spec, spec.design, 0)
+    made = Parts.from_design(spec, spec.design, 0)
     assert made.paths == ("mechanism.beam.offset",)
     judged = analyze_parts(made, made.draw(), result, Run()).share()
     share = shares.good.value
@@ -115,9 +115,9 @@ def test_the_process_of_a_part_is_what_it_is_assumed_to_be_made_by_and_its_own_v
     assert assume_errors(own).deviations == {"mechanism.beam.offset": pytest.approx(7e-6)}
     assert assume_errors(own).process.least_feature == assume_errors(named).process.least_feature
     # it says how parts are made where their yield is asked for, and judges no parts otherwise
-    assert Parts.of_design(own, own.design, 0) is None
+    assert Parts.from_design(own, own.design, 0) is None
     asked = own.replace({"design.yield": 0.9})
-    assert Parts.of_design(asked, asked.design, 0).paths == ("mechanism.beam.offset",)
+    assert Parts.from_design(asked, asked.design, 0).paths == ("mechanism.beam.offset",)
 
 
 def test_the_process_of_a_part_warns_of_what_it_cannot_make():
@@ -141,9 +141,9 @@ def test_a_process_that_is_none_is_refused(change, reported):
 
 def test_tolerances_of_a_search_of_shapes_are_those_of_its_audit_alone():
     spec = cfmkit.load("configs/beam_design_arch.yaml").replace({"design.optimise.tolerances": {"nodes": "0.05 mm"}})
-    assert Parts.of_design(spec, spec.design, 0) is None
+    assert Parts.from_design(spec, spec.design, 0) is None
     toleranced = spec.replace({"design.tolerances": {"mechanism.nodes.b.at.1": {"normal": "0.05 mm"}}})
-    assert Parts.of_design(toleranced, toleranced.design, 0).paths == ("mechanism.nodes.b.at.1",)
+    assert Parts.from_design(toleranced, toleranced.design, 0).paths == ("mechanism.nodes.b.at.1",)
 
 
 def test_the_last_digit_is_at_most_a_tenth_of_the_deviation_of_the_process():

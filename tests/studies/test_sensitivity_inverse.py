@@ -12,7 +12,7 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.studies.parts.allowed_tolerances import MAX_TOLERANCE_FACTOR, LimitsAlong, factors_that_keep
 from cfmkit.studies.parts.share import Share
-from cfmkit.studies.sensitivity.output import by_interval, yield_ok
+from cfmkit.studies.sensitivity.output import is_met_by_interval, yield_ok
 
 TWO_SIDED = NormalDist().inv_cdf(0.975)
 ERRORS = np.random.default_rng(0).standard_normal((40_000, 2))
@@ -136,7 +136,7 @@ def test_a_study_states_tolerances_and_judges_parts_within_them():
 def test_stated_tolerances_miss_their_yield_where_the_parts_rule_it_out_and_not_by_chance(method, good, ok, by_chance):
     share = Share(good, 0, 200)
     found = SimpleNamespace(setup=SimpleNamespace(block=SimpleNamespace(min_yield=0.8), method=method), all_met=share)
-    assert (yield_ok(found), by_interval(found)) == (ok, by_chance)
+    assert (yield_ok(found), is_met_by_interval(found)) == (ok, by_chance)
 
 
 def test_a_cost_of_no_parameter_is_refused():

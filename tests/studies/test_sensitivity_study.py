@@ -20,7 +20,7 @@ from cfmkit.studies.parts.share import Share
 from cfmkit.studies.sensitivity import METHOD_NAMES
 from cfmkit.studies.sensitivity.evaluation import Evaluator
 from cfmkit.studies.sensitivity.method import method_named
-from cfmkit.studies.sensitivity.output import as_json, by_interval, exit_code, message, outputs, yield_ok
+from cfmkit.studies.sensitivity.output import as_json, exit_code, is_met_by_interval, message, outputs, yield_ok
 from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
 from cfmkit.studies.sensitivity.setup import prepare
 from cfmkit.studies.summary import Summary
@@ -112,7 +112,7 @@ def test_failed_parts_count_as_bad_in_a_yield_and_are_counted(good, met):
     parts = np.arange(100)
     share = Share.from_outcomes(parts < good, (parts >= good) & (parts < good + 5))
     found = dataclasses.replace(found, all_met=share)
-    assert (yield_ok(found), by_interval(found)) == (met, False)
+    assert (yield_ok(found), is_met_by_interval(found)) == (met, False)
     sentence = as_json(found)["requirements"][-1]["sentence"]
     outcome = "ok" if met else "missed"
     assert sentence == f"yield {good} % (5 of 100 parts failed), required >= 95 %: {outcome}"

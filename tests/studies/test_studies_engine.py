@@ -411,6 +411,13 @@ def test_small_blocks_are_computed_together_and_noted_one_by_one(tmp_path):
     assert jobs == [(3584, 3590)]
 
 
+@pytest.mark.parametrize(("structure", "most"), [("v-beam", 512), ("cosine", 40)])
+def test_a_task_of_leaves_that_are_searched_for_is_small(structure, most):
+    """So that Ctrl-C and a kill lose seconds."""
+    spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"mechanism.bistable.structure": structure})
+    assert work("mechanism.bistable.thickness=0.7 mm:1.3 mm:480", spec=spec, names=("force_mean",)).together == most
+
+
 def test_a_study_knows_a_data_file_by_its_content(tmp_path):
     (tmp_path / "synthetic").mkdir()
     (tmp_path / "cam.yaml").write_bytes(Path("configs/cam_as_built.yaml").read_bytes())

@@ -277,7 +277,7 @@ def test_the_force_of_a_cam_follows_the_scatter_of_its_springs():
     asked = {"metric": "force_mean[load]", "min": low, "max": high, "over": ["20 mm", "200 mm"]}
     result = cfmkit.analyze(spec.replace({"requirements": (asked,)}))
     rates = {"method": "tolerance", "parameters": {"mechanism.springs.stiffness": {"uniform": "5 %"}}}
-    parts = Parts.of_block(spec, spec.replace({"sensitivity": rates}).sensitivity, 20, 0)
+    parts = Parts.from_block(spec, spec.replace({"sensitivity": rates}).sensitivity, 20, 0)
     share = expected_shares(result, replace(parts, spec=result.spec), Run()).good
     assert share.value == pytest.approx(0.5, abs=0.05)
 
@@ -374,7 +374,7 @@ def test_a_safety_factor_is_required_of_stresses_and_leaves_less_strength_to_the
 )
 def test_a_verdict_names_what_fails_or_is_open(proposal, verdict):
     assert proposal.verdict == verdict
-    assert Proposal.of_record(proposal.as_record()).verdict == verdict
+    assert Proposal.from_record(proposal.as_record()).verdict == verdict
 
 
 def test_a_mechanism_whose_springs_are_stretched_too_far_is_no_proposal():

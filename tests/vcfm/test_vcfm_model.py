@@ -46,7 +46,7 @@ def test_what_all_preloads_share_is_what_each_has_alone(name):
         assert found == pytest.approx(np.nan if wanted is None else wanted, rel=1e-13, nan_ok=True)
     windows = np.transpose(solution.curves.flat_parts(spec.analysis.flatness))
     for row, (push, window) in enumerate(zip(solution.pushes, windows, strict=True)):
-        one = solution.curves.of_rows(np.array([row]))
+        one = solution.curves.select_rows(np.array([row]))
         wanted = np.ravel(one.flat_parts(spec.analysis.flatness))
         assert window == pytest.approx(wanted, rel=1e-12, nan_ok=True)
         if push.rest:

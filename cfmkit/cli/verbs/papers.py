@@ -83,7 +83,7 @@ def _page(records: Sequence[Record], counts: Mapping[str, int], reported: str, v
     yield TextLine((Span("cfmkit papers", Tone.LABEL), Span("  numbers of the papers, and the results here")))
     for paper in dict.fromkeys(one["paper"] for one in records):
         mine = [one for one in records if one["paper"] == paper]
-        yield from _of_paper(f"{paper}: {titles.get(paper, '')}", mine, verbose)
+        yield from _list_paper_rows(f"{paper}: {titles.get(paper, '')}", mine, verbose)
     yield BLANK_LINE
     yield Paragraph("verdict", reported, Tone.BAD if "do not hold" in reported else Tone.GOOD)
     named = [
@@ -92,14 +92,14 @@ def _page(records: Sequence[Record], counts: Mapping[str, int], reported: str, v
     yield from record_table("", named, (field("count"), field("verdict"), field("meaning", wraps=True)))
 
 
-def _of_paper(title: str, records: Sequence[Record], verbose: bool) -> Iterator[Block]:
+def _list_paper_rows(title: str, records: Sequence[Record], verbose: bool) -> Iterator[Block]:
     """Yield the rows of one paper, with the reasons below them; inputs only where everything is wanted."""
     shown = [one for one in records if verbose or one["trouble"] or one["verdict"] != "given"]
     fields = (
         field("place", wraps=True),
         field("what", wraps=True),
         Field("printed", lambda one: ", ".join(one["printed"]), wraps=True),
-        Field("here", _here, wraps=True),
+        Field("here", _describe_computed, wraps=True),
         Field("verdict", lambda one: "DOES NOT HOLD" if one["trouble"] else one["verdict"]),
     )
     yield from record_table(title, shown, fields)
@@ -117,7 +117,7 @@ def _of_paper(title: str, records: Sequence[Record], verbose: bool) -> Iterator[
         )
 
 
-def _here(record: Record) -> str:
+def _describe_computed(record: Record) -> str:
     if record["skipped"]:
         return "with --all"
     same = record["verdict"] == "given" and not record["trouble"]

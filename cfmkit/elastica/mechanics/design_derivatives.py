@@ -78,7 +78,7 @@ def partials(mesh: Discretisation, z: Any, drive: Any, names: Collection[str]) -
     def places_of_starts() -> Any:
         return poses(mesh.attachments, z, e.ends[:, 0]).place
 
-    def by_line() -> Any:
+    def differentiate_by_line() -> Any:
         reach = np.stack([(w * e.ahead * slope).sum(axis=-1) for slope in (at.slope_x, at.slope_y)], axis=-1)
         constant, grows = -(places_of_starts() * e.length[:, None] + reach), np.asarray(drive)[..., None, None]
         return np.stack([constant + 0 * grows, constant * grows], axis=-2)
@@ -94,14 +94,14 @@ def partials(mesh: Discretisation, z: Any, drive: Any, names: Collection[str]) -
         "shear": lambda: -w * at.shear**2 / 2,
         "ahead": lambda: -w * (at.slope_x * load[..., :1] + at.slope_y * load[..., 1:]),
         "length": lambda: -(load * places_of_starts()).sum(axis=-1),
-        "line": by_line,
+        "line": differentiate_by_line,
     }
     if {"origin", "arm", "frame"} & {*names}:
-        by_elements |= _by_attachments(mesh, z, load)
+        by_elements |= _differentiate_attachments(mesh, z, load)
     return {name: by_elements[name]() for name in names}
 
 
-def _by_attachments(mesh: Discretisation, z: Any, load: Any) -> dict[str, Callable[[], Any]]:
+def _differentiate_attachments(mesh: Discretisation, z: Any, load: Any) -> dict[str, Callable[[], Any]]:
     """Return functions for the derivatives by origin, arm and frame, from the forces on both ends of every element."""
     a, e = mesh.attachments, mesh.elements
     last = z[..., e.unknowns[:, -2:]]
@@ -111,13 +111,13 @@ def _by_attachments(mesh: Discretisation, z: Any, load: Any) -> dict[str, Callab
     x, y, turn = (z[..., a.unknowns[:, k]] for k in range(3))
     fx, fy = force[..., 0], force[..., 1]
 
-    def by_arm() -> Any:
+    def differentiate_by_arm() -> Any:
         cos, sin = cos_sin(turn)
         return np.stack([cos * fx + sin * fy, cos * fy - sin * fx], axis=-1)
 
     return {
         "origin": lambda: force,
-        "arm": by_arm,
+        "arm": differentiate_by_arm,
         "frame": lambda: np.stack([fx * x + fy * y, fy * x - fx * y], axis=-1),
     }
 

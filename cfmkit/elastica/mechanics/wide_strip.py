@@ -73,12 +73,12 @@ def curling_share(z: Any) -> tuple[Any, Any, Any]:
     [1.0, 0.994488, 0.02]
     """
     small = np.real(z) < 1.0
-    near, far = _by_series(np.where(small, z, 0.0)), _closed_form(np.where(small, 1.0, z))
+    near, far = _sum_series(np.where(small, z, 0.0)), _closed_form(np.where(small, 1.0, z))
     g, first, second = (np.where(small, *pair) for pair in zip(near, far, strict=True))
     return g, first, second
 
 
-def _by_series(z: Any) -> tuple[Any, Any, Any]:
+def _sum_series(z: Any) -> tuple[Any, Any, Any]:
     g, first, second = 0.0 * z, 0.0 * z, 0.0 * z
     for coefficient in reversed(SERIES_COEFFICIENTS):
         second = second * z + 2 * first

@@ -168,13 +168,13 @@ def fit(
         raise InputError(f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted")
     gap = float(np.hypot(np.real(dx - cx), np.real(dy - cy)))
     if beam.closure == "raw":
-        return _in_place(Fit(0.0, 1.0, gap, length, course), beam, known)
+        return _fix_breaks(Fit(0.0, 1.0, gap, length, course), beam, known)
     rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
     scale = distance / own
-    return _in_place(Fit(rotation, scale, gap, length * scale, course), beam, known)
+    return _fix_breaks(Fit(rotation, scale, gap, length * scale, course), beam, known)
 
 
-def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
+def _fix_breaks(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
     """Return a fit over a parameter in which complex steps move neither the shape's breaks nor the section's stations.
 
     Elements end there (`cfmkit.elastica.mechanics.discretise`). A station keeps its fraction u of the arc length: where

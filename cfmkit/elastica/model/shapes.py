@@ -45,14 +45,14 @@ class FittedShape:
         steps = np.imag(moved)
         rates = 1 + 1j * np.diff(steps) / np.diff(marks)
 
-        def own(t: Any) -> Any:
+        def move(t: Any) -> Any:
             return t + 1j * np.interp(np.real(t), marks, steps)
 
         def speed(t: Any, inside: float) -> Any:
             piece = np.searchsorted(marks, inside, side="right") - 1
-            return self.speed(own(t), inside) * rates[min(int(piece), len(rates) - 1)]
+            return self.speed(move(t), inside) * rates[min(int(piece), len(rates) - 1)]
 
-        return FittedShape(lambda t, inside: self.angle(own(t), inside), speed, read_only(marks), False)
+        return FittedShape(lambda t, inside: self.angle(move(t), inside), speed, read_only(marks), False)
 
 
 @dataclass(frozen=True)

@@ -157,9 +157,9 @@ class PathsOfDesigns:
         ends = np.stack([low, high], axis=1) / self._scale[:, None]
         every = range(len(self.laws))
         free, found, _ = self._solve(np.arange(len(self.laws)), ends)
-        chosen = [choose_few_points(self._own(k), *ends[k]) for k in every]
+        chosen = [choose_few_points(self._get_drive(k), *ends[k]) for k in every]
         known = self._evaluate_stresses(chosen)
-        more = [find_near_largest(self._own(k), few, known[k], *ends[k]) for k, few in enumerate(chosen)]
+        more = [find_near_largest(self._get_drive(k), few, known[k], *ends[k]) for k, few in enumerate(chosen)]
         dense = self._evaluate_stresses(more)
         both = [self._merge_points(*pairs) for pairs in zip(chosen, known, more, dense, strict=True)]
         at_ends = self._stresses(np.repeat(every, 2), free.reshape(2 * len(every), -1), ends.ravel())
@@ -167,11 +167,11 @@ class PathsOfDesigns:
         for k, m in np.argwhere(~found).tolist():
             stress_at_ends[k, m] = self.laws[k].stress("", np.array([(low, high)[m][k]]))[0]
         tops = stress_at_ends.max(axis=1)
-        runs = [runs_of_points(self._own(k), *both[k], ends[k]) for k in every]
+        runs = [runs_of_points(self._get_drive(k), *both[k], ends[k]) for k in every]
         row = [k for k in every for _ in runs[k]]
         knots = iter(solve_all_extremes([run for own in runs for run in own], partial(self._stresses_at, row)))
         for k in every:
-            top = largest_of_runs(self._own(k), *both[k], ends[k], [next(knots) for _ in runs[k]])
+            top = largest_of_runs(self._get_drive(k), *both[k], ends[k], [next(knots) for _ in runs[k]])
             tops[k] = max(tops[k], top)
         return np.asarray(tops)
 
@@ -187,7 +187,7 @@ class PathsOfDesigns:
         ends = np.cumsum(count)[:-1]
         return list(zip(np.split(stresses, ends, axis=1), np.split(found[here], ends), strict=True))
 
-    def _own(self, number: int) -> FloatArray:
+    def _get_drive(self, number: int) -> FloatArray:
         return np.asarray(self._drive[number, : self._counts[number]])
 
     def _evaluate_stresses(self, points: Sequence[Rows]) -> list[FloatArray]:

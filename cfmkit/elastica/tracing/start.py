@@ -129,7 +129,7 @@ def _ramps(mesh: Discretisation) -> Iterator[tuple[str, tuple[Change, bool]]]:
 
 
 def _make_ramp(change: tuple[Change, bool], mesh: Discretisation, remesh: Remesh | None) -> NetworkProblem:
-    """Return the problem along what is constant."""
+    """Return the problem whose way applies what is constant (`_ramps`), prestress or loads, from none to all."""
     alter, ramp = change
     own = None if remesh is None else (lambda flanks: alter(remesh(flanks)))
     return NetworkProblem(alter(mesh), ramp=ramp, remesh=own)

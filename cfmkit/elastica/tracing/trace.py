@@ -416,9 +416,9 @@ def _settle_events(points: PointColumns, events: list[PathEvent], drive: Drive, 
 
     There the number of unstable directions is rounding.
     """
+    near = SAME_PLACE * _range(drive) / unit if events else 0.0
     for event in reversed(events):  # of several the first counts
         if event.kind == "bifurcation":
-            near = SAME_PLACE * _range(drive) / unit
             points.unstable[np.abs(points.drive - event.drive) <= near] = min(event.before, event.after)
 
 

@@ -258,7 +258,7 @@ class PartContact(Model):
         common = set(end_nodes(mechanism, first)) & set(end_nodes(mechanism, second))
         if common:
             return "between", f"both beams are at node {common.pop()!r}: give a node that touches, and the other beam"
-        tapered = [name for name in self.between if isinstance(mechanism.of_beams("thickness")[name], tuple)]
+        tapered = [name for name in self.between if isinstance(mechanism.collect_beam_values("thickness")[name], tuple)]
         if tapered:
             return "between", f"the thickness of beam {tapered[0]!r} varies: give a node that touches, and a beam"
         for name in self.between:
@@ -276,7 +276,7 @@ class PartContact(Model):
             radius = free_ends(mechanism)[node] if self.radius is None else self.radius
             return (NodeOnBeam(f"{node}_{beam}", node, beam, radius),)
         first, second = self.between
-        name, thickness = f"{first}_{second}", mechanism.of_beams("thickness")
+        name, thickness = f"{first}_{second}", mechanism.collect_beam_values("thickness")
         ends = [
             NodeOnBeam(name, node, partner, 0.5 * thickness[beam])
             for beam, partner in ((first, second), (second, first))
@@ -334,7 +334,7 @@ def pads_of(mechanism: Mechanism, obstacle: ObstacleBase) -> Mapping[str, float]
     for name in sides_of(mechanism, obstacle):
         if name not in mechanism.beams:
             continue
-        beam, thickness = mechanism.beams[name], mechanism.of_beams("thickness")[name]
+        beam, thickness = mechanism.beams[name], mechanism.collect_beam_values("thickness")[name]
         for node, last in ((beam.start, False), (beam.end, True)):
             if mechanism.nodes[node].support not in HELD_SUPPORTS:
                 half = 0.5 * (thickness[-1 if last else 0][1] if isinstance(thickness, tuple) else thickness)
@@ -346,7 +346,7 @@ def pads_of(mechanism: Mechanism, obstacle: ObstacleBase) -> Mapping[str, float]
 def free_ends(mechanism: Mechanism) -> dict[str, float]:
     """Return the nodes at which one beam ends freely, with half its thickness there [m]."""
     linked = {name for link in mechanism.links for name in (link.master, link.node)}
-    thickness, radii = mechanism.of_beams("thickness"), dict[str, float]()
+    thickness, radii = mechanism.collect_beam_values("thickness"), dict[str, float]()
     for node, spec in mechanism.nodes.items():
         ends = [(name, end) for name, beam in mechanism.beams.items() for end in ("start", "end")
                 if getattr(beam, end) == node]  # fmt: skip
@@ -436,7 +436,7 @@ def _side_faults(mechanism: Mechanism, obstacle: ObstacleBase, place: tuple[str 
     """Yield what is wrong with the sides of beams on an obstacle."""
     if obstacle.beams and obstacle.stiffness is not None:
         yield (*place, "stiffness"), "an obstacle that sides of beams touch is rigid: leave it out, or state 'nodes'"
-    outline, thickness = obstacle.outline(), mechanism.of_beams("thickness")
+    outline, thickness = obstacle.outline(), mechanism.collect_beam_values("thickness")
     for name in sides_of(mechanism, obstacle):
         if name not in mechanism.beams:
             continue

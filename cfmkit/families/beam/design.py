@@ -142,14 +142,14 @@ def _sizes(mechanism: Mechanism) -> dict[str, float]:
     """Return what a rescaling may change, by its key: size, largest thickness and largest width of the beams [m]."""
     return {
         "size": size_of(mechanism),
-        "thickness": max(map(thickest, mechanism.of_beams("thickness").values())),
-        "width": max(mechanism.of_beams("width").values()),
+        "thickness": max(map(thickest, mechanism.collect_beam_values("thickness").values())),
+        "width": max(mechanism.collect_beam_values("width").values()),
     }
 
 
 def _modulus(mechanism: Mechanism) -> float:
     """Return the modulus of the beams, which are of one material [Pa]."""
-    material: BeamMaterial = next(iter(mechanism.of_beams("material").values()))
+    material: BeamMaterial = next(iter(mechanism.collect_beam_values("material").values()))
     return material.modulus
 
 

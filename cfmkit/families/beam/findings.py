@@ -16,7 +16,7 @@ from cfmkit.families.beam.contacts import change_sentences, contact_sentences
 from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of
-from cfmkit.families.beam.path_ending import drive_text, ending_of, in_units
+from cfmkit.families.beam.path_ending import add_units, drive_text, ending_of
 from cfmkit.families.beam.scalar_results import find_in_window
 from cfmkit.families.beam.solution import pairs_in_contact
 from cfmkit.families.findings import percent, stiffer, too_soft
@@ -212,7 +212,7 @@ def _inaccurate_points(solution: Solution) -> Sentence:
 
 
 def _bent_beams(solution: Solution) -> Sentence:
-    reported = in_units(solution.assembly, solution.path.imperfection)
+    reported = add_units(solution.assembly, solution.path.imperfection)
     if reported.startswith("none: "):
         return (f"the beams were not bent: {reported.removeprefix('none: ')}",)
     return (f"the beams were bent by {reported}",)

@@ -253,7 +253,7 @@ class Mechanism(RoundedCorners, Model):
     def _stations(cls, value: Thickness) -> Thickness:
         return checked_thickness(value)
 
-    def of_beams(self, key: Literal["material", "thickness", "width"]) -> dict[str, Any]:
+    def collect_beam_values(self, key: Literal["material", "thickness", "width"]) -> dict[str, Any]:
         """Return a value of each beam by name: its own, or that of the mechanism where it has none."""
         usual = getattr(self, key)
         return {name: getattr(beam, key) or usual for name, beam in self.beams.items()}
@@ -281,7 +281,7 @@ class Mechanism(RoundedCorners, Model):
     @property
     def thinnest(self) -> float:
         """Smallest thickness of all beams [m]."""
-        thicknesses = self.of_beams("thickness").values()
+        thicknesses = self.collect_beam_values("thickness").values()
         return min(
             thickness if isinstance(thickness, float) else min(value for _, value in thickness)
             for thickness in thicknesses

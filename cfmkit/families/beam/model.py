@@ -29,7 +29,7 @@ from cfmkit.families.beam.contacts import contact_columns, contact_values, refus
 from cfmkit.families.beam.findings import findings_of
 from cfmkit.families.beam.network_elements_spec import LoadsDrive
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
-from cfmkit.families.beam.path_ending import distance, ending_of, in_units, ways_to_supports
+from cfmkit.families.beam.path_ending import add_units, distance, ending_of, ways_to_supports
 from cfmkit.families.beam.requested_node_columns import END_FORCES, columns_of, output_columns
 from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, natural, target_of
 from cfmkit.families.beam.solution import Solution
@@ -264,7 +264,7 @@ def _frequencies(solution: Solution) -> LazyColumns:
 def _branches(solution: Solution) -> Any:
     """Return the name of the branch at every point, with units."""
     names = solution.path.branch[solution.keep]
-    reported = {name: in_units(solution.assembly, name) for name in sorted(set(names.tolist()))}
+    reported = {name: add_units(solution.assembly, name) for name in sorted(set(names.tolist()))}
     return read_only(np.array([reported[name] for name in names.tolist()]), np.str_)
 
 

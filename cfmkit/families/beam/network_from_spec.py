@@ -124,7 +124,7 @@ class Assembly(ShortRepr):
         """Return what the parts weigh; None if a density is not known."""
         mechanism = self.spec.mechanism
         # stages in series have the names of the first, with a number behind a dot
-        stated_materials = mechanism.of_beams("material")
+        stated_materials = mechanism.collect_beam_values("material")
         materials = {name: stated_materials[name.split(".")[0]] for name in self.network.beams}
         density = {name: material.density for name, material in materials.items() if material.density is not None}
         if len(density) < len(materials):
@@ -224,7 +224,8 @@ def known_allowable_stresses(spec: BeamSpec) -> dict[str, float]:
     """Return yield strength over safety factor of the beams whose strength is known, by name [Pa]."""
     mechanism = spec.mechanism
     limits = {
-        name: material.allowable(mechanism.safety_factor) for name, material in mechanism.of_beams("material").items()
+        name: material.allowable(mechanism.safety_factor)
+        for name, material in mechanism.collect_beam_values("material").items()
     }
     return {name: limit for name, limit in limits.items() if limit is not None}
 

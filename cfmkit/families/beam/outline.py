@@ -128,17 +128,17 @@ def _distances(words: str, start: Any, end: Any, along: tuple[Literal["x", "y"],
 def _facts(assembly: Assembly, fillet: float) -> Iterator[tuple[str, str]]:
     """Yield what the part is made of, and how thick its beams are."""
     mechanism = assembly.spec.mechanism
-    materials = {name: material.words for name, material in mechanism.of_beams("material").items()}
-    yield "material", _by_beam(materials) if len({*materials.values()}) > 1 else next(iter(materials.values()))
+    materials = {name: material.words for name, material in mechanism.collect_beam_values("material").items()}
+    yield "material", _group_by_text(materials) if len({*materials.values()}) > 1 else next(iter(materials.values()))
     yield "fillets", format_short(fillet, "length") if fillet else "none"
     thick = {}
-    for name, thickness in mechanism.of_beams("thickness").items():
+    for name, thickness in mechanism.collect_beam_values("thickness").items():
         ends = [thickness] if isinstance(thickness, float) else [value for _, value in thickness]
         thick[name] = " ... ".join(dict.fromkeys(format_short(value, "length") for value in (min(ends), max(ends))))
-    yield "thickness", _by_beam(thick)
+    yield "thickness", _group_by_text(thick)
 
 
-def _by_beam(texts: Mapping[str, str]) -> str:
+def _group_by_text(texts: Mapping[str, str]) -> str:
     """Return each text once, with the beams that it is about."""
     named: dict[str, list[str]] = {}
     for name, text in texts.items():
@@ -149,7 +149,7 @@ def _by_beam(texts: Mapping[str, str]) -> str:
 def _sheet(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Sheet:
     """Return the mechanism's width, and where beams have another one."""
     mechanism, axis = assembly.spec.mechanism, mirror_axis(assembly)
-    widths = mechanism.of_beams("width")
+    widths = mechanism.collect_beam_values("width")
     regions = [
         Region(strip.polygon, width)
         for name, strips in beams.items()

@@ -217,7 +217,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
             *bodies(solution, choose_points(solution, N_POSES), regions(solution.spec, BOX_TOLERANCE)),
         ),
         direction=assembly.direction if solution.motion_dimension == "length" else 0.5 * np.pi,
-        depth=legs * max([mechanism.width or 0.0, *mechanism.of_beams("width").values()]),
+        depth=legs * max([mechanism.width or 0.0, *mechanism.collect_beam_values("width").values()]),
         pieces=legs,
     )
 

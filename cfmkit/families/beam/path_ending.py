@@ -40,7 +40,7 @@ def taut_beams(path: Path, last: int) -> list[str]:
 
     These are beams, or else ways along several of them from the driven node to a support.
     """
-    return list(_find_pulled(path, last)) or list(_in_line(path, last))
+    return list(_find_pulled(path, last)) or list(_find_taut_supports(path, last))
 
 
 def _find_pulled(path: Path, last: int) -> Iterator[str]:
@@ -57,7 +57,7 @@ def _find_pulled(path: Path, last: int) -> Iterator[str]:
             yield f"{name}: {_describe_beam(distance_of_ends, length)}"
 
 
-def _in_line(path: Path, last: int) -> Iterator[str]:
+def _find_taut_supports(path: Path, last: int) -> Iterator[str]:
     """Yield the supports that the driven node has moved away from by nearly the whole way along the beams."""
     network, drive = path.network, path.load_case
     if not isinstance(drive, Displacement):
@@ -120,7 +120,7 @@ def drive_text(assembly: Assembly, value: float) -> str:
     return assembly.spec.mechanism.drive.text(value, assembly.parallel)
 
 
-def in_units(assembly: Assembly, text: str) -> str:
+def add_units(assembly: Assembly, text: str) -> str:
     """Return a sentence of the engine with units."""
     text = _LENGTH_PATTERN.sub(lambda match: format_short(float(match[1]), "length"), text)
     return _PLACE_PATTERN.sub(lambda match: f"{match[1]} {drive_text(assembly, float(match[2]))}", text)
@@ -141,7 +141,7 @@ class PathEnding:
 def ending_of(solution: Solution) -> PathEnding:
     """Return why a path ended; a path that is complete has nothing to say."""
     path = solution.path
-    said = in_units(solution.assembly, path.message or path.status.value)
+    said = add_units(solution.assembly, path.message or path.status.value)
     spreads = bool(path.contact_events) and path.contact_events[-1].kind == "spreads" and bool(path.changes_contact[-1])
     rigid = solution.spec.fidelity == "inextensible" and not spreads  # then the contact is why
     taut: list[str] = []
@@ -152,7 +152,7 @@ def ending_of(solution: Solution) -> PathEnding:
         if not taut:
             taut, kept = taut_beams(path, len(path) - 1), False
     if not taut and len(solution.keep) < 2:
-        return PathEnding(f"{said}: {_in_the_way(solution)}", (EXTENSIBLE_OPTION,) if rigid else ())
+        return PathEnding(f"{said}: {_list_blocking_keys(solution)}", (EXTENSIBLE_OPTION,) if rigid else ())
     if not taut:
         return PathEnding(said)
     if kept:
@@ -166,7 +166,7 @@ def ending_of(solution: Solution) -> PathEnding:
     )
 
 
-def _in_the_way(solution: Solution) -> str:
+def _list_blocking_keys(solution: Solution) -> str:
     """Return the keys that may keep a mechanism from having a first pose."""
     spec = solution.spec
     mechanism = spec.mechanism

@@ -260,7 +260,7 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     bare = remove_screws(spec)
     drawn = drawing(remove_frame(bare, frame, pads) if frame else bare)
     cut = [contour for contour in drawn.contours if contour.layer == "cut"]
-    material, width = (next(iter(spec.mechanism.of_beams(key).values())) for key in ("material", "width"))
+    material, width = (next(iter(spec.mechanism.collect_beam_values(key).values())) for key in ("material", "width"))
     law = MATERIAL_LAWS[material.law](material.modulus, material.poisson)
     places = [
         HeldOrDriven(

@@ -83,7 +83,7 @@ def kept_shapes() -> tuple[Kept, ...]:
     shear: then the curve is exact where the thickness goes with the size, and a guess elsewhere.
     """
     plain = tuple(_follow_shape(name) for name in SHAPE_FILES)
-    return (*plain, *(_in_two_layers(kept) for kept in plain if kept.spec.mechanism.copies is not None))
+    return (*plain, *(_stack_two_layers(kept) for kept in plain if kept.spec.mechanism.copies is not None))
 
 
 def _follow_shape(name: str) -> Kept:
@@ -96,7 +96,7 @@ def _follow_shape(name: str) -> Kept:
     return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, BoundingBox.from_part(part))
 
 
-def _in_two_layers(kept: Kept) -> Kept:
+def _stack_two_layers(kept: Kept) -> Kept:
     """Return two of a shape in series: twice the travel at the same force and stress."""
     spec = kept.spec.replace({"mechanism.copies.layers": 2})
     single_height, double_height = (float(box(as_made(assemble(stacked)))[1, 1]) for stacked in (kept.spec, spec))

@@ -24,7 +24,7 @@ def free(spec: BeamSpec, designed: BeamSpec) -> dict[str, tuple[float, float]]:
     if design is None:
         return {}
     if design.optimise is not None:
-        return dict(_of_shapes(design.optimise, designed))
+        return dict(_list_shape_ranges(design.optimise, designed))
     name = None if design.rescale is None else design.rescale.choose_dimension(sheet_of(designed.mechanism.part))
     if name is None or name == "size":
         return {}
@@ -41,7 +41,7 @@ def _stated_paths(mechanism: Mechanism, key: Literal["thickness", "width"]) -> I
             yield f"mechanism.beams.{name}.{key}"
 
 
-def _of_shapes(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tuple[float, float]]]:
+def _list_shape_ranges(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tuple[float, float]]]:
     """Yield what a search of shapes may vary, with the ranges of the search or as far as a shape stays what it is."""
     box = wanted.limits.envelope
     for name, node in wanted.free.items():

@@ -223,7 +223,7 @@ def _quantity(
     return ScalarQuantity(dimension, definition, lambda solution: or_nan(function(solution)), reason)
 
 
-def _of_solids(names: Iterable[str]) -> dict[str, ScalarQuantity[Solution]]:
+def _make_solid_quantities(names: Iterable[str]) -> dict[str, ScalarQuantity[Solution]]:
     reason = "only the model of the part as a solid has it"
     return {name: _quantity(*OF_SOLIDS[name], lambda _: None, reason) for name in names}
 
@@ -366,7 +366,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "peak_stress_y": _quantity(
         "length", "y of the place of the largest stress in the window, on the part before any load", lambda _: None
     ),
-    **_of_solids(OF_SOLIDS),
+    **_make_solid_quantities(OF_SOLIDS),
     "strain_energy_max": _quantity(
         "energy",
         "largest strain energy on the path, of all copies",

@@ -324,7 +324,7 @@ class BeamSpec(Spec):
     @property
     def durability(self) -> Durability | None:
         """Of all beams; None if they are not of one material."""
-        kinds = {*self.mechanism.of_beams("material").values()}
+        kinds = {*self.mechanism.collect_beam_values("material").values()}
         return kinds.pop().durability if len(kinds) == 1 else None
 
     @property
@@ -452,7 +452,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
 
 def _several(spec: BeamSpec, key: Literal["material", "width"]) -> bool:
     """Return True if beams differ in a value that they may take from the mechanism."""
-    return len({*spec.mechanism.of_beams(key).values()}) > 1
+    return len({*spec.mechanism.collect_beam_values(key).values()}) > 1
 
 
 def _no_density(spec: BeamSpec) -> str:
@@ -473,7 +473,7 @@ def _no_density(spec: BeamSpec) -> str:
 
 def _has_strength(spec: BeamSpec, material: BeamMaterial | None) -> bool:
     """Return True if the allowable stress is known of all beams, or of another material if there is one."""
-    of = [material] if material else spec.mechanism.of_beams("material").values()
+    of = [material] if material else spec.mechanism.collect_beam_values("material").values()
     return all(material.allowable(spec.mechanism.safety_factor) is not None for material in of)
 
 

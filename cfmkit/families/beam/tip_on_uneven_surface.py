@@ -72,10 +72,10 @@ def course_of(surface: Surface) -> SurfaceCourse:
     Raises DataError if the file cannot be used.
     """
     profile = surface.profile
-    return _of_file(profile) if profile.kind == "file" else _of_formula(profile)
+    return _read_file_course(profile) if profile.kind == "file" else _read_formula_course(profile)
 
 
-def _of_formula(profile: FormulaProfile) -> SurfaceCourse:
+def _read_formula_course(profile: FormulaProfile) -> SurfaceCourse:
     from cfmkit.specs.formula_of_x import formula, slope
 
     height, rise = formula(profile.height), slope(profile.height)
@@ -83,7 +83,7 @@ def _of_formula(profile: FormulaProfile) -> SurfaceCourse:
     return SurfaceCourse(lambda x: height(x * 1e3) * 1e-3, lambda x: rise(x * 1e3), rows, np.zeros(0))
 
 
-def _of_file(profile: FileProfile) -> SurfaceCourse:
+def _read_file_course(profile: FileProfile) -> SurfaceCourse:
     from pathlib import Path
 
     from scipy.interpolate import CubicSpline

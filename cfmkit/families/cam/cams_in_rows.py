@@ -93,32 +93,39 @@ def solve_rows(variants: Variants) -> Iterator[Group]:
 def _is_left_out(spec: CamSpec) -> bool:
     mechanism, analysis = spec.mechanism, spec.analysis
     unnamed_curve = mechanism.profile.curve is not None and spec.target_curve is None  # it grows with the springs
-    other = mechanism.profile.file is not None or mechanism.left is not None or mechanism.envelope is not None
-    return spec.fidelity != "quasi-static" or analysis.manufacturing is not None or unnamed_curve or other
+    has_parts_of_single_cams = (
+        mechanism.profile.file is not None or mechanism.left is not None or mechanism.envelope is not None
+    )
+    return (
+        spec.fidelity != "quasi-static"
+        or analysis.manufacturing is not None
+        or unnamed_curve
+        or has_parts_of_single_cams
+    )
 
 
 def _plain_numbers(spec: CamSpec) -> set[str]:
     """Return the numbers for which it is enough to be within bounds of their own."""
-    mechanism, found = spec.mechanism, {"mechanism.brace_length", "mechanism.rolling_friction"}
+    mechanism, bounded_keys = spec.mechanism, {"mechanism.brace_length", "mechanism.rolling_friction"}
     springs, profile = mechanism.springs, mechanism.profile
     if springs.wound is None and not springs.initial_tension:
         several = range(len(springs.each)) if isinstance(springs.each, tuple) else ()
-        found |= {f"mechanism.springs.stiffness.{k}" for k in several} or {"mechanism.springs.stiffness"}
+        bounded_keys |= {f"mechanism.springs.stiffness.{k}" for k in several} or {"mechanism.springs.stiffness"}
         if not several:
-            found.add("mechanism.springs.count")
+            bounded_keys.add("mechanism.springs.count")
     if mechanism.masses is not None:
-        found |= {f"mechanism.masses.{name}" for name in ("slider", "brace", "roller")}
+        bounded_keys |= {f"mechanism.masses.{name}" for name in ("slider", "brace", "roller")}
     if mechanism.contact is not None:
-        found.add("mechanism.contact.width")
+        bounded_keys.add("mechanism.contact.width")
     if spec.design is not None and spec.design.force is not None:
-        found.add("design.force")
+        bounded_keys.add("design.force")
     lengths = ["force_constant", "stroke", "brace_length"]
     if mechanism.plate.base_width is None:
         lengths += ["rest_half_width", "roller_radius"]
-        found.add("mechanism.roller_radius")
+        bounded_keys.add("mechanism.roller_radius")
         if springs.rest_length is None and springs.preload is None:
-            found.add("mechanism.rest_half_width")
-    return found | {f"mechanism.profile.{name}" for name in lengths if getattr(profile, name) is not None}
+            bounded_keys.add("mechanism.rest_half_width")
+    return bounded_keys | {f"mechanism.profile.{name}" for name in lengths if getattr(profile, name) is not None}
 
 
 def _group_shared(columns: list[NDArray[Any]], rows: Rows, least: int) -> tuple[list[Rows], Rows]:
@@ -190,14 +197,14 @@ def _solve_alike(
         return
     samples = len(rows) * assembly.spec.analysis.points
     for some in np.array_split(np.arange(len(rows)), -(-samples // MAX_SAMPLES_AT_ONCE)):
-        parcel = replace(rows_of(assembly, some), track=track.of_rows(some)) if len(some) < len(rows) else assembly
+        parcel = replace(rows_of(assembly, some), track=track.select_rows(some)) if len(some) < len(rows) else assembly
         windows = windows_of(rows[some])
         yield rows[some], _solve_group(replace(solve(parcel, len(some)), windows=windows), rows[some])
 
 
 def _solve_group(solution: Solution, chosen: Rows) -> SolvedRows[Solution]:
-    known = np.isfinite(solution.up.slider[..., 1:].sum(axis=-1) + solution.down.slider[..., 1:].sum(axis=-1))
+    is_known = np.isfinite(solution.up.slider[..., 1:].sum(axis=-1) + solution.down.slider[..., 1:].sum(axis=-1))
     held = solution.elongation.max(axis=-1) >= 0
     held = held if held.all() else held | (solution.up.contact > 0).any(axis=-1)
-    complete = np.broadcast_to(known & held, len(chosen))
+    complete = np.broadcast_to(is_known & held, len(chosen))
     return SolvedRows(solution, ROW_COLUMNS, LazySequence(partial(rules_of, solution)), complete)

@@ -65,17 +65,17 @@ def clearances(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
 
 def nearest_pairs(solution: Solution) -> dict[str, FloatArray]:
     """Return the gap of each pair of parts, of several alike the smallest, at every point of the solution, (n,) [m]."""
-    found: dict[str, FloatArray] = {}
+    gaps: dict[str, FloatArray] = {}
     for pair, gap in clearances(solution):
-        found[pair] = np.minimum(found[pair], gap) if pair in found else gap
-    return found
+        gaps[pair] = np.minimum(gaps[pair], gap) if pair in gaps else gap
+    return gaps
 
 
 def smallest(solution: Solution) -> dict[str, Quantity]:
     """Return the smallest distance by name; nothing where no sizes are given."""
     least = {pair: float(gap.min()) for pair, gap in nearest_pairs(solution).items()}
-    found = [gap for pair, gap in least.items() if pair != BESIDE_FLANKS_PAIR or gap < -OVERLAP_TOL]
-    return {"clearance_min": Quantity(min(found), *SCALAR_DEFINITIONS["clearance_min"])} if found else {}
+    gaps = [gap for pair, gap in least.items() if pair != BESIDE_FLANKS_PAIR or gap < -OVERLAP_TOL]
+    return {"clearance_min": Quantity(min(gaps), *SCALAR_DEFINITIONS["clearance_min"])} if gaps else {}
 
 
 def touching(solution: Solution) -> Iterator[Finding]:

@@ -58,14 +58,14 @@ def flank_pressure(assembly: Assembly, states: TrackStates, force: FloatArray, r
     law, cut_for, built, offset, width = numbers if rows is None else rows_of(numbers, rows)
     with np.errstate(divide="ignore", invalid="ignore"):
         curvature = 1.0 / built + 1.0 / (law.curvature_radius(states.parameter) - cut_for + offset)
-    found = pressure_between(force, curvature, contact.material, width)
-    return np.where(states.on_corner, np.nan, found)
+    pressures = pressure_between(force, curvature, contact.material, width)
+    return np.where(states.on_corner, np.nan, pressures)
 
 
 def worst(pressures: FloatArray) -> int | None:
     """Return where the largest pressure is; None if there is none."""
-    known = np.isfinite(pressures)
-    return int(np.argmax(np.where(known, pressures, -np.inf))) if known.any() else None
+    is_known = np.isfinite(pressures)
+    return int(np.argmax(np.where(is_known, pressures, -np.inf))) if is_known.any() else None
 
 
 def allowable_stress(mechanism: Mechanism) -> float | None:

@@ -92,7 +92,7 @@ def _design(spec: CamSpec, target: CamDesign) -> Design:
     _check_room(spec)
     if target.choose == "catalogue":
         best, *others = _from_catalogue(spec, target, pull, factor, smallest)
-        next_best = tuple(partial(_with_next, spec, target, factor, one) for one in others)
+        next_best = tuple(partial(_with_next, spec, target, factor, choice) for choice in others)
         return replace(_with_choice(spec, target, factor, best), next_best=next_best)
     ways = {"force-constant": _from_springs, "stiffness": _from_constant, "preload": _with_preload}
     return _with_choice(spec, target, factor, ways[target.choose](spec, target, pull, factor, smallest))
@@ -255,15 +255,15 @@ def _from_catalogue(
         for item in offers(target.catalogue, "extension")
         for count in item.counts
     ]
-    fitting = [one for one in tried if not isinstance(one, Miss)]
+    fitting = [outcome for outcome in tried if not isinstance(outcome, Miss)]
     if fitting:
         return [choice for _, choice in sorted(fitting, key=lambda pair: pair[0])]
-    rejected = [one for one in tried if isinstance(one, Miss)]
+    rejected = [outcome for outcome in tried if isinstance(outcome, Miss)]
     if not rejected:
         none = "the catalogue has no extension spring, which is what pulls the rollers together"
         raise finding.infeasible("no_spring_fits", f"{none} ('design.catalogue')")
     reported = f"no spring of the catalogue fits: {nearest(rejected)}; add others to 'design.catalogue'"
-    raise finding.infeasible("no_spring_fits", f"{reported}, or change {_in_the_way(reported)}")
+    raise finding.infeasible("no_spring_fits", f"{reported}, or change {_list_blocking_keys(reported)}")
 
 
 def _with_spring(
@@ -341,7 +341,7 @@ _BLOCKING_KEYS = {
 """Which key blocks a spring of the catalogue that is refused for a reason."""
 
 
-def _in_the_way(reported: str) -> str:
+def _list_blocking_keys(reported: str) -> str:
     """Return the keys that block springs of the catalogue: those of their reasons, and what all of them are to do."""
     keys = [key for word, key in _BLOCKING_KEYS.items() if f": {word}" in reported]
     return ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"
@@ -362,7 +362,7 @@ def two_way_gap(
     x = x[path.travel(x) >= 0.02 * target.stroke]
     tangent, on_flank = brace_tangent(x, loads.brace_length), np.zeros(len(x), dtype=bool)
     states = TrackStates(x, np.zeros_like(x), law.slope(x), tangent, on_flank, x, partial(law.slope_derivative, x))
-    ways = np.stack([forces(states, loads, way * friction, way).slider for way in (1.0, -1.0)])
+    ways = np.stack([forces(states, loads, direction * friction, direction).slider for direction in (1.0, -1.0)])
     if not np.isfinite(ways).all():
         return float("inf")
     carried = loads.slider_weight if target.gravity else 0.0
@@ -410,10 +410,10 @@ _SOURCE_KEYS = {
 
 def _overwritten(spec: CamSpec, written: CamSpec) -> Iterator[Finding]:
     """Yield what to say about values of the profile that the user gave and the design replaces."""
-    given, new = spec.mechanism.profile, written.mechanism.profile
+    stated, new = spec.mechanism.profile, written.mechanism.profile
     # What the design is for, its force constant and stroke, is meant to be replaced.
-    for name in sorted(given.model_fields_set - {"force_constant", "stroke"}):
-        old, now = getattr(given, name), getattr(new, name)
+    for name in sorted(stated.model_fields_set - {"force_constant", "stroke"}):
+        old, now = getattr(stated, name), getattr(new, name)
         if old is not None and old != now and not (isinstance(old, float) and isclose(old, now or 0.0, rel_tol=1e-12)):
             values = [f"{item:g}" if name in ("friction", "slope_factor") else _length(item) for item in (old, now)]
             source = _SOURCE_KEYS.get(name, f"mechanism.{name}")

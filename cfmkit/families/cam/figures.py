@@ -85,19 +85,19 @@ def draw_mechanism(
     view: Scene | None = None,  # of the same solution, where several positions are drawn
 ) -> Axes:
     """Draw the mechanism to scale at one point of the solution; return the axes, which are in millimetres."""
-    view, here = view or scene(solution), pose(solution, index)
+    view, drawn_pose = view or scene(solution), pose(solution, index)
     radius, height = solution.assembly.spec.mechanism.roller_radius, view.box[3] - view.box[1]
     parts.plate(ax, view.plate)
     parts.axis_of_symmetry(ax, view.box[1], view.box[3])
-    for side, name, at in ((1.0, "right", here), (-1.0, "left", here.mirror())):
+    for side, name, at in ((1.0, "right", drawn_pose), (-1.0, "left", drawn_pose.mirror())):
         mirror = np.array([side, 1.0])
         parts.edge(ax, view.flank * mirror, f"flank-{name}")
         parts.edge(ax, view.path * mirror, f"path-{name}", color=LINE_BLUE, linewidth=0.7, dashes=(1, 2), zorder=2.4)
         parts.roller(ax, at.roller, radius, f"roller-{name}")
         parts.link(ax, at.slider, at.roller, f"brace-{name}")
         parts.contact(ax, at.contact, f"contact-{name}")
-    parts.spring(ax, here.mirror().roller, here.roller, 0.9 * radius)
-    x, y = here.slider
+    parts.spring(ax, drawn_pose.mirror().roller, drawn_pose.roller, 0.9 * radius)
+    x, y = drawn_pose.slider
     parts.slider(ax, (x, y), 0.035 * height)
     parts.force_arrow(ax, (x, y + 0.02 * height), (x, y + 0.11 * height))
     parts.to_scale(ax, view.box)
@@ -123,19 +123,19 @@ def loop(result: Result) -> Figure:
 
 def regions(solution: Solution) -> list[MarkedRange]:
     """Return the parts of the displacement in which the mechanism does not work as intended."""
-    found, origin = [], solution.origin
+    ranges, origin = [], solution.origin
     asked, reached = solution.assembly.spec.analysis.travel, float(solution.travel[-1])
     corner = min(solution.corner_travel, reached)
     if corner > 0:
-        found.append(MarkedRange(origin, origin + corner, f"on the corner: first {value_text(corner, 'length')}"))
+        ranges.append(MarkedRange(origin, origin + corner, f"on the corner: first {value_text(corner, 'length')}"))
     slack = np.flatnonzero(solution.elongation < -1e-12)
     if len(slack) and float(solution.travel[slack[-1]]) > corner:
         end = float(solution.travel[slack[-1]])
-        found.append(MarkedRange(origin, origin + end, f"springs slack: first {value_text(end, 'length')}"))
+        ranges.append(MarkedRange(origin, origin + end, f"springs slack: first {value_text(end, 'length')}"))
     if asked and asked > reached * (1 + 1e-9):
         text = f"the profile ends at {value_text(origin + reached, 'length')}"
-        found.append(MarkedRange(origin + reached, origin + asked, text))
-    return found
+        ranges.append(MarkedRange(origin + reached, origin + asked, text))
+    return ranges
 
 
 @apply_style
@@ -163,24 +163,24 @@ def mechanism(result: Result) -> Figure:
 
 
 def _names_at_start(solution: Solution, index: int, _view: Scene) -> list[Label]:
-    here = pose(solution, index)
-    return [parts.part_name("corner", [here.contact], (1.0, 0.6), TROUBLE_RED)] if here.on_corner else []
+    drawn_pose = pose(solution, index)
+    return [parts.part_name("corner", [drawn_pose.contact], (1.0, 0.6), TROUBLE_RED)] if drawn_pose.on_corner else []
 
 
 def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
-    here, number, height = (
+    drawn_pose, number, height = (
         pose(solution, index),
         count_of(solution.assembly.spec.mechanism.springs),
         view.box[3] - view.box[1],
     )
-    radius, (x, y) = solution.assembly.spec.mechanism.roller_radius, here.roller
-    roller, pin = np.array(here.roller), np.array(here.slider)
+    radius, (x, y) = solution.assembly.spec.mechanism.roller_radius, drawn_pose.roller
+    roller, pin = np.array(drawn_pose.roller), np.array(drawn_pose.slider)
     spring = np.column_stack([np.linspace(-0.5, 0.5, 20) * x, np.full(20, y - 0.45 * radius)])
     return [
         parts.part_name("F", [pin + np.array([0.0, 0.06 * height])], (1.0, 0.0), LINE_VERMILLION),
         parts.part_name("slider", [pin], (-1.0, 0.2)),
         parts.part_name("brace", pin + np.linspace(0.2, 0.8, 20)[:, None] * (roller - pin), (1.0, 0.5)),
-        parts.part_name("roller", parts.ring(here.roller, radius, 25), (0.0, -1.0)),
+        parts.part_name("roller", parts.ring(drawn_pose.roller, radius, 25), (0.0, -1.0)),
         parts.part_name("spring" if number == 1 else f"{number} springs", spring, (0.0, -1.0), SPRING_OCHRE),
     ]
 
@@ -207,18 +207,18 @@ def curvature(result: Result) -> Figure:
     limits = [Limit(cut_for, f"roller {value_text(cut_for, 'length')}", trouble=profile.corner is not None)]
     if built != cut_for:
         limits.append(Limit(built, f"roller built in {value_text(built, 'length')}"))
-    found = []
+    ranges = []
     if profile.corner:
         first = f": the first {value_text(solution.corner_travel, 'length')} of travel"
         text = f"undercut{first if solution.corner_travel > 0 else ''}"
-        found.append(MarkedRange(float(x[0]), profile.corner.first_contact, text))
+        ranges.append(MarkedRange(float(x[0]), profile.corner.first_contact, text))
     scales = Scale("x of the roller's axis", "length"), Scale("radius of curvature", "length", log=True)
     series = [
         Series(radius, "roller path", LINE_BLUE, prefer=0.5),
         Series(flank, "cam", TEXT_GREY, dashed=True, prefer=0.15),
     ]
     heading = Heading.from_result(result, "Radius of curvature")
-    figure = diagram_figure(heading, [Diagram(x, *scales, series, limits, found)], top_mm=9.0)
+    figure = diagram_figure(heading, [Diagram(x, *scales, series, limits, ranges)], top_mm=9.0)
     travel = profile.path.travel(x) + solution.origin
     top_axis(figure.axes[0], parts.mm(x), parts.mm(travel), TRAVEL_SCALE.label)
     return figure
@@ -237,11 +237,11 @@ def contact(result: Result) -> Figure:
     if not alike:
         series.append(Series(down.contact, "contact, down", LINE_VERMILLION, prefer=0.3))
     angle = [Series(solution.pressure_angle, "between the brace's pull and the roller's motion", LINE_BLUE)]
-    found = regions(solution)
+    ranges = regions(solution)
     limits = [Limit(np.pi / 2, "90 deg: no leverage on the roller"), *limits_on(result, "pressure_angle_max")]
-    unnamed = [replace(region, text="") for region in found]
+    unnamed = [replace(region, text="") for region in ranges]
     diagrams = [
-        Diagram(over, TRAVEL_SCALE, Scale("force", "force"), series, limits_on(result, "contact_force_max"), found),
+        Diagram(over, TRAVEL_SCALE, Scale("force", "force"), series, limits_on(result, "contact_force_max"), ranges),
         Diagram(over, TRAVEL_SCALE, Scale("pressure angle", "angle"), angle, limits, unnamed),
     ]
     return diagram_figure(Heading.from_result(result, "forces on the parts, and the pressure angle"), diagrams)
@@ -273,15 +273,15 @@ def springs(result: Result) -> Figure:
 def clearance(result: Result) -> Figure:
     """Return how far the moving parts stay from plate, screws and each other over the travel, with the gap wanted."""
     solution: Solution = result.state
-    envelope, found = solution.assembly.spec.mechanism.envelope, nearest_pairs(solution)
+    envelope, gaps = solution.assembly.spec.mechanism.envelope, nearest_pairs(solution)
     colors = (LINE_BLUE, LINE_VERMILLION, LINE_PURPLE, SPRING_OCHRE, LINE_BLACK, LINE_BROWN, TEXT_GREY)
-    order = sorted(found, key=lambda pair: float(found[pair].min()))
+    order = sorted(gaps, key=lambda pair: float(gaps[pair].min()))
     series = [
-        Series(found[pair], pair, color, prefer=0.15 + 0.12 * number)
+        Series(gaps[pair], pair, color, prefer=0.15 + 0.12 * number)
         for number, (pair, color) in enumerate(zip(order, colors, strict=False))
     ]
     wanted = envelope.gap if envelope is not None else 0.0
-    passed = any(float(gap.min()) < wanted - 1e-9 for gap in found.values())
+    passed = any(float(gap.min()) < wanted - 1e-9 for gap in gaps.values())
     text = f"wanted {value_text(wanted, 'length')}" if wanted else "touching"
     limits = [*limits_on(result, "clearance_min"), Limit(wanted, text, trouble=passed)]
     diagram = Diagram(solution.travel + solution.origin, TRAVEL_SCALE, Scale("distance", "length"), series, limits)
@@ -332,11 +332,11 @@ def _cut_away(solution: Solution, ax: Axes, view: Scene) -> None:
     x, y = 0.5 * (tail.max(axis=0) + tail.min(axis=0))
     size = 0.75 * float(np.ptp(tail, axis=0).max())
     parts.close_up(ax, (float(x), float(y)), size)
-    near = rim[(np.abs(rim - np.array([x, y])) < size).all(axis=1)]
+    close_rim = rim[(np.abs(rim - np.array([x, y])) < size).all(axis=1)]
     names = [
         parts.part_name("corner", corner, (-1.0, 1.0), TROUBLE_RED),
         parts.part_name("shifted path,\ncut away", tail, (0.5, -1.0), TROUBLE_RED, prefer=0.2),
-        parts.part_name("roller at the start", near, (0.0, -1.0), prefer=0.8),
+        parts.part_name("roller at the start", close_rim, (0.0, -1.0), prefer=0.8),
     ]
     place_labels(ax, names)
 
@@ -384,10 +384,10 @@ def _values_over_height(built: MeasuredCam, side: int, values: FloatArray, heigh
     used = built.registration.used[side]
     y = built.registration.points[side][used, 1]
     order = np.argsort(y, kind="stable")
-    found: FloatArray = np.interp(heights, y[order], values[used][order])
+    deviations: FloatArray = np.interp(heights, y[order], values[used][order])
     for low, high in holes_between(y[order], heights[0], heights[-1]):
-        found[(heights > low) & (heights < high)] = np.nan
-    return found
+        deviations[(heights > low) & (heights < high)] = np.nan
+    return deviations
 
 
 def shares(result: Result) -> Figure:
@@ -423,9 +423,9 @@ def manufacturing(result: Result) -> Figure:
         (0.025, "2.5 %", LINE_VERMILLION),
     )
     series = [Series(band.quantile(share)[shown], name, color, prefer=0.7) for share, name, color in lines]
-    one = Series(band.forces[0][shown], "one of them", LINE_PURPLE, prefer=0.3)
+    example = Series(band.forces[0][shown], "one of them", LINE_PURPLE, prefer=0.3)
     scales = Scale("displacement", "length"), Scale("force without friction", "force", zero=False)
-    diagram = Diagram(over[shown], *scales, [*series, one])
+    diagram = Diagram(over[shown], *scales, [*series, example])
     median = 100 * float(np.median(band.deviations()))
     subject = f"cams cut with errors, {median:.2g} % SD along the travel"
     return diagram_figure(Heading.from_result(result, subject), [diagram])

@@ -124,17 +124,17 @@ def overstress(mechanism: Mechanism, largest: float, place: str) -> tuple[str, .
 
 def left_out(spec: CamSpec) -> tuple[Finding, ...]:
     """Return what to say where the two sides differ: the quasi-static model is symmetric."""
-    errors, found = spec.mechanism.errors, []
+    errors, unsupported = spec.mechanism.errors, []
     if errors and (errors.slider_deviation or errors.flank_angle):
-        found.append("'mechanism.errors'")
+        unsupported.append("'mechanism.errors'")
     if spec.mechanism.left:
-        found.append("'mechanism.left'")
-    if not found:
+        unsupported.append("'mechanism.left'")
+    if not unsupported:
         return ()
-    verb = "counts" if len(found) == 1 else "count"
+    verb = "counts" if len(unsupported) == 1 else "count"
     message = (
-        f"the quasi-static model is symmetric: {' and '.join(found)} {verb} in the dynamic model only; to see the "
-        "effect, state a slow motion in 'analysis.dynamics'"
+        f"the quasi-static model is symmetric: {' and '.join(unsupported)} {verb} in the dynamic model only; to see "
+        "the effect, state a slow motion in 'analysis.dynamics'"
     )
     return (finding("symmetric_model", message),)
 
@@ -280,18 +280,18 @@ def _describe_overstretch(solution: Solution) -> tuple[str, ...]:
     return (f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",)
 
 
-def _slack_cable(way: Literal["up", "down"]) -> FindingRule[Solution]:
+def _slack_cable(direction: Literal["up", "down"]) -> FindingRule[Solution]:
     # Springs that pull keep the rollers on the cam as long as nothing accelerates: the contact force is positive.
     def places(solution: Solution) -> NDArray[np.bool_]:
-        return np.asarray((solution.elongation > 0) & (getattr(solution, way).slider <= 0))
+        return np.asarray((solution.elongation > 0) & (getattr(solution, direction).slider <= 0))
 
     def message(solution: Solution) -> tuple[str, ...]:
         return (
-            f"on the way {way} the force on the slider is not positive from "
+            f"on the way {direction} the force on the slider is not positive from "
             f"{_where(solution.travel, places(solution))} of travel: a cable would go slack",
         )
 
-    return FindingRule("slack_cable", lambda one: places(one).any(axis=-1), message)
+    return FindingRule("slack_cable", lambda solution: places(solution).any(axis=-1), message)
 
 
 def _is_lifted(solution: Solution) -> Any:
@@ -345,7 +345,7 @@ def _is_overstressed(solution: Solution) -> Any:
 
 
 def _describe_overstress(solution: Solution) -> tuple[str, ...]:
-    top, travel = (float(one[0, 0]) for one in solution.flank.largest_pressure)
+    top, travel = (float(values[0, 0]) for values in solution.flank.largest_pressure)
     return overstress(solution.mechanism, top, f"at {mm(travel)} of travel")
 
 
@@ -364,11 +364,13 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     return (
         FindingRule("undercut", _is_undercut, _undercut, _undercut_in_short),
         FindingRule(
-            "corner_pressure", lambda one: one.mechanism.contact is not None and _is_undercut(one), _corner_pressure
+            "corner_pressure",
+            lambda solution: solution.mechanism.contact is not None and _is_undercut(solution),
+            _corner_pressure,
         ),
         *map(_jam, range(number)),
         FindingRule("dead_point", _is_dead, _dead_point),
-        FindingRule("spring_slack", lambda one: is_slack(one.elongation).any(axis=-1), _slack),
+        FindingRule("spring_slack", lambda solution: is_slack(solution.elongation).any(axis=-1), _slack),
         FindingRule("spring_overstretched", _is_overstretched, _describe_overstretch),
         _slack_cable("up"),
         _slack_cable("down"),
@@ -383,7 +385,7 @@ TOO_NOISY = 2.0  # points are noisier than stated if their neighbours say so by 
 
 def findings_of_built(built: MeasuredCam) -> list[Finding]:
     """Return what the user must know about the measured profile."""
-    found = [*_built_mechanics(built), *_weak_registration(built), *_doubtful_points(built)]
+    warnings = [*_built_mechanics(built), *_weak_registration(built), *_doubtful_points(built)]
     last = built.assembly.stroke
     if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0 or built.unmeasured:
         ends = [
@@ -392,15 +394,15 @@ def findings_of_built(built: MeasuredCam) -> list[Finding]:
             float(built.travel[-1]),
         ]
         spans = [f"{mm(low)} to {mm(high)}" for low, high in zip(ends[::2], ends[1::2], strict=True)]
-        found.append(
+        warnings.append(
             finding(
                 "part_measured",
                 f"the flanks were measured for {' and '.join(spans)} of the travel only, which is {mm(last)}",
             )
         )
     if built.unmeasured:
-        found.append(finding("profile_hole", describe_unmeasured(built)))
-    return found
+        warnings.append(finding("profile_hole", describe_unmeasured(built)))
+    return warnings
 
 
 def describe_unmeasured(built: MeasuredCam) -> str:
@@ -471,7 +473,7 @@ def _doubtful_points(built: MeasuredCam) -> Iterator[Finding]:
             "profile_outliers", f"{outliers} of {count} points are far off or beyond the flank and are omitted"
         )
     stated = float(built.assembly.spec.mechanism.profile.noise or 0.0)
-    seen = max(neighbour_noise(one, use) for one, use in _errors_along(built))
+    seen = max(neighbour_noise(errors, use) for errors, use in _errors_along(built))
     if seen > TOO_NOISY * stated:
         yield finding(
             "noise_understated",

@@ -35,9 +35,9 @@ from cfmkit.families.hardware import (
     GuideRods,
     Hardware,
     PartStrength,
+    describe_faults,
     guide_part,
     guide_rods,
-    in_sentences,
     link_width,
     mm,
     pin_for,
@@ -69,7 +69,7 @@ MAX_BAR_WIDTH = 1.0
 
 
 @dataclass(frozen=True)
-class _Loads:
+class _SizingLoads:
     """Largest forces, thicknesses, and stresses that parts may have: sizes of parts follow from these."""
 
     strength: PartStrength
@@ -82,7 +82,7 @@ class _Loads:
     hooks: _Hooks
 
     @classmethod
-    def of_solution(cls, solution: Solution) -> _Loads:
+    def from_solution(cls, solution: Solution) -> _SizingLoads:
         """Return those of a solved mechanism."""
         spec = solution.assembly.spec
         plate, contact = spec.mechanism.plate, spec.mechanism.contact
@@ -109,7 +109,7 @@ class _Loads:
 
 def hardware(solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism."""
-    mechanism, loads, faults = solution.assembly.spec.mechanism, _Loads.of_solution(solution), dict[str, str]()
+    mechanism, loads, faults = solution.assembly.spec.mechanism, _SizingLoads.from_solution(solution), dict[str, str]()
     strength, thick, hooks = loads.strength, loads.thickness, loads.hooks
     pin = _slider_pin(mechanism, loads, faults)
     shaft, bearing = _shaft(mechanism, loads, faults)
@@ -151,13 +151,13 @@ def hardware(solution: Solution) -> Hardware:
         (*standing, *around),
         drawn,
         rubbing,
-        in_sentences(faults),
+        describe_faults(faults),
         heads,
         2.0 * rods.slider_thickness,
     )
 
 
-def _slider_pin(mechanism: Mechanism, loads: _Loads, faults: dict[str, str]) -> float:
+def _slider_pin(mechanism: Mechanism, loads: _SizingLoads, faults: dict[str, str]) -> float:
     """Return the stated slider pin, or the thinnest that bears [m]; faults are added."""
     arm, thin = 0.5 * (loads.brace + loads.rods.slider_thickness), min(loads.brace, loads.rods.slider_thickness)
     pin, bears = pin_for(loads.pull, arm, thin, loads.strength, mechanism.plate.stock)
@@ -174,7 +174,7 @@ def _slider_pin(mechanism: Mechanism, loads: _Loads, faults: dict[str, str]) -> 
     return mechanism.pins.diameter
 
 
-def _screw(mechanism: Mechanism, loads: _Loads, holes: int, faults: dict[str, str]) -> Screw:
+def _screw(mechanism: Mechanism, loads: _SizingLoads, holes: int, faults: dict[str, str]) -> Screw:
     """Return the screw that goes through the holes of the plate, or one that bears; faults are added."""
     count = max(holes, 2)
     needed = screw_for(loads.force, loads.thickness, count, loads.strength)
@@ -262,10 +262,10 @@ def cut_plate(solution: Solution) -> tuple[Contour, ...]:
 
 def roller_shaft(solution: Solution) -> tuple[float, Bearing | None]:
     """Return the diameter of the rollers' shafts [m] and the ball bearing on each; None if the roller turns on it."""
-    return _shaft(solution.assembly.spec.mechanism, _Loads.of_solution(solution), {})
+    return _shaft(solution.assembly.spec.mechanism, _SizingLoads.from_solution(solution), {})
 
 
-def _shaft(mechanism: Mechanism, loads: _Loads, faults: dict[str, str]) -> tuple[float, Bearing | None]:
+def _shaft(mechanism: Mechanism, loads: _SizingLoads, faults: dict[str, str]) -> tuple[float, Bearing | None]:
     """Return the stated shaft of a roller or the thinnest that bears [m], and its ball bearing; faults are added."""
     least, most = loads.thinnest_shaft(mechanism.plate.stock), BEARING_IN_ROLLER * 2.0 * mechanism.roller_radius
     stated = mechanism.bearings
@@ -307,7 +307,7 @@ def _springs_in_words(mechanism: Mechanism, hooks: _Hooks, shaft: float) -> str:
 
 def _parts(
     solution: Solution,
-    loads: _Loads,
+    loads: _SizingLoads,
     width: float,  # of a brace [m]
     pins: tuple[float, float, Bearing | None],  # diameters of slider pin and shafts [m], and what is on a shaft
     slider: str,  # its size

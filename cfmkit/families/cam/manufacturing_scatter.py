@@ -121,5 +121,5 @@ def _track(assembly: Assembly, built: CurveFrame, slider: FloatArray) -> tuple[F
     rising = np.concatenate([[True], np.diff(np.maximum.accumulate(height)) > 0])
     slope = built.normals[:, 0] / -built.normals[:, 1]
     at = height[rising]
-    found = tuple(np.interp(slider, at, values[rising], left=np.nan, right=np.nan) for values in (x, slope))
-    return found[0], found[1]
+    interpolated = tuple(np.interp(slider, at, values[rising], left=np.nan, right=np.nan) for values in (x, slope))
+    return interpolated[0], interpolated[1]

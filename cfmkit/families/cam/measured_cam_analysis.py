@@ -94,7 +94,7 @@ def analyze_built(spec: CamSpec) -> Result:
         return no_result(spec, problem.finding)
     holes = built.unmeasured
     short = ended.message if ended else describe_unmeasured(built) if large_holes(built) else ""
-    found = [ended] if ended else []
+    warnings = [ended] if ended else []
     asked = assembly.spec.analysis.model_copy(
         update={"travel": float(travel[-1]), "gravity": spec.gravity, "fidelity": "quasi-static"}
     )
@@ -106,7 +106,7 @@ def analyze_built(spec: CamSpec) -> Result:
         closed=LoopAsBuilt(built, tracks),
         values=_values(built),
         warnings=(
-            *found,
+            *warnings,
             *left_out(spec),
             *rubbing_left_out(spec, "the model of a measured cam"),
             *findings_of_built(built),
@@ -140,15 +140,15 @@ def register_cam(assembly: Assembly) -> Registration:
     if not isinstance(source, DataSource):
         raise DataError("the specification names no file with measured points")
     points, flanks = read_sides(source.path), flanks_of(assembly)
-    way = assembly.spec.mechanism.profile.registration or "auto"
-    if way == "datum":
-        found = registered_where_it_is(points, flanks, register(points, flanks, width=True))
-    elif way == "auto":
-        found = _as_the_points_tell(register(points, flanks), register(points, flanks, width=True))
+    method = assembly.spec.mechanism.profile.registration or "auto"
+    if method == "datum":
+        registration = registered_where_it_is(points, flanks, register(points, flanks, width=True))
+    elif method == "auto":
+        registration = _as_the_points_tell(register(points, flanks), register(points, flanks, width=True))
     else:
-        found = register(points, flanks, width=way == "width")
-    _check_fit(found, source)
-    return found
+        registration = register(points, flanks, width=method == "width")
+    _check_fit(registration, source)
+    return registration
 
 
 def _as_the_points_tell(moved: Registration, widened: Registration) -> Registration:
@@ -168,16 +168,16 @@ def _as_the_points_tell(moved: Registration, widened: Registration) -> Registrat
     return widened if certain and explains else moved
 
 
-def _check_fit(found: Registration, name: str) -> None:
+def _check_fit(registration: Registration, name: str) -> None:
     """Refuse points that are not those of the design's flanks."""
-    for use in found.used:
+    for use in registration.used:
         if int(use.sum()) < 20:
             raise DataError(
                 f"{name}: only {int(use.sum())} points of a flank lie on the design; is it the same cam, with x "
                 "across, y upwards and the right units?"
             )
-    errors = np.concatenate([error[use] for error, use in zip(found.errors, found.used, strict=True)])
-    height = max(float(np.ptp(points[:, 1])) for points in found.points)
+    errors = np.concatenate([error[use] for error, use in zip(registration.errors, registration.used, strict=True)])
+    height = max(float(np.ptp(points[:, 1])) for points in registration.points)
     if (rms := float(np.sqrt(np.mean(errors**2)))) > MAX_HEIGHT_DEVIATION * height:
         raise DataError(
             f"{name}: registered to the design, the points are still {mm(rms)} (rms) off it; is it the same cam?"
@@ -193,22 +193,22 @@ def _tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack,
     mechanism, design = assembly.spec.mechanism, flanks_of(assembly)[0]
     noise = float(mechanism.profile.noise or 0.0)
     # The left flank's feet and errors are those of its mirror image.
-    found = []
+    tracks = []
     for u, error, used in zip(registration.parameters, registration.errors, registration.used, strict=True):
         flank = built_flank(design, u[used], error[used], noise)
         track = built_track(flank, mechanism.roller_radius, mechanism.brace_length)
-        found.append(replace(track, holes=_holes(track, np.sort(np.interp(u[used], *flank.arc)), assembly)))
-    return found[0], found[1]
+        tracks.append(replace(track, holes=_holes(track, np.sort(np.interp(u[used], *flank.arc)), assembly)))
+    return tracks[0], tracks[1]
 
 
 def _holes(track: BuiltTrack, places: FloatArray, assembly: Assembly) -> tuple[tuple[float, float], ...]:
     """Return where the slider is while the contact is in a hole between measured points, if that is large [m]."""
-    found = []
+    holes = []
     for low, high in holes_between(places, places[0], places[-1]):
         inside = track.slider[(track.contact > low) & (track.contact < high)]
         if len(inside) and np.ptp(inside) > MAX_HOLE_SHARE * _narrowest_window(track, assembly):
-            found.append((float(inside[0]), float(inside[-1])))
-    return tuple(found)
+            holes.append((float(inside[0]), float(inside[-1])))
+    return tuple(holes)
 
 
 def _narrowest_window(track: BuiltTrack, assembly: Assembly) -> float:
@@ -291,11 +291,11 @@ class LoopAsBuilt(ShortRepr):
 
     def effort(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the force on the way up or down at displacements of any shape [N]."""
-        return np.asarray(self._move_to(places).forces(_way(branch))[0].reshape(np.shape(places)))
+        return np.asarray(self._move_to(places).forces(_get_sign(branch))[0].reshape(np.shape(places)))
 
     def stress(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the stress below the more loaded contact at displacements of any shape [Pa]."""
-        return np.asarray(stress(pressure_of(self._move_to(places), _way(branch))).reshape(np.shape(places)))
+        return np.asarray(stress(pressure_of(self._move_to(places), _get_sign(branch))).reshape(np.shape(places)))
 
     def _move_to(self, places: FloatArray) -> MeasuredCam:
         """Return the mechanism at other displacements."""
@@ -305,7 +305,7 @@ class LoopAsBuilt(ShortRepr):
         return replace(built, travel=travel, sides=sides, shares={})
 
 
-def _way(branch: str) -> float:
+def _get_sign(branch: str) -> float:
     return 1.0 if branch == "load" else -1.0
 
 
@@ -336,11 +336,11 @@ def shares_of(assembly: Assembly, designed: Sides, sides: Sides) -> dict[str, Fl
 def _values(built: MeasuredCam) -> Mapping[str, Quantity]:
     """Return the scalar results: those of any cam, and those of a measured one."""
     (up, *pressed_up), (down, *pressed_down) = built.forces(1.0), built.forces(-1.0)
-    known = np.isfinite(up) & np.isfinite(down) & (up + down > 0)
+    is_known = np.isfinite(up) & np.isfinite(down) & (up + down > 0)
     numbers = design_values(built.assembly) | {
         "spring_elongation_max": float(built.elongation.max()),
         "contact_force_max": largest(*pressed_up, *pressed_down),
-        "friction_half_gap_max": largest((up - down)[known] / (up + down)[known]),
+        "friction_half_gap_max": largest((up - down)[is_known] / (up + down)[is_known]),
     }
     if built.assembly.spec.mechanism.contact:
         numbers["contact_pressure_max"] = largest(pressure_of(built, 1.0))
@@ -352,8 +352,8 @@ def _curve(built: MeasuredCam) -> Curve:
     """Return the closed loop with the parts of the force."""
     up, down = built.forces(1.0), built.forces(-1.0)
 
-    def loop(one: FloatArray, other: FloatArray | None = None) -> FloatArray:
-        return np.concatenate([one, (one if other is None else other)[::-1]])
+    def loop(up_column: FloatArray, down_column: FloatArray | None = None) -> FloatArray:
+        return np.concatenate([up_column, (up_column if down_column is None else down_column)[::-1]])
 
     shares = built.shares
     extra = {
@@ -445,13 +445,13 @@ def _lift(
     count, reach = len(places), max(int(CONTACT_REACH / (places[1] - places[0])), 2)
     best, where = np.full(count, -np.inf), np.zeros(count, dtype=int)
     for shift in range(-reach, reach + 1):
-        other = np.clip(np.arange(count) + shift, 0, count - 1)
-        gap = points[other] - centers
+        neighbour = np.clip(np.arange(count) + shift, 0, count - 1)
+        gap = points[neighbour] - centers
         along = (gap * normals).sum(axis=1)
         beside = (gap * gap).sum(axis=1) - along**2
         need = along + np.sqrt(np.maximum(radius**2 - beside, 0.0))
         better = need > best
-        best, where = np.where(better, need, best), np.where(better, other, where)
+        best, where = np.where(better, need, best), np.where(better, neighbour, where)
     return best, places[where]
 
 

@@ -49,7 +49,7 @@ def attribute(
     design = designed.forces(loads, 0.0, drawn)[0]
     on_track = sides.forces(loads, 0.0, drawn)[0]
     smooth = sides.forces(loads, 0.0, rest)[0]
-    up, down = (sides.forces(loads, way * friction, rest)[0] for way in (1.0, -1.0))
+    up, down = (sides.forces(loads, direction * friction, rest)[0] for direction in (1.0, -1.0))
     numbers = {
         "data_friction": friction,
         "data_rest_error": 2.0 * (rest - loads.rest_half_width),
@@ -84,7 +84,7 @@ def _explain_loop(sides: Sides, loads: Loads, loop: MeasuredLoop) -> tuple[float
     area, middle = np.trapezoid(loop.up - loop.down, loop.places), 0.5 * (loop.up + loop.down)
     for _ in range(_MAX_ROUNDS):
         size = friction or _DIFFERENCE_STEP
-        up, down = (sides.forces(loads, way * size, rest)[0] for way in (1.0, -1.0))
+        up, down = (sides.forces(loads, direction * size, rest)[0] for direction in (1.0, -1.0))
         new = float(size * area / np.trapezoid(up - down, loop.places))
         slope = (
             _middle(sides, loads, new, rest + _DIFFERENCE_STEP) - _middle(sides, loads, new, rest)
@@ -99,7 +99,7 @@ def _explain_loop(sides: Sides, loads: Loads, loop: MeasuredLoop) -> tuple[float
 
 def _middle(sides: Sides, loads: Loads, friction: float, rest: float) -> FloatArray:
     """Return the line midway between the branches [N]."""
-    up, down = (sides.forces(loads, way * friction, rest)[0] for way in (1.0, -1.0))
+    up, down = (sides.forces(loads, direction * friction, rest)[0] for direction in (1.0, -1.0))
     middle: FloatArray = 0.5 * (up + down)
     return middle
 

@@ -184,11 +184,11 @@ def travel_between_stops(spec: CamSpec) -> tuple[Any, Any]:
 
 def shortfalls(assembly: Assembly, reached: Any) -> tuple[Finding, ...]:
     """Return why the curve ends, at a travel [m], before what was requested, or before the flank does."""
-    found = [assembly.shortfall] if assembly.shortfall else []
+    warnings = [assembly.shortfall] if assembly.shortfall else []
     asked = assembly.spec.analysis.travel
     short = asked is not None and fails(reached < asked * (1 - TRAVEL_RTOL))
     if asked is not None and short and travel_between_stops(assembly.spec)[1] <= reached * (1 + TRAVEL_RTOL):
-        found.append(
+        warnings.append(
             finding(
                 "end_stop",
                 f"the requested travel is {mm(asked)}, but the slider is stopped at {mm(reached)} "
@@ -196,7 +196,7 @@ def shortfalls(assembly: Assembly, reached: Any) -> tuple[Finding, ...]:
             )
         )
     elif assembly.track.turns_back and (short or asked is None):
-        found.append(
+        warnings.append(
             finding(
                 "brace_too_short",
                 f"with a brace of {mm(assembly.track.brace_length)} on this cam the slider stops rising after "
@@ -205,14 +205,14 @@ def shortfalls(assembly: Assembly, reached: Any) -> tuple[Finding, ...]:
             )
         )
     elif asked is not None and short:
-        found.append(
+        warnings.append(
             finding(
                 "outside_profile",
                 f"the requested travel is {mm(asked)}, but the profile is cut for {mm(reached)} with these parts; "
                 "cut a longer profile ('mechanism.profile.stroke') or request less ('analysis.travel')",
             )
         )
-    return tuple(found)
+    return tuple(warnings)
 
 
 def _curve(solution: Solution) -> Curve:

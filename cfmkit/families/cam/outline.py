@@ -91,10 +91,10 @@ def _facts(spec: CamSpec) -> Iterator[tuple[str, str]]:
     yield "material", mechanism.contact.material.words if mechanism.contact else "not stated"
     yield "rollers", f"2, diameter {mm(2.0 * mechanism.roller_radius)}"
     yield "braces", f"2, {mm(mechanism.brace_length)} between pin and roller axis"
-    given, count = mechanism.springs.each, mechanism.springs.count or 1
-    each = given if isinstance(given, tuple) else (given,) * count
-    same = len(set(each)) == 1
-    yield "springs", f"{len(each)} of {rate(each[0])}" if same else f"{len(each)}: {', '.join(map(rate, each))}"
+    stated_rates, count = mechanism.springs.each, mechanism.springs.count or 1
+    rates = stated_rates if isinstance(stated_rates, tuple) else (stated_rates,) * count
+    same = len(set(rates)) == 1
+    yield "springs", f"{len(rates)} of {rate(rates[0])}" if same else f"{len(rates)}: {', '.join(map(rate, rates))}"
     if mechanism.preload:
         yield "preload", f"springs stretched by {mm(mechanism.preload)} at the start"
     yield "cut for", f"A {mm(profile.force_constant)}, rolling friction {profile.friction:g}"
@@ -226,27 +226,27 @@ def plate_notes(profiles: Profiles, plate: Plate) -> tuple[str, ...]:
     """Return what the plate lacks for want of room: its tab, or some of its fixing holes."""
     flanks, diameter = (flank_edge(profiles[0]), flank_edge(profiles[1])), plate.hole_diameter
     width, (bottom, top, across) = tab_width(plate, profiles), _extents(flanks, plate)
-    found = []
+    faults = []
     if plate.base_height and not width:
-        found.append("the rollers leave no room for the tab below the cam: the plate has none ('mechanism.plate')")
+        faults.append("the rollers leave no room for the tab below the cam: the plate has none ('mechanism.plate')")
     elif plate.base_height and diameter and not _room_in_tab(plate, width):
-        found.append(
+        faults.append(
             f"the two {mm(diameter)} holes of the tab are left out: they need a tab of {mm(6 * diameter)} by "
             f"{mm(2 * diameter)}, it is {mm(width)} by {mm(plate.base_height)} ('mechanism.plate.base_width', "
             "'.base_height', '.hole_diameter')"
         )
     room = _room_for_tool(flanks, plate, profiles)
     if plate.tool_radius > room > 0:
-        found.append(
+        faults.append(
             f"inside corners beside the tab have room for a tool radius of {mm(room)}, not {mm(plate.tool_radius)}: "
             "they are drawn sharp ('mechanism.plate.tool_radius', '.base_width')"
         )
     if diameter and not _room_at_top(plate, top - bottom, across):
-        found.append(
+        faults.append(
             f"the two {mm(diameter)} holes near the top are left out: they need a cam {mm(6 * diameter)} high and "
             f"{mm(8 * diameter)} wide, it is {mm(top - bottom)} by {mm(2 * across)} ('mechanism.plate.hole_diameter')"
         )
-    return tuple(found)
+    return tuple(faults)
 
 
 def _tables(profiles: Profiles) -> Iterator[Curve2D]:

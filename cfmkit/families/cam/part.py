@@ -56,7 +56,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
     pieces = 9 + count_of(mechanism.springs)
     joining = hardware(solution)
     depth = None if depth is None else depth + joining.slider_excess
-    depth = None if depth is None else 0.5 * depth + max(0.5 * depth, 0.5 * thick + joining.heads)
+    depth = None if depth is None else 0.5 * depth + max(0.5 * depth, 0.5 * thick + joining.screw_head_height)
     return PosedPart(
         (*bodies(solution), *joining.bodies),
         depth=depth,

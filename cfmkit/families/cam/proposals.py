@@ -75,14 +75,14 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     if request.adjustable is not None:
         return FamilyOffer(reason="the force of a cam is fixed by its springs and cannot be adjusted")
     draw = np.random.default_rng(run.seed).uniform(size=(N_PROPORTIONS, 5)).T
-    found = _size_proportions(request, draw)
-    fitting = found["fits"] & found["flat"] & found["lossless"]
+    sizes = _size_proportions(request, draw)
+    fitting = sizes["fits"] & sizes["flat"] & sizes["lossless"]
     if not fitting.any():
-        return _explain_no_offer(request, found)
-    chosen = _spread(found, np.flatnonzero(fitting))
+        return _explain_no_offer(request, sizes)
+    chosen = _spread(sizes, np.flatnonzero(fitting))
     candidates: list[Candidate] = []
     for index in chosen:
-        made = _candidate(request, {name: float(values[index]) for name, values in found.items()})
+        made = _candidate(request, {name: float(values[index]) for name, values in sizes.items()})
         candidates += [made, _from_catalogue(made, request)] if made else []
         if len(candidates) >= MAX_PROPOSALS:
             break
@@ -129,16 +129,16 @@ def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
         ripple = 1.0 - (1.0 + loss.min(axis=0)) / (1.0 + loss.max(axis=0))
         down = 1.0 - (1.0 - loss.max(axis=0)) / (1.0 - loss.min(axis=0))
     least = np.maximum(ROLLER_MIN, 0.5 * shaft / SHAFT_IN_ROLLER)
-    there = (end < 0.97 * brace) & (roller > least) & (roller < 0.99 * radius) & np.isfinite(loss).all(axis=0)
-    ripple = np.where(there, np.maximum(ripple, down), np.inf)
-    hysteresis = np.where(there, 2.0 * loss.mean(axis=0), np.inf)
+    exists = (end < 0.97 * brace) & (roller > least) & (roller < 0.99 * radius) & np.isfinite(loss).all(axis=0)
+    ripple = np.where(exists, np.maximum(ripple, down), np.inf)
+    hysteresis = np.where(exists, 2.0 * loss.mean(axis=0), np.inf)
     return {
         "brace": brace, "start": start, "constant": constant, "roller": roller, "run_in": run_in, "end": end,
         "width": width, "height": height, "ripple": ripple, "hysteresis": hysteresis, "loss": loss.mean(axis=0),
-        "there": there, "contact": contact, "plain": plain,
-        "fits": there & (width < RESERVE_SHARES * across) & (height < RESERVE_SHARES * along),
-        "flat": there & (ripple < FLAT_RESERVE * request.ripple) & (loss.max(axis=0) < 0.2),
-        "lossless": there & (hysteresis < RESERVE_SHARES * (request.hysteresis or np.inf)),
+        "there": exists, "contact": contact, "plain": plain,
+        "fits": exists & (width < RESERVE_SHARES * across) & (height < RESERVE_SHARES * along),
+        "flat": exists & (ripple < FLAT_RESERVE * request.ripple) & (loss.max(axis=0) < 0.2),
+        "lossless": exists & (hysteresis < RESERVE_SHARES * (request.hysteresis or np.inf)),
     }  # fmt: skip
 
 
@@ -158,12 +158,12 @@ def spare_stroke(request: Request) -> float:
     return spare + 2.0 * request.stop_margin
 
 
-def _spread(found: dict[str, Any], fitting: Any) -> list[int]:
+def _spread(sizes: dict[str, Any], fitting: Any) -> list[int]:
     """Return designs that fit, by turns the smallest, the flattest and those with the softest springs."""
-    size = (found["width"] * found["height"])[fitting]
-    soft = (found["end"] - found["start"])[fitting] / found["start"][fitting]
+    size = (sizes["width"] * sizes["height"])[fitting]
+    soft = (sizes["end"] - sizes["start"])[fitting] / sizes["start"][fitting]
     orders = [
-        fitting[np.argsort(key)] for key in (size, found["ripple"][fitting], soft, size * found["ripple"][fitting])
+        fitting[np.argsort(key)] for key in (size, sizes["ripple"][fitting], soft, size * sizes["ripple"][fitting])
     ]
     return list(dict.fromkeys(int(order[k]) for k in range(min(60, len(fitting))) for order in orders))
 
@@ -202,7 +202,7 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
         if depths:
             # as few springs as there is room for; without a depth they may be as deep as the envelope is wide
             modest = [count for count, depth in depths.items() if request.depth or depth <= max(request.envelope)]
-            count = modest[0] if modest else min(depths, key=lambda one: depths[one])
+            count = modest[0] if modest else min(depths, key=lambda count_of_springs: depths[count_of_springs])
             return _write_candidate(request, size | {"pin": float(pin or 0.0)}, dict(block), thick, count, total)
     return None
 
@@ -360,15 +360,15 @@ def _write_candidate(
     return Candidate(variant, spec, design=True, finish=f"{__name__}:with_wire", promise=promise, springs="custom")
 
 
-def _explain_no_offer(request: Request, found: dict[str, Any]) -> FamilyOffer:
+def _explain_no_offer(request: Request, sizes: dict[str, Any]) -> FamilyOffer:
     """Return why no proportions fit."""
-    if not found["there"].any():
+    if not sizes["there"].any():
         return FamilyOffer(reason="no cam of this travel has a path that its roller can follow within such an envelope")
-    flat = found["flat"] & found["lossless"]
+    flat = sizes["flat"] & sizes["lossless"]
     if not flat.any():
         return FamilyOffer(reason="with the friction of the rollers, ripple or loss is larger than required")
     scale = (
-        np.maximum(found["width"] / request.envelope[0], found["height"] / request.envelope[1])[flat].min()
+        np.maximum(sizes["width"] / request.envelope[0], sizes["height"] / request.envelope[1])[flat].min()
         / RESERVE_SHARES
     )
     need = " x ".join(mm(side * float(scale)) for side in request.envelope[:2])

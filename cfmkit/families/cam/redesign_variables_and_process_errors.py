@@ -11,16 +11,16 @@ if TYPE_CHECKING:
 
 
 def free(
-    given: CamSpec,  # with the `design` block
+    spec: CamSpec,  # with the `design` block
     designed: CamSpec,  # what came out
 ) -> dict[str, tuple[float, float]]:
     """Return the force constant of the cut, and the rate of the springs where the design may choose it."""
-    wanted, mechanism = given.design, designed.mechanism
-    found = {"mechanism.profile.force_constant": range_about(mechanism.profile.force_constant)}
+    wanted, mechanism = spec.design, designed.mechanism
+    ranges = {"mechanism.profile.force_constant": range_about(mechanism.profile.force_constant)}
     rate = mechanism.springs.stiffness
     if wanted is not None and wanted.choose == "stiffness" and isinstance(rate, float):
-        found["mechanism.springs.stiffness"] = range_about(rate)
-    return found
+        ranges["mechanism.springs.stiffness"] = range_about(rate)
+    return ranges
 
 
 PLACE_KEYS = "mechanism.brace_length", "mechanism.rest_half_width", "mechanism.roller_radius"

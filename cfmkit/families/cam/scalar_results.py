@@ -202,16 +202,16 @@ def contact_pressure(solution: Solution, forces: Forces | None = None) -> FloatA
 
 def largest(*arrays: FloatArray) -> float | None:
     """Return the largest finite value of all arrays; None if there is none."""
-    found = float(largest_of_each(*arrays)[0])
-    return None if np.isnan(found) else found
+    largest = float(largest_of_each(*arrays)[0])
+    return None if np.isnan(largest) else largest
 
 
 def _bearing_load(solution: Solution) -> FloatArray:
     """Return the largest load of one bearing of each mechanism [N]."""
-    return largest_of_each(*(_of_contact(solution) * state.contact for state in (solution.up, solution.down)))
+    return largest_of_each(*(_find_bearing_share(solution) * state.contact for state in (solution.up, solution.down)))
 
 
-def _of_contact(solution: Solution) -> Any:
+def _find_bearing_share(solution: Solution) -> Any:
     """Return the load of one bearing over the contact force of its roller."""
     mechanism, loads = solution.mechanism, solution.assembly.loads
     losses = loads.losses or Losses(roller_radius=mechanism.roller_radius)
@@ -226,8 +226,10 @@ def _bearing_life(solution: Solution) -> FloatArray:
     # In the middle of each step: at the start the load of a mechanism that jams there is unbounded.
     middles = 0.5 * (travel[..., 1:] + travel[..., :-1])
     used = 0.0
-    for way in (1.0, -1.0):
-        load = np.nan_to_num(np.maximum(solution.evaluate_travel(middles, way)[1].contact, 0.0)) * _of_contact(solution)
+    for direction in (1.0, -1.0):
+        load = np.nan_to_num(
+            np.maximum(solution.evaluate_travel(middles, direction)[1].contact, 0.0)
+        ) * _find_bearing_share(solution)
         used = used + (turns * (load / bearings.dynamic_rating) ** exponent).sum(axis=-1, keepdims=True)
     return np.where(used > 0, 1e6 / used, np.nan)
 
@@ -261,8 +263,8 @@ def _integral(places: FloatArray, values: FloatArray, low: Any, high: Any) -> Fl
     left, first = places[..., :-1], values[..., :-1]
     slope = np.diff(values) / np.diff(places)
     middle = np.where(start == left, first, first + slope * (start - left)) + 0.5 * slope * (stop - start)
-    found = np.where(stop > start, (stop - start) * middle, 0.0)
-    return np.asarray(found.sum(axis=-1, keepdims=True))
+    areas = np.where(stop > start, (stop - start) * middle, 0.0)
+    return np.asarray(areas.sum(axis=-1, keepdims=True))
 
 
 def _corner_peak(solution: Solution) -> FloatArray:
@@ -323,45 +325,47 @@ def _loop_share(solution: Solution, kind: str) -> FloatArray:
 
 def _least_contact(solution: Solution) -> FloatArray:
     both = (solution.up.least_contact, solution.down.least_contact)
-    return -largest_of_each(*(-one[..., 1:] for one in both if one is not None))
+    return -largest_of_each(*(-contact[..., 1:] for contact in both if contact is not None))
 
 
 _SCALAR_FUNCTIONS: dict[str, tuple[Callable[[Solution], Any], Callable[[Solution], bool] | None]] = {
-    "force_constant": (lambda one: one.assembly.profile.path.law.force_constant, None),
-    "spring_stiffness": (lambda one: one.assembly.loads.stiffness, None),
-    "theoretical_force": (lambda one: constant_force(one.assembly), None),
-    "undercut_travel": (lambda one: one.corner_travel, None),
-    "roller_radius_max": (lambda one: one.of_each_cam(largest_roller), None),
-    "force_constant_min": (lambda one: one.of_each_cam(smallest_constant), None),
+    "force_constant": (lambda solution: solution.assembly.profile.path.law.force_constant, None),
+    "spring_stiffness": (lambda solution: solution.assembly.loads.stiffness, None),
+    "theoretical_force": (lambda solution: constant_force(solution.assembly), None),
+    "undercut_travel": (lambda solution: solution.corner_travel, None),
+    "roller_radius_max": (lambda solution: solution.read_each_cam(largest_roller), None),
+    "force_constant_min": (lambda solution: solution.read_each_cam(smallest_constant), None),
     "corner_force_max": (_corner_peak, None),
-    "jam_travel": (lambda one: one.jam_travel, None),
-    "spring_elongation_max": (lambda one: one.elongation.max(axis=-1, keepdims=True), None),
-    "contact_force_max": (lambda one: largest_of_each(one.up.contact, one.down.contact), None),
-    "pressure_angle_max": (lambda one: largest_of_each(one.flank.pressure_angle), None),
+    "jam_travel": (lambda solution: solution.jam_travel, None),
+    "spring_elongation_max": (lambda solution: solution.elongation.max(axis=-1, keepdims=True), None),
+    "contact_force_max": (lambda solution: largest_of_each(solution.up.contact, solution.down.contact), None),
+    "pressure_angle_max": (lambda solution: largest_of_each(solution.flank.pressure_angle), None),
     "brace_angle_max": (
-        lambda one: np.arcsin(one.states.x.max(axis=-1, keepdims=True) / one.assembly.track.brace_length),
+        lambda solution: np.arcsin(
+            solution.states.x.max(axis=-1, keepdims=True) / solution.assembly.track.brace_length
+        ),
         None,
     ),
-    "friction_half_gap_max": (lambda one: one.flank.half_gap, None),
-    "contact_pressure_max": (lambda one: one.flank.largest_pressure[0], _is_in_contact),
+    "friction_half_gap_max": (lambda solution: solution.flank.half_gap, None),
+    "contact_pressure_max": (lambda solution: solution.flank.largest_pressure[0], _is_in_contact),
     **{f"loop_energy_{kind}": (partial(_loop_energy, kind=kind), _rubs) for kind in FRICTION_KINDS},
     **{f"loop_share_{kind}": (partial(_loop_share, kind=kind), _rubs) for kind in FRICTION_KINDS},
     "bearing_load_max": (_bearing_load, _has_bearings),
     "bearing_static_safety": (
-        lambda one: one.mechanism.bearings.static_rating / _bearing_load(one),
-        lambda one: (
-            _has_bearings(one)
-            and one.mechanism.bearings.static_rating is not None
-            and bool((_bearing_load(one) > 0).any())
+        lambda solution: solution.mechanism.bearings.static_rating / _bearing_load(solution),
+        lambda solution: (
+            _has_bearings(solution)
+            and solution.mechanism.bearings.static_rating is not None
+            and bool((_bearing_load(solution) > 0).any())
         ),
     ),
     "bearing_life": (
         _bearing_life,
-        lambda one: _has_bearings(one) and one.mechanism.bearings.dynamic_rating is not None,
+        lambda solution: _has_bearings(solution) and solution.mechanism.bearings.dynamic_rating is not None,
     ),
     "contact_force_least": (_least_contact, _is_tilted),
-    "manufacturing_force_share": (_deviations(0.5), lambda one: one.band is not None),
-    "manufacturing_force_share_95": (_deviations(0.95), lambda one: one.band is not None),
+    "manufacturing_force_share": (_deviations(0.5), lambda solution: solution.band is not None),
+    "manufacturing_force_share_95": (_deviations(0.95), lambda solution: solution.band is not None),
 }
 SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **{
@@ -380,7 +384,7 @@ ROW_COLUMNS: Mapping[str, ScalarQuantity[Solution]] = {
 
 def values_of_built(built: MeasuredCam) -> Mapping[str, Quantity]:
     """Return the scalar results by name."""
-    found, used = built.registration, built.registration.used
+    registration, used = built.registration, built.registration.used
     errors = errors_used(built)
     across = np.concatenate([item[keep] for item, keep in zip(built.across, used, strict=True)])
     inside = window_mask(built)
@@ -392,12 +396,12 @@ def values_of_built(built: MeasuredCam) -> Mapping[str, Quantity]:
         "profile_rmse_x": root_mean_square(across),
         "profile_sd_x": float(across.std(ddof=1)),
         "profile_outliers": float(sum(int((~keep).sum()) for keep in used)),
-        "registration_angle": found.angle,
-        "registration_x": float(found.shift[0]),
-        "registration_y": float(found.shift[1]),
-        "registration_width": found.width,
-        "registration_uncertainty": found.weakest(half_extent(built))[1],
-        "registration_y_per_width": float(found.growth[1]),
+        "registration_angle": registration.angle,
+        "registration_x": float(registration.shift[0]),
+        "registration_y": float(registration.shift[1]),
+        "registration_width": registration.width,
+        "registration_uncertainty": registration.weakest(half_extent(built))[1],
+        "registration_y_per_width": float(registration.growth[1]),
         "profile_force_sd": float(np.nanstd(share, ddof=1)),
         "profile_force_share": float(np.nanstd(share, ddof=1) / np.nanmean(built.shares["design"][inside])),
         "rest_force_mean": float(np.nanmean(built.shares["rest"][inside])),
@@ -405,25 +409,25 @@ def values_of_built(built: MeasuredCam) -> Mapping[str, Quantity]:
         "loop_area_per_friction": loop_area_per_friction(built),
     }
     unknown = OF_THE_FORCE if large_holes(built) else ()
-    known = {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
+    quantities = {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
     why = "a part of the flanks was not measured"
-    return known | {name: Quantity(None, *BUILT_DEFINITIONS[name], why) for name in unknown}
+    return quantities | {name: Quantity(None, *BUILT_DEFINITIONS[name], why) for name in unknown}
 
 
 OF_THE_FORCE = ("profile_force_sd", "profile_force_share", "loop_area_per_friction")
 """What needs the force everywhere in the window."""
 
 
-def pressure_of(built: MeasuredCam, way: float) -> FloatArray:
+def pressure_of(built: MeasuredCam, direction: float) -> FloatArray:
     """Return the larger pressure of both contacts on the way up (1) or down (-1), the flank curved as designed [Pa]."""
-    track, forces = built.assembly.track, built.forces(way)
+    track, forces = built.assembly.track, built.forces(direction)
     return flank_pressure(built.assembly, track.states(track.start + built.travel), np.maximum(forces[1], forces[2]))
 
 
 def loop_area_per_friction(built: MeasuredCam) -> float:
     """Return d(loop area)/d(friction) over the window [J], from a small friction either way."""
     loads, small = built.assembly.loads, 1e-6
-    up, down = (built.sides.forces(loads, way * small, loads.rest_half_width)[0] for way in (1.0, -1.0))
+    up, down = (built.sides.forces(loads, direction * small, loads.rest_half_width)[0] for direction in (1.0, -1.0))
     window = built.assembly.spec.analysis.window
     ends = window_places(window, requested_travel(built)) if window else None
     places = built.travel + built.origin

@@ -97,7 +97,7 @@ class Solution(ShortRepr):
         """Block `mechanism` of the specification."""
         return self.assembly.spec.mechanism
 
-    def of_each_cam(self, read: Callable[[CamProfile], float]) -> FloatArray:
+    def read_each_cam(self, read: Callable[[CamProfile], float]) -> FloatArray:
         """Return a number of each different cam, (m, 1), or (1, 1) where all are alike."""
         cam = self.assembly.profile
         if not isinstance(self.assembly.track, TrackRows):
@@ -159,7 +159,7 @@ class Solution(ShortRepr):
         """Return where the rollers are, and the forces on the way up (1) or down (-1), at travels [m]."""
         track, loads, friction = self.assembly.track, self.assembly.loads, self.mechanism.rolling_friction
         if rows is not None:
-            track, loads, friction = track.of_rows(rows), rows_of(loads, rows), rows_of(friction, rows)
+            track, loads, friction = track.select_rows(rows), rows_of(loads, rows), rows_of(friction, rows)
         slider = track.start + travel
         if rows is None and not flank:
             states = self._states_at(slider)
@@ -208,8 +208,8 @@ class Solution(ShortRepr):
             else:
                 parts = track, friction, states, losses
                 if len(rows) < self.count:
-                    own = states and states.combine(partial(rows_of, rows=rows))
-                    parts = track.of_rows(rows), rows_of(friction, rows), own, rows_of(losses, rows)
+                    row_states = states and states.combine(partial(rows_of, rows=rows))
+                    parts = track.select_rows(rows), rows_of(friction, rows), row_states, rows_of(losses, rows)
                 jams_and_ends = zip(jams(*parts, len(rows)), total[rows].tolist(), strict=True)
                 clipped = [_clip_intervals(jam, end) for jam, end in jams_and_ends]
             for row, jam in zip(rows.tolist(), clipped, strict=True):
@@ -240,8 +240,8 @@ class Solution(ShortRepr):
             return Several((low, high))
         windows = self.windows or [stated]
         which, lows, highs = np.broadcast_arrays(np.arange(len(windows)), low.ravel(), high.ravel())
-        own = zip(which.tolist(), zip(lows.tolist(), highs.tolist(), strict=True), strict=True)
-        ends = np.array([window_places(windows[row], pair) for row, pair in own]).T
+        ends_of_rows = zip(which.tolist(), zip(lows.tolist(), highs.tolist(), strict=True), strict=True)
+        ends = np.array([window_places(windows[row], pair) for row, pair in ends_of_rows]).T
         return Several(ends[..., None] if low.ndim > 1 or self.windows else ends)
 
     @property
@@ -292,14 +292,14 @@ class Solution(ShortRepr):
     @cached_property
     def branches(self) -> dict[str, CurveRows]:
         """The curves by branch, up and down."""
-        motion = self._of_each(self.travel + self.origin)
+        motion = self._spread_over_rows(self.travel + self.origin)
         corner, first = self.column(self.corner_travel), self.column(self.travel[..., :1])
         valid = np.maximum(corner, first) + self.column(self.origin), motion[:, -1]
         target = target_force(self.assembly.spec, self.assembly)
         return {
             name: CurveRows(
-                RowSamples(motion, self._of_each(state.slider), np.full(self.count, motion.shape[1])),
-                lambda: self._of_each(self.places),
+                RowSamples(motion, self._spread_over_rows(state.slider), np.full(self.count, motion.shape[1])),
+                lambda: self._spread_over_rows(self.places),
                 partial(self._effort_in_rows, name),
                 self.column(self.effort_error),
                 np.full(self.count, np.nan) if target is None else self.column(target),
@@ -307,14 +307,14 @@ class Solution(ShortRepr):
                 valid,
                 partial(self._part_efforts_in_rows, name),
                 self._stress_rows(name, state),
-                peaks=self._of_each(self.peaks),
+                peaks=self._spread_over_rows(self.peaks),
                 travel=(motion[:, 0], self.column(self.requested) + self.column(self.origin)),
                 followed=self.assembly.spec.target_curve,
             )
             for name, state in (("load", self.up), ("unload", self.down))
         }
 
-    def _of_each(self, values: FloatArray) -> FloatArray:
+    def _spread_over_rows(self, values: FloatArray) -> FloatArray:
         return np.broadcast_to(values, (self.count, values.shape[-1]))
 
     def _effort_in_rows(self, name: str, places: FloatArray, rows: Any) -> FloatArray:
@@ -330,7 +330,7 @@ class Solution(ShortRepr):
         allowable = allowable_stress(self.mechanism)
 
         def read() -> list[RowSamples]:
-            values = self._of_each(stress(flank_pressure(self.assembly, self.states, state.contact)))
+            values = self._spread_over_rows(stress(flank_pressure(self.assembly, self.states, state.contact)))
             curve = self.branches[name].samples
             return [RowSamples(curve.motion, values, curve.count)]
 

@@ -89,10 +89,10 @@ class MeasuredCam(ShortRepr):
         opened = self.assembly.spec.mechanism.springs.tension_stretch
         return self.sides.x[0] + self.sides.x[1] - 2.0 * self.assembly.loads.rest_half_width - opened
 
-    def forces(self, way: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def forces(self, direction: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the force on the slider and at both contacts on the way up (1) or down (-1), each (n,) [N]."""
         loads, friction = self.assembly.loads, self.assembly.spec.mechanism.rolling_friction
-        return self.sides.forces(loads, way * friction, loads.rest_half_width)
+        return self.sides.forces(loads, direction * friction, loads.rest_half_width)
 
 
 def travel_window(built: MeasuredCam) -> tuple[float, float]:

@@ -85,7 +85,7 @@ class Stops(Model):
     upper: PositiveLength | None = Field(None, description="highest position; default: only the end of the flank")
 
     @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def _check_order(self) -> Self:
         if self.upper is not None and self.upper <= self.lower:
             raise ValueError("'upper' must be above 'lower'")
         return self
@@ -237,8 +237,8 @@ class Mechanism(Model):
             return self
         sides = [(self.profile.rest_half_width, self.profile.roller_radius, self.roller_radius)]
         if left := self.left:
-            own = left.profile or self.profile
-            sides.append((own.rest_half_width, own.roller_radius, left.roller_radius or self.roller_radius))
+            profile = left.profile or self.profile
+            sides.append((profile.rest_half_width, profile.roller_radius, left.roller_radius or self.roller_radius))
         room = 2.0 * min((x0 or self.rest_half_width) - max(cut or 0.0, built) for x0, cut, built in sides)
         if self.plate.base_width > room > 0:
             reported = (

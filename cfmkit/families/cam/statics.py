@@ -150,7 +150,7 @@ def spring_force(states: TrackStates, loads: Loads) -> FloatArray:
     return stretch
 
 
-def forces(states: TrackStates, loads: Loads, friction: Any, way: float = 1.0) -> Forces:
+def forces(states: TrackStates, loads: Loads, friction: Any, direction: float = 1.0) -> Forces:
     """Return the forces for one direction of travel [SS, eq. 1].
 
     Parameters
@@ -161,7 +161,7 @@ def forces(states: TrackStates, loads: Loads, friction: Any, way: float = 1.0) -
         Springs and weights.
     friction : float or (m, 1) array
         Rolling friction mu, of one sign: positive on the way up, negative on the way down.
-    way : float
+    direction : float
         1 on the way up, -1 on the way down: the sign of all other friction, and of mu where that is zero.
 
     Returns
@@ -171,7 +171,7 @@ def forces(states: TrackStates, loads: Loads, friction: Any, way: float = 1.0) -
     """
     if not loads.plain:
         sign = float(np.sign(np.ravel(friction)[0]))
-        return _forces_with_losses(states, loads, np.abs(friction), sign or way)
+        return _forces_with_losses(states, loads, np.abs(friction), sign or direction)
     slope, weight = states.slope, loads.roller_weight if np.any(loads.roller_weight) else None
     tangent = states.tangent
     turn, lever = levers(slope, tangent, friction)
@@ -259,18 +259,18 @@ def leverage(
     friction: Any,  # rolling friction: positive on the way up, negative on the way down
 ) -> FloatArray:
     """Return the slider's lever on a roller with all friction: no force moves it where this is not positive."""
-    way = -1.0 if np.any(friction < 0) else 1.0
-    turn = way * normal_turn(losses, np.abs(friction))
+    direction = -1.0 if np.any(friction < 0) else 1.0
+    turn = direction * normal_turn(losses, np.abs(friction))
     tangent = brace_tangent(x, brace_length)
     cos, sin = 1.0 / np.sqrt(1.0 + tangent**2), tangent / np.sqrt(1.0 + tangent**2)
     along = np.sqrt(1.0 + slope * slope)
-    one, lever = levers(slope, tangent, turn)
-    rubbed = losses.pin * (one / cos + sin * lever) - losses.bearing * np.sqrt(1.0 + turn**2) * along
-    found: FloatArray = lever - way * rubbed / (cos * brace_length)
-    return found
+    load_factor, lever = levers(slope, tangent, turn)
+    rubbed = losses.pin * (load_factor / cos + sin * lever) - losses.bearing * np.sqrt(1.0 + turn**2) * along
+    free_lever: FloatArray = lever - direction * rubbed / (cos * brace_length)
+    return free_lever
 
 
-def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward: Any) -> _Side:
+def _side(states: TrackStates, loads: Loads, losses: Losses, direction: float, outward: Any) -> _Side:
     """Return the forces of one side whose roller's weight pulls `outward` [N]; NaN where nothing moves it.
 
     With n and t along the contact normal and the track, u along the brace and V across it, the roller's axis is in
@@ -280,43 +280,52 @@ def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward
     slope, length, weight = states.slope, loads.brace_length, loads.roller_weight
     tangent = states.tangent
     cos, sin = 1.0 / np.sqrt(1.0 + tangent**2), tangent / np.sqrt(1.0 + tangent**2)
-    turn = way * normal_turn(losses, losses.rolling)
-    (one, lever), along = levers(slope, tangent, turn), np.sqrt(1.0 + slope * slope)
+    turn = direction * normal_turn(losses, losses.rolling)
+    (load_factor, lever), along = levers(slope, tangent, turn), np.sqrt(1.0 + slope * slope)
     spring = spring_force(states, loads)
     pulled, hooks = spring - outward, losses.pin * spring
     bearing = losses.bearing * np.sqrt(1.0 + turn**2)
-    load = pulled * one + weight * (slope - turn)
+    load = pulled * load_factor + weight * (slope - turn)
     # A pin rubs whichever way its brace is loaded: the sign is that of the axial force.
     for sign in (1.0, -1.0):
         pin = sign * losses.pin
-        scale = cos * length * lever - way * (pin * (one / cos + sin * lever) - bearing * along)
+        scale = cos * length * lever - direction * (pin * (load_factor / cos + sin * lever) - bearing * along)
         held = (scale <= 0) & (load != 0) if sign > 0 else (scale <= 0)
         scale = np.where(scale > 0, scale, np.nan)
-        pull = (load * (cos * length - way * pin * sin) + way * one * hooks + way * bearing * along * weight) / scale
-        bend = way * (pin * load / cos + hooks * lever - bearing * along * (pulled + weight * tangent)) / scale
+        pull = (
+            load * (cos * length - direction * pin * sin)
+            + direction * load_factor * hooks
+            + direction * bearing * along * weight
+        ) / scale
+        bend = direction * (pin * load / cos + hooks * lever - bearing * along * (pulled + weight * tangent)) / scale
         pull, bend = np.where(held, np.nan, pull), np.where(held, np.nan, bend)
         if sign > 0:
-            found = pull, bend
+            normal_force_and_moment = pull, bend
             continue
-        pushed = (found[0] + found[1] * cos * sin) < 0
-        found = np.where(pushed, pull, found[0]), np.where(pushed, bend, found[1])
-    pull, bend = found
+        pushed = (normal_force_and_moment[0] + normal_force_and_moment[1] * cos * sin) < 0
+        normal_force_and_moment = (
+            np.where(pushed, pull, normal_force_and_moment[0]),
+            np.where(pushed, bend, normal_force_and_moment[1]),
+        )
+    pull, bend = normal_force_and_moment
     idle = (load == 0) & (hooks == 0) & (weight == 0)
     pull, bend = np.where(idle, 0.0, pull), np.where(idle, 0.0, bend)
     if not any(map(np.any, (turn, losses.pin, weight, outward))):
         dead = (np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width) & (np.abs(lever) < 1e-13)
         parts = loads.rest_half_width, loads.brace_length, loads.stiffness
         pull = np.where(dead, 0.5 * dead_point_limit(slope, states.bend, parts, 0.0), pull)
-    contact = ((slope - turn) * (pulled + bend + pull * tangent) + one * (pull - weight)) / ((1.0 + turn**2) * along)
+    contact = ((slope - turn) * (pulled + bend + pull * tangent) + load_factor * (pull - weight)) / (
+        (1.0 + turn**2) * along
+    )
     return _Side(pull, pull * tangent + bend, contact, (pull + bend * cos * sin) / cos)
 
 
-def _forces_with_losses(states: TrackStates, loads: Loads, rolling: Any, way: float) -> Forces:
+def _forces_with_losses(states: TrackStates, loads: Loads, rolling: Any, direction: float) -> Forces:
     losses = replace(loads.losses or Losses(), rolling=rolling)
-    right = _side(states, loads, losses, way, loads.sideways[0])
-    left = _side(states, loads, losses, way, -loads.sideways[0]) if np.any(loads.sideways[0]) else right
+    right = _side(states, loads, losses, direction, loads.sideways[0])
+    left = _side(states, loads, losses, direction, -loads.sideways[0]) if np.any(loads.sideways[0]) else right
     free = right.along + left.along + loads.slider_weight
-    guided = losses.guide.force(free, right.across - left.across + loads.sideways[1], loads.off_plane, way)
+    guided = losses.guide.force(free, right.across - left.across + loads.sideways[1], loads.off_plane, direction)
     return Forces(
         guided,
         lambda: (np.maximum(right.contact, left.contact), np.maximum(np.abs(right.axial), np.abs(left.axial))),
@@ -356,7 +365,7 @@ def jams(
     `states` that are given, if force is known to be missing in one of them; else where a stretch of the track begins or
     ends without it. With `losses` it is `leverage`. A jam up to the end of the track has no other end.
     """
-    before, found = np.zeros(count, dtype=bool), [list[float]() for _ in range(count)]
+    before, places_of_rows = np.zeros(count, dtype=bool), [list[float]() for _ in range(count)]
     for number, part in enumerate(track.stretches()):
         lever = partial(_lever, track, number, friction, losses)
         grid = _places(part, states)
@@ -366,17 +375,20 @@ def jams(
         rows, at = np.nonzero(held != np.column_stack([before, held[:, :-1]]))
         if rows.size:
             grid = np.broadcast_to(grid, held.shape)
-            here, earlier, begins = grid[rows, at], grid[rows, np.maximum(at - 1, 0)], held[rows, at]
-            moves, rests = np.where(begins, earlier, here)[:, None], np.where(begins, here, earlier)[:, None]
+            place_here, earlier, begins = grid[rows, at], grid[rows, np.maximum(at - 1, 0)], held[rows, at]
+            moves, rests = (
+                np.where(begins, earlier, place_here)[:, None],
+                np.where(begins, place_here, earlier)[:, None],
+            )
             place = last_places(partial(_shortage, lever, rows), moves, rests)
-            own = track.of_rows(rows)
-            travel = list(own.stretches())[number].at(place)[0] - own.start
+            row_track = track.select_rows(rows)
+            travel = list(row_track.stretches())[number].at(place)[0] - row_track.start
             for row, first, edge in zip(rows.tolist(), (at == 0).tolist(), travel[:, 0].tolist(), strict=True):
-                found[row].append(0.0 if first and not found[row] else edge)
+                places_of_rows[row].append(0.0 if first and not places_of_rows[row] else edge)
         before = held[:, -1]
     for row in np.flatnonzero(before).tolist():
-        found[row].append(np.inf)
-    return [tuple(zip(edges[::2], edges[1::2], strict=True)) for edges in found]
+        places_of_rows[row].append(np.inf)
+    return [tuple(zip(edges[::2], edges[1::2], strict=True)) for edges in places_of_rows]
 
 
 def _lever(
@@ -387,7 +399,7 @@ def _lever(
     Rounding at a start without any lever is not a jam.
     """
     if rows is not None:
-        track, losses = track.of_rows(rows), rows_of(losses, rows)
+        track, losses = track.select_rows(rows), rows_of(losses, rows)
         friction = friction[rows] if np.ndim(friction) else friction
     _, x, slope = list(track.stretches())[number].at(parameter)
     if losses is not None:
@@ -405,7 +417,9 @@ def _places(part: TrackStretch, states: TrackStates | None) -> FloatArray:
     """Return where to look for a jam on a stretch: its parameters in increasing order, of one track or of each."""
     grid: FloatArray = part.low + (part.high - part.low) * JAM_SHARES
     if states is not None:
-        known = np.arctan(states.slope) if part.on_corner else states.parameter
-        known = np.where(states.on_corner == part.on_corner, known, part.low)
-        grid = np.sort(np.concatenate([known, np.broadcast_to(grid, (*known.shape[:-1], grid.shape[-1]))], axis=-1))
+        known_places = np.arctan(states.slope) if part.on_corner else states.parameter
+        known_places = np.where(states.on_corner == part.on_corner, known_places, part.low)
+        grid = np.sort(
+            np.concatenate([known_places, np.broadcast_to(grid, (*known_places.shape[:-1], grid.shape[-1]))], axis=-1)
+        )
     return np.minimum(np.maximum(grid, part.low), part.high)

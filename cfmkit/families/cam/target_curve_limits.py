@@ -41,10 +41,10 @@ def check_target(design: CamDesign) -> None:
     assert curve is not None
     first, last = curve.extent
     if not curve.covers(0.0, design.stroke) or 0.0 > first > -float("inf"):
-        known = f"{mm(first)} to {mm(last)}"
+        covered = f"{mm(first)} to {mm(last)}"
         raise finding.infeasible(
             "target_curve",
-            f"the target curve goes from {known}, and the slider from 0 mm to {mm(design.stroke)}; let its points "
+            f"the target curve goes from {covered}, and the slider from 0 mm to {mm(design.stroke)}; let its points "
             "begin at 0 mm and reach the stroke ('design.target', 'design.stroke')",
             {"design.stroke": format_at_most(last)} if last > 0 >= first else None,
         )

@@ -128,8 +128,8 @@ def flattest_springs(motion: SprungMotion, effort: float, flat: float) -> HeldEf
         return None
     step = (last - first) / (N_WINDOWS - 1)
     nearer = np.linspace(max(first, best.begin - step), min(last, best.begin + step), N_NEIGHBOUR_WINDOWS)
-    found = best if last == first else _best_of(motion, effort, nearer) or best
-    return _of_fewer(motion, effort, min(best, found, key=lambda one: one.deviation), flat)
+    finer = best if last == first else _best_of(motion, effort, nearer) or best
+    return _drop_needless_springs(motion, effort, min(best, finer, key=lambda window: window.deviation), flat)
 
 
 def _best_of(motion: SprungMotion, effort: float, begins: FloatArray) -> HeldEffort | None:
@@ -137,16 +137,16 @@ def _best_of(motion: SprungMotion, effort: float, begins: FloatArray) -> HeldEff
     ends = begins + motion.length
     places = np.unique([*np.linspace(motion.assembly.start, ends[-1], N_MOTION_PLACES), *ends])
     largest = RATE_SHARE * motion.largest_rates(places)[:, :, np.searchsorted(places, ends)]
-    found = [
-        one
+    windows = [
+        window
         for k, begin in enumerate(begins.tolist())
         for upper in largest[:, :, k]
-        if (one := _fit_window(motion, effort, begin, upper)) is not None
+        if (window := _fit_window(motion, effort, begin, upper)) is not None
     ]
-    return min(found, key=lambda one: one.deviation, default=None)
+    return min(windows, key=lambda window: window.deviation, default=None)
 
 
-def _of_fewer(motion: SprungMotion, effort: float, best: HeldEffort, flat: float) -> HeldEffort:
+def _drop_needless_springs(motion: SprungMotion, effort: float, best: HeldEffort, flat: float) -> HeldEffort:
     """Return a window with as few springs as are flat enough, those left out first that do least."""
     does = best.rates * np.abs(motion.assembly.forces(_window(motion, best.begin))).max(axis=1)
     for k in np.argsort(does).tolist():

@@ -38,7 +38,7 @@ def sample_poses(
         chain = chain_of(spec, linkage, unloaded_angle(spec.mechanism, linkage))
     except CannotBuild:
         return None
-    pressed = chain.press(places, 0, spec.analysis.accuracy)
+    pressed = chain.press(places)
     if pressed.ending is not PressingEnd.COMPLETE:
         return None
     model: ChainModel = "lumped" if spec.fidelity == "lumped" else "beam"

@@ -70,7 +70,7 @@ class Linkage:
         reach = self.crank + self.coupler
         return math.sqrt((reach - self.offset) * (reach + self.offset))
 
-    def way(self, angle: float) -> tuple[float, float]:
+    def find_path_ends(self, angle: float) -> tuple[float, float]:
         """Return the ends of the slider's path around the place it has at a crank angle [m], seen to the right.
 
         Distances along the way from the pivot's foot; of the left branch those of its mirror image. From stretched
@@ -79,8 +79,8 @@ class Linkage:
         short, far = self.crank - self.coupler, self.stretched_position
         if abs(self.offset) > abs(short):
             return -far, far
-        near = math.sqrt((short - self.offset) * (short + self.offset))
-        return (near, far) if self.branch * self.place(angle) >= 0.0 else (-far, -near)
+        nearest = math.sqrt((short - self.offset) * (short + self.offset))
+        return (nearest, far) if self.branch * self.place(angle) >= 0.0 else (-far, -nearest)
 
     def room(self, angle: float) -> tuple[float, float]:
         """Return how far the slider is from the ends of its `way` at a crank angle [m], from the low and the high one.
@@ -97,7 +97,7 @@ class Linkage:
             share = math.sin(half) if abs(end) == far else math.cos(half)
             return square * share**2 / abs(end + place)
 
-        low, high = self.way(angle)
+        low, high = self.find_path_ends(angle)
         return measure_distance(low), measure_distance(high)
 
     def arc(self, angle: float) -> tuple[float, float]:
@@ -209,8 +209,8 @@ def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
 
     Raises CannotBuild if the linkage does not reach it.
     """
-    given = mechanism.unloaded_angle
-    angle = given if given is not None else linkage.stretched_angle + (mechanism.unloaded_offset or 0.0)
+    stated_angle = mechanism.unloaded_angle
+    angle = stated_angle if stated_angle is not None else linkage.stretched_angle + (mechanism.unloaded_offset or 0.0)
     if not linkage.reaches(angle):
         low, high = linkage.arc(linkage.stretched_angle)
         raise finding.cannot_build(

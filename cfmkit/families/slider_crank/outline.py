@@ -34,26 +34,26 @@ def drawing(spec: SliderCrankSpec, tolerance: float = OUTLINE_TOLERANCE) -> Draw
     return replace(made, notes=(*notes, *made.notes))
 
 
-def with_mirror_image(one: Drawing) -> Drawing:
+def with_mirror_image(drawing: Drawing) -> Drawing:
     """Return a drawing with the mirror image of its parts below them, apart from them."""
-    heights = np.concatenate(polygons(one.contours, "cut"))[:, 1]
+    heights = np.concatenate(polygons(drawing.contours, "cut"))[:, 1]
     low, high = float(heights.min()), float(heights.max())
     axis = low - 0.05 * (high - low) - 0.002
-    mirrored = tuple(_mirror_contour(contour, axis) for contour in one.contours)
-    return replace(one, contours=(*one.contours, *mirrored))
+    mirrored = tuple(_mirror_contour(contour, axis) for contour in drawing.contours)
+    return replace(drawing, contours=(*drawing.contours, *mirrored))
 
 
 def _mirror_contour(contour: Contour, axis: float) -> Contour:
     """Return a contour as seen in a mirror along y = axis [m]."""
 
-    def edge(one: Edge) -> Edge:
-        if isinstance(one, Line):
-            (a, b), (c, d) = one.start, one.end
+    def edge(edge_of_half: Edge) -> Edge:
+        if isinstance(edge_of_half, Line):
+            (a, b), (c, d) = edge_of_half.start, edge_of_half.end
             return Line((a, 2.0 * axis - b), (c, 2.0 * axis - d))
-        if isinstance(one, Arc):
-            x, y = one.center
-            return Arc((x, 2.0 * axis - y), one.radius, -one.start, -one.end)
+        if isinstance(edge_of_half, Arc):
+            x, y = edge_of_half.center
+            return Arc((x, 2.0 * axis - y), edge_of_half.radius, -edge_of_half.start, -edge_of_half.end)
         flip = np.array([1.0, -1.0])
-        return Smooth(one.points * flip + np.array([0.0, 2.0 * axis]), one.tangents * flip)
+        return Smooth(edge_of_half.points * flip + np.array([0.0, 2.0 * axis]), edge_of_half.tangents * flip)
 
-    return replace(contour, edges=tuple(edge(one).reverse() for one in reversed(contour.edges)))
+    return replace(contour, edges=tuple(edge(half_edge).reverse() for half_edge in reversed(contour.edges)))

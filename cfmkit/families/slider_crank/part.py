@@ -35,7 +35,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
     spec = result.spec
     if spec.built_as == "springs":
         return of_springs(result)
-    cut = (one for one in drawing(spec).contours if one.layer == "cut" and not one.hole)
-    as_cut = (PosedBody.polygon("as cut", "free", one.points(OUTLINE_TOLERANCE)) for one in cut)
+    cut = (contour for contour in drawing(spec).contours if contour.layer == "cut" and not contour.hole)
+    as_cut = (PosedBody.polygon("as cut", "free", contour.points(OUTLINE_TOLERANCE)) for contour in cut)
     moving = of_printed(result)
     return replace(moving, bodies=(*as_cut, *moving.bodies))

@@ -82,10 +82,10 @@ FOLLOWED_TRAVEL_RATIO = 1.02
 
 def propose(request: Request, run: Run) -> FamilyOffer:
     """Return linkages that fit the envelope, to be given springs, flexures or a strip by the family's design."""
-    return turned_linkages(request) if request.kind == "torque" else _of_force(request)
+    return turned_linkages(request) if request.kind == "torque" else _propose_for_force(request)
 
 
-def _of_force(request: Request) -> FamilyOffer:
+def _propose_for_force(request: Request) -> FamilyOffer:
     if request.adjustable is not None:
         return FamilyOffer(reason="the force of a slider-crank is fixed by its springs and cannot be adjusted")
     tried = [offer for lengths in PUSHED_PROPORTIONS for offer in _offer_pushed(request, lengths)]
@@ -210,16 +210,16 @@ def _single_parts(request: Request, lengths: Proportions, crank: float, travel: 
 def _slow_parts(request: Request, lengths: Proportions, crank: float) -> list[Candidate]:
     """Return flexures and tapered strips of one size, which take longer to design; they begin late where they can."""
     deep, reach = request.depth or max(request.envelope), FOLLOWED_TRAVEL_RATIO * lengths.reach * crank
-    found = []
+    candidates = []
     for block in _materials(request):
         wide = strip_width(request, block, crank)
         if FLEXURES_WIDER * wide <= MAX_WIDTH_RATIO * deep:
             for start in _starts(request, reach, (LATE_START, *START_SHARES))[:2]:
-                found.append(_flexures(request, block, lengths, crank, _window(request, start)))
+                candidates.append(_flexures(request, block, lengths, crank, _window(request, start)))
         if wide <= MAX_WIDTH_RATIO * deep and _can_be_cut(request, THICKEST_TAPERED * crank):
             for start in _starts(request, reach)[-1:]:
-                found.append(_offer_tapered(request, block, lengths, crank, _window(request, start)))
-    return found
+                candidates.append(_offer_tapered(request, block, lengths, crank, _window(request, start)))
+    return candidates
 
 
 def _can_be_cut(request: Request, thickest: float) -> bool:
@@ -399,15 +399,15 @@ def correct(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     result = solve_solid(
         solid.replace({"analysis.travel": (0.0, TRAVEL_EXTENSION * end), "analysis.window": None}), Run()
     )
-    found, material = flattest(result, request.travel), solid.mechanism.material
-    if found is None or material is None:
+    flat_window, material = flattest(result, request.travel), solid.mechanism.material
+    if flat_window is None or material is None:
         return solid
     curve, allowed = result.curve, request.strength_used * (material.allowable(1.0) or np.inf)
-    mean = float(np.interp(np.linspace(*found, 101), curve.motion, curve.effort).mean())
+    mean = float(np.interp(np.linspace(*flat_window, 101), curve.motion, curve.effort).mean())
     stress = np.maximum.accumulate(curve.extra["max_stress"].values)
-    thinner = min(1.0, 0.99 * allowed / float(np.interp(found[1], curve.motion, stress)))
-    window = tuple(Place(place, "length") for place in found)
-    changes: dict[str, Any] = {"analysis.travel": (0.0, found[1]), "analysis.window": window}
+    thinner = min(1.0, 0.99 * allowed / float(np.interp(flat_window[1], curve.motion, stress)))
+    window = tuple(Place(place, "length") for place in flat_window)
+    changes: dict[str, Any] = {"analysis.travel": (0.0, flat_window[1]), "analysis.window": window}
     return solid.replace(changes | _scale_sections(solid, thinner, request.target / (mean * thinner**3)))
 
 

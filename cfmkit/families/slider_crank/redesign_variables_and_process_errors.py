@@ -14,39 +14,39 @@ if TYPE_CHECKING:
 
 
 def free(
-    given: SliderCrankSpec,  # with the `design` block
+    spec: SliderCrankSpec,  # with the `design` block
     designed: SliderCrankSpec,  # what came out
 ) -> dict[str, tuple[float, float]]:
     """Return the values that a redesign may vary, with ranges: thicknesses and width of a strip, or spring rates.
 
     The width of a strip from a sheet stays.
     """
-    wanted, beam = given.design.beam if given.design else None, designed.mechanism.beam
+    wanted, beam = spec.design.beam if spec.design else None, designed.mechanism.beam
     if wanted is None or beam is None:
-        return _rates(given, designed)
-    found: dict[str, tuple[float, float]] = {}
+        return _rates(spec, designed)
+    ranges_of_paths: dict[str, tuple[float, float]] = {}
     if isinstance(beam.thickness, tuple):
         ranges = wanted.thicknesses or (wanted.thickness or DEFAULT_THICKNESS,) * len(beam.thickness)
         if len(ranges) == len(beam.thickness):
-            found |= {f"mechanism.beam.thickness.{k}": ends for k, ends in enumerate(ranges)}
+            ranges_of_paths |= {f"mechanism.beam.thickness.{k}": ends for k, ends in enumerate(ranges)}
     else:
-        found["mechanism.beam.thickness"] = wanted.thickness or DEFAULT_THICKNESS
+        ranges_of_paths["mechanism.beam.thickness"] = wanted.thickness or DEFAULT_THICKNESS
     if isinstance(wanted.width, tuple) and sheet_of(designed.mechanism.part) is None:
-        found["mechanism.beam.width"] = wanted.width
-    return {path: (float(low), float(high)) for path, (low, high) in found.items() if low < high}
+        ranges_of_paths["mechanism.beam.width"] = wanted.width
+    return {path: (float(low), float(high)) for path, (low, high) in ranges_of_paths.items() if low < high}
 
 
-def _rates(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[float, float]]:
+def _rates(spec: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[float, float]]:
     """Return the rates that a design chose, up to their limits; those of bought springs stay."""
-    design, springs = given.design, designed.mechanism.springs
+    design, springs = spec.design, designed.mechanism.springs
     if design is None or design.catalogue or springs.bought:
         return {}
-    found = {}
+    ranges = {}
     for joint in design.springs:
         rate, most = getattr(springs, joint), getattr(design.max_rates, joint, None)
         if rate > 0:
-            found[f"mechanism.springs.{joint}"] = range_about(float(rate), high=most)
-    return {path: ends for path, ends in found.items() if ends[0] < ends[1]}
+            ranges[f"mechanism.springs.{joint}"] = range_about(float(rate), high=most)
+    return {path: ends for path, ends in ranges.items() if ends[0] < ends[1]}
 
 
 def errors(spec: SliderCrankSpec) -> dict[str, str]:
@@ -58,7 +58,7 @@ def errors(spec: SliderCrankSpec) -> dict[str, str]:
         return {}
     rubbing = [name for name in ("pins", "guide") if getattr(mechanism, name) is not None][:1]
     friction = {f"mechanism.{name}.friction": "friction" for name in rubbing}
-    given = {name: getattr(mechanism, name) for name in ("crank_length", "stretched_position", "offset")}
-    found = {f"mechanism.{name}": "position" for name, value in given.items() if isinstance(value, float)}
+    lengths = {name: getattr(mechanism, name) for name in ("crank_length", "stretched_position", "offset")}
+    errors = {f"mechanism.{name}": "position" for name, value in lengths.items() if isinstance(value, float)}
     rates = zip(JOINT_NAMES, mechanism.springs.rates, strict=True)
-    return found | {f"mechanism.springs.{name}": "rate" for name, rate in rates if rate > 0.0} | friction
+    return errors | {f"mechanism.springs.{name}": "rate" for name, rate in rates if rate > 0.0} | friction

@@ -178,9 +178,9 @@ class SliderCrankSpec(Spec):
     @property
     def out_of_plane_widths(self) -> Mapping[str, float | None]:
         """Of flexures and strip, where there are any."""
-        own, strip = self.mechanism.flexures, self.mechanism.beam
+        flexures, strip = self.mechanism.flexures, self.mechanism.beam
         names = ("pivot", "crank_pin", "slider_pin")
-        widths = {f"flexures.{name}.width": getattr(own, name).width for name in names} if own else {}
+        widths = {f"flexures.{name}.width": getattr(flexures, name).width for name in names} if flexures else {}
         return widths | ({"beam.width": strip.width} if strip else {})
 
     @model_validator(mode="after")
@@ -216,10 +216,10 @@ class SliderCrankSpec(Spec):
         coupler = part.coupler_length
         if coupler is None:
             coupler = math.hypot(part.stretched_position or 0.0, part.offset) - part.crank_length
-        own, names = part.flexures.all, ("pivot", "crank_pin", "slider_pin")
+        flexures, names = part.flexures.all, ("pivot", "crank_pin", "slider_pin")
         faults: dict[tuple[str | int, ...], str] = {}
         for k, (link, room) in enumerate((("crank", part.crank_length), ("coupler", coupler))):
-            shares = (1.0 - own[k].before) * own[k].length, own[k + 1].before * own[k + 1].length
+            shares = (1.0 - flexures[k].before) * flexures[k].length, flexures[k + 1].before * flexures[k + 1].length
             if 0.0 < room * (1.0 + 1e-12) < sum(shares):
                 longer = names[k] if shares[0] >= shares[1] else names[k + 1]
                 faults["mechanism", "flexures", longer, "length"] = (

@@ -101,11 +101,13 @@ def turned_linkages(request: Request) -> FamilyOffer:
     """Return linkages for a torque at their crank, those whose springs can hold most of it first; or why none can."""
     if (reason := explain_overfilled(request)) is not None:
         return FamilyOffer(reason=reason)
-    found = [_offer_turned(request, size, one) for size in RELATIVE_SIZES for one in TORQUE_PROPORTIONS]
-    candidates = sorted((one for one in found if isinstance(one, Candidate)), key=lambda one: one.promise)
+    offers = [
+        _offer_turned(request, size, proportions) for size in RELATIVE_SIZES for proportions in TORQUE_PROPORTIONS
+    ]
+    candidates = sorted((offer for offer in offers if isinstance(offer, Candidate)), key=lambda offer: offer.promise)
     if candidates:
         return FamilyOffer(tuple(candidates))
-    return FamilyOffer(reason=_too_weak(request, max(one for one in found if isinstance(one, float))))
+    return FamilyOffer(reason=_too_weak(request, max(offer for offer in offers if isinstance(offer, float))))
 
 
 def _too_weak(request: Request, most: float) -> str:
@@ -306,8 +308,8 @@ def with_links(spec: SliderCrankSpec, request: Request, block: MaterialBlock) ->
         return None
     loads = _loads(spec)
     widest = min((_hole_of_coil(spec, name, loads_of) for name, loads_of in _turns_of(spec).items()), default=np.inf)
-    own = PartStrength.from_material(material, request.safety)
-    strength = replace(own, allowable=min(request.strength_used * allowable, own.allowable))
+    from_material = PartStrength.from_material(material, request.safety)
+    strength = replace(from_material, allowable=min(request.strength_used * allowable, from_material.allowable))
     link = links_that_bear(loads, sheet, strength, request.thinnest, widest)
     if link is None:
         return None
@@ -342,7 +344,7 @@ def _turns_of(spec: SliderCrankSpec) -> dict[str, float]:
     assembly = assemble(spec)
     low, high = spec.analysis.travel or spec.analysis.angle or (0.0, 0.0)
     turns = MotionExtremes(assembly, low, high).largest_turns[:, 0]
-    bought = {one.at for one in spec.mechanism.springs.bought}
+    bought = {spring.at for spring in spec.mechanism.springs.bought}
     return {name: float(turn) for name, turn in zip(JOINT_NAMES[:3], turns, strict=False) if name in bought}
 
 
@@ -402,7 +404,7 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
     bought: dict[str, HelicalSpring] = {}
     for name in sorted(turns, key="pivot".__eq__):
         if name == "pivot" and request.depth is not None:
-            deep = room - max((height_of(other, coil, turns[other][1]) for other, coil in bought.items()), default=0.0)
+            deep = room - max((height_of(joint, coil, turns[joint][1]) for joint, coil in bought.items()), default=0.0)
         if name == "slider":
             coil = extension_spring(*turns[name], rest if pulled else 0.0, request.safety)
         else:
@@ -415,8 +417,8 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
 
 
 def _no_spring(name: str, turn: tuple[float, float], coil: HelicalSpring | None) -> str:
-    dimension, way = ("stiffness", "length") if name == "slider" else ("rotational_stiffness", "angle")
-    reported = f"{format_short(turn[0], dimension, 3)} over {format_short(turn[1], way, 3)}"
+    dimension, motion = ("stiffness", "length") if name == "slider" else ("rotational_stiffness", "angle")
+    reported = f"{format_short(turn[0], dimension, 3)} over {format_short(turn[1], motion, 3)}"
     wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
     return f"no spring of steel wire fits at the {name.replace('_', ' ')}: {reported}{wide}"
 

@@ -218,8 +218,8 @@ class SliderPath:
     def is_unreachable(self, travel: FloatArray) -> NDArray[np.bool_]:
         """Return whether the slider cannot get there."""
         slack = 1e-12 * np.abs(self.x0)
-        found: NDArray[np.bool_] = (travel > self.inward + slack) | (travel < -self.outward - slack)
-        return found
+        is_beyond: NDArray[np.bool_] = (travel > self.inward + slack) | (travel < -self.outward - slack)
+        return is_beyond
 
     def _to_stretched(self, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the distances from the stretched positions on either side, x_s - x and x_s + x, without cancellation.
@@ -227,9 +227,9 @@ class SliderPath:
         The product of both is x_s^2 - x^2.
         """
         xs, outside = self.stretched, np.asarray(self.x0) >= 0.0
-        near = np.maximum(self.gap / (xs + np.abs(self.x0)) + np.where(outside, travel, -travel), 0.0)
+        nearest = np.maximum(self.gap / (xs + np.abs(self.x0)) + np.where(outside, travel, -travel), 0.0)
         far = xs + np.where(outside, self.x0 - travel, travel - self.x0)
-        return np.where(outside, near, far), np.where(outside, far, near)
+        return np.where(outside, nearest, far), np.where(outside, far, nearest)
 
     def evaluate(self, travel: FloatArray) -> _SliderState:
         """Return the state at some travels."""
@@ -239,8 +239,10 @@ class SliderPath:
         share = np.sqrt(ahead * behind / (4.0 * link.crank * link.coupler))
         knee = 2.0 * np.arcsin(np.minimum(share, 1.0))
         if (is_folding := share > NEARLY_FOLDED).any():
-            other = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / (4.0 * link.crank * link.coupler)
-            folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(other, 0.0), 1.0)))
+            sine_squared = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / (
+                4.0 * link.crank * link.coupler
+            )
+            folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(sine_squared, 0.0), 1.0)))
             knee = np.where(is_folding, folding, knee)
         knee = self.side * knee
         e = link.offset
@@ -254,7 +256,7 @@ class SliderPath:
 
     def forces(self, state: _SliderState) -> FloatArray:
         """Return q q' by the travel, (4, n)."""
-        return self._forces(state, *self._by_knee(state.cosine))
+        return self._forces(state, *self._differentiate_by_knee(state.cosine))
 
     def _forces(self, state: _SliderState, d2: FloatArray, by_knee: FloatArray) -> FloatArray:
         link = self.linkage
@@ -269,20 +271,20 @@ class SliderPath:
         effort[3] = -state.turn[3]
         return effort
 
-    def _by_knee(self, cosine: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _differentiate_by_knee(self, cosine: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the squared distance of the pins at both ends, and what the first three q do by the knee angle."""
         r1, r2 = self.linkage.crank, self.linkage.coupler
         d2 = r1 * r1 + r2 * r2 + 2.0 * r1 * r2 * cosine
-        found = np.empty((3, *np.shape(cosine)))
-        found[0], found[1], found[2] = r2 * (r2 + r1 * cosine) / d2, -1.0, -r1 * (r1 + r2 * cosine) / d2
-        return d2, found
+        slopes = np.empty((3, *np.shape(cosine)))
+        slopes[0], slopes[1], slopes[2] = r2 * (r2 + r1 * cosine) / d2, -1.0, -r1 * (r1 + r2 * cosine) / d2
+        return d2, slopes
 
     def efforts(self, state: _SliderState) -> tuple[FloatArray, FloatArray]:
         """Return q q' and (q q')' by the travel, (4, n) each."""
         link, knee, x = self.linkage, state.knee, state.position
         r1, r2, e = link.crank, link.coupler, link.offset
         sine, cosine = state.sine, state.cosine
-        d2, by_knee = self._by_knee(cosine)
+        d2, by_knee = self._differentiate_by_knee(cosine)
         view1, view2 = e / d2, 2.0 * e * x / d2**2
         lever = x / (r1 * r2)
         bend = r1 * r2 * (r2**2 - r1**2) * sine / d2**2

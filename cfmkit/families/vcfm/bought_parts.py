@@ -50,9 +50,9 @@ def _list_springs(springs: BoughtSprings) -> ListedPart:
 
 def _worst(solution: Solution) -> tuple[FloatArray, FloatArray]:
     """Return the largest preload of each mechanism and the deflection at the end of its travel, (m,) each [m]."""
-    preload = solution.by_mechanism(solution.curves.preload[:, 0])
+    preload = solution.split_by_mechanism(solution.curves.preload[:, 0])
     rows, most = np.arange(len(preload)), preload.argmax(axis=1)
-    last = solution.by_mechanism(solution.curves.ends[1])
+    last = solution.split_by_mechanism(solution.curves.ends[1])
     return preload[rows, most], (last + preload)[rows, most]
 
 

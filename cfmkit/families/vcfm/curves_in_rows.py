@@ -64,7 +64,7 @@ class ForceSampler(Protocol):
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
 
-    def of_rows(self, rows: Any) -> Self:
+    def select_rows(self, rows: Any) -> Self:
         """Return the model of some of the rows."""
 
 
@@ -98,7 +98,7 @@ class PartSampler(Protocol):
     def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Return at which travels [m] leaves and spring were solved for, not interpolated; None if all are known."""
 
-    def of_rows(self, rows: Any) -> Self:
+    def select_rows(self, rows: Any) -> Self:
         """Return the model of some of the rows."""
 
 
@@ -133,10 +133,10 @@ class Rows(ShortRepr):
     count: NDArray[np.intp]  # (r,) points of each row
     stops: EndStops = NO_STOPS  # of the shuttle
 
-    def of_rows(self, rows: Any) -> Rows:
+    def select_rows(self, rows: Any) -> Rows:
         """Return some of the curves, with what is known of them."""
         chosen = Rows(
-            self.sampler.of_rows(rows), self.preload[rows], self.rest[rows], self.travel[rows], self.count[rows],
+            self.sampler.select_rows(rows), self.preload[rows], self.rest[rows], self.travel[rows], self.count[rows],
             self.stops,
         )  # fmt: skip
         for name in ("leaves", "leaf_force", "spring_samples"):
@@ -179,7 +179,7 @@ class Rows(ShortRepr):
         """Return the force at some travels of each row, or of some rows, (k, m), by the model [N]."""
         sampler, preload = self.sampler, self.preload
         if rows is not None:
-            sampler, preload = sampler.of_rows(rows), preload[rows]
+            sampler, preload = sampler.select_rows(rows), preload[rows]
         total = np.asarray(sampler.leaf_force(places) + sampler.spring(places + preload)[0])
         return total + self.stops.force(places) if self.stops else total
 
@@ -195,10 +195,10 @@ class Rows(ShortRepr):
         Minus and plus infinity where the curve does not reach there.
         """
         low, high = (end[:, None] for end in window)
-        own = np.where((self.travel > low) & (self.travel < high), self.force, np.nan)
-        force = np.hstack([own, self.evaluate_within_ends(np.hstack([low, high]))])
-        known = np.isfinite(force)
-        return np.where(known, force, -np.inf).max(axis=1), np.where(known, force, np.inf).min(axis=1)
+        force_inside = np.where((self.travel > low) & (self.travel < high), self.force, np.nan)
+        force = np.hstack([force_inside, self.evaluate_within_ends(np.hstack([low, high]))])
+        is_known = np.isfinite(force)
+        return np.where(is_known, force, -np.inf).max(axis=1), np.where(is_known, force, np.inf).min(axis=1)
 
     def flat_parts(self, flatness: float) -> Ends:
         """Return from where to where (max - min)/max of the force is longest within `flatness` [m]; NaN: nowhere."""

@@ -77,15 +77,15 @@ def design(spec: VcfmSpec, run: Run) -> Design:
 
     INFEASIBLE, with the reason and the nearest feasible values, if there is none.
     """
-    found = _attempt(spec)
-    nearest, last = dict(found.nearest_feasible), found
+    outcome = _attempt(spec)
+    nearest, last = dict(outcome.nearest_feasible), outcome
     for _ in range(MAX_ROUNDS):
         if last.status is not Status.INFEASIBLE or not last.nearest_feasible:
             break
         # what cures one limit may break the next: what is proposed must meet all of them
         last = _attempt(spec.replace({path: {"true": True}.get(value, value) for path, value in nearest.items()}))
         nearest |= last.nearest_feasible
-    return replace(found, nearest_feasible=nearest if last.status is Status.COMPLETE else {})
+    return replace(outcome, nearest_feasible=nearest if last.status is Status.COMPLETE else {})
 
 
 @refusals_answered
@@ -212,15 +212,15 @@ def check_room(target: VcfmDesign, sizes: DesignSizes) -> None:
     """Raise if the design needs more room than there is."""
     spans = {"leaves": 2.0 * float(sizes.leaf.reach), "spring": 2.0 * float(sizes.spring_leaf.reach)}
     widths = {"leaves": sizes.leaf.width, "spring": sizes.spring_leaf.width}
-    for path, limit, found in (("max_span", target.max_span, spans), ("max_width", target.max_width, widths)):
-        name = max(found, key=lambda key: found[key])
-        if limit is not None and found[name] > limit * (1 + 1e-9):
+    for path, limit, needed in (("max_span", target.max_span, spans), ("max_width", target.max_width, widths)):
+        name = max(needed, key=lambda key: needed[key])
+        if limit is not None and needed[name] > limit * (1 + 1e-9):
             words = "across the motion" if path == "max_span" else "out of the plane"
             verb = "need" if name == "leaves" else "needs"
             raise finding.infeasible(
                 "envelope",
-                f"the {name} {verb} {mm(found[name])} {words}, 'design.{path}' allows {mm(limit)}",
-                {f"design.{path}": format_at_least(ENVELOPE_MARGIN * found[name])},
+                f"the {name} {verb} {mm(needed[name])} {words}, 'design.{path}' allows {mm(limit)}",
+                {f"design.{path}": format_at_least(ENVELOPE_MARGIN * needed[name])},
             )
 
 

@@ -100,15 +100,15 @@ def elastic_networks(spec: VcfmSpec) -> tuple[DrivenNetwork, ...]:
     from cfmkit.elastica import Displacement
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
 
-    found = [
+    networks = [
         DrivenNetwork("vcfm-leaf", leaf_network(spec), Displacement("shuttle", DOWN_ANGLE, np.array([spec.travel])))
     ]
     if spec.mechanism.springs is None:
         chain = spring_chain(spec)
         end = chain.travel * (max(*spec.analysis.preloads, 0.0) + spec.travel)
         drive = Displacement(chain.node, DOWN_ANGLE, np.array([end]))
-        found.append(DrivenNetwork("vcfm-spring", chain.network, drive))
-    return tuple(found)
+        networks.append(DrivenNetwork("vcfm-spring", chain.network, drive))
+    return tuple(networks)
 
 
 class ExactSampler:
@@ -147,7 +147,8 @@ class ExactSampler:
         place = np.ravel(travel)
         ahead, behind = self.pushed.evaluate(np.maximum(place, 0.0)), self.pulled.evaluate(np.minimum(place, 0.0))
         force, stress, stable, buckled = (
-            np.where(place < 0, one, other).reshape(np.shape(travel)) for one, other in zip(behind, ahead, strict=True)
+            np.where(place < 0, backward, forward).reshape(np.shape(travel))
+            for backward, forward in zip(behind, ahead, strict=True)
         )
         return LeafSamples(self.each * force, stress, stable, buckled)
 
@@ -159,7 +160,7 @@ class ExactSampler:
         """Return the largest stress of the leaves [Pa]."""
         return self.leaves(travel).stress
 
-    def of_rows(self, _rows: Any) -> Self:
+    def select_rows(self, _rows: Any) -> Self:
         """Return the same: all rows are curves of one mechanism."""
         return self
 
@@ -205,7 +206,7 @@ class ExactSampler:
 
 def problem_of(part: Literal["bistable", "positive"], paths: Sequence[Any], travel: float) -> str:
     """Return how far a part was followed, in shares `travel` of its node, and why no farther; empty if to the end."""
-    short = next((one for one in paths if one.problem), None)
+    short = next((path for path in paths if path.problem), None)
     if short is None:
         return ""
     subject = {"bistable": "leaves were", "positive": "spring was"}[part]

@@ -94,11 +94,11 @@ def split(result: Result) -> Figure:
     if (truss := solution.leaf_kind.truss) is not None and solution.fidelity != "truss":
         bars = solution.parts.half_beams * np.asarray(truss(solution.parts.strip).force(push.travel))
         series.append(Series(bars, "leaves by the truss law", TEXT_GREY, dashed=True, prefer=0.4))
-    found = list(_range_beyond(solution))
+    ranges = list(_range_beyond(solution))
     low = float(solution.linear[0][0])
     if np.isfinite(low):
-        found.insert(0, MarkedRange(push.travel[0], low, "not yet buckled"))
-    diagram = Diagram(push.travel, TRAVEL_SCALE, Scale("force", "force"), series, (), found)
+        ranges.insert(0, MarkedRange(push.travel[0], low, "not yet buckled"))
+    diagram = Diagram(push.travel, TRAVEL_SCALE, Scale("force", "force"), series, (), ranges)
     subject = f"leaves and spring, preload {value_text(push.preload, 'length')}"
     return diagram_figure(Heading.from_result(result, subject), [diagram])
 
@@ -164,9 +164,9 @@ def _curves(result: Result, subject: str, shifted: bool) -> Figure:
 def adjustability(result: Result) -> Figure:
     """Return force in the window, rest position and start of the window, with the paper's straight rules."""
     solution: Solution = result.state
-    given = np.array([push.preload for push in solution.pushes])
-    over = np.linspace(given.min(), given.max(), N_PRELOADS)
-    one = solution.character
+    preloads = np.array([push.preload for push in solution.pushes])
+    over = np.linspace(preloads.min(), preloads.max(), N_PRELOADS)
+    character = solution.character
     places = np.linspace(*solution.window_of_one, 41)
     stops = solution.curves.stops
     leaves = solution.sampler.leaves(places).force
@@ -175,8 +175,8 @@ def adjustability(result: Result) -> Figure:
     grid = np.linspace(0.0, float(solution.first.travel[-1]), 241)
     rests = -rests_of(solution.sampler, over, grid, stops)
     nominal = float(np.interp(solution.first.preload, over, mean))
-    straight = nominal + force_change(one.positive_stiffness, over - solution.first.preload)
-    by_rule = rest_shift(one.positive_stiffness, one.first_stiffness, over)
+    straight = nominal + force_change(character.positive_stiffness, over - solution.first.preload)
+    by_rule = rest_shift(character.positive_stiffness, character.first_stiffness, over)
     constant = bool(np.isfinite(solution.constant_force[0]))
     x, first = Scale("preload", "length"), Scale("constant force" if constant else "mean force", "force")
     forces = [Series(mean, "mean in the window", LINE_BLUE, prefer=0.4)]
@@ -219,10 +219,10 @@ def stress_map(result: Result) -> Figure:
     if sampler.sides:
         solids.append(("spring", sampler.sides[0].solved, sampler.chain.travel, number_fillets(spring, len(leaf))))
     views = []
-    for name, solved, share, own in solids:
+    for name, solved, share, beams in solids:
         pose = int(solved.peaks[0].argmax())
         reported = f"{name} at {value_text(solved.course.travel[pose] / share, 'length')}"
-        views.append(StressView(solved, pose, reported, own))
+        views.append(StressView(solved, pose, reported, beams))
     return stress_map_figure(result, views, "stress of leaf and spring as drawn")
 
 

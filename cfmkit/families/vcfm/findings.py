@@ -94,7 +94,7 @@ EXACT_FORM = 2e-4  # share of a stress that counts for nothing: designs are fitt
 
 def _slenderness(solution: Solution) -> FloatArray:
     """Return rise over thickness of the leaves, (m,)."""
-    return solution.of_mechanisms(solution.parts.strip.slenderness)
+    return solution.spread_over_mechanisms(solution.parts.strip.slenderness)
 
 
 # --- what is reported of a built mechanism, and the spring's room ---------------------------------------------------
@@ -103,9 +103,11 @@ def _slenderness(solution: Solution) -> FloatArray:
 def _contradicts(solution: Solution) -> Any:
     if solution.spec.analysis.measured is None or not solution.leaf_kind.buckles:
         return False  # such leaves push where they are flat
-    balance = solution.of_mechanisms(solution.parts.balance)
+    balance = solution.spread_over_mechanisms(solution.parts.balance)
     stated = [spec.analysis.measured for spec in solution.specs]
-    stiffness, force = np.array([(one.positive_stiffness, one.force) for one in stated if one is not None]).T
+    stiffness, force = np.array(
+        [(values.positive_stiffness, values.force) for values in stated if values is not None]
+    ).T
     apart = np.abs(stiffness * balance / force - 1.0) > solution.spec.analysis.flatness
     return (_slenderness(solution) >= FLAT_BUCKLED_ABOVE) & apart
 
@@ -173,7 +175,9 @@ def _negative_and_straight(solution: Solution) -> tuple[Any, Any]:
     if not solution.leaf_kind.buckles or solution.fidelity == "truss":
         return True, True
     if limits is None:  # or they depend on more than the slenderness: as the curve has it
-        return solution.of_mechanisms(solution.character.negative_stiffness) > 0, np.isfinite(solution.linear[0])
+        return solution.spread_over_mechanisms(solution.character.negative_stiffness) > 0, np.isfinite(
+            solution.linear[0]
+        )
     q = _slenderness(solution)
     return q >= limits.negative, q > limits.constant
 
@@ -216,10 +220,13 @@ def _is_not_flat(solution: Solution) -> Any:
 
 
 def _uneven_force(solution: Solution) -> Sentence:
-    push, (low, high), one = solution.first, solution.window_of_one, solution.character
+    push, (low, high), character = solution.first, solution.window_of_one, solution.character
     ripple, allowed = ripple_inside(solution, solution.window), solution.spec.analysis.flatness
-    alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < STIFFNESS_RTOL
-    reported = f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)}"
+    alike = (
+        character.positive_stiffness > 0
+        and abs(character.negative_stiffness / character.positive_stiffness - 1.0) < STIFFNESS_RTOL
+    )
+    reported = f"K_p = {rate(character.positive_stiffness)} and K_n = {rate(character.negative_stiffness)}"
     cause = f"{reported} cancel, but not in the whole window" if alike else f"{reported} do not cancel"
     low, high = max(low, float(push.travel[0])), min(high, float(push.travel[-1]))  # what is beyond is not known
     words, cures = flattening(solution, ripple)
@@ -292,12 +299,12 @@ def _overload(solution: Solution) -> Sentence:
 def _pulled_out_of_range(solution: Solution) -> FloatArray:
     """Return at which negative preloads no outward force remains somewhere in the window, (m, p) of bool."""
     curves = solution.curves
-    pulled = solution.by_mechanism(curves.preload[:, 0] < 0)
+    pulled = solution.split_by_mechanism(curves.preload[:, 0] < 0)
     if not pulled.any():
         return np.zeros(pulled.shape, dtype=bool)
     low, high = (np.repeat(end, solution.preloads) for end in solution.window)
     lost = ~(curves.rest <= low) | (curves.extremes_inside((low, high))[1] <= 0)
-    return np.asarray(pulled & solution.by_mechanism(lost))
+    return np.asarray(pulled & solution.split_by_mechanism(lost))
 
 
 def _pull(solution: Solution) -> Sentence:
@@ -310,7 +317,7 @@ def _pull(solution: Solution) -> Sentence:
 
 
 def _least_preload(solution: Solution) -> FloatArray:
-    return np.asarray(solution.by_mechanism(solution.curves.preload[:, 0]).min(axis=1))
+    return np.asarray(solution.split_by_mechanism(solution.curves.preload[:, 0]).min(axis=1))
 
 
 def _slack(solution: Solution) -> Sentence:
@@ -391,8 +398,8 @@ def _wide(name: str) -> FindingRule[Solution]:
     """Return the rule on leaves, or a spring, that are too wide for beams."""
 
     def holds(solution: Solution) -> Any:
-        found = solution.hindered_curling
-        return found[name][0] > TOO_SOFT if name in found else False
+        curling = solution.hindered_curling
+        return curling[name][0] > TOO_SOFT if name in curling else False
 
     def sentence(solution: Solution) -> Sentence:
         share, place = (float(value[0]) for value in solution.hindered_curling[name])

@@ -30,8 +30,8 @@ def flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]]
     factor, left = _better_width(solution)
     allowed = solution.spec.analysis.flatness
     if left <= allowed and left < ripple:
-        other = "as wide" if solution.spec.mechanism.springs is None else "as stiff"
-        text = f"; leaves {factor:.3g} times as wide, or a spring {1.0 / factor:.3g} times {other}, make them equal"
+        by_spring = "as wide" if solution.spec.mechanism.springs is None else "as stiff"
+        text = f"; leaves {factor:.3g} times as wide, or a spring {1.0 / factor:.3g} times {by_spring}, make them equal"
         return text, ()
     (first, last), (low, high) = (float(end[0]) for end in solution.linear), solution.window_of_one
     why = ""
@@ -61,11 +61,11 @@ def _better_width(solution: Solution) -> tuple[float, float]:
     spring = solution.sampler.spring(places + solution.first.preload)[0]
     if not np.isfinite(leaves + spring).all():
         return 1.0, np.inf
-    one = solution.character
+    character = solution.character
     factors = np.geomspace(1.0 / MAX_WIDTH_FACTOR, MAX_WIDTH_FACTOR, 801)
-    if one.negative_stiffness > 0:  # the nearest at hand where the slopes are constant
-        factors = np.append(factors, one.positive_stiffness / one.negative_stiffness)
-    top, bottom = (extreme_sums(factors, leaves, spring, way) for way in (1.0, -1.0))
+    if character.negative_stiffness > 0:  # the nearest at hand where the slopes are constant
+        factors = np.append(factors, character.positive_stiffness / character.negative_stiffness)
+    top, bottom = (extreme_sums(factors, leaves, spring, sign) for sign in (1.0, -1.0))
     with np.errstate(all="ignore"):
         left = np.where(bottom > 0, (top - bottom) / top, np.inf)
     # stiffnesses that cancel are what a reader expects: another factor only where that one does not do
@@ -73,8 +73,8 @@ def _better_width(solution: Solution) -> tuple[float, float]:
     return float(factors[best]), float(left[best])
 
 
-def extreme_sums(factors: FloatArray, slopes: FloatArray, offsets: FloatArray, way: float) -> FloatArray:
-    """Return the largest (`way` 1) or smallest (-1) of factor * slope + offset over many lines, for each factor.
+def extreme_sums(factors: FloatArray, slopes: FloatArray, offsets: FloatArray, sign: float) -> FloatArray:
+    """Return the largest (`sign` 1) or smallest (-1) of factor * slope + offset over many lines, for each factor.
 
     Only lines of the convex hull of (slope, offset) are ever extreme: some dozen of hundreds.
 
@@ -86,8 +86,8 @@ def extreme_sums(factors: FloatArray, slopes: FloatArray, offsets: FloatArray, w
     hull: list[int] = []
     # Where leaves are buckled the lines meet in one point: without a margin, rounding keeps all of them.
     margin = 1e-14 * float(np.ptp(slopes)) * float(np.abs(offsets).max(initial=0.0))
-    x, y = (way * slopes).tolist(), (way * offsets).tolist()
-    for k in np.lexsort((-way * offsets, way * slopes)).tolist():
+    x, y = (sign * slopes).tolist(), (sign * offsets).tolist()
+    for k in np.lexsort((-sign * offsets, sign * slopes)).tolist():
         if hull and x[k] == x[hull[-1]]:
             continue
         while len(hull) > 1:
@@ -97,4 +97,4 @@ def extreme_sums(factors: FloatArray, slopes: FloatArray, offsets: FloatArray, w
             hull.pop()
         hull.append(k)
     sums = factors[:, None] * slopes[hull] + offsets[hull]
-    return np.asarray(way * (way * sums).max(axis=1))
+    return np.asarray(sign * (sign * sums).max(axis=1))

@@ -60,9 +60,9 @@ class PathPoints:
     stable: Any
     buckled: Any
 
-    def merge(self, other: PathPoints) -> PathPoints:
+    def merge(self, points: PathPoints) -> PathPoints:
         """Return these points and others, each place once."""
-        pairs = zip(self.columns, other.columns, strict=True)
+        pairs = zip(self.columns, points.columns, strict=True)
         places, *columns = (np.concatenate(pair) for pair in pairs)
         _, kept = np.unique(np.abs(places), return_index=True)
         return PathPoints(places[kept], *(column[kept] for column in columns))
@@ -95,13 +95,13 @@ class Traced:
     @cached_property
     def _stresses(self) -> list[Callable[[FloatArray], FloatArray]]:
         """The stress on each piece, as a function of the travel's size."""
-        pieces, own = self.piece(self.points.places), self.sense * self.points.places
+        pieces, sizes = self.piece(self.points.places), self.sense * self.points.places
         ends = self.sense * np.array(self.edges)
-        found = []
+        laws = []
         for number, (low, high) in enumerate(pairwise(ends)):
-            here = pieces == number
-            found.append(_stress_law(own[here], self.points.stress[here], float(low), float(high)))
-        return found
+            on_piece = pieces == number
+            laws.append(_stress_law(sizes[on_piece], self.points.stress[on_piece], float(low), float(high)))
+        return laws
 
     def evaluate(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, Any, Any]:
         """Return force, stress, stability and form at some travels [m]; NaN beyond the end."""
@@ -121,8 +121,8 @@ class Traced:
     @property
     def buckled_range(self) -> tuple[float, float]:
         """Range in which another form than unloaded is taken, from and to [m]; NaN where none is."""
-        found = np.flatnonzero(self.buckled)
-        return (self.edges[found[0]], self.edges[found[-1] + 1]) if len(found) else (np.nan, np.nan)
+        numbers = np.flatnonzero(self.buckled)
+        return (self.edges[numbers[0]], self.edges[numbers[-1] + 1]) if len(numbers) else (np.nan, np.nan)
 
     @cached_property
     def buckled(self) -> Any:
@@ -137,8 +137,8 @@ class Traced:
     def _most(self, flags: Any, empty: bool) -> Any:
         """Return what most of the points of each piece are."""
         pieces = self.piece(self.points.places)
-        found = [flags[pieces == number] for number in range(len(self.edges) - 1)]
-        return np.array([one.mean() > 0.5 if len(one) else empty for one in found])
+        flags_of_pieces = [flags[pieces == number] for number in range(len(self.edges) - 1)]
+        return np.array([piece_flags.mean() > 0.5 if len(piece_flags) else empty for piece_flags in flags_of_pieces])
 
 
 def _stress_law(x: FloatArray, stress: FloatArray, low: float, high: float) -> Callable[[FloatArray], FloatArray]:
@@ -272,8 +272,8 @@ def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevP
     # points in every piece and those of the first path: none that follows may step over a bifurcation that this one saw
     guards = [np.linspace(*piece, 5)[1:-1] for piece in pieces]
     steps = sense * first.grid
-    near = np.abs(steps[:, None] - ends[1:-1]).min(axis=1, initial=np.inf) < apart
-    guards.append(steps[(steps < ends[-1]) & ~near])
+    near_edge = np.abs(steps[:, None] - ends[1:-1]).min(axis=1, initial=np.inf) < apart
+    guards.append(steps[(steps < ends[-1]) & ~near_edge])
     early = min(float(ends[1]), PEAK_TRAVEL_SHARE * float(ends[-1]))
     wanted = [panel for piece in pieces for panel in pairwise(np.linspace(*piece, count + 1).tolist())]
     done: dict[tuple[float, float], FloatArray] = {}
@@ -293,13 +293,13 @@ def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevP
         largest = np.maximum.accumulate(np.abs(points.force))
         halves: list[tuple[float, float]] = []
         for panel in wanted:
-            found = coefficients(shrink_panel(panel), size, points.force)
+            series = coefficients(shrink_panel(panel), size, points.force)
             scale = largest[np.searchsorted(size, max(panel[1], early), side="right") - 1]
-            if left and np.abs(found[-3:]).max() > route.resolved * scale:  # false where a node is missing
+            if left and np.abs(series[-3:]).max() > route.resolved * scale:  # false where a node is missing
                 middle = 0.5 * (panel[0] + panel[1])
                 halves += [(panel[0], middle), (middle, panel[1])]
             else:
-                done[panel] = found
+                done[panel] = series
         if not halves:
             break
         wanted = halves
@@ -311,6 +311,6 @@ def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevP
 
 def _alike(first: First, points: PathPoints) -> bool:
     """Return True if points are on the branch that a first path took in each piece, where it has points there."""
-    one, two = Traced(first.points, None, first.edges), Traced(points, None, first.edges)
-    both = np.isin(np.arange(len(first.edges) - 1), one.piece(first.points.places))
-    return bool(((one.stable == two.stable) & (one.buckled == two.buckled))[both].all())
+    first_traced, traced = Traced(first.points, None, first.edges), Traced(points, None, first.edges)
+    both = np.isin(np.arange(len(first.edges) - 1), first_traced.piece(first.points.places))
+    return bool(((first_traced.stable == traced.stable) & (first_traced.buckled == traced.buckled))[both].all())

@@ -138,9 +138,9 @@ def complete_analysis(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, f
     step = 10.0 ** floor(log10(target.stroke) - 3)
     inside = ceil(low / step) * step, floor(high / step) * step
     analysis, flat = spec.analysis, spec.analysis.flatness
-    given = analysis.model_fields_set if "analysis" in spec.model_fields_set else set()
+    stated_keys = analysis.model_fields_set if "analysis" in spec.model_fields_set else set()
     changes: dict[str, object] = {}
-    if "preloads" not in given:
+    if "preloads" not in stated_keys:
         changes["analysis.preloads"] = (0.0, target.preload_stroke) if target.adjustment else (0.0,)
     if analysis.window is None:
         changes["analysis.window"] = inside

@@ -256,12 +256,16 @@ def _find_miss(spec: VcfmSpec, target: VcfmDesign, leaves: LeavesAroundSprings, 
         return Miss(leaves.label, float(leaf.angle) / MAX_LEAF_ANGLE - 1.0, "leaves steeper than 15 deg")
     life, safety = target.spring_life, target.spring_safety
     if offer is not None and (life is not None or safety is not None):
-        weak = [miss for use in _in_use(spec, leaves, offer) if (miss := use.why_too_weak(life, safety)) is not None]
+        weak = [
+            miss
+            for use in _list_springs_in_use(spec, leaves, offer)
+            if (miss := use.why_too_weak(life, safety)) is not None
+        ]
         return Miss(leaves.label, *max(weak)) if weak else None
     return None
 
 
-def _in_use(spec: VcfmSpec, leaves: LeavesAroundSprings, offer: Offer) -> Iterator[SpringInUse]:
+def _list_springs_in_use(spec: VcfmSpec, leaves: LeavesAroundSprings, offer: Offer) -> Iterator[SpringInUse]:
     """Yield a spring between rest and the end of the travel at each preload, by the closed form of the leaves."""
     from cfmkit.families.vcfm.model import LawSampler, rest_of
 
@@ -290,42 +294,42 @@ def _write_design(spec: VcfmSpec, leaves: LeavesAroundSprings) -> VcfmSpec:
     )
 
 
-def _fit_width(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> LeavesAroundSprings | Miss:
+def _fit_width(spec: VcfmSpec, target: VcfmDesign, sized: LeavesAroundSprings) -> LeavesAroundSprings | Miss:
     """Return the leaves with the width that makes the exact force flattest, long enough for their exact stress."""
     from cfmkit.families.vcfm.exact_model import ExactSampler, farthest_back
 
-    allowable, own_target = spec.mechanism.allowable_stress or 0.0, found.target
-    first, last = found.linear
+    allowable, own_target = spec.mechanism.allowable_stress or 0.0, sized.target
+    first, last = sized.linear
     middle, half = 0.5 * (first + last), 0.5 * FITTED_REGION_SHARE * (last - first)
     places = np.linspace(middle - half, middle + half, 101)
     worst, sheet = np.inf, sheet_of(spec.mechanism.part)
     for _ in range(N_RESCALES if sheet is None else MAX_PASSES):
-        made = _write_design(spec, found).replace({"analysis.preloads": (0.0,), "analysis.branch": "stable"})
+        made = _write_design(spec, sized).replace({"analysis.preloads": (0.0,), "analysis.branch": "stable"})
         # leaves are followed as far as the spring can push them, not through all of a long preload
         back = min(own_target.preload_stroke, RETURN_TRAVEL_RATIO * farthest_back(made, (own_target.preload_stroke,)))
         sampler = ExactSampler(made, last, back)
         if sampler.problem:
-            return Miss(found.label, 1.0, f"the exact model does not confirm the stroke: {sampler.problem}")
+            return Miss(sized.label, 1.0, f"the exact model does not confirm the stroke: {sampler.problem}")
         leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
         wide = float(leaves @ (target.required_force - spring) / (leaves @ leaves))
-        fitted = replace(found, leaf=replace(found.leaf, width=found.leaf.width * wide))
+        fitted = replace(sized, leaf=replace(sized.leaf, width=sized.leaf.width * wide))
         ends = np.linspace(-_rest(sampler, wide, own_target.preload_stroke), last, 201)
         worst = float(sampler.leaves(ends).stress.max()) / allowable
         if sheet is not None:
             if worst <= 1.0 + 1e-4 and abs(wide - 1.0) <= FORCE_RTOL:
-                return _find_miss(spec, target, found, None) or found
-            count, leaf = next_leaf(found.half_beams, found.leaf, wide, worst, own_target.height)
-            found = replace(found, leaf=leaf, linear=onset_and_exit(leaf), half_beams=count)
+                return _find_miss(spec, target, sized, None) or sized
+            count, leaf = next_leaf(sized.half_beams, sized.leaf, wide, worst, own_target.height)
+            sized = replace(sized, leaf=leaf, linear=onset_and_exit(leaf), half_beams=count)
             continue
         if worst <= 1.0 + 1e-4:
             return _find_miss(spec, target, fitted, None) or fitted
         if target.leaf_length is not None:
             break
         # stress falls with the square of a length
-        longer = sized_leaf(spec, own_target, found.leaf.thickness, float(found.leaf.length) * sqrt(1.0005 * worst))
-        found = replace(found, leaf=longer, linear=onset_and_exit(longer))
+        longer = sized_leaf(spec, own_target, sized.leaf.thickness, float(sized.leaf.length) * sqrt(1.0005 * worst))
+        sized = replace(sized, leaf=longer, linear=onset_and_exit(longer))
     return Miss(
-        found.label, worst - 1.0, f"the exact stress of the leaves is {mpa(worst * allowable)} of {mpa(allowable)}"
+        sized.label, worst - 1.0, f"the exact stress of the leaves is {mpa(worst * allowable)} of {mpa(allowable)}"
     )
 
 

@@ -128,13 +128,13 @@ def solve(spec: VcfmSpec, made: LeafLaws, sampler: PartSampler) -> Solution:
     room = np.full(len(preloads), spring_room(spec))
     curves = _curves(sampler, preloads, travel_grid(spec)[None, :], room, spec.mechanism.end_stops)
     curves.leaves  # noqa: B018  force and stress come of one root, and a curve has both
-    known = np.isfinite(curves.force)
-    if (known != curves.there).any():
-        travel, count = _compress_rows(curves.travel, known)
+    is_known = np.isfinite(curves.force)
+    if (is_known != curves.there).any():
+        travel, count = _compress_rows(curves.travel, is_known)
         curves = replace(curves, travel=travel, count=count)
     kept = curves.count >= LEAST_POINTS
     kept[0] = True
-    return Solution((spec,), made, curves if kept.all() else curves.of_rows(np.flatnonzero(kept)), int(kept.sum()))
+    return Solution((spec,), made, curves if kept.all() else curves.select_rows(np.flatnonzero(kept)), int(kept.sum()))
 
 
 def solve_rows(specs: Sequence[VcfmSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[Solution]]]:
@@ -148,17 +148,18 @@ def solve_rows(specs: Sequence[VcfmSpec]) -> Iterator[tuple[NDArray[np.intp], So
         for start in range(0, len(members), size):
             chosen = members[start : start + size]
             solution = _solve_kind([specs[index] for index in chosen])
-            yield np.array(chosen), SolvedRows(solution, ROW_COLUMNS, FINDING_RULES, _is_complete(solution))
+            complete, slow = _is_complete(solution), solution.parts.leaf.one_by_one
+            yield np.array(chosen), SolvedRows(solution, ROW_COLUMNS, FINDING_RULES, complete, slow)
 
 
 def _is_complete(solution: Solution) -> NDArray[np.bool_]:
     """Return which mechanisms have all of their curves, each up to the end of the travel, (m,)."""
     curves, nominal = solution.curves, solution.nominal
     spring = curves.spring_samples.force.sum(axis=1) + curves.sampler.leaf_force(curves.travel[:, :1])[:, 0]
-    known = (curves.count >= LEAST_POINTS) & np.isfinite(spring)
+    is_known = (curves.count >= LEAST_POINTS) & np.isfinite(spring)
     reached = nominal.ends[1] >= solution.travel * (1 - 1e-9)
     finite = np.isfinite(nominal.force).sum(axis=1) == nominal.count
-    return np.asarray(solution.by_mechanism(known).all(axis=1) & reached & finite & ~is_closed(solution))
+    return np.asarray(solution.split_by_mechanism(is_known).all(axis=1) & reached & finite & ~is_closed(solution))
 
 
 def _kind(spec: VcfmSpec) -> Hashable | None:
@@ -175,12 +176,14 @@ def _solve_kind(specs: Sequence[VcfmSpec]) -> Solution:
     """Return mechanisms of one kind as rows."""
     made, count = stack_laws([parts(spec) for spec in specs]), len(specs[0].analysis.preloads)
     preloads = np.concatenate([spec.analysis.preloads for spec in specs])
-    each = np.repeat(np.arange(len(specs)), count)
+    mechanism_of_row = np.repeat(np.arange(len(specs)), count)
     grid, room = np.stack([travel_grid(spec) for spec in specs]), np.array([spring_room(spec) for spec in specs])
     made.linear  # noqa: B018  once for all preloads
     sampler = LawSampler(made)
-    sampler = sampler if count == 1 or len(specs) == 1 else sampler.of_rows(each)
-    return Solution(tuple(specs), made, _curves(sampler, preloads, grid[each], room[each]), count)
+    sampler = sampler if count == 1 or len(specs) == 1 else sampler.select_rows(mechanism_of_row)
+    return Solution(
+        tuple(specs), made, _curves(sampler, preloads, grid[mechanism_of_row], room[mechanism_of_row]), count
+    )
 
 
 def _curves(
@@ -246,7 +249,7 @@ def rests_of(
     rest = np.where(preload == 0, 0.0, np.nan)
     for rows, search in ((np.flatnonzero(preload < 0), _pulled_ahead), (np.flatnonzero(preload > 0), _pushed_back)):
         if rows.size:
-            rest[rows] = search(sampler.of_rows(rows), preload[rows], grid[rows])
+            rest[rows] = search(sampler.select_rows(rows), preload[rows], grid[rows])
     return rest
 
 
@@ -275,9 +278,11 @@ def _pulled_ahead(sampler: ForceSampler, preload: FloatArray, grid: FloatArray) 
     some = beyond.any(axis=1) & (first > 0)
 
     def excess(travel: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
-        found = _force(sampler.of_rows(ends), travel, preload[ends]) / np.abs(force[ends, first[ends]])[:, None]
+        excess_share = (
+            _force(sampler.select_rows(ends), travel, preload[ends]) / np.abs(force[ends, first[ends]])[:, None]
+        )
         # no value: farther back than the leaves were followed, where they pull still harder
-        return np.where(np.isfinite(found), found, -1.0)
+        return np.where(np.isfinite(excess_share), excess_share, -1.0)
 
     low, high = grid[rows, before], grid[rows, first]
     some &= force[rows, first] != 0
@@ -290,13 +295,13 @@ def _pulled_ahead(sampler: ForceSampler, preload: FloatArray, grid: FloatArray) 
 def _pushed_back(sampler: ForceSampler, preload: FloatArray, _grid: FloatArray) -> FloatArray:
     """Return where the shuttle rests at positive preloads, (r,) [m]."""
     nothing = np.zeros((len(preload), 1))
-    there, behind = (_force(sampler, at, preload)[:, 0] for at in (nothing, -preload[:, None]))
+    force_unloaded, force_behind = (_force(sampler, at, preload)[:, 0] for at in (nothing, -preload[:, None]))
     # No number unloaded: leaves too thin for the engine could not be moved at all. No number farther back: than they
     # were followed, where they pull still harder. The closed form of arches pulls the wrong way far out of its range.
-    rests = (there > 0) & ~(behind > 0)
+    rests = (force_unloaded > 0) & ~(force_behind > 0)
 
     def excess(travel: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
-        return -_force(sampler.of_rows(ends), travel, preload[ends]) / there[ends][:, None]
+        return -_force(sampler.select_rows(ends), travel, preload[ends]) / force_unloaded[ends][:, None]
 
     place = last_places(excess, nothing, np.where(rests, -preload, 0.0)[:, None])[:, 0]
     return np.where(rests, _polish_rest(sampler, preload, place, 1e-9 * preload), np.nan)
@@ -304,9 +309,9 @@ def _pushed_back(sampler: ForceSampler, preload: FloatArray, _grid: FloatArray) 
 
 def _polish_rest(sampler: ForceSampler, preload: FloatArray, place: FloatArray, step: FloatArray) -> FloatArray:
     """Return rest positions after one secant more over what is left of their brackets: known to rounding."""
-    here, ahead = (_force(sampler, at[:, None], preload)[:, 0] for at in (place, place + step))
+    force_here, force_ahead = (_force(sampler, at[:, None], preload)[:, 0] for at in (place, place + step))
     with np.errstate(all="ignore"):
-        change = here * step / (ahead - here)
+        change = force_here * step / (force_ahead - force_here)
     return place - np.where(np.abs(change) < step, change, 0.0)
 
 
@@ -342,7 +347,7 @@ class LawSampler:
     problem = ""
     accuracy = ROUND_OFF
 
-    def of_rows(self, rows: Any) -> Self:
+    def select_rows(self, rows: Any) -> Self:
         """Return the laws of some rows."""
         return type(self)(rows_of(self.parts, rows))
 
@@ -384,9 +389,9 @@ class StoppedSampler:
     sampler: ForceSampler
     stops: EndStops
 
-    def of_rows(self, rows: Any) -> Self:
+    def select_rows(self, rows: Any) -> Self:
         """Return those of some rows."""
-        return type(self)(self.sampler.of_rows(rows), self.stops)
+        return type(self)(self.sampler.select_rows(rows), self.stops)
 
     def leaf_force(self, travel: FloatArray) -> FloatArray:
         """Return the force of leaves and stops [N]."""

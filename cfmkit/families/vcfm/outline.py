@@ -55,7 +55,7 @@ def drawing(spec: VcfmSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     cut = [contour for contour, _ in rounded]
     sections = check_outline(cut, tuple(specified_pieces(spec, top)), thinnest, fillet)
     part = spec.mechanism.cut_part
-    holes = [circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes]
+    holes = [circle(hole.at, 0.5 * hole.diameter, "cut", hole=True) for hole in part.holes]
     marks = tuple(_marks(spec, spring, sizes))
     contours, bare = add_fixing_holes((*cut, *holes), marks, part.screws)
     return Drawing(
@@ -119,8 +119,8 @@ def _dimensions(spec: VcfmSpec, sizes: FrameSizes) -> Iterator[DrawnDimension]:
     yield DrawnDimension("across clamps", (-half - reach, -rise), (half + reach, -rise), "x")
     if sizes.stopped:
         yield DrawnDimension("stop", (sizes.out, sizes.wall_top), (sizes.out, sizes.under), "y")
-    given = spec.mechanism.cut_part.frame
-    if sizes.floor is not None and given is not None and given.seat is not None:
+    frame = spec.mechanism.cut_part.frame
+    if sizes.floor is not None and frame is not None and frame.seat is not None:
         face = max(y for _, y in sizes.ledge)
         yield DrawnDimension("seat of the spring", (0.0, face), (0.0, -spec.mechanism.frame.clearance), "y")
 
@@ -129,15 +129,17 @@ def _facts(spec: VcfmSpec) -> Iterator[tuple[str, str]]:
     """Yield what both parts are made of, and their leaves."""
     leaves, spring = spec.mechanism.bistable, spec.mechanism.positive
     yield "material", spec.mechanism.material.words
-    for part in (one for one in parts_of(spec) if one.source == "buy"):
+    for part in (listed for listed in parts_of(spec) if listed.source == "buy"):
         yield "springs", f"{part.count} x {f'{part.name}, ' if part.name else ''}{part.data}"
-    for word, one, count in (("leaves", leaves, leaves.half_beams), ("spring", spring, None)):
-        if one is None:
+    for word, strip, count in (("leaves", leaves, leaves.half_beams), ("spring", spring, None)):
+        if strip is None:
             continue
-        length, thick, width = (format_short(size, "length", 7) for size in (one.length, one.thickness, one.width))
+        length, thick, width = (
+            format_short(size, "length", 7) for size in (strip.length, strip.thickness, strip.width)
+        )
         size = f"{length} long, {thick} thick, {width} wide"
-        angle = f", at {format_short(one.angle, 'angle', 6)}" if one.angle else ""
-        yield word, f"{f'{count} {one.structure}' if count else one.structure}: {size}{angle}"
+        angle = f", at {format_short(strip.angle, 'angle', 6)}" if strip.angle else ""
+        yield word, f"{f'{count} {strip.structure}' if count else strip.structure}: {size}{angle}"
 
 
 def _sheet(spec: VcfmSpec, spring: Sequence[Contour]) -> Sheet:

@@ -20,7 +20,7 @@ from cfmkit.export.beam_sections import BeamSection
 from cfmkit.export.contours import Arc, Contour, Edge, Line, Smooth
 from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.fillets import round_inside_corners
-from cfmkit.export.posed_part import MIRROR_FACTORS, PosedBody, PosedPart, band, in_poses, rectangle
+from cfmkit.export.posed_part import MIRROR_FACTORS, PosedBody, PosedPart, band, join_poses, rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.rows import with_values
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring
@@ -79,7 +79,7 @@ def bodies(solution: Solution, poses: Sequence[tuple[float, float]]) -> tuple[Po
         sizes = frame_sizes(with_values(spec, {"mechanism.part": None}), None)
     # coils of which nothing says it are drawn as long as the farthest pose needs them
     farthest = max(push.preload for push in solution.pushes) + float(solution.first.travel[-1])
-    return in_poses([list(_pose(spec, sizes, solution.parts.leaf, *pose, farthest)) for pose in poses])
+    return join_poses([list(_pose(spec, sizes, solution.parts.leaf, *pose, farthest)) for pose in poses])
 
 
 def _pose(
@@ -91,8 +91,8 @@ def _pose(
     line = leaf.bent_line(travel)[::-1] * MIRROR_FACTORS + np.array([sizes.wall, -float(leaf.strip.rise)])
     half, spacing = 0.5 * leaf_thickness(leaf, len(line)), spec.mechanism.frame.spacing
     for number in range(spec.mechanism.bistable.half_beams):
-        one = PosedBody.polygon("leaf", "free", band(line + np.array([0.0, number // 2 * spacing]), half))
-        yield one.mirror() if number % 2 else one
+        half_beam = PosedBody.polygon("leaf", "free", band(line + np.array([0.0, number // 2 * spacing]), half))
+        yield half_beam.mirror() if number % 2 else half_beam
     if spec.mechanism.springs is None:
         yield from _leaf_spring(spec, sizes.bottom - travel, travel + preload)
     else:
@@ -178,12 +178,14 @@ def leaf_sections(law: LeafLaw, apex: Point) -> Iterator[BeamSection]:
     """Yield the section in the middle of every piece of a leaf whose thickness has no step."""
     x, y, slope = law.centre_line
     length = float(np.hypot(np.diff(x), np.diff(y)).sum())
-    for (start, one), (end, other) in pairwise(zip(*law.profile, strict=True)):
+    for (start, first_thickness), (end, last_thickness) in pairwise(zip(*law.profile, strict=True)):
         if end > start:
             at = [float(np.interp(0.5 * (start + end), np.linspace(0.0, 1.0, len(x)), row)) for row in (x, y, slope)]
             across = np.array([-at[2], 1.0]) / np.hypot(1.0, at[2])
             place = np.array([apex[0] + at[0], apex[1] + at[1]])
-            yield BeamSection("leaf", place, across, float(0.5 * (one + other)), (end - start) * length)
+            yield BeamSection(
+                "leaf", place, across, float(0.5 * (first_thickness + last_thickness)), (end - start) * length
+            )
 
 
 def _section(strip: PosedBody, thickness: float) -> BeamSection:
@@ -317,8 +319,8 @@ def solved_spring(spec: VcfmSpec) -> SolvedPiece:
     x0, y0, x1, y1 = made.extents
     strips = (body for body in _leaf_spring(spec, 0.0, 0.0) if body.name == "spring")
     sections = [_section(strip, law.strip.thickness) for strip in strips]
-    own = tuple(one for one in sections if x0 < one.at[0] < x1 and y0 < one.at[1] < y1)
-    return SolvedPiece(made, block, (np.array(held),), False, own, glides)
+    inside = tuple(section for section in sections if x0 < section.at[0] < x1 and y0 < section.at[1] < y1)
+    return SolvedPiece(made, block, (np.array(held),), False, inside, glides)
 
 
 def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:

@@ -126,10 +126,10 @@ class SolidSampler(ExactSampler):
         self.pushed, self.mesh_error = _path(leaves.solution), leaves.error
         self.pulled = _pull_back(spec, leaves, -back, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
         self.sides, self.problem = [], problem_of("bistable", (self.pushed, self.pulled), 1.0)
-        for one in spring:
+        for solver in spring:
             self.chain = spring_chain(spec)
             back_again = self.chain.travel * min(min(preloads) - back, -0.02 * end)
-            springs = one.solve(lambda part, _: run.progress(0.7 + 0.2 * part, "spring"))
+            springs = solver.solve(lambda part, _: run.progress(0.7 + 0.2 * part, "spring"))
             pull = _pull_back(spec, springs, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
             self.sides, self.mesh_error = [_path(springs.solution), pull], self.mesh_error.worse(springs.error)
             self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
@@ -137,17 +137,17 @@ class SolidSampler(ExactSampler):
 
     def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Return at which travels [m] leaves and, unless it is bought, spring have a pose."""
-        found = _poses_at(travel, (self.pushed, self.pulled))
+        has_pose = _poses_at(travel, (self.pushed, self.pulled))
         if self.coils is None:
-            found &= _poses_at(self.chain.travel * (travel + preload), self.sides)
-        return found
+            has_pose &= _poses_at(self.chain.travel * (travel + preload), self.sides)
+        return has_pose
 
 
 def _poses_at(places: FloatArray, paths: Sequence[SolidPath]) -> NDArray[np.bool_]:
     """Return at which travels (n,) [m] one of some paths has a pose."""
-    known = np.concatenate([path.solved.course.solved_travel for path in paths])
-    near = 1e-9 * float(np.abs(known).max(initial=0.0))
-    return np.asarray((np.abs(places[:, None] - known) <= near).any(axis=1))
+    travels = np.concatenate([path.solved.course.solved_travel for path in paths])
+    same_travel = 1e-9 * float(np.abs(travels).max(initial=0.0))
+    return np.asarray((np.abs(places[:, None] - travels) <= same_travel).any(axis=1))
 
 
 def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
@@ -166,9 +166,9 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
     )
     walls = [
         HeldOrDriven(
-            f"wall-{number}", (one,), one.mean(axis=0), np.zeros(3), across, _seams(one) if len(one) > 2 else ()
+            f"wall-{number}", (edge,), edge.mean(axis=0), np.zeros(3), across, _seams(edge) if len(edge) > 2 else ()
         )
-        for number, one in enumerate(piece.held, start=1)
+        for number, edge in enumerate(piece.held, start=1)
     ]
     rings, places = rings_of((piece.contour,), about.thickness), (shuttle, *walls)
     return Part(rings, about.thickness, about.width, law, places, sections=piece.sections)
@@ -183,16 +183,16 @@ def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
     if spec.mechanism.springs is None:
         pieces["spring"] = solved_spring(spec)
         ends["spring"] = spring_chain(spec).travel * (max(*spec.analysis.preloads, 0.0) + spec.travel)
-    own = [place for _, window in spec.windows() for place in window_places(window, (0.0, spec.travel))]
-    places = {"leaf": own}
+    leaf_places = [place for _, window in spec.windows() for place in window_places(window, (0.0, spec.travel))]
+    places = {"leaf": leaf_places}
     if spec.mechanism.springs is None:
         share, preload = spring_chain(spec).travel, spec.analysis.preloads[0]
-        places["spring"] = [share * (preload + place) for place in own]
-    found = []
+        places["spring"] = [share * (preload + place) for place in leaf_places]
+    driven_parts = []
     for name, piece in pieces.items():
         part, stops = part_of(spec, piece), _stops(spec, ends[name], 1, places[name])
-        found.append(DrivenPart(f"vcfm-{name}", part, spec.analysis.solid.error, stops))
-    return tuple(found)
+        driven_parts.append(DrivenPart(f"vcfm-{name}", part, spec.analysis.solid.error, stops))
+    return tuple(driven_parts)
 
 
 def _seams(polygon: FloatArray) -> tuple[FloatArray, ...]:
@@ -237,15 +237,15 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         return not_meshed(spec, error)
     except SolutionError as error:
         return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}")
-    found = result_of(solution := solve(spec, made, sampler))
-    warnings = (*found.warnings, *_findings(spec, sampler))
-    if not found.curves:
-        return replace(found, warnings=warnings)
+    result = result_of(solution := solve(spec, made, sampler))
+    warnings = (*result.warnings, *_findings(spec, sampler))
+    if not result.curves:
+        return replace(result, warnings=warnings)
     rows = sum(fillets(solution), ())
-    tables = dict(found.tables)
+    tables = dict(result.tables)
     tables["fillets"] = partial(fillet_table, rows)
-    values = {**found.values, **largest_concentration(rows)}
-    return replace(found, values=values, warnings=warnings, tables=tables)
+    values = {**result.values, **largest_concentration(rows)}
+    return replace(result, values=values, warnings=warnings, tables=tables)
 
 
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
@@ -263,23 +263,23 @@ def fillets(solution: Solution) -> tuple[tuple[FilletRow, ...], tuple[FilletRow,
     """
     sampler: Any = solution.sampler  # of solids
     leaf = _rows(solution, "leaf", "shuttle", (sampler.pushed, sampler.pulled))
-    network, placed = leaf_network(solution.spec), partial(_in_leaf_network, solution.spec)
+    network, placed = leaf_network(solution.spec), partial(_place_in_leaf_network, solution.spec)
     leaf = _with_nominal(leaf, [row.motion for row in leaf], network, "shuttle", placed)
     if not sampler.sides:
         return leaf, ()
     chain, spring = sampler.chain, _rows(solution, "spring", "block", sampler.sides)
     travel = [chain.travel * (row.motion + (row.preload or 0.0)) for row in spring]
-    return leaf, _with_nominal(spring, travel, chain.network, chain.node, partial(_in_chain, solution.spec))
+    return leaf, _with_nominal(spring, travel, chain.network, chain.node, partial(_place_in_chain, solution.spec))
 
 
 def _rows(solution: Solution, piece: str, moved: str, ways: Sequence[Any]) -> tuple[FilletRow, ...]:
     """Return the fillets of one piece that is pushed and pulled."""
     radius = solution.spec.mechanism.fillet
-    pushed, pulled = (way.solved for way in ways)
+    pushed, pulled = (direction.solved for direction in ways)
     rows = []
-    for one in _both_ways(pushed, pulled, radius):
-        joined = one.arc.find_touched(_rigid(pushed, moved))
-        row = _largest(solution, one, f"{piece} at {joined[0] if joined else 'corner'}", piece == "spring")
+    for fillet in _both_ways(pushed, pulled, radius):
+        joined = fillet.arc.find_touched(_rigid(pushed, moved))
+        row = _largest(solution, fillet, f"{piece} at {joined[0] if joined else 'corner'}", piece == "spring")
         rows += [] if row is None else [row]
     return tuple(rows)
 
@@ -298,14 +298,14 @@ def _with_nominal(
     return with_nominal(rows, nominal_stresses(rows, np.array(travel), paths, placed))
 
 
-def _in_leaf_network(spec: VcfmSpec, points: FloatArray) -> FloatArray:
+def _place_in_leaf_network(spec: VcfmSpec, points: FloatArray) -> FloatArray:
     """Return where in the network of leaves points of the drawing are (m, 2) [m]: there the walls come first."""
     strip, half = strip_of(spec.mechanism.bistable, spec.mechanism.material), 0.5 * spec.mechanism.frame.shuttle_width
     x, y = points.T
     return np.column_stack([float(strip.reach) + half * np.sign(x) - x, y + float(strip.rise)])
 
 
-def _in_chain(spec: VcfmSpec, points: FloatArray) -> FloatArray:
+def _place_in_chain(spec: VcfmSpec, points: FloatArray) -> FloatArray:
     """Return where in the network of the spring points of the drawing are (m, 2) [m]: there the block stands."""
     block = spec.mechanism.frame.block
     return np.column_stack([points[:, 0] - 0.5 * block, -points[:, 1] - block])
@@ -315,35 +315,37 @@ def _both_ways(pushed: MeshSolution, pulled: MeshSolution, radius: float) -> Ite
     """Yield the fillets of a part with the poses of both ways: they are of one mesh, and begin with the same pose."""
     from cfmkit.solid.stress_along_fillets import FilletStress, stressed_fillets
 
-    back = {tuple(one.arc.middle.tolist()): one for one in stressed_fillets(pulled, radius)}
-    for one in stressed_fillets(pushed, radius):
-        other = back.get(tuple(one.arc.middle.tolist()))
-        if other is None:
-            yield one
+    back = {tuple(fillet.arc.middle.tolist()): fillet for fillet in stressed_fillets(pulled, radius)}
+    for fillet in stressed_fillets(pushed, radius):
+        pulled_fillet = back.get(tuple(fillet.arc.middle.tolist()))
+        if pulled_fillet is None:
+            yield fillet
         else:
-            travel, stress = (np.concatenate([a[:-1], b]) for a, b in zip(_poses(other), _poses(one), strict=True))
-            yield FilletStress(one.arc, travel, stress)
+            travel, stress = (
+                np.concatenate([a[:-1], b]) for a, b in zip(_poses(pulled_fillet), _poses(fillet), strict=True)
+            )
+            yield FilletStress(fillet.arc, travel, stress)
 
 
-def _poses(one: FilletStress) -> tuple[Any, Any]:
-    return one.travel, one.stress
+def _poses(fillet: FilletStress) -> tuple[Any, Any]:
+    return fillet.travel, fillet.stress
 
 
 def _rigid(solved: MeshSolution, moved: str) -> dict[str, list[Any]]:
     """Return the polygons of what moves and of what stands [m]; the middle of a corner is a line, and no piece."""
-    found: dict[str, list[Any]] = {}
+    polygons: dict[str, list[Any]] = {}
     for place in solved.part.places:
         name = moved if place.name == "shuttle" else {"shuttle": "wall"}.get(moved, moved)
-        found.setdefault(name, []).extend(shape for shape in place.shapes if len(shape) > 2)
-    return found
+        polygons.setdefault(name, []).extend(shape for shape in place.shapes if len(shape) > 2)
+    return polygons
 
 
-def _largest(solution: Solution, one: FilletStress, place: str, of_spring: bool) -> FilletRow | None:
+def _largest(solution: Solution, fillet: FilletStress, place: str, of_spring: bool) -> FilletRow | None:
     """Return the row of a fillet: at the preload and the travel of the shuttle where its stress is largest."""
-    found = []
+    rows = []
     for push in solution.pushes:
         share, ahead = (solution.sampler.chain.travel, push.preload) if of_spring else (1.0, 0.0)  # type: ignore[attr-defined]
         start, end = float(push.travel[0]), min(solution.window_of_one[1], float(push.travel[-1]))
-        if (worst := one.largest(share * (start + ahead), share * (end + ahead))) is not None:
-            found.append(FilletRow(place, one.arc, worst[0], worst[1] / share - ahead, push.preload))
-    return max(found, key=lambda row: abs(row.stress), default=None)
+        if (worst := fillet.largest(share * (start + ahead), share * (end + ahead))) is not None:
+            rows.append(FilletRow(place, fillet.arc, worst[0], worst[1] / share - ahead, push.preload))
+    return max(rows, key=lambda row: abs(row.stress), default=None)

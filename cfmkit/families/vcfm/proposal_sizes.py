@@ -69,7 +69,10 @@ def preloads_for(
         stroke = design.preload_stroke / design.adjustment if design and design.adjustment else 0.0
         per_force = stroke if bought is None else 1.0 / Coils.from_springs(bought).stiffness
     low, high = request.adjustable
-    return (0.0, *(one for one in ((high - request.target) * per_force, (low - request.target) * per_force) if one))
+    return (
+        0.0,
+        *(shift for shift in ((high - request.target) * per_force, (low - request.target) * per_force) if shift),
+    )
 
 
 def widen(spec: VcfmSpec, leaves: float, spring: float) -> VcfmSpec:

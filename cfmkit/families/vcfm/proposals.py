@@ -63,7 +63,7 @@ STRESS_MARGIN = 1.03
 """On the stress: the exact model has a little more of it than the closed forms that give the leaf's length."""
 DEFAULT_ADJUSTMENT = 0.02  # adjustment, over the force, where none is required: every such mechanism has one
 VARIANT_ORDER = {"1 V": 2, "3 Vs": 4, "4 Vs": 5, "2 Vs, catalogue": 7} | {
-    one.variant: one.turn for _, one in STRUCTURE_BLOCKS.values()
+    block.variant: block.turn for _, block in STRUCTURE_BLOCKS.values()
 }
 """Variants by their first words, in the order in which they are tried behind two Vs with a diamond."""
 MIN_RISE_RATIO = 0.9
@@ -82,7 +82,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     """Return mechanisms that the closed forms say are worth designing, the smallest first, for a yield the thickest."""
     if request.kind == "torque":
         return FamilyOffer(reason="leaves that snap through give a force at their shuttle, no torque")
-    found: list[Candidate] = []
+    candidates: list[Candidate] = []
     closest: tuple[float, dict[str, float]] | None = None
     for block in request.materials or ({"name": "pom"},):
         for loose, sizes in _designs(request, dict(block)):
@@ -98,14 +98,14 @@ def propose(request: Request, run: Run) -> FamilyOffer:
                 thick = min(sizes.leaf.thickness, sizes.spring_leaf.thickness)
                 promise = over["across"] * over["along"] if request.good_parts is None else -thick
                 promise += WIDE_LAST * _is_too_wide(request, block, sizes)
-                found.append(
+                candidates.append(
                     Candidate(variant, spec, True, FINISH_FUNCTION, float(promise), correct=CORRECTION_FUNCTION)
                 )
             if (coiled := _offer_coiled(request, block, spec, sizes)) is not None:
-                found.append(coiled)
-    if found:
-        ranked = sorted(found, key=lambda one: one.promise)
-        plain = [one for one in ranked if one.promise < 0.5 * WIDE_LAST] or ranked
+                candidates.append(coiled)
+    if candidates:
+        ranked = sorted(candidates, key=lambda candidate: candidate.promise)
+        plain = [candidate for candidate in ranked if candidate.promise < 0.5 * WIDE_LAST] or ranked
         return FamilyOffer(tuple(_vary_by_turns([*plain, *_with_structures(plain)])[:MAX_PROPOSALS]))
     if closest is None:
         return FamilyOffer(
@@ -120,18 +120,23 @@ def _is_too_wide(request: Request, block: MaterialBlock, sizes: DesignSizes) -> 
     material = MaterialSpec.model_validate(dict(block))
     strain = request.strength_used * (material.allowable(1.0) or 0.0) / material.modulus
     return any(
-        is_too_wide(request, float(one.width), float(one.thickness), strain) for one in (sizes.leaf, sizes.spring_leaf)
+        is_too_wide(request, float(strip.width), float(strip.thickness), strain)
+        for strip in (sizes.leaf, sizes.spring_leaf)
     )
 
 
-def _vary_by_turns(found: list[Candidate]) -> list[Candidate]:
+def _vary_by_turns(candidates: list[Candidate]) -> list[Candidate]:
     """Return candidates, those of different numbers of Vs by turns."""
-    kinds = sorted(dict.fromkeys(one.variant for one in found), key=_turn)
-    rows = [[one for one in found if one.variant == kind] for kind in kinds]
+    kinds = sorted(dict.fromkeys(candidate.variant for candidate in candidates), key=_turn)
+    rows = [[candidate for candidate in candidates if candidate.variant == kind] for kind in kinds]
     # the smallest first, then larger ones, which are flatter; for a yield the thickest, then thinner ones
     turns = [[row[len(row) * part // 8] for part in (0, 4, 2, 6, 1, 7)] for row in rows]
     mixed = [row[k] for k in range(6) for row in turns]
-    return [one for number, one in enumerate(mixed) if all(one is not other for other in mixed[:number])]
+    return [
+        candidate
+        for number, candidate in enumerate(mixed)
+        if all(candidate is not earlier for earlier in mixed[:number])
+    ]
 
 
 def _turn(variant: str) -> int:
@@ -253,7 +258,7 @@ def _offer_coiled(request: Request, block: MaterialBlock, spec: VcfmSpec, sizes:
     springs = list(_springs_beside(request, spec, float(sizes.linear[1]), request.envelope[1] - stands))
     if not springs:
         return None
-    promise = across * (stands + min(one.free_length or 0.0 for one in springs))
+    promise = across * (stands + min(spring.free_length or 0.0 for spring in springs))
     promise = promise if request.good_parts is None else -float(leaf.thickness)
     # the spring decides how wide the leaves are: of those for which there is a place, one whose leaves fit the depth
     listed = spec.replace({"design.catalogue": tuple(springs), "design.max_width": request.depth})
@@ -268,17 +273,17 @@ def _springs_beside(request: Request, spec: VcfmSpec, travel: float, place: floa
     target = spec.design
     assert target is not None
     softest, preload = target.required_force / target.height, target.preload_stroke
-    for one in chain(generic("compression"), generic("extension")):
-        wide = one.outer_diameter or 0.0
+    for spring in chain(generic("compression"), generic("extension")):
+        wide = spring.outer_diameter or 0.0
         # a pulled spring stands above a shuttle that goes down, and the preload moves its other end up
-        long = (one.free_length or 0.0) + (target.stroke + preload if one.kind == "extension" else 0.0)
-        stretched = (one.largest or 0.0) > MIN_RISE_RATIO * (travel + preload)
+        long = (spring.free_length or 0.0) + (target.stroke + preload if spring.kind == "extension" else 0.0)
+        stretched = (spring.largest or 0.0) > MIN_RISE_RATIO * (travel + preload)
         if long > place or wide > (request.depth or np.inf) or not stretched:
             continue
         most = request.envelope[0] / (SPRING_CLEARANCE_RATIO * wide)
-        counts = tuple(n for n in one.counts if softest <= n * one.rate <= softest / MIN_RISE_RATIO and n <= most)
+        counts = tuple(n for n in spring.counts if softest <= n * spring.rate <= softest / MIN_RISE_RATIO and n <= most)
         if counts:
-            yield CatalogueSpring.from_offer(replace(one, counts=counts))
+            yield CatalogueSpring.from_offer(replace(spring, counts=counts))
 
 
 def _explain_no_offer(request: Request, excess: float, over: dict[str, float]) -> FamilyOffer:
@@ -289,13 +294,15 @@ def _explain_no_offer(request: Request, excess: float, over: dict[str, float]) -
     return FamilyOffer(reason=f"leaves and spring need {mm(sides[worst] * excess)} {words}")
 
 
-def _with_structures(found: list[Candidate]) -> Iterator[Candidate]:
+def _with_structures(candidates: list[Candidate]) -> Iterator[Candidate]:
     """Yield the same with other springs and leaves: of two Vs, a small, a larger and a large one of each structure."""
-    plain = [one for one in found if _turn(one.variant) == 0]
+    plain = [candidate for candidate in candidates if _turn(candidate.variant) == 0]
     chosen = [plain[k] for k in dict.fromkeys(len(plain) * part // 8 for part in (0, 3, 6))] if plain else []
     for name, (_, structure) in STRUCTURE_BLOCKS.items():
-        for one in chosen:
-            yield replace(one, variant=one.variant.replace("2 Vs", structure.variant), finish=f"{FINISH_WITH}:{name}")
+        for candidate in chosen:
+            yield replace(
+                candidate, variant=candidate.variant.replace("2 Vs", structure.variant), finish=f"{FINISH_WITH}:{name}"
+            )
 
 
 def finish_with(name: str, spec: VcfmSpec, request: Request) -> VcfmSpec:
@@ -325,10 +332,12 @@ def _use_flattest_window(spec: VcfmSpec, request: Request, preloads: tuple[float
     keys = {"analysis.fidelity": "exact", "analysis.preloads": preloads, "design": None, "mechanism.safety_factor": 1.0}
     free = {"analysis.window": None, "analysis.travel": wide, "requirements": ()}
     made = open_corners(spec.replace(keys | free), wide, preloads)
-    found = flattest(analyze(made, Run()), request.travel)
-    if found is None:
+    window = flattest(analyze(made, Run()), request.travel)
+    if window is None:
         return made
-    return made.replace({"analysis.window": tuple(Place(end, "length") for end in found), "analysis.travel": found[1]})
+    return made.replace(
+        {"analysis.window": tuple(Place(end, "length") for end in window), "analysis.travel": window[1]}
+    )
 
 
 WINDOW_CENTRES = np.linspace(0.5, 1.5, 41)
@@ -370,15 +379,15 @@ def with_structure(
     changes = {f"mechanism.{block}.{key}": value for key, value in keys}
     made = spec.replace({**changes, "design": None, "requirements": (), "mechanism.safety_factor": 1.0})
     made = made.replace({"analysis.fidelity": "exact", "analysis.preloads": (0.0,), "analysis.window": None})
-    found = _fit_widths(made, forces, travel)
+    widths = _fit_widths(made, forces, travel)
     for _ in range(N_LENGTHENINGS):
-        over = [stress / strength for stress in found.stresses]
+        over = [stress / strength for stress in widths.stresses]
         if max(over) <= 1.0:
             break
-        made = lengthen(made, [max(1.0, sqrt(1.02 * one)) for one in over])
-        found = _fit_widths(made, forces, travel)
-    made = widen(made, found.wide, found.stiff)
-    return made, found.end, found.stiffness
+        made = lengthen(made, [max(1.0, sqrt(1.02 * overstress)) for overstress in over])
+        widths = _fit_widths(made, forces, travel)
+    made = widen(made, widths.wide, widths.stiff)
+    return made, widths.end, widths.stiffness
 
 
 def _fit_widths(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _Fit:
@@ -389,7 +398,7 @@ def _fit_widths(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _
     from cfmkit.families.vcfm.exact_model import ExactSampler
 
     rise = spec.mechanism.bistable.length * sin(spec.mechanism.bistable.angle)
-    centres = [one * rise for one in WINDOW_CENTRES if one * rise > 0.51 * travel]
+    centres = [share * rise for share in WINDOW_CENTRES if share * rise > 0.51 * travel]
     if not centres:
         raise SolutionError("the leaves are too flat for the travel")
     end = max(centres) + 0.5 * travel
@@ -401,7 +410,9 @@ def _fit_widths(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _
         sampler = ExactSampler(spec, end, 0.0)
     if sampler.problem:
         raise SolutionError(sampler.problem)
-    tried = [one for one in (fit_in_window(sampler, at, forces[0], travel) for at in centres) if one is not None]
+    tried = [
+        widths for widths in (fit_in_window(sampler, at, forces[0], travel) for at in centres) if widths is not None
+    ]
     if not tried:
         raise SolutionError("no widths of this structure give the force over the travel")
     _, at, wide, stiff = min(tried)

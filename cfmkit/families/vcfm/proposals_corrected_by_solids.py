@@ -43,10 +43,10 @@ def correct(spec: VcfmSpec, request: Request) -> VcfmSpec:
     free = {"analysis.travel": max(ends), "analysis.window": None, "analysis.preloads": (0.0,)}
     sampler = SolidSampler(solid.replace(free), max(ends), 0.0, Run())
     tried = [fit_in_window(sampler, end - 0.5 * request.travel, request.target, request.travel) for end in ends]
-    known = [one for one in tried if one is not None]
-    if not known:
+    fitted = [fit for fit in tried if fit is not None]
+    if not fitted:
         return solid
-    _, at, wide, stiff = min(known)
+    _, at, wide, stiff = min(fitted)
     last = at + 0.5 * request.travel
     leaf = float(sampler.leaves(np.linspace(0.0, last, 201)).stress.max())
     preloads, largest = solid.analysis.preloads, max(solid.analysis.preloads)

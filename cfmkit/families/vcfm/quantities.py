@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Quantity
 
 
-def _of_mesh(name: str) -> Callable[[Solution], float]:
+def _read_mesh_error(name: str) -> Callable[[Solution], float]:
     """Return what reads an error of the mesh: solids alone have one."""
 
     def read(solution: Solution) -> float:
@@ -56,8 +56,8 @@ def _why_not_constant(solution: Solution) -> str:
     alone, flat = float(solution.spring_alone[0]), float(solution.window_force[0])
     if np.isnan(alone):
         return "the leaves carry a force where they are flat, or the spring has no constant stiffness"
-    found = "" if np.isnan(flat) else f"; its flat part is at {newton(flat)}"
-    return f"where the leaves carry nothing the force is {newton(alone)}, but the curve is not flat there{found}"
+    flat_part = "" if np.isnan(flat) else f"; its flat part is at {newton(flat)}"
+    return f"where the leaves carry nothing the force is {newton(alone)}, but the curve is not flat there{flat_part}"
 
 
 def _rest_position(solution: Solution) -> FloatArray:
@@ -65,15 +65,17 @@ def _rest_position(solution: Solution) -> FloatArray:
 
 
 def _rest_shift_max(solution: Solution) -> FloatArray:
-    shift = np.abs(solution.by_mechanism(solution.curves.rest))
+    shift = np.abs(solution.split_by_mechanism(solution.curves.rest))
     return np.where(np.isnan(shift).all(axis=1), np.nan, np.where(np.isnan(shift), 0.0, shift).max(axis=1))
 
 
 def _stiffness_mismatch(solution: Solution) -> FloatArray:
     character, alone = solution.character, solution.spring_alone
-    difference = solution.of_mechanisms(np.abs(character.positive_stiffness - character.negative_stiffness))
-    known = np.abs(alone) > solution.effort_error
-    return np.where(known, difference * (solution.window[1] - solution.window[0]) / np.where(known, alone, 1.0), np.nan)
+    difference = solution.spread_over_mechanisms(np.abs(character.positive_stiffness - character.negative_stiffness))
+    is_known = np.abs(alone) > solution.effort_error
+    return np.where(
+        is_known, difference * (solution.window[1] - solution.window[0]) / np.where(is_known, alone, 1.0), np.nan
+    )
 
 
 def _travel_stress_max(solution: Solution) -> FloatArray:
@@ -87,14 +89,14 @@ def _travel_safety_factor(solution: Solution) -> FloatArray:
 
 def _spring_stress_max(solution: Solution) -> FloatArray:
     ends = np.repeat(solution.window[1], solution.preloads)
-    stress = solution.by_mechanism(solution.curves.spring_stress(ends)).max(axis=1)
+    stress = solution.split_by_mechanism(solution.curves.spring_stress(ends)).max(axis=1)
     return stress if solution.spec.mechanism.springs is None else np.full(len(solution), np.nan)
 
 
 def _largest_change(solution: Solution) -> tuple[FloatArray, FloatArray]:
     """Return the largest change of the mean force due to a preload [N], and the change of that preload [m]."""
     means = solution.window_forces.mean(axis=2)
-    changes, preload = means - means[:, :1], solution.by_mechanism(solution.curves.preload[:, 0])
+    changes, preload = means - means[:, :1], solution.split_by_mechanism(solution.curves.preload[:, 0])
     sizes = np.where(np.isnan(changes), -1.0, np.abs(changes))[:, 1:]
     if not sizes.shape[1]:
         return np.full(len(means), np.nan), np.full(len(means), np.nan)
@@ -110,20 +112,20 @@ def _force_per_preload(solution: Solution) -> FloatArray:
 def _value_over_preloads(solution: Solution, read: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Return a value of the forces (m, p, places) of all preloads; NaN where one of them has no force in the window."""
     forces = solution.window_forces
-    known = (np.isfinite(forces).all(axis=2) & (forces.max(axis=2) > 0)).all(axis=1)
-    return np.where(known, read(forces), np.nan)
+    is_known = (np.isfinite(forces).all(axis=2) & (forces.max(axis=2) > 0)).all(axis=1)
+    return np.where(is_known, read(forces), np.nan)
 
 
 def _spring_deflection_max(solution: Solution) -> FloatArray:
     curves = solution.curves
-    return np.asarray(np.maximum(solution.by_mechanism(curves.ends[1] + curves.preload[:, 0]).max(axis=1), 0.0))
+    return np.asarray(np.maximum(solution.split_by_mechanism(curves.ends[1] + curves.preload[:, 0]).max(axis=1), 0.0))
 
 
 def _is_bought(solution: Solution) -> bool:
     return solution.spec.mechanism.springs is not None
 
 
-def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
+def _list_springs_in_use(solution: Solution, number: int) -> list[SpringInUse]:
     """Return what bought springs of a mechanism are put through between rest and the end of the travel."""
     springs = solution.specs[number].mechanism.springs
     if springs is None:
@@ -139,14 +141,14 @@ def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
 
 def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
     """Yield the largest stress in the wire of bought springs, and their shortest life, of each mechanism."""
-    return (wire_quantities(_in_use(solution, number)) for number in range(len(solution)))
+    return (wire_quantities(_list_springs_in_use(solution, number)) for number in range(len(solution)))
 
 
 SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **{
         name: ScalarQuantity(
             *about,
-            _of_mesh(name),
+            _read_mesh_error(name),
             lambda solution: "there is none" if _is_solid(solution) else "only the model of the part as a solid has it",
         )
         for name, about in OF_SOLIDS.items()
@@ -330,10 +332,14 @@ def readings(solution: Solution) -> Table:
     Where a measured force and stiffness are stated, also with those.
     """
     rows = []
-    for one in _readings(solution):
-        found = spread(_force(solution, one))
-        about = {"reading": one.text, "half_beams": one.half_beams, "positive_stiffness": one.positive_stiffness}
-        rows.append(about | found)
+    for reading in _readings(solution):
+        spread_values = spread(_force(solution, reading))
+        about = {
+            "reading": reading.text,
+            "half_beams": reading.half_beams,
+            "positive_stiffness": reading.positive_stiffness,
+        }
+        rows.append(about | spread_values)
     return _table(rows, _READING_COLUMNS)
 
 
@@ -372,24 +378,24 @@ def _readings(solution: Solution) -> Iterator[TableReading]:
         yield TableReading("the stiffness that the measured force needs, 4 half-beams", 4, needed)
 
 
-def _force(solution: Solution, one: TableReading) -> FloatArray:
+def _force(solution: Solution, reading: TableReading) -> FloatArray:
     """Return the force of a reading without preload at even places of the window [N]."""
     places = np.linspace(*solution.window_of_one, MEAN_PLACES)
-    if one.truss and (truss := solution.leaf_kind.truss) is not None:
+    if reading.truss and (truss := solution.leaf_kind.truss) is not None:
         law = truss(solution.parts.strip)
-        return np.asarray(one.half_beams * law.force(places) + one.positive_stiffness * places)
+        return np.asarray(reading.half_beams * law.force(places) + reading.positive_stiffness * places)
     leaves = solution.sampler.leaves(places).force / solution.parts.half_beams
     spring = solution.sampler.spring(places)[0] / solution.character.positive_stiffness
-    return np.asarray(one.half_beams * leaves + one.positive_stiffness * spring)
+    return np.asarray(reading.half_beams * leaves + reading.positive_stiffness * spring)
 
 
 def _table(rows: list[dict[str, Any]], columns: dict[str, str]) -> Table:
-    found = []
+    table_columns = []
     for name, dimension in columns.items():
         values = [row.get(name) for row in rows]
         if dimension in ("text", "count"):
-            found.append(TableColumn(name, tuple(values)))
+            table_columns.append(TableColumn(name, tuple(values)))
         else:
-            known = np.array([or_nan(value) for value in values])
-            found.append(border_column(name, known, dimension))
-    return Table(tuple(found))
+            numbers = np.array([or_nan(value) for value in values])
+            table_columns.append(border_column(name, numbers, dimension))
+    return Table(tuple(table_columns))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def _slimness(solution: Solution) -> FloatArray:
     """Return thickness over length of the leaves, (m,)."""
-    return solution.of_mechanisms(solution.parts.strip.thickness / solution.parts.strip.length)
+    return solution.spread_over_mechanisms(solution.parts.strip.thickness / solution.parts.strip.length)
 
 
 def is_stocky(solution: Solution) -> Any:
@@ -37,8 +37,8 @@ def leaves_out_of_range(solution: Solution) -> Any:
         return False
     if solution.leaf_kind.shortcoming is not None:
         return ~is_stocky(solution)
-    reach = MAX_TRAVEL_RATIO * solution.of_mechanisms(solution.parts.balance)
-    steep = solution.of_mechanisms(solution.parts.strip.angle) > MAX_LEAF_ANGLE
+    reach = MAX_TRAVEL_RATIO * solution.spread_over_mechanisms(solution.parts.balance)
+    steep = solution.spread_over_mechanisms(solution.parts.strip.angle) > MAX_LEAF_ANGLE
     far = goes_beyond(solution.nominal.ends[1], reach)
     return ~is_stocky(solution) & ((_slimness(solution) > THICK_LEAF_RATIO) | steep | far)
 
@@ -84,7 +84,7 @@ def _worst_compression(solution: Solution, limits: tuple[float, float]) -> Float
     """Return by how much the spring is compressed, or negative stretched, where that matters most, (m,) [m]."""
     pressed, stretched = limits
     ends = np.stack([end + solution.curves.preload[:, 0] for end in solution.curves.ends], axis=1)
-    ends = solution.by_mechanism(ends).reshape(len(solution), -1)
+    ends = solution.split_by_mechanism(ends).reshape(len(solution), -1)
     worst = np.where(ends > 0, ends / pressed, -ends / stretched).argmax(axis=1)
     return np.asarray(ends[np.arange(len(ends)), worst])
 
@@ -96,8 +96,8 @@ def spring_out_of_range(solution: Solution) -> Any:
     if solution.fidelity != "analytic" or limits is None:
         return False
     worst = _worst_compression(solution, limits)
-    share = np.abs(worst) / (2.0 * solution.of_mechanisms(spring.strip.length))
-    steep = solution.of_mechanisms(spring.strip.angle) > MAX_LEAF_ANGLE
+    share = np.abs(worst) / (2.0 * solution.spread_over_mechanisms(spring.strip.length))
+    steep = solution.spread_over_mechanisms(spring.strip.angle) > MAX_LEAF_ANGLE
     return ~is_stocky(solution) & (steep | (share > np.where(worst > 0, *limits)))
 
 

@@ -84,11 +84,11 @@ class Solution(ShortRepr):
         """Return a number of each specification, (m,); NaN for None."""
         return np.array([read(spec) for spec in self.specs], dtype=float)
 
-    def of_mechanisms(self, value: Any) -> FloatArray:
+    def spread_over_mechanisms(self, value: Any) -> FloatArray:
         """Return what laws give, a number or a column, as (m,)."""
         return np.broadcast_to(np.ravel(value), len(self))
 
-    def by_mechanism(self, values: NDArray[Any]) -> NDArray[Any]:
+    def split_by_mechanism(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return what is known of each curve, (m p, ...), as (m, p, ...)."""
         return values.reshape(len(self), self.preloads, *values.shape[1:])
 
@@ -126,19 +126,21 @@ class Solution(ShortRepr):
 
     def _push(self, row: int) -> Push:
         curves, size = self.curves, int(self.curves.count[row])
-        leaves = LeafSamples(*(one[row, :size] for one in vars(curves.leaves).values()))
-        force, stress = (one[row, :size] for one in vars(curves.spring_samples).values())
+        leaves = LeafSamples(*(column[row, :size] for column in vars(curves.leaves).values()))
+        force, stress = (column[row, :size] for column in vars(curves.spring_samples).values())
         travel, preload, rest = curves.travel[row, :size], float(curves.preload[row, 0]), float(curves.rest[row])
-        known = None if np.isnan(rest) else rest
+        rest_or_none = None if np.isnan(rest) else rest
         stopped = curves.stops.force(travel) if curves.stops else None
-        return Push(preload, travel, leaves, force, stress, known, stopped, curves.sampler.find_solved(travel, preload))
+        return Push(
+            preload, travel, leaves, force, stress, rest_or_none, stopped, curves.sampler.find_solved(travel, preload)
+        )
 
     # --- what characterises each mechanism, (m,) --------------------------------------------------------------------
 
     @cached_property
     def nominal(self) -> Rows:
         """The curves of the first preload, one for each mechanism."""
-        return self.curves if self.preloads == 1 else self.curves.of_rows(slice(None, None, self.preloads))
+        return self.curves if self.preloads == 1 else self.curves.select_rows(slice(None, None, self.preloads))
 
     @cached_property
     def character(self) -> Characteristics:
@@ -148,7 +150,7 @@ class Solution(ShortRepr):
     @cached_property
     def linear(self) -> Ends:
         """Range of constant negative stiffness, from and to [m]; NaN where it nowhere is."""
-        first, last = map(self.of_mechanisms, self.character.linear)
+        first, last = map(self.spread_over_mechanisms, self.character.linear)
         return first, last
 
     @cached_property
@@ -239,9 +241,9 @@ class Solution(ShortRepr):
         (low, high), curves = self.flat, self.nominal
         with np.errstate(all="ignore"):
             places = np.linspace(low, high, FLAT_PLACES, axis=1)
-            known = np.isfinite(low)[:, None]
-            force = curves.force_at(np.where(known, places, curves.travel[:, :1]))
-            mean = np.trapezoid(np.where(known, force, np.nan), places, axis=1) / (places[:, -1] - places[:, 0])
+            is_known = np.isfinite(low)[:, None]
+            force = curves.force_at(np.where(is_known, places, curves.travel[:, :1]))
+            mean = np.trapezoid(np.where(is_known, force, np.nan), places, axis=1) / (places[:, -1] - places[:, 0])
         return np.where(high > low, mean, np.nan)
 
     @cached_property
@@ -252,7 +254,7 @@ class Solution(ShortRepr):
         constant stiffness. Then no single number stands for the curve.
         """
         about, curves = self.spec.mechanism.positive, self.nominal
-        place = self.of_mechanisms(self.parts.balance)[:, None]
+        place = self.spread_over_mechanisms(self.parts.balance)[:, None]
         force = curves.sampler.spring(place + curves.preload)[0][:, 0]
         # leaves with a stated waviness carry a little there, which no flatness tells
         buckles = np.isfinite(self.linear[0]) & self.leaf_kind.buckles
@@ -269,8 +271,8 @@ class Solution(ShortRepr):
         (start, end), (low, high), alone = self.flat, self.window, self.spring_alone
         with np.errstate(all="ignore"):
             common = np.minimum(end, high) - np.maximum(start, low)
-            near = np.abs(alone - self.window_force) <= self._flatness * np.maximum(alone, self.window_force)
-            return np.where(near & (common >= 0.5 * (high - low)), alone, np.nan)
+            is_same_force = np.abs(alone - self.window_force) <= self._flatness * np.maximum(alone, self.window_force)
+            return np.where(is_same_force & (common >= 0.5 * (high - low)), alone, np.nan)
 
     @cached_property
     def least(self) -> Ends:
@@ -294,10 +296,10 @@ class Solution(ShortRepr):
     @cached_property
     def leaf_rows(self) -> Rows:
         """Curves that go wherever the leaves go at any preload: of each mechanism one, or all where some end early."""
-        first, last = (self.by_mechanism(end) for end in self.curves.ends)
+        first, last = (self.split_by_mechanism(end) for end in self.curves.ends)
         if (last != last[:, :1]).any():
             return self.curves
-        return self.curves.of_rows(np.arange(len(self)) * self.preloads + first.argmin(axis=1))
+        return self.curves.select_rows(np.arange(len(self)) * self.preloads + first.argmin(axis=1))
 
     def leaf_stress(self, end: FloatArray | float = np.inf) -> FloatArray:
         """Return the largest stress of the leaves up to travels, (m,) or one, over all preloads, (m,) [Pa]."""
@@ -312,12 +314,12 @@ class Solution(ShortRepr):
     @cached_property
     def travel_spring_stress(self) -> FloatArray:
         """Largest stress of the spring over the whole travel at each preload, (m, p) [Pa]."""
-        return self.by_mechanism(self.curves.spring_stress())
+        return self.split_by_mechanism(self.curves.spring_stress())
 
     @property
     def overrating(self) -> FloatArray:
         """By what share the model overestimates the stress of the leaves at most, where that is known; else zero."""
-        return self.of_mechanisms(self.parts.leaf.overrating if self.fidelity == "analytic" else 0.0)
+        return self.spread_over_mechanisms(self.parts.leaf.overrating if self.fidelity == "analytic" else 0.0)
 
     @cached_property
     def hindered_curling(self) -> dict[str, Ends]:
@@ -328,20 +330,20 @@ class Solution(ShortRepr):
         about, curves = self.spec.mechanism, self.curves
         if about.wide_beams or self.spec.analysis.fidelity in ("truss", "solid"):
             return {}
-        nu, found = self.column(lambda spec: spec.mechanism.material.poisson), {}
+        nu, shares = self.column(lambda spec: spec.mechanism.material.poisson), {}
         modulus = self.column(lambda spec: spec.mechanism.material.modulus)
         leaves = ("leaves", "bistable", self.leaf_rows, self.leaf_rows.leaves.stress)
         for name, key, rows, samples in (leaves, ("spring", "positive", curves, curves.spring_samples.stress)):
             if getattr(about, key) is None:  # a bought spring is none
                 continue
             sizes = [getattr(spec.mechanism, key) for spec in self.specs]
-            width, thickness = (np.array([getattr(one, size) for one in sizes]) for size in ("width", "thickness"))
+            width, thickness = (np.array([getattr(strip, size) for strip in sizes]) for size in ("width", "thickness"))
             stress = np.where(rows.there, samples, -np.inf).reshape(len(self), -1)
             worst = np.nanargmax(stress, axis=1)[:, None]
             curvature = 2.0 * np.take_along_axis(stress, worst, 1)[:, 0] / (modulus * thickness)
             share = np.asarray(hindered_share(width, thickness, nu, curvature))
-            found[name] = share, np.take_along_axis(rows.travel.reshape(len(self), -1), worst, 1)[:, 0]
-        return found
+            shares[name] = share, np.take_along_axis(rows.travel.reshape(len(self), -1), worst, 1)[:, 0]
+        return shares
 
     @cached_property
     def window_forces(self) -> FloatArray:
@@ -349,9 +351,9 @@ class Solution(ShortRepr):
         places = np.linspace(*self.window, MEAN_PLACES, axis=1)
         leaves = self.nominal.sampler.leaf_force(places)[:, None]
         spring = self.curves.sampler.spring(np.repeat(places, self.preloads, axis=0) + self.curves.preload)[0]
-        first, last = (self.by_mechanism(end)[..., None] for end in self.curves.ends)
+        first, last = (self.split_by_mechanism(end)[..., None] for end in self.curves.ends)
         inside = (places[:, None] >= first) & (places[:, None] <= last)
-        force = leaves + self.by_mechanism(spring)
+        force = leaves + self.split_by_mechanism(spring)
         if self.curves.stops:
             force = force + self.curves.stops.force(places)[:, None]
         return np.where(inside, force, np.nan)
@@ -378,24 +380,27 @@ class Solution(ShortRepr):
         """
         curves, count = (self.nominal, 1) if alone else (self.curves, self.preloads)
         chosen = np.arange(len(self)) if rows is None else rows
-        each = (chosen[:, None] * count + np.arange(count)).ravel()
-        travel, (first, last) = np.repeat(places, count, axis=0), (end[each, None] for end in curves.ends)
-        spring = curves.sampler.of_rows(each).spring(travel + curves.preload[each])[1]
+        curve_numbers = (chosen[:, None] * count + np.arange(count)).ravel()
+        travel, (first, last) = np.repeat(places, count, axis=0), (end[curve_numbers, None] for end in curves.ends)
+        spring = curves.sampler.select_rows(curve_numbers).spring(travel + curves.preload[curve_numbers])[1]
         spring = np.where((travel < first) | (travel > last), 0.0, spring).reshape(len(chosen), count, -1)
-        return np.asarray(np.maximum(self.nominal.sampler.of_rows(chosen).leaf_stress(places), spring.max(axis=1)))
+        return np.asarray(np.maximum(self.nominal.sampler.select_rows(chosen).leaf_stress(places), spring.max(axis=1)))
 
     def _stress_samples(self) -> list[RowSamples]:
         """Return the largest stress of leaves and spring at the points of each preload, the nominal one first [Pa]."""
         curves, every = self.curves, [slice(k, None, self.preloads) for k in range(self.preloads)]
         stress = np.maximum(curves.leaves.stress, curves.spring_samples.stress)
-        return [RowSamples(curves.travel[own], stress[own], curves.count[own]) for own in every]
+        return [
+            RowSamples(curves.travel[curve_numbers], stress[curve_numbers], curves.count[curve_numbers])
+            for curve_numbers in every
+        ]
 
     @cached_property
     def branches(self) -> dict[str, CurveRows]:
         """The nominal curves by branch, as metrics see them."""
         curves = self.nominal
         low, high = (np.where(self.is_linear, *ends) for ends in zip(self.linear, curves.ends, strict=True))
-        found = CurveRows(
+        rows_of_curves = CurveRows(
             RowSamples(curves.travel, curves.force, curves.count),
             lambda: self.dense,
             curves.force_at,
@@ -407,4 +412,4 @@ class Solution(ShortRepr):
             StressRows(self._stress_samples, self.stress, self.allowable_stress),
             followed=self.spec.target_curve,
         )
-        return {"load": found}
+        return {"load": rows_of_curves}

@@ -87,9 +87,9 @@ class Mechanism(CutLeaves, Model):
 
     @property
     def flexures(self) -> Positive:
-        """The structure of leaves.
+        """The spring that balances the leaves and is cut with them.
 
-        Raises TypeError if the spring is bought: ask `springs` first.
+        Raises TypeError if it is bought: ask `springs` first.
         """
         if self.positive is None:
             raise TypeError("the springs of this mechanism are bought")
@@ -298,7 +298,7 @@ class VcfmSpec(Spec):
         if frame is None:
             return self
         if frame.stop is not None and frame.stop < self.travel * (1 - 1e-9):
-            stop, travel = (format_short(one, "length") for one in (frame.stop, self.travel))
+            stop, travel = (format_short(length, "length") for length in (frame.stop, self.travel))
             reported = (
                 f"the stop holds the shuttle at {stop}, but the travel is {travel}: make the stop or 'analysis' agree"
             )
@@ -312,8 +312,8 @@ class VcfmSpec(Spec):
     def out_of_plane_widths(self) -> Mapping[str, float | None]:
         """Of leaves, and of a spring that is cut."""
         spring = self.mechanism.positive
-        own = {} if spring is None else {"positive.width": spring.width}
-        return {"bistable.width": self.mechanism.bistable.width} | own
+        spring_width = {} if spring is None else {"positive.width": spring.width}
+        return {"bistable.width": self.mechanism.bistable.width} | spring_width
 
     @model_validator(mode="after")
     def _has_the_stops_that_it_names(self) -> Self:
@@ -342,7 +342,7 @@ class VcfmSpec(Spec):
     @model_validator(mode="after")
     def _truss_has_two_laws(self) -> Self:
         both = self.mechanism.positive, self.mechanism.bistable
-        if self.analysis.fidelity == "truss" and any(one is None or one.kind.truss is None for one in both):
+        if self.analysis.fidelity == "truss" and any(strip is None or strip.kind.truss is None for strip in both):
             names = [
                 f"'{kind.name}'" for kind in (*SPRING_KINDS.values(), *LEAF_KINDS.values()) if kind.truss is not None
             ]
@@ -352,14 +352,14 @@ class VcfmSpec(Spec):
     @model_validator(mode="after")
     def _solid_is_of_what_is_made(self) -> Self:
         if self.analysis.fidelity == "solid" or (self.design is not None and self.design.verify == "solid"):
-            found: dict[tuple[str | int, ...], str] = {}
+            faults: dict[tuple[str | int, ...], str] = {}
             if self.mechanism.bistable.waviness:
-                found["mechanism", "bistable", "waviness"] = (
+                faults["mechanism", "bistable", "waviness"] = (
                     "the model 'solid' does not support it: leaves are as drawn"
                 )
             if self.analysis.branch == "primary":
-                found["analysis", "branch"] = "the model 'solid' follows the stable branch only"
-            refuse("Spec", found)
+                faults["analysis", "branch"] = "the model 'solid' follows the stable branch only"
+            refuse("Spec", faults)
         return self
 
     @model_validator(mode="after")
@@ -387,12 +387,12 @@ class VcfmSpec(Spec):
     @property
     def durability(self) -> Durability | None:
         """Of leaves and spring; bought springs do not relax with the leaves, so that no law holds for their sum."""
-        found = self.mechanism.material.durability
-        if found is None or self.mechanism.springs is None:
-            return found
-        if found.fatigue is None:
+        durability = self.mechanism.material.durability
+        if durability is None or self.mechanism.springs is None:
+            return durability
+        if durability.fatigue is None:
             return None
-        return Durability(found.fatigue, assumed=found.assumed if found.relaxation is None else ())
+        return Durability(durability.fatigue, assumed=durability.assumed if durability.relaxation is None else ())
 
     def end_stop_changes(self, end: float) -> Mapping[str, Any]:
         """Return what puts a rigid stop at a motion of the shuttle [m] and ends the analysis just before it."""

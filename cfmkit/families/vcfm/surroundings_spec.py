@@ -44,7 +44,7 @@ class CutLeaves(RoundedCorners):
     @property
     def thinnest(self: Any) -> float:
         """Smallest thickness of all leaves that are cut [m]."""
-        return min(float(one.thickness) for one in (self.bistable, self.positive) if one is not None)
+        return min(float(strip.thickness) for strip in (self.bistable, self.positive) if strip is not None)
 
 
 class BoughtSprings(SpringSupport):

@@ -77,17 +77,17 @@ def frame_sizes(
     Raises GeometryError if the spring does not fit between the walls, or the shuttle comes to the seat.
     """
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
-    given = spec.mechanism.cut_part.frame or StandingFrame()
+    standing = spec.mechanism.cut_part.frame or StandingFrame()
     levels, strip = -(-about.half_beams // 2), strip_of(about, spec.mechanism.material)
     wall, rise = 0.5 * frame.shuttle_width + float(strip.reach), float(strip.rise)
-    thick, block = given.wall or frame.block, frame.block
+    thick, block = standing.wall or frame.block, frame.block
     top, bottom = (levels - 1) * frame.spacing + frame.clearance, -frame.clearance
     wall_top, wall_bottom = (levels - 1) * frame.spacing - rise + block, -rise - block
     under = top
-    if given.stop is not None:  # the bar stays above the leaves that it moves with
-        under = max(top, wall_top + given.stop)
-        wall_top = under - given.stop
-    floor, ledge = _floor(spec, given, spring, (bottom, wall_bottom, wall))
+    if standing.stop is not None:  # the bar stays above the leaves that it moves with
+        under = max(top, wall_top + standing.stop)
+        wall_top = under - standing.stop
+    floor, ledge = _floor(spec, standing, spring, (bottom, wall_bottom, wall))
     return FrameSizes(
         half=0.5 * frame.shuttle_width,
         bottom=bottom,
@@ -96,10 +96,10 @@ def frame_sizes(
         out=wall + thick,
         wall_top=wall_top,
         wall_bottom=wall_bottom,
-        shuttle=given.shuttle or block,
-        ground=given.ground or block,
+        shuttle=standing.shuttle or block,
+        ground=standing.ground or block,
         under=under,
-        stopped=given.stop is not None,
+        stopped=standing.stop is not None,
         floor=floor,
         ledge=ledge,
     )
@@ -107,34 +107,34 @@ def frame_sizes(
 
 def _floor(
     spec: VcfmSpec,
-    given: StandingFrame,
+    standing: StandingFrame,
     spring: tuple[float, float, float, float] | None,
     around: tuple[float, float, float],
 ) -> tuple[float | None, tuple[Point, ...]]:
     """Return where the ground is, and the raised seats on it; without a ground nothing."""
     bottom, wall_bottom, wall = around
-    least = min(bottom - spec.travel - given.clearance, wall_bottom)
-    if given.seat is None or spring is None:
-        return (None, ()) if given.ground is None else (least, ((0.0, least),))
+    least = min(bottom - spec.travel - standing.clearance, wall_bottom)
+    if standing.seat is None or spring is None:
+        return (None, ()) if standing.ground is None else (least, ((0.0, least),))
     _, low, right, high = spring
-    seat = bottom - (high - low - given.seat)
+    seat = bottom - (high - low - standing.seat)
     about, block = spec.mechanism.flexures, spec.mechanism.frame.block
     widest = right + (about.length - float(strip_of(about, spec.mechanism.material).reach))  # leaves that lie flat
-    if widest + given.clearance > wall:
+    if widest + standing.clearance > wall:
         raise GeometryError(
             f"the spring does not fit between the walls onto its seat, at ({mm(wall)}, {mm(seat)}): it is "
             f"{mm(2 * widest)} wide and the walls are {mm(2 * wall)} apart; use longer leaves, or leave out "
             f"'mechanism.part.frame.seat'"
         )
     if not about.kind.stands_on_ends:
-        if seat > bottom - spec.travel - given.clearance:
+        if seat > bottom - spec.travel - standing.clearance:
             raise GeometryError(
                 f"the shuttle comes to the seat at (0 mm, {mm(seat)}) within the travel of {mm(spec.travel)}: reduce "
-                f"'mechanism.part.frame.seat' ({mm(given.seat)}) or 'analysis.travel'"
+                f"'mechanism.part.frame.seat' ({mm(standing.seat)}) or 'analysis.travel'"
             )
         return seat, ((0.0, seat),)
     # the middle block goes down between the two seats of a straight beam, farther than they are high
-    floor = min(least, seat - given.seat - spec.travel - given.clearance)
+    floor = min(least, seat - standing.seat - spec.travel - standing.clearance)
     seats: tuple[Point, ...] = (
         (right, floor),
         (right, seat),
@@ -147,10 +147,10 @@ def _floor(
 
 def frame_notes(spec: VcfmSpec, sizes: FrameSizes) -> Iterator[str]:
     """Yield what stop and seat are for."""
-    given = spec.mechanism.cut_part.frame
-    if given is not None and given.stop is not None:
-        yield f"the bar across the shuttle lands on the walls after {mm(given.stop)}"
-    if given is not None and given.seat is not None:
-        yield f"on the ground below the shuttle the spring is preloaded by {mm(given.seat)}"
-        if all(abs(given.seat - one) > 1e-9 for one in spec.analysis.preloads):
+    standing = spec.mechanism.cut_part.frame
+    if standing is not None and standing.stop is not None:
+        yield f"the bar across the shuttle lands on the walls after {mm(standing.stop)}"
+    if standing is not None and standing.seat is not None:
+        yield f"on the ground below the shuttle the spring is preloaded by {mm(standing.seat)}"
+        if all(abs(standing.seat - preload) > 1e-9 for preload in spec.analysis.preloads):
             yield "'analysis.preloads' does not have the preload of the seat"

@@ -151,6 +151,6 @@ def _accept(
         return False
     if moved <= MOTION_ROUNDING:
         return True
-    size = float(np.linalg.norm(chord[motions]))
-    ends = (tangent[:-1][motions] for tangent in (before, step.tangent))
-    return all(chord[motions] @ end >= CHORD_COSINE * size * np.linalg.norm(end) for end in ends)
+    own, ends = chord[motions], [tangent[:-1][motions] for tangent in (before, step.tangent)]
+    size = math.sqrt(own @ own)
+    return all(own @ end >= CHORD_COSINE * size * math.sqrt(end @ end) for end in ends)

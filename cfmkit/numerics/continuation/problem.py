@@ -91,7 +91,7 @@ def arc_weights(problem: ContinuationProblem, span: float) -> FloatArray:
 
 def largest_motion(problem: ContinuationProblem, x: FloatArray) -> float:
     """Return the largest size of a motion."""
-    return float(np.abs(x[problem.motions]).max(initial=0.0))
+    return _largest(np.abs(x[problem.motions]))
 
 
 def keep_motions(problem: ContinuationProblem, x: FloatArray) -> FloatArray:
@@ -102,4 +102,9 @@ def keep_motions(problem: ContinuationProblem, x: FloatArray) -> FloatArray:
 def force_change(problem: ContinuationProblem, old: FloatArray, new: FloatArray, largest: float, share: float) -> float:
     """Return the largest change of a force over what a step may change: `largest` units and a share of the force."""
     allowed = largest * problem.unit + share * np.abs(old)
-    return float((np.abs(new - old) / allowed)[~problem.motions].max(initial=0.0))
+    return _largest((np.abs(new - old) / allowed)[~problem.motions])
+
+
+def _largest(sizes: FloatArray) -> float:
+    """Return the largest of some sizes, 0 of none: of a few `max` takes twice the time."""
+    return float(sizes[sizes.argmax()]) if len(sizes) else 0.0

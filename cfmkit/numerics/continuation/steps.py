@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -82,8 +83,8 @@ def _keeps_direction(walk: Walk, new: PathEquilibrium, moved: float) -> bool:
         return True
     change = new.drive - here.drive
     chord, slopes = (new.x - here.x)[motions], (here.rate[motions], new.rate[motions])
-    size = float(np.linalg.norm(chord))
-    if any(np.sign(change) * (chord @ slope) < CHORD_COSINE * size * np.linalg.norm(slope) for slope in slopes):
+    size, sense = math.sqrt(chord @ chord), math.copysign(1.0, change)
+    if any(sense * (chord @ slope) < CHORD_COSINE * size * math.sqrt(slope @ slope) for slope in slopes):
         return False
     misfit = np.abs(chord - 0.5 * change * (slopes[0] + slopes[1])).max()
     return bool(misfit <= CHORD_MISFIT * moved + MOTION_ROUNDING)

@@ -50,12 +50,12 @@ def shift_decimal(
     """
     if not -MAX_FLOAT_DIGITS <= power <= MAX_FLOAT_DIGITS:
         raise ValueError(f"the decimal point can move by -{MAX_FLOAT_DIGITS} to {MAX_FLOAT_DIGITS} places, not {power}")
-    given = np.asarray(values, dtype=np.float64)
-    flat = given.ravel()
+    numbers = np.asarray(values, dtype=np.float64)
+    flat = numbers.ravel()
     shifted = _times(flat, power)
     if power:
         _shift_short(flat, power, shifted)
-    return shifted.reshape(given.shape)
+    return shifted.reshape(numbers.shape)
 
 
 def even_grid(

@@ -97,19 +97,19 @@ class UnitField:
         """Return text that `read` takes back; a ratio stays a number."""
         return format_quantity(value, self.dimensions[0]) if self.needs_unit else float(value)
 
-    def check(self, value: float, bounds: Mapping[str, float], given: Any = None) -> float:
+    def check(self, value: float, bounds: Mapping[str, float], stated: Any = None) -> float:
         """Return `value` if it keeps its SI bounds: gt, ge, lt, le.
 
         Raises QuantityError with the value as it was given, and the bounds with units.
         """
         if all(_BOUND_OPERATORS[name][1](value, bound) for name, bound in bounds.items()):
             return value
-        reported = given.strip() if isinstance(given, str) else self.format_value(value)
+        reported = stated.strip() if isinstance(stated, str) else self.format_value(value)
         raise QuantityError(f"{reported} is not allowed: must be {self.describe_allowed(bounds, reported)}")
 
-    def describe_allowed(self, bounds: Mapping[str, float], given: str) -> str:
+    def describe_allowed(self, bounds: Mapping[str, float], stated: str) -> str:
         """Return bounds in words, with the percentage that was meant by a number above 1, if it keeps them."""
-        meant = meant_as_percent(given) if self.dimensions == ("ratio",) else ""
+        meant = meant_as_percent(stated) if self.dimensions == ("ratio",) else ""
         share = read_one_of(meant, self.dimensions)[0] if meant else 0.0
         fits = meant and all(_BOUND_OPERATORS[name][1](share, bound) for name, bound in bounds.items())
         return f"{self.limits(bounds)}; did you mean {meant}?" if fits else self.limits(bounds)

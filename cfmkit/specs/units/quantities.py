@@ -74,8 +74,8 @@ def read_one_of(text: str, dimensions: tuple[str, ...]) -> tuple[float, str]:
     for name in dimensions:
         if size.powers == border_size(name).powers:
             return _scale_number(number, unit, size.factor), name
-    found = f"{quote(f'{number} {unit}')} is {_kind(size)}"
-    raise QuantityError(f"{found}; {describe_dimensions(dimensions)} is needed, e.g. {example(dimensions, number)}")
+    problem = f"{quote(f'{number} {unit}')} is {_kind(size)}"
+    raise QuantityError(f"{problem}; {describe_dimensions(dimensions)} is needed, e.g. {example(dimensions, number)}")
 
 
 def meant_as_percent(text: str) -> str:
@@ -299,8 +299,8 @@ def _meanings(word: str) -> Iterator[str]:
     yield from (symbol for symbol in UNITS_BY_SYMBOL if symbol.lower() == lower)
     yield from (_UNIT_NAMES[name] for name in (lower, lower.removesuffix("s")) if name in _UNIT_NAMES)
     yield from _products(word)
-    near = difflib.get_close_matches(lower, list(_UNIT_NAMES), n=2, cutoff=0.75)
-    yield from (_UNIT_NAMES[name] for name in near)
+    close = difflib.get_close_matches(lower, list(_UNIT_NAMES), n=2, cutoff=0.75)
+    yield from (_UNIT_NAMES[name] for name in close)
     yield from difflib.get_close_matches(word, list(UNITS_BY_SYMBOL), n=2, cutoff=0.75)
 
 

@@ -85,7 +85,9 @@ class Slot:
         """Return what is allowed below a key or index; nothing if it does not exist."""
         if self.model is not None:
             fields = self.model.model_fields
-            field = fields.get(str(key)) or next((one for one in fields.values() if one.alias == key), None)
+            field = fields.get(str(key)) or next(
+                (candidate for candidate in fields.values() if candidate.alias == key), None
+            )
             return slots(field.annotation, tuple(field.metadata)) if field else ()
         arguments = get_args(self.kind)
         if isinstance(self.origin, type) and issubclass(self.origin, Mapping):
@@ -149,16 +151,16 @@ def slots(annotation: Any, metadata: tuple[Any, ...] = ()) -> tuple[Slot, ...]:
 
 def slots_at(model: type[BaseModel], path: str) -> tuple[Slot, ...]:
     """Return every type that is allowed at a dotted path of a block; none if there is nothing."""
-    here: tuple[Slot, ...] = (Slot(model),)
+    allowed: tuple[Slot, ...] = (Slot(model),)
     for part in path.split("."):
         key: str | int = int(part) if part.isdecimal() and part.isascii() and len(part) < 10 else part
-        here = tuple(inner for slot in here for inner in slot.child(key))
-    return here
+        allowed = tuple(inner for slot in allowed for inner in slot.child(key))
+    return allowed
 
 
 def _flat(extra: list[Any]) -> tuple[Any, ...]:
     """Return annotations with those inside a ``Field(...)`` beside the others."""
-    return tuple(one for item in extra for one in (*getattr(item, "metadata", ()), item))
+    return tuple(metadata for item in extra for metadata in (*getattr(item, "metadata", ()), item))
 
 
 def required_keys(model: type[BaseModel]) -> list[str]:
@@ -177,40 +179,40 @@ def describe_expected(allowed: tuple[Slot, ...], plain: bool = False) -> str:
 
 def trace(model: type[BaseModel], tree: Any, loc: tuple[str | int, ...]) -> Trace:
     """Return where in the tree pydantic's `loc` points."""
-    here = Trace((), tree, (Slot(model),), (), ())
+    trace = Trace((), tree, (Slot(model),), (), ())
     label_due = False
     for item in loc:
         if label_due:
-            here, label_due = _narrow_trace(here, str(item)), False
+            trace, label_due = _narrow_trace(trace, str(item)), False
             continue
-        before = here
-        here = _step_down(here, item)
-        label_due = here is not before and len(here.slots) > 1
-    return here
+        before = trace
+        trace = _step_down(trace, item)
+        label_due = trace is not before and len(trace.slots) > 1
+    return trace
 
 
-def _narrow_trace(here: Trace, tag: str) -> Trace:
-    members = tuple(slot for slot in here.slots if slot.matches(tag)) or here.slots
-    return Trace(here.path, here.node, members, here.parents, (*here.tags, (here.path, tag)))
+def _narrow_trace(trace: Trace, tag: str) -> Trace:
+    members = tuple(slot for slot in trace.slots if slot.matches(tag)) or trace.slots
+    return Trace(trace.path, trace.node, members, trace.parents, (*trace.tags, (trace.path, tag)))
 
 
-def _step_down(here: Trace, item: str | int) -> Trace:
+def _step_down(trace: Trace, item: str | int) -> Trace:
     """Go one step down.
 
     What neither the tree nor the types know is a label. A key or index that a
     validator put around what the user wrote adds nothing to the path.
     """
-    allowed = tuple(slot for parent in here.slots for slot in parent.child(item))
-    step = _step(here.node, item)
+    allowed = tuple(slot for parent in trace.slots for slot in parent.child(item))
+    step = _step(trace.node, item)
     if step is MISSING_VALUE and not allowed:
-        return here
+        return trace
     if (
         step is MISSING_VALUE
-        and here.node is not MISSING_VALUE
-        and not isinstance(here.node, dict if isinstance(item, str) else tuple)
+        and trace.node is not MISSING_VALUE
+        and not isinstance(trace.node, dict if isinstance(item, str) else tuple)
     ):
-        return Trace(here.path, here.node, allowed, here.slots, here.tags)
-    return Trace((*here.path, item), step, allowed, here.slots, here.tags)
+        return Trace(trace.path, trace.node, allowed, trace.slots, trace.tags)
+    return Trace((*trace.path, item), step, allowed, trace.slots, trace.tags)
 
 
 def _step(node: Any, item: str | int) -> Any:

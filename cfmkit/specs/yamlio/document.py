@@ -90,18 +90,18 @@ class YamlDocument:
         options = [old for old in self._options if old[0][: len(path)] != path]
         return dataclasses.replace(self, tree=tree, _options=(*options, (path, parsed.label)))
 
-    def family(self, known: Sequence[str]) -> str:
+    def family(self, families: Sequence[str]) -> str:
         """Return what the specification says its family is.
 
-        Raises SpecError if it says none of the `known` ones, or cannot be read.
+        Raises SpecError if it says none of these `families`, or cannot be read.
         """
         family = self.tree.get("family") if isinstance(self.tree, dict) else None
         if self._reading.broken or not isinstance(self.tree, dict):
             raise SpecError(_sort_problems(self.problems))
-        if isinstance(family, str) and family in known:
+        if isinstance(family, str) and family in families:
             return family
-        missing = f"the key 'family' is missing: one of {', '.join(known)}"
-        problem = self.problem(("family",), not_among(family, known)) if family else self.problem((), missing)
+        missing = f"the key 'family' is missing: one of {', '.join(families)}"
+        problem = self.problem(("family",), not_among(family, families)) if family else self.problem((), missing)
         raise SpecError(_sort_problems((*self.problems, problem)))
 
     def bind(self, spec_type: type[SpecType]) -> SpecType:
@@ -139,8 +139,10 @@ class YamlDocument:
 
     def _option_at(self, path: Path) -> str:
         """Return the option that set a value or made its block; empty if a file has it."""
-        for own, label in reversed(self._options):
-            if path[: len(own)] == own or (own[: len(path)] == path and not self._is_written(path)):
+        for option_path, label in reversed(self._options):
+            if path[: len(option_path)] == option_path or (
+                option_path[: len(path)] == path and not self._is_written(path)
+            ):
                 return label
         return ""
 
@@ -163,8 +165,8 @@ class YamlDocument:
     def _own_place(self, path: Path, at_key: bool) -> tuple[int, int]:
         table = self._reading.keys if at_key else self._reading.values
         for length in range(len(path), -1, -1):
-            if found := table.get(path[:length]) or self._reading.values.get(path[:length]):
-                return found
+            if position := table.get(path[:length]) or self._reading.values.get(path[:length]):
+                return position
         return 1, 1
 
     def _line(self, number: int) -> str:
@@ -217,10 +219,15 @@ def _no_block(reading: ParsedYaml) -> Fault:
 
 def _sort_problems(problems: Sequence[Problem]) -> list[Problem]:
     """Return problems in the order of the file, those of options last, and not more than can be read."""
-    sources = list(dict.fromkeys(one.source for one in problems))
+    sources = list(dict.fromkeys(problem.source for problem in problems))
     ordered = sorted(
         dict.fromkeys(problems),
-        key=lambda one: (one.line == 0, sources.index(one.source) if one.line else 0, one.line, one.column),
+        key=lambda problem: (
+            problem.line == 0,
+            sources.index(problem.source) if problem.line else 0,
+            problem.line,
+            problem.column,
+        ),
     )
     if len(ordered) <= MOST_PROBLEMS:
         return ordered
@@ -263,9 +270,9 @@ def parse_option(text: str) -> Option:
 
     Raises UsageError if there is no ``=``, no path or no value.
     """
-    found = _OPTION_PATTERN.fullmatch(text)
-    path, equals, value = (found[1], "=", found[2]) if found else text.partition("=")
-    parts = [part.strip() for part in re.findall(_PART_PATTERN, path)] if found else []
+    match = _OPTION_PATTERN.fullmatch(text)
+    path, equals, value = (match[1], "=", match[2]) if match else text.partition("=")
+    parts = [part.strip() for part in re.findall(_PART_PATTERN, path)] if match else []
     example = "write e.g. --set mechanism.springs.count=2"
     if not equals or not value.strip():
         raise UsageError(f"--set {quote(text)}: no value; {example}")

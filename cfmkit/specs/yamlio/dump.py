@@ -42,11 +42,11 @@ def _content(value: Any, text: Any, allowed: tuple[Slot, ...], complete: bool) -
     """
     if isinstance(value, BaseModel) and isinstance(text, dict):
         must_tell = sum(slot.model is not None for slot in allowed) != 1
-        own = Slot(type(value))
+        own_slot = Slot(type(value))
         names = [
             name for name in type(value).model_fields if name in text and _is_written(value, name, must_tell, complete)
         ]
-        return {name: _content(getattr(value, name), text[name], own.child(name), complete) for name in names}
+        return {name: _content(getattr(value, name), text[name], own_slot.child(name), complete) for name in names}
     if isinstance(value, Mapping) and isinstance(text, dict):
         return {key: _content(value.get(key), item, _slots_below(allowed, key), complete) for key, item in text.items()}
     if isinstance(value, tuple | list) and isinstance(text, list) and len(value) == len(text):

@@ -65,7 +65,9 @@ class _Error:
 
 def spec_error(error: ValidationError, model: type[BaseModel], tree: Any) -> SpecError:
     """Return a pydantic error about values that come from no file, with the paths that are wrong."""
-    return SpecError([Problem("", 0, 0, to_dotted(one.path), one.message) for one in explain(error, model, tree)])
+    return SpecError(
+        [Problem("", 0, 0, to_dotted(complaint.path), complaint.message) for complaint in explain(error, model, tree)]
+    )
 
 
 def explain(
@@ -98,7 +100,11 @@ def _one_member(lines: list[_Error], depth: int) -> list[_Error]:
     for line in lines:
         members.setdefault(line.trace.tags[depth][1], []).append(line)
     place = lines[0].trace.tags[depth][0]
-    fitting = [own for own in members.values() if not any(line.misfit and line.trace.path == place for line in own)]
+    fitting = [
+        member_lines
+        for member_lines in members.values()
+        if not any(line.misfit and line.trace.path == place for line in member_lines)
+    ]
     if fitting:
         return min(fitting, key=len)
     return lines[:1] if len(members) == 1 else [_nothing_fits(lines, place)]
@@ -117,23 +123,23 @@ def _complaint(line: _Error) -> Complaint:
         return Complaint(line.trace.path, _unknown_key(line.trace), at_key=True)
     if line.kind.startswith("union_tag"):
         return _unknown_kind(line)
-    explainer = _EXPLAINER_BY_TYPE.get(line.kind, _in_pydantics_words)
+    explainer = _EXPLAINER_BY_TYPE.get(line.kind, _translate_pydantic_message)
     return Complaint(line.trace.path, " ".join(explainer(line).split()))
 
 
-def _missing(found: Trace) -> Complaint:
-    if not found.path:
-        return Complaint((), f"{describe_expected(found.slots)} is missing")
-    last = found.path[-1]
+def _missing(trace: Trace) -> Complaint:
+    if not trace.path:
+        return Complaint((), f"{describe_expected(trace.slots)} is missing")
+    last = trace.path[-1]
     what = f"the key {last!r}" if isinstance(last, str) else f"item {last + 1} of the list"
-    return Complaint(found.path[:-1], f"{what} is missing: {describe_expected(found.slots)}")
+    return Complaint(trace.path[:-1], f"{what} is missing: {describe_expected(trace.slots)}")
 
 
-def _unknown_key(found: Trace) -> str:
-    fields = [one for slot in found.parents if slot.model is not None for one in slot.model.model_fields.items()]
+def _unknown_key(trace: Trace) -> str:
+    fields = [field for slot in trace.parents if slot.model is not None for field in slot.model.model_fields.items()]
     names = [field.alias or name for name, field in fields]
-    key = str(found.path[-1]) if found.path else ""
-    removed = (getattr(slot.model, "removed_keys", {}).get(key) for slot in found.parents)
+    key = str(trace.path[-1]) if trace.path else ""
+    removed = (getattr(slot.model, "removed_keys", {}).get(key) for slot in trace.parents)
     if instead := next(filter(None, removed), ""):
         return f"the key {quote(key)} was removed; {instead}"
     deeper = [f"{name}.{key}" for name, field in fields if _has_key(field.annotation, key)]
@@ -145,7 +151,9 @@ def _unknown_key(found: Trace) -> str:
 def _has_key(annotation: Any, key: str) -> bool:
     """Return True if a block has a key."""
     blocks = (annotation, *get_args(annotation))
-    return any(isinstance(one, type) and issubclass(one, BaseModel) and key in one.model_fields for one in blocks)
+    return any(
+        isinstance(block, type) and issubclass(block, BaseModel) and key in block.model_fields for block in blocks
+    )
 
 
 def _unknown_kind(line: _Error) -> Complaint:
@@ -168,12 +176,12 @@ def not_among(value: Any, allowed: Sequence[Any]) -> str:
     return f"{describe_value(value)} is not {reported}" + (f"; {hint}" if hint else "")
 
 
-def did_you_mean(word: str, known: Sequence[str]) -> str:
+def did_you_mean(word: str, names: Sequence[str]) -> str:
     """Return ``did you mean 'x'?`` if something known is near, else nothing."""
     tidy = word.lower().replace("-", "_").replace(" ", "_")
-    by_tidy = {name.lower().replace("-", "_"): name for name in known}
-    near = difflib.get_close_matches(tidy[:100], list(by_tidy), n=1, cutoff=0.65)
-    return f"did you mean {by_tidy[near[0]]!r}?" if near else ""
+    by_tidy = {name.lower().replace("-", "_"): name for name in names}
+    close = difflib.get_close_matches(tidy[:100], list(by_tidy), n=1, cutoff=0.65)
+    return f"did you mean {by_tidy[close[0]]!r}?" if close else ""
 
 
 def list_allowed(words: str, items: Sequence[Any]) -> str:
@@ -203,7 +211,7 @@ def _needs(line: _Error) -> str:
         return f"nothing is given here; {describe_expected(line.trace.slots)} is needed"
     choices = [str(choice) for slot in line.trace.slots for choice in slot.choices]
     hint = f"; write [{value}]" if line.kind == "tuple_type" and isinstance(value, str) and "," in value[:60] else ""
-    hint = hint or (f"; {near}" if isinstance(value, str) and (near := did_you_mean(value, choices)) else "")
+    hint = hint or (f"; {guess}" if isinstance(value, str) and (guess := did_you_mean(value, choices)) else "")
     return f"{describe_value(value)} does not fit here; {describe_expected(line.trace.slots)} is needed{hint}"
 
 
@@ -239,14 +247,14 @@ def _no_choice(line: _Error) -> str:
 def _explain_bounds(line: _Error) -> str:
     """Name the value and all its bounds, with units where it has some."""
     slot = next((slot for slot in line.trace.slots if slot.bounds), None)
-    given = line.trace.node
+    value = line.trace.node
     if slot is not None and slot.quantity is not None:
-        reported = given.strip() if isinstance(given, str) else slot.quantity.format_value(float(given))
+        reported = value.strip() if isinstance(value, str) else slot.quantity.format_value(float(value))
         return f"{reported} is not allowed: must be {slot.quantity.describe_allowed(slot.bounds, reported)}"
     signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
     bounds = slot.bounds if slot else {name: line.context[name] for name in signs if name in line.context}
     limits = " and ".join(f"{signs[name]} {bound}" for name, bound in bounds.items())
-    return f"{describe_value(given).strip(chr(39))} is not allowed: must be {limits}"
+    return f"{describe_value(value).strip(chr(39))} is not allowed: must be {limits}"
 
 
 def _too_few_or_many(line: _Error) -> str:
@@ -264,7 +272,7 @@ def _own_words(line: _Error) -> str:
     return str(line.context.get("error", line.text)) or "is not allowed"
 
 
-def _in_pydantics_words(line: _Error) -> str:
+def _translate_pydantic_message(line: _Error) -> str:
     return line.text.replace("Input should", f"{describe_value(line.trace.node)} should").replace("Value error, ", "")
 
 

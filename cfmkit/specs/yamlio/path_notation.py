@@ -27,13 +27,13 @@ def parse_indices(path: tuple[str, ...], tree: Any) -> Path:
 
 def to_dotted(path: Path) -> str:
     """Return a path as ``requirements.0.max``; odd keys are quoted."""
-    return ".".join(
-        part if isinstance(part, str) and re.fullmatch(r"[\w-]{1,60}", part) else _quote_key(part) for part in path
-    )
+    return ".".join(str(part) if re.fullmatch(r"[\w-]{1,60}", str(part)) else quote(str(part)) for part in path)
 
 
-def _quote_key(part: str | int) -> str:
-    return str(part) if isinstance(part, int) else quote(part)
+def read_item_suffix(path: str) -> str:
+    """Return the number of an item at the end of a dotted path with its dot; "" if it has none."""
+    last = path.rpartition(".")[2]
+    return f".{last}" if last.isdecimal() else ""
 
 
 SHORT_FOR = {"material": "name"}

@@ -95,7 +95,7 @@ def decode(data: bytes | str) -> str:
 
 def replace_odd_characters(text: str) -> tuple[str, list[Fault]]:
     """Return the text with a space for every character that is refused, and a fault for each kind of them."""
-    kinds = {char: found[1] for char in set(text) if (found := odd_character(char))}
+    kinds = {char: kind[1] for char in set(text) if (kind := odd_character(char))}
     first = sorted((text.index(char), char) for char in sorted(kinds)[:MOST_KINDS])
     faults = [_odd(text, index, kinds[char], text.count(char)) for index, char in first]
     return text.translate(dict.fromkeys(map(ord, kinds), " ")), faults
@@ -255,13 +255,13 @@ class _Builder:
                     self._node(following, (*path, ""))
                 continue
             key = self._key(event, path)
-            here = (*path, key)
-            if first := self.reading.keys.get(here):
+            key_path = (*path, key)
+            if first := self.reading.keys.get(key_path):
                 message = f"the key {quote(key)} was given in line {first[0]} already; keep one"
-                self._complain(event, here, message, makes_value_unusable=False)
-            self.reading.keys.setdefault(here, _place(event))
+                self._complain(event, key_path, message, makes_value_unusable=False)
+            self.reading.keys.setdefault(key_path, _place(event))
             last = next(self.events)
-            block.setdefault(key, self._node(last, here))
+            block.setdefault(key, self._node(last, key_path))
         return block
 
     def _decimal_comma(self, whole: Event, rest: Event, path: Path) -> None:

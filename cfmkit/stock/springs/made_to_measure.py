@@ -131,7 +131,9 @@ def _windings(kind: Kind, safety: float) -> tuple[FloatArray, FloatArray, FloatA
     """Return wire and coil of all sizes and indices [m], their rate with one turn and their largest load, (n,) each."""
     indices = np.linspace(MIN_INDEX, MAX_INDEX, N_INDICES)
     springs: list[Any] = [HelicalSpring(kind, wire, cast("Any", wire * indices), 1.0) for wire in WIRE_DIAMETERS]
-    rows = [(0.0 * each.coil + each.wire, each.coil, each.rate, largest_load(each, safety)) for each in springs]
+    rows = [
+        (0.0 * spring.coil + spring.wire, spring.coil, spring.rate, largest_load(spring, safety)) for spring in springs
+    ]
     wire, coil, rate, load = np.concatenate(rows, axis=1)
     return wire, coil, rate, load
 

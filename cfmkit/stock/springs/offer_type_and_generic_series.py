@@ -85,13 +85,13 @@ def generic(kind: Kind) -> tuple[Offer, ...]:
     >>> generic("torsion")[0].name
     'generic-torsion-d0.4-D2.4-n3'
     """
-    found = []
+    series = []
     for wire in WIRE_DIAMETERS:
         for index in SPRING_INDICES:
             for turns in TORSION_TURNS if kind == "torsion" else COIL_COUNTS:
                 coil = round(index * wire, 6)  # 4.8, not 4.800000000000001, in what is written of it
-                found.append(_generic(HelicalSpring(kind, wire * 1e-3, coil * 1e-3, float(turns))))
-    return tuple(found)
+                series.append(_generic(HelicalSpring(kind, wire * 1e-3, coil * 1e-3, float(turns))))
+    return tuple(series)
 
 
 def largest_load(wound: HelicalSpring, safety: float) -> Any:

@@ -61,8 +61,8 @@ class WireLimits(Model):
 
     @model_validator(mode="after")
     def _moduli_are_known(self) -> Self:
-        own = self.model_fields_set & {"shear_modulus", "youngs_modulus"}
-        self._class = None if own and "material" not in self.model_fields_set else self.material
+        stated_moduli = self.model_fields_set & {"shear_modulus", "youngs_modulus"}
+        self._class = None if stated_moduli and "material" not in self.model_fields_set else self.material
         for key in ("shear_modulus", "youngs_modulus"):
             if getattr(self, key) is None:
                 # past the frozen model, and not counted as set: another material then has others
@@ -84,10 +84,12 @@ class WireLimits(Model):
         try:
             WIRES_BY_NAME[self._class].check_diameter(wire)
         except WireOutOfRange as error:
-            other = ", ".join(
-                one.name for one in WIRES_BY_NAME.values() if one.thinnest <= wire <= one.thickest < float("inf")
+            names = ", ".join(
+                material.name
+                for material in WIRES_BY_NAME.values()
+                if material.thinnest <= wire <= material.thickest < float("inf")
             )
-            others = f"'material' {other}, or " if other else ""
+            others = f"'material' {names}, or " if names else ""
             raise ValueError(f"{error}; state {others}the wire's own moduli") from None
 
 
@@ -130,15 +132,18 @@ class SpringWire(WireLimits):
 def _disagree(wound: HelicalSpring, stated: float) -> str:
     """Return what is wrong with a rate that is not that of wire, coil and turns."""
     alike = [
-        one.name
-        for one in WIRES_BY_NAME.values()
-        if abs(stated / replace(wound, shear_modulus=one.shear_modulus, youngs_modulus=one.youngs_modulus).rate - 1.0)
+        material.name
+        for material in WIRES_BY_NAME.values()
+        if abs(
+            stated / replace(wound, shear_modulus=material.shear_modulus, youngs_modulus=material.youngs_modulus).rate
+            - 1.0
+        )
         <= RATE_RTOL
     ]
-    other = f" (that of {', '.join(alike)} agrees)" if alike else ""
+    agreement = f" (that of {', '.join(alike)} agrees)" if alike else ""
     return (
         f"wire, coil and turns give {wound.rate / stated:.3g} times the rate that is stated: leave one of them out, or "
-        f"give the wire's 'material'{other} or modulus"
+        f"give the wire's 'material'{agreement} or modulus"
     )
 
 
@@ -146,7 +151,7 @@ def check_initial_tension(wound: HelicalSpring | None, tension: float) -> None:
     """Raise `ValueError` for an initial tension [N] that cannot be wound into a spring of this wire."""
     if wound is None or not tension:
         return
-    low, high = (format_short(one, "force") for one in wound.usual_initial_tension)
+    low, high = (format_short(end, "force") for end in wound.usual_initial_tension)
     if tension > MAX_TENSION_RATIO * wound.usual_initial_tension[1]:
         stated = format_short(tension, "force")
         raise ValueError(f"'initial_tension' of {stated} cannot be wound: such a spring has about {low} to {high}")
@@ -181,8 +186,8 @@ def settle_rate(springs: Any, kind: Kind, info: ValidationInfo) -> None:
         # past the frozen model, and not counted as set: another wire then has another rate
         object.__setattr__(springs, "stiffness", springs.wound.to_wound(kind).rate)
     elif springs.wound is not None and not is_made(info):
-        for one in springs.stiffness if isinstance(springs.stiffness, tuple) else (springs.stiffness,):
-            springs.wound.check_rate(kind, one)
+        for rate in springs.stiffness if isinstance(springs.stiffness, tuple) else (springs.stiffness,):
+            springs.wound.check_rate(kind, rate)
 
 
 class CatalogueSpring(WireLimits, SpringSupport):
@@ -225,11 +230,11 @@ class CatalogueSpring(WireLimits, SpringSupport):
     @model_validator(mode="after")
     def _rate_is_known(self) -> Self:
         stated = self.rate if self.kind == "torsion" else self.stiffness
-        other = "'stiffness'" if self.kind == "torsion" else "'rate'"
+        wrong_key = "'stiffness'" if self.kind == "torsion" else "'rate'"
         if (self.stiffness if self.kind == "torsion" else self.rate) is not None:
-            raise ValueError(f"a spring of kind {self.kind!r} has no {other}")
-        given = [self.wire, self.coil, self.turns]
-        if any(item is not None for item in given) and None in given:
+            raise ValueError(f"a spring of kind {self.kind!r} has no {wrong_key}")
+        stated_sizes = [self.wire, self.coil, self.turns]
+        if any(item is not None for item in stated_sizes) and None in stated_sizes:
             raise ValueError("'wire', 'coil' and 'turns' belong together: a rate follows from all three")
         self.check_wire(self.wire, self.coil)
         if (self.max_stress or self.fatigue) and self.wound is None:
@@ -288,8 +293,8 @@ class CatalogueSpring(WireLimits, SpringSupport):
             "life": offer.life,
             "counts": offer.counts,
         } | support_of(offer)
-        known = {key: value for key, value in about.items() if value is not None}
-        return cls.model_validate((wire.model_dump(exclude_unset=True) if wire else {}) | known)
+        stated = {key: value for key, value in about.items() if value is not None}
+        return cls.model_validate((wire.model_dump(exclude_unset=True) if wire else {}) | stated)
 
     @property
     def wound(self) -> HelicalSpring | None:
@@ -336,22 +341,24 @@ class CatalogueSpring(WireLimits, SpringSupport):
 
 def check_names(springs: Sequence[CatalogueSpring]) -> None:
     """Raise `ValueError` if two springs of one name are not the same."""
-    known: dict[str, CatalogueSpring] = {}
-    for one in springs:
-        if known.setdefault(one.name, one) != one:
-            raise ValueError(f"there are two springs {one.name!r} with different values: a name stands for one spring")
+    springs_by_name: dict[str, CatalogueSpring] = {}
+    for spring in springs:
+        if springs_by_name.setdefault(spring.name, spring) != spring:
+            raise ValueError(
+                f"there are two springs {spring.name!r} with different values: a name stands for one spring"
+            )
 
 
 def _resolve_file(value: Any, handler: Any, info: ValidationInfo) -> Any:
     """Return a file's name as a file beside the specification; lists and the generic series' word as they are."""
-    found = handler(value)
-    if not isinstance(found, str):
-        check_names(found)
-        return found
-    if found == GENERIC_SERIES:
-        return found
+    value_read = handler(value)
+    if not isinstance(value_read, str):
+        check_names(value_read)
+        return value_read
+    if value_read == GENERIC_SERIES:
+        return value_read
     folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
-    return DataSource(found, folder)
+    return DataSource(value_read, folder)
 
 
 def wire_of(offer: Offer) -> SpringWire | None:
@@ -359,14 +366,14 @@ def wire_of(offer: Offer) -> SpringWire | None:
     wound = offer.wound
     if wound is None:
         return None
-    known = WIRES_BY_NAME[wound.material or MUSIC_WIRE.name]
+    material = WIRES_BY_NAME[wound.material or MUSIC_WIRE.name]
     about = {
         "wire": wound.wire,
         "coil": wound.coil,
         "turns": wound.turns,
         "material": None if wound.material == MUSIC_WIRE.name else wound.material,
-        "shear_modulus": None if wound.shear_modulus == known.shear_modulus else wound.shear_modulus,
-        "youngs_modulus": None if wound.youngs_modulus == known.youngs_modulus else wound.youngs_modulus,
+        "shear_modulus": None if wound.shear_modulus == material.shear_modulus else wound.shear_modulus,
+        "youngs_modulus": None if wound.youngs_modulus == material.youngs_modulus else wound.youngs_modulus,
         "max_stress": offer.max_stress,
         "fatigue": None if offer.fatigue is None else Fatigue.from_law(offer.fatigue),
     }
@@ -411,7 +418,7 @@ def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
     rows = csv.reader(lines, delimiter=separator, strict=True)
     try:
         heads = _heads(next(rows, []), source)
-        found: list[CatalogueSpring] = []
+        springs: list[CatalogueSpring] = []
         for cells in rows:
             if not any(cell.strip() for cell in cells):
                 continue
@@ -423,8 +430,8 @@ def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
                 if head and cell.strip()
             }
             try:
-                found.append(CatalogueSpring.model_validate(block))
-                check_names(found)
+                springs.append(CatalogueSpring.model_validate(block))
+                check_names(springs)
             except ValidationError as error:
                 first = error.errors()[0]
                 place = ".".join(str(part) for part in first["loc"]) or str(block.get("name", ""))
@@ -434,9 +441,9 @@ def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
                 raise DataError(f"{source}:{rows.line_num}: {error}") from None
     except csv.Error as error:
         raise DataError(f"{source}:{rows.line_num}: {error}") from None
-    if not found:
+    if not springs:
         raise DataError(f"{source}: lists no spring; a header and one line per spring are needed")
-    yield from found
+    yield from springs
 
 
 def _lines(source: DataSource) -> list[str]:
@@ -451,25 +458,25 @@ def _lines(source: DataSource) -> list[str]:
 def _heads(cells: Sequence[str], source: DataSource) -> list[tuple[str, str | None] | None]:
     """Return name and unit of each column; None for a remark, such as a price, which is not read."""
     allowed = [name for name in CatalogueSpring.model_fields if name != "fatigue"]  # a block, which no cell holds
-    found: list[tuple[str, str | None] | None] = []
+    columns: list[tuple[str, str | None] | None] = []
     for cell in cells:
         title, unit = split_header(cell)
         name = title.strip().lower().replace(" ", "_")
-        if name in [head[0] for head in found if head]:
+        if name in [head[0] for head in columns if head]:
             raise DataError(f"{source}:1: the column {name!r} appears twice")
-        near = get_close_matches(name, allowed, n=1, cutoff=0.75)
-        if name not in allowed and (near or (unit and is_unit(unit)) or not found or name == "fatigue"):
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+        close = get_close_matches(name, allowed, n=1, cutoff=0.75)
+        if name not in allowed and (close or (unit and is_unit(unit)) or not columns or name == "fatigue"):
+            hint = f"; did you mean {close[0]!r}?" if close else ""
             listed = ", ".join(allowed)
             raise DataError(f"{source}:1: {name!r} is not a column of a list of springs{hint}; columns are {listed}")
-        found.append((name, unit) if name in allowed else None)
-    return found
+        columns.append((name, unit) if name in allowed else None)
+    return columns
 
 
 def _cell(name: str, cell: str, unit: str | None, separator: str) -> object:
     """Return a cell as a specification would say it."""
     if name == "counts":
-        return tuple(int(one) if one.isdigit() else one for one in cell.split())
+        return tuple(int(word) if word.isdigit() else word for word in cell.split())
     if separator != "," and name not in ("name", "kind"):
         cell = _COMMA_PATTERN.sub(r"\1.\2", cell) if _COMMA_PATTERN.fullmatch(cell.split(" ")[0]) else cell
     if name in ("turns", "life") and _NUMBER_PATTERN.fullmatch(cell):

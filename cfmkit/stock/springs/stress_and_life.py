@@ -64,7 +64,7 @@ class SpringInUse:
     @classmethod
     def from_offer(cls, offer: Offer, least: float, largest: float) -> SpringInUse:
         """Return a spring on offer between two deflections [m or rad]."""
-        low, high = (offer.initial_tension + offer.rate * one for one in (least, largest))
+        low, high = (offer.initial_tension + offer.rate * deflection for deflection in (least, largest))
         return cls(offer.wound, low, high, offer.fatigue, offer.life)
 
     @property
@@ -120,26 +120,26 @@ class SpringInUse:
         return self.fatigue.life(self.wound.stress(self.largest), self.wound.stress(self.least))
 
 
-def in_the_sense_of_the_larger(high: float, low: float) -> tuple[float, float]:
+def orient_to_larger(high: float, low: float) -> tuple[float, float]:
     """Return the least and the largest of what a spring goes through between two ends, the larger of these positive."""
     return (low, high) if abs(high) >= abs(low) else (-high, -low)
 
 
 def wire_quantities(springs: Sequence[SpringInUse]) -> dict[str, Quantity]:
     """Return the largest stresses and the shortest life of some springs by name, as far as they are known."""
-    found: dict[str, Quantity] = {}
-    for name, each in (
-        ("wire_stress_max", [one.stress for one in springs]),
-        ("loop_stress_max", [one.loop_stress for one in springs]),
+    quantities: dict[str, Quantity] = {}
+    for name, values in (
+        ("wire_stress_max", [spring.stress for spring in springs]),
+        ("loop_stress_max", [spring.loop_stress for spring in springs]),
     ):
-        if stresses := [stress for stress in each if stress is not None]:
-            found[name] = Quantity(max(stresses), *WIRE_DEFINITIONS[name])
-    if factors := [factor for factor in (one.safety_factor for one in springs) if factor is not None]:
-        found["spring_safety_factor"] = Quantity(min(factors), *WIRE_DEFINITIONS["spring_safety_factor"])
+        if stresses := [stress for stress in values if stress is not None]:
+            quantities[name] = Quantity(max(stresses), *WIRE_DEFINITIONS[name])
+    if factors := [factor for factor in (spring.safety_factor for spring in springs) if factor is not None]:
+        quantities["spring_safety_factor"] = Quantity(min(factors), *WIRE_DEFINITIONS["spring_safety_factor"])
     try:
-        lives = [life for life in (one.life() for one in springs) if life is not None]
+        lives = [life for life in (spring.life() for spring in springs) if life is not None]
     except Undefined as error:
-        return found | {"spring_life": Quantity(None, *WIRE_DEFINITIONS["spring_life"], reason=str(error))}
+        return quantities | {"spring_life": Quantity(None, *WIRE_DEFINITIONS["spring_life"], reason=str(error))}
     if lives:
-        found["spring_life"] = Quantity(min(lives), *WIRE_DEFINITIONS["spring_life"])
-    return found
+        quantities["spring_life"] = Quantity(min(lives), *WIRE_DEFINITIONS["spring_life"])
+    return quantities

@@ -46,10 +46,10 @@ class SpringSupport(Model):
 
     def check_guide(self, kind: Kind, wound: HelicalSpring | None, outer: float | None) -> None:
         """Raise `ValueError` for a guide that does not fit, or for one of a spring that does not buckle."""
-        own = ["seats"] if self.seats != "fixed-fixed" else []
-        own += [key for key in ("guide_rod", "guide_tube") if getattr(self, key) is not None]
-        if own and kind != "compression":
-            raise ValueError(f"{own[0]!r} is for compression springs, which buckle; this is of kind {kind!r}")
+        stated = ["seats"] if self.seats != "fixed-fixed" else []
+        stated += [key for key in ("guide_rod", "guide_tube") if getattr(self, key) is not None]
+        if stated and kind != "compression":
+            raise ValueError(f"{stated[0]!r} is for compression springs, which buckle; this is of kind {kind!r}")
         inside = wound.inner_diameter if wound is not None else outer
         if self.guide_rod is not None and inside is not None and self.guide_rod >= inside:
             inner = format_short(inside, "length")

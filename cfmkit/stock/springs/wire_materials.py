@@ -95,7 +95,7 @@ class WireMaterial:
 
     def check_diameter(self, wire: float) -> None:
         """Raise `WireOutOfRange` if the strength of a diameter [m] is not published."""
-        if self.strengths and not any(one.includes(wire) for one in self.strengths):
+        if self.strengths and not any(entry.includes(wire) for entry in self.strengths):
             raise WireOutOfRange(
                 f"{self.name} is listed from {1e3 * self.thinnest:g} to {1e3 * self.thickest:g} mm "
                 f"(Shigley, Table 10-4), and the wire is {1e3 * wire:.4g} mm"
@@ -117,17 +117,17 @@ class WireMaterial:
         Table 10-4), and the wire is 7.25 mm
         """
         self.check_diameter(wire)
-        for one in self.strengths:
-            if one.includes(wire):
-                return float(one.constant * 1e6 / (1e3 * wire) ** one.exponent)
+        for entry in self.strengths:
+            if entry.includes(wire):
+                return float(entry.constant * 1e6 / (1e3 * wire) ** entry.exponent)
         raise WireOutOfRange(f"{self.name} has no tensile strength in Table 10-4 of Shigley: state 'max_stress'")
 
 
 _EN_10270_1 = "EN 10270-1 [G]: 206 and 81.5 GPa for all diameters"
 WIRES_BY_NAME: Mapping[str, WireMaterial] = MappingProxyType(
     {
-        one.name: one
-        for one in (
+        material.name: material
+        for material in (
             WireMaterial(
                 "music-wire", "music wire (ASTM A228, EN 10270-1 SH and DH)", 206e9, 81.5e9, _EN_10270_1,
                 COLD_DRAWN,

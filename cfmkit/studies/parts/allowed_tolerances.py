@@ -132,11 +132,11 @@ def factors_that_keep(
     def share(factors: FloatArray) -> float:
         return good(np.sum([one(f * error) for one, f, error in zip(along, factors, errors.T, strict=True)], axis=0))
 
-    def one(k: int) -> Callable[[float], float]:
+    def share_alone(k: int) -> Callable[[float], float]:
         others = all_moved - stated[k]
         return lambda f: good(others + along[k](f * errors[:, k]))
 
-    alone = np.array([_largest(one(k), wanted) for k in range(len(ones))])
+    alone = np.array([_largest(share_alone(k), wanted) for k in range(len(ones))])
     shape = _shape(rows, np.array([moved.std(axis=0) for moved in stated]).T, costs)
     together = _largest(lambda f: share(f * ones), wanted)
     allocated = _largest(lambda f: share(np.minimum(f * shape, MAX_TOLERANCE_FACTOR)), wanted)

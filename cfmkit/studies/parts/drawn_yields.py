@@ -110,7 +110,7 @@ def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
     Raises SpecError if a tolerance is on a value that the design does not have.
     """
     block: DesignKeys | None = getattr(design.spec, "design", None) or getattr(given, "design", None)
-    if not isinstance(block, DesignKeys) or (parts := Parts.of_design(design.spec, block, run.seed)) is None:
+    if not isinstance(block, DesignKeys) or (parts := Parts.from_design(design.spec, block, run.seed)) is None:
         return None
     values = parts.draw()
     found = analyze_parts(parts, values, design, run.part(0.0, 0.4))
@@ -136,7 +136,7 @@ def _yield_before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[Sha
     if given is None:
         return None, "nothing was given to begin with"
     try:
-        parts = Parts.of_design(given, block, run.seed)
+        parts = Parts.from_design(given, block, run.seed)
         result = family(given.family).analyze(given, run)
         if parts is None or not result.curves:
             return None, f"the specification as given has no curve: {result.message}"

@@ -44,7 +44,7 @@ class Parts:
     seed: int  # of the generator
 
     @classmethod
-    def of_block(cls, spec: Spec, block: Sensitivity, samples: int, seed: int) -> Parts:
+    def from_block(cls, spec: Spec, block: Sensitivity, samples: int, seed: int) -> Parts:
         """Return the parts whose errors are the parameters of a block.
 
         Raises SpecError with every fault, at ``sensitivity.parameters`` and the path.
@@ -54,7 +54,7 @@ class Parts:
         return cls(spec, parameters, groups(block, paths), correlations(block, paths), samples, seed)
 
     @classmethod
-    def of_design(cls, spec: Spec, design: DesignBlock, seed: int) -> Parts | None:
+    def from_design(cls, spec: Spec, design: DesignBlock, seed: int) -> Parts | None:
         """Return the parts of a specification with the tolerances of a `design` block or of its process; None if none.
 
         Raises SpecError if a path is not in the specification, at ``design.tolerances`` and the path.
@@ -63,7 +63,7 @@ class Parts:
         if not stated:
             return None
         try:
-            return cls.of_block(spec, _block(stated, design.correlated), *_count_and_seed(spec, design, seed))
+            return cls.from_block(spec, _block(stated, design.correlated), *_count_and_seed(spec, design, seed))
         except SpecError as error:
             raise SpecError([replace(one, path=_rename_fault(one.path)) for one in error.problems]) from None
 
@@ -74,7 +74,7 @@ class Parts:
         if not isinstance(design, DesignKeys):
             return None, ""
         if design.tolerances_of(spec)[0]:
-            return cls.of_design(spec, design, seed), "within design.tolerances"
+            return cls.from_design(spec, design, seed), "within design.tolerances"
         found = assume_errors(spec, process)
         if found is None:
             return None, ""
@@ -85,7 +85,7 @@ class Parts:
         """Return the parts that a process is assumed to make, for a specification some of whose values err by it."""
         design = getattr(spec, "design", None)
         known = _count_and_seed(spec, design, seed) if isinstance(design, DesignKeys) else (0, seed)
-        return cls.of_block(spec, _block(tolerances(spec, process)), *known)
+        return cls.from_block(spec, _block(tolerances(spec, process)), *known)
 
     @property
     def paths(self) -> tuple[str, ...]:

@@ -257,7 +257,7 @@ def _move_design(stated: Spec, design: Design, run: Run, clock: Clock, largest: 
         return 0, design
     free = free_of(stated, design.spec)
     nominal = family(stated.family).analyze(design.spec, run)
-    parts = Parts.of_design(design.spec, block, run.seed)
+    parts = Parts.from_design(design.spec, block, run.seed)
     if parts is None:
         return 0, replace(design, notes=(*design.notes, ("margins", f"none: {NO_TOLERANCE}")))
     if nominal.status is not Status.COMPLETE:

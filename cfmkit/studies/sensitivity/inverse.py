@@ -28,30 +28,30 @@ DEFAULT_YIELD, N_DRAWN_PARTS = 0.95, 4000
 def run(setup: Setup, evaluator: Evaluator) -> Findings:
     """State which tolerances keep the yield, and draw parts within those that are allocated."""
     wanted = setup.block.min_yield or DEFAULT_YIELD
-    spreads = [one.spread for one in setup.parameters]
+    spreads = [parameter.spread for parameter in setup.parameters]
     errors = setup.parts.draw(N_DRAWN_PARTS, [setup.seed, 3]) - setup.values
     costs = np.array([setup.block.costs.get(path, 1.0) for path in setup.paths])
     answer = allowed_tolerances(setup.parts, setup.nominal.result, errors, costs, wanted)
-    found = list(_tolerance_lines(setup, answer))
+    index_lines = list(_tolerance_lines(setup, answer))
     factors = np.where(np.isfinite(answer.allocated), np.maximum(answer.allocated, LEAST_FACTOR), 1.0)
-    tight = [one.tighten(float(factor)) for one, factor in zip(spreads, factors, strict=True)]
+    tight = [spread.tighten(float(factor)) for spread, factor in zip(spreads, factors, strict=True)]
 
     points = values_at(tight, setup.parts.unit(setup.samples, setup.seed))[:, None, :]
     outputs = evaluator.outputs(points, [DRAWN_ROLE])
-    plain = Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+    plain = Findings(setup, evaluator, tuple(index_lines), points=points, outputs=outputs)
     return with_shares(plain, *judge_samples(setup, outputs))
 
 
 def _tolerance_lines(setup: Setup, answer: ToleranceFactors) -> Iterator[IndexLine]:
     """Yield what each tolerance may be, in its own unit: a standard deviation, or the half width of a range."""
-    for k, one in enumerate(setup.parameters):
-        spread = one.spread
+    for k, parameter in enumerate(setup.parameters):
+        spread = parameter.spread
         stated_width = spread.deviation if spread.kind == "normal" else 0.5 * (spread.high - spread.low)
         for name in ("alone", "together", "allocated"):
             width = float(getattr(answer, name)[k]) * stated_width
-            value = reported(float(to_border(width, one.dimension)), "ratio")
-            unit = border_unit(one.dimension)
-            yield IndexLine("yield", one.path, f"tolerance_{name}", value, None, None, unit, N_DRAWN_PARTS)
+            value = reported(float(to_border(width, parameter.dimension)), "ratio")
+            unit = border_unit(parameter.dimension)
+            yield IndexLine("yield", parameter.path, f"tolerance_{name}", value, None, None, unit, N_DRAWN_PARTS)
 
 
 SENSITIVITY_METHOD = Method(

@@ -83,9 +83,9 @@ def slope(
     if both.sum() >= 2:
         return _extrapolate(((up - down) / (2.0 * size))[both], noise[both], 4.0)
     for side, sign in ((up, 1.0), (down, -1.0)):
-        there = ~np.isnan(side)
-        if there.sum() >= 2 and np.isfinite(at_nominal):
-            return _extrapolate((sign * (side - at_nominal) / size)[there], noise[there], 2.0)
+        is_known = ~np.isnan(side)
+        if is_known.sum() >= 2 and np.isfinite(at_nominal):
+            return _extrapolate((sign * (side - at_nominal) / size)[is_known], noise[is_known], 2.0)
     return UNKNOWN_SLOPE
 
 
@@ -121,17 +121,17 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
         sides = [side for side in ("up", "down") for _ in range(N_STEP_LEVELS)]
         roles = [[f"{path} {side}" for side in sides] for path in setup.paths]
         outputs = evaluator.outputs(points.reshape(count, -1, count), roles).reshape(outputs.shape)
-    found: list[IndexLine] = []
+    index_lines: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         nominal = float(setup.nominal.values[m])
-        for k, one in enumerate(setup.parameters):
-            known = exact.get(metric.name, {}).get(one.path) if metric.over is None else None
-            if known is not None:
-                derivative = Slope(known, 0.0)
+        for k, parameter in enumerate(setup.parameters):
+            exact_slope = exact.get(metric.name, {}).get(parameter.path) if metric.over is None else None
+            if exact_slope is not None:
+                derivative = Slope(exact_slope, 0.0)
             else:
                 derivative = slope(outputs[k, 0, :, m], outputs[k, 1, :, m], nominal, float(half[k]))
-            found += _gradient_lines(metric, one, derivative, nominal)
-    return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+            index_lines += _gradient_lines(metric, parameter, derivative, nominal)
+    return Findings(setup, evaluator, tuple(index_lines), points=points, outputs=outputs)
 
 
 def _exact(setup: Setup) -> Mapping[str, Mapping[str, float]]:
@@ -139,26 +139,26 @@ def _exact(setup: Setup) -> Mapping[str, Mapping[str, float]]:
     gradient = family(setup.study.spec.family).gradient
     if gradient is None or setup.study.design:
         return {}
-    found: Mapping[str, Mapping[str, float]] = gradient(setup.study.spec, setup.paths)
-    return found
+    gradients: Mapping[str, Mapping[str, float]] = gradient(setup.study.spec, setup.paths)
+    return gradients
 
 
 def _all_known(setup: Setup, exact: Mapping[str, Mapping[str, float]]) -> bool:
-    wanted = ((one, path) for one in setup.study.metrics for path in setup.paths)
-    return all(one.over is None and path in exact.get(one.name, {}) for one, path in wanted)
+    wanted = ((metric, path) for metric in setup.study.metrics for path in setup.paths)
+    return all(metric.over is None and path in exact.get(metric.name, {}) for metric, path in wanted)
 
 
-def _gradient_lines(metric: Metric, one: Parameter, slope: Slope, at_nominal: float) -> Iterator[IndexLine]:
-    above, below = border_unit(metric.dimension), border_unit(one.dimension)
-    scale = float(to_border(1.0, metric.dimension)) / float(to_border(1.0, one.dimension))
+def _gradient_lines(metric: Metric, parameter: Parameter, slope: Slope, at_nominal: float) -> Iterator[IndexLine]:
+    above, below = border_unit(metric.dimension), border_unit(parameter.dimension)
+    scale = float(to_border(1.0, metric.dimension)) / float(to_border(1.0, parameter.dimension))
     unit = above if below == "1" else f"{above}/{below}" if below.isalpha() else f"{above}/({below})"
     value, low, high = (reported(end * scale, "ratio") for end in _neighbours(slope.value, slope.error))
-    yield IndexLine(metric.label, one.path, "gradient", value, low, high, unit, N_STEP_LEVELS)
-    relative = normalise(1.0, one.spread.nominal, at_nominal)
+    yield IndexLine(metric.label, parameter.path, "gradient", value, low, high, unit, N_STEP_LEVELS)
+    relative = normalise(1.0, parameter.spread.nominal, at_nominal)
     value, low, high = (
         reported(end, "ratio") for end in _neighbours(slope.value * relative, slope.error * abs(relative))
     )
-    yield IndexLine(metric.label, one.path, SLOPE_INDEX, value, low, high, "1", N_STEP_LEVELS)
+    yield IndexLine(metric.label, parameter.path, SLOPE_INDEX, value, low, high, "1", N_STEP_LEVELS)
 
 
 def _neighbours(value: float, reach: float) -> tuple[float, float, float]:

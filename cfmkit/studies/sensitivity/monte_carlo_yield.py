@@ -38,7 +38,7 @@ def sample(
 ) -> FloatArray:
     """Return made mechanisms, (n, 1 + groups, d): as drawn, then with one group tightened each."""
     drawn = values_at(spreads, unit)
-    tight = values_at([one.tighten(TIGHTENING_FACTOR) for one in spreads], unit)
+    tight = values_at([spread.tighten(TIGHTENING_FACTOR) for spread in spreads], unit)
     blocks = [drawn]
     for group in groups:
         changed = drawn.copy()

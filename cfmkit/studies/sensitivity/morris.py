@@ -44,8 +44,8 @@ def sample(
     """
     from SALib.sample import morris
 
-    own = np.random.default_rng([seed, start])
-    points = morris.sample(problem(parameters), count, num_levels=N_GRID_LEVELS, seed=own)
+    generator = np.random.default_rng([seed, start])
+    points = morris.sample(problem(parameters), count, num_levels=N_GRID_LEVELS, seed=generator)
     return np.asarray(points).reshape(count, parameters + 1, parameters)
 
 
@@ -64,7 +64,7 @@ def analyze(points: FloatArray, outputs: FloatArray, seed: int) -> Analysis:
     from SALib.analyze import morris
 
     count = points.shape[2]
-    found = morris.analyze(
+    indices = morris.analyze(
         problem(count),
         points.reshape(-1, count),
         outputs.ravel(),
@@ -72,9 +72,9 @@ def analyze(points: FloatArray, outputs: FloatArray, seed: int) -> Analysis:
         num_levels=N_GRID_LEVELS,
         seed=np.random.default_rng([seed, 1]),
     )
-    reach = np.asarray(found["mu_star_conf"], dtype=np.float64)
+    reach = np.asarray(indices["mu_star_conf"], dtype=np.float64)
     gap = np.full(count, np.nan)
-    size, mean, scatter = (np.asarray(found[name], dtype=np.float64) for name in INDEX_NAMES)
+    size, mean, scatter = (np.asarray(indices[name], dtype=np.float64) for name in INDEX_NAMES)
     return (
         Index(MU_STAR, size, np.maximum(size - reach, 0.0), size + reach),
         Index(MU_INDEX, mean, gap, gap),
@@ -85,7 +85,7 @@ def analyze(points: FloatArray, outputs: FloatArray, seed: int) -> Analysis:
 def run(setup: Setup, evaluator: Evaluator) -> Findings:
     """Return size, mean and scatter of the effects."""
     count, seed = len(setup.parameters), setup.seed
-    spreads = [one.spread for one in setup.parameters]
+    spreads = [parameter.spread for parameter in setup.parameters]
 
     unit = sample(0, setup.samples, count, seed)
     points = values_across(spreads, unit.reshape(-1, count)).reshape(unit.shape)
@@ -93,11 +93,11 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     outputs = evaluator.outputs(points, roles)
     low, high = setup.ends.T
     grid = np.rint((points - low) / (high - low) * (N_GRID_LEVELS - 1)) / (N_GRID_LEVELS - 1)
-    found: list[IndexLine] = []
+    index_lines: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
-        analysis = analyze_complete(outputs[..., m], lambda one: analyze(grid, one, seed), INDEX_NAMES, count)
-        found += lines_of(metric, setup.paths, analysis, len(grid))
-    return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+        analysis = analyze_complete(outputs[..., m], lambda kept: analyze(grid, kept, seed), INDEX_NAMES, count)
+        index_lines += lines_of(metric, setup.paths, analysis, len(grid))
+    return Findings(setup, evaluator, tuple(index_lines), points=points, outputs=outputs)
 
 
 SENSITIVITY_METHOD = Method(

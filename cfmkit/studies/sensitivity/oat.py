@@ -72,12 +72,12 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     """Return what each parameter does through its range."""
     points = sample(setup.values, setup.ends, setup.samples)
     outputs = evaluator.outputs(points, [[path] * setup.samples for path in setup.paths])
-    found: list[IndexLine] = []
+    index_lines: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         nominal = float(setup.nominal.values[m])
         analysis = analyze(setup.values, setup.ends, outputs[..., m], nominal)
-        found += lines_of(metric, setup.paths, analysis, setup.samples)
-    return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+        index_lines += lines_of(metric, setup.paths, analysis, setup.samples)
+    return Findings(setup, evaluator, tuple(index_lines), points=points, outputs=outputs)
 
 
 SENSITIVITY_METHOD = Method(

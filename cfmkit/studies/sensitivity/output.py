@@ -25,26 +25,26 @@ if TYPE_CHECKING:
 YIELD_DEFINITION = "share of parts that meet every requirement, of those drawn from the tolerances"
 
 
-def outputs(found: Findings) -> Iterator[tuple[str, Data]]:
+def outputs(findings: Findings) -> Iterator[tuple[str, Data]]:
     """Yield every file of a study but the pictures as (name, content)."""
     from cfmkit.specs.yamlio import dump
     from cfmkit.tables.json_writing import json_bytes
 
-    spec = found.setup.study.spec
-    yield "results.csv", results_csv(found)
-    if not found.interrupted:
-        yield "indices.csv", to_csv(lines_table(found.lines))
-    if found.convergence:
-        yield "convergence.csv", to_csv(lines_table(found.convergence))
-    yield "metrics.json", json_bytes(as_json(found))
+    spec = findings.setup.study.spec
+    yield "results.csv", results_csv(findings)
+    if not findings.interrupted:
+        yield "indices.csv", to_csv(lines_table(findings.lines))
+    if findings.convergence:
+        yield "convergence.csv", to_csv(lines_table(findings.convergence))
+    yield "metrics.json", json_bytes(as_json(findings))
     resolve = family(spec.family).resolve
     yield "resolved.yaml", dump(resolve(spec) if resolve else spec, complete=True).encode()
 
 
-def results_csv(found: Findings) -> Iterator[bytes]:
+def results_csv(findings: Findings) -> Iterator[bytes]:
     """Yield results.csv: to which block a sample belongs and what it is for, then as in a sweep."""
     first = True
-    for piece in found.evaluator.pieces:
+    for piece in findings.evaluator.pieces:
         for indices, rows in piece.records.batches():
             leading = (
                 TableColumn("block", piece.blocks[indices]),
@@ -67,93 +67,93 @@ def lines_table(lines: Sequence[IndexLine]) -> Table:
     return Table(tuple(map(column, ("metric", "parameter", "index", "value", "low", "high", "unit", "samples"))))
 
 
-def exit_code(found: Findings) -> ExitCode:
+def exit_code(findings: Findings) -> ExitCode:
     """Return the exit code of the process: samples that failed count before requirements that are missed."""
-    if found.interrupted:
+    if findings.interrupted:
         return ExitCode.INTERRUPTED
-    evaluator = found.evaluator
+    evaluator = findings.evaluator
     if evaluator.count and evaluator.failed == evaluator.count and not evaluator.ends[Status.TIMEOUT]:
         alike = (end for end in (Status.CRASHED, Status.INVALID) if evaluator.ends[end] == evaluator.count)
         return next(alike, Status.NO_EQUILIBRIUM).exit_code
-    stated = found.setup.method == "local" and not found.lacking
+    stated = findings.setup.method == "local" and not findings.lacking
     # a tolerance that does not exist is an answer
-    if (evaluator.failed and not stated) or (found.lacking and found.setup.method != "inverse"):
+    if (evaluator.failed and not stated) or (findings.lacking and findings.setup.method != "inverse"):
         return ExitCode.PARTIAL
-    missed = not all(outcome.ok for outcome in found.setup.nominal.outcomes) or not yield_ok(found)
+    missed = not all(outcome.ok for outcome in findings.setup.nominal.outcomes) or not yield_ok(findings)
     return ExitCode.REQUIREMENT_MISSED if missed else ExitCode.OK
 
 
-def yield_ok(found: Findings) -> bool:
+def yield_ok(findings: Findings) -> bool:
     """Return whether the yield is what was requested; true if nothing was.
 
     The tolerances of `inverse` aim at that yield: of parts drawn within them nearly half the times a few less are good.
     They miss it where so many parts rule it out.
     """
-    wanted = found.setup.block.min_yield
-    if wanted is None or not method_named(found.setup.method).draws_parts:
+    wanted = findings.setup.block.min_yield
+    if wanted is None or not method_named(findings.setup.method).draws_parts:
         return True
-    share = found.all_met
+    share = findings.all_met
     return share is not None and (
-        share.value >= wanted or (found.setup.method == "inverse" and share.wilson[1] >= wanted)
+        share.value >= wanted or (findings.setup.method == "inverse" and share.wilson[1] >= wanted)
     )
 
 
-def by_interval(found: Findings) -> bool:
+def is_met_by_interval(findings: Findings) -> bool:
     """Return whether the yield is what was requested because its interval has that in it, and not its value."""
-    wanted, share = found.setup.block.min_yield, found.all_met
-    return wanted is not None and share is not None and share.value < wanted and yield_ok(found)
+    wanted, share = findings.setup.block.min_yield, findings.all_met
+    return wanted is not None and share is not None and share.value < wanted and yield_ok(findings)
 
 
-def message(found: Findings) -> str:
+def message(findings: Findings) -> str:
     """Return the outcome in one sentence."""
-    evaluator = found.evaluator
-    reported = f"{found.setup.method}: {evaluator.count} samples"
-    if found.interrupted:
+    evaluator = findings.evaluator
+    reported = f"{findings.setup.method}: {evaluator.count} samples"
+    if findings.interrupted:
         of = f"{evaluator.missing} of {evaluator.count + evaluator.missing} samples"
-        again = "run the same command again without --fresh" if found.fresh else "run the same command again"
+        again = "run the same command again without --fresh" if findings.fresh else "run the same command again"
         return f"{reported}; interrupted: {of} were not computed; {again} to continue"
     if evaluator.failed:
         reported += f", {evaluator.failed} without a result (the first: {evaluator.first_failure})"
-    if found.unstated:
-        reported += f"; {found.unstated} of {len(found.lines)} indices are not stated"
+    if findings.unstated:
+        reported += f"; {findings.unstated} of {len(findings.lines)} indices are not stated"
     return reported
 
 
-def warnings(found: Findings) -> tuple[Finding, ...]:
+def warnings(findings: Findings) -> tuple[Finding, ...]:
     """Return what the user must know beside the numbers."""
-    evaluator, setup = found.evaluator, found.setup
+    evaluator, setup = findings.evaluator, findings.setup
     extra = []
     if evaluator.failed:
         reported = f"{evaluator.failed} of {evaluator.count} samples have no result: indices that need them are not "
         reported += "stated, and as parts they count as bad"
         extra.append(Finding("failed_samples", reported))
-    elif found.unstated and not found.interrupted:
-        reported = f"{found.unstated} indices are not stated: "
+    elif findings.unstated and not findings.interrupted:
+        reported = f"{findings.unstated} indices are not stated: "
         if setup.method == "inverse":
-            reported = f"{found.unstated} tolerances are not stated: even without the error of that parameter, "
+            reported = f"{findings.unstated} tolerances are not stated: even without the error of that parameter, "
             reported += "or of all parameters, the yield would be too low"
         else:
-            reported += "samples have no value" if found.lacking else f"{', '.join(found.constant)} does not vary"
+            reported += "samples have no value" if findings.lacking else f"{', '.join(findings.constant)} does not vary"
         extra.append(Finding("not_stated", reported))
     return (*setup.warnings, *extra)
 
 
-def as_json(found: Findings) -> dict[str, Any]:
+def as_json(findings: Findings) -> dict[str, Any]:
     """Return what metrics.json says."""
-    setup = found.setup
-    code = exit_code(found)
+    setup = findings.setup
+    code = exit_code(findings)
     return {
         "status": _STATUS_BY_CODE.get(code, "complete"),
-        "message": message(found),
+        "message": message(findings),
         "method": setup.method,
-        "metrics": metrics_json(_metrics(found)),
-        "requirements": _requirements(found),
-        "warnings": [{"name": item.name, "message": item.message} for item in warnings(found)],
-        "yield": found.all_met and found.all_met.as_json(),
-        "samples": _samples(found),
-        "parameters": [_parameter(one) for one in setup.parameters],
+        "metrics": metrics_json(_metrics(findings)),
+        "requirements": _requirements(findings),
+        "warnings": [{"name": item.name, "message": item.message} for item in warnings(findings)],
+        "yield": findings.all_met and findings.all_met.as_json(),
+        "samples": _samples(findings),
+        "parameters": [_parameter(parameter) for parameter in setup.parameters],
         "correlated": _correlated_pairs(setup),
-        "indices": [vars(line) for line in found.lines],
+        "indices": [vars(line) for line in findings.lines],
     }
 
 
@@ -164,46 +164,49 @@ _STATUS_BY_CODE = {
 }
 
 
-def _metrics(found: Findings) -> dict[str, Quantity]:
+def _metrics(findings: Findings) -> dict[str, Quantity]:
     """Return the metrics of the specification itself, and the yield."""
-    study, values = found.setup.study, found.setup.nominal.values.tolist()
+    study, values = findings.setup.study, findings.setup.nominal.values.tolist()
     noted = {
-        one.label: Quantity(value, one.dimension, one.definition)
-        for one, value in zip(study.metrics, values, strict=True)
+        metric.label: Quantity(value, metric.dimension, metric.definition)
+        for metric, value in zip(study.metrics, values, strict=True)
     }
-    if found.all_met is not None:
+    if findings.all_met is not None:
         noted["yield"] = Quantity(
-            _finite_or_none(found.all_met.value), "ratio", YIELD_DEFINITION, "no parts were drawn"
+            _finite_or_none(findings.all_met.value), "ratio", YIELD_DEFINITION, "no parts were drawn"
         )
     return noted
 
 
-def _requirements(found: Findings) -> list[dict[str, Any]]:
-    outcomes = found.setup.nominal.outcomes
-    shares = found.each_met or (None,) * len(outcomes)
-    each = [one.as_json() | {"yield": share and share.as_json()} for one, share in zip(outcomes, shares, strict=True)]
-    wanted = found.setup.block.min_yield
-    if wanted is None or found.all_met is None:
-        return each
-    value, good = _finite_or_none(found.all_met.value), yield_ok(found)
+def _requirements(findings: Findings) -> list[dict[str, Any]]:
+    outcomes = findings.setup.nominal.outcomes
+    shares = findings.each_met or (None,) * len(outcomes)
+    records = [
+        outcome.as_json() | {"yield": share and share.as_json()}
+        for outcome, share in zip(outcomes, shares, strict=True)
+    ]
+    wanted = findings.setup.block.min_yield
+    if wanted is None or findings.all_met is None:
+        return records
+    value, good = _finite_or_none(findings.all_met.value), yield_ok(findings)
     shown = "no value" if value is None else f"{100 * value:.4g} %"
-    if value is not None and found.all_met.failed:
-        shown += f" ({found.all_met.failed} of {found.all_met.count} parts failed)"
-    outcome = "ok, within the 95 % interval" if by_interval(found) else "ok" if good else "missed"
+    if value is not None and findings.all_met.failed:
+        shown += f" ({findings.all_met.failed} of {findings.all_met.count} parts failed)"
+    outcome = "ok, within the 95 % interval" if is_met_by_interval(findings) else "ok" if good else "missed"
     sentence = f"yield {shown}, required >= {100 * wanted:.4g} %: {outcome}"
     bounds = {"value": value, "min": wanted, "max": None, "unit": "1", "over": None, "over_unit": None}
-    return [*each, {"metric": "yield", **bounds, "ok": good, "sentence": sentence}]
+    return [*records, {"metric": "yield", **bounds, "ok": good, "sentence": sentence}]
 
 
 def _finite_or_none(value: float) -> float | None:
     return None if isnan(value) else value
 
 
-def _samples(found: Findings) -> dict[str, Any]:
-    evaluator, setup = found.evaluator, found.setup
+def _samples(findings: Findings) -> dict[str, Any]:
+    evaluator, setup = findings.evaluator, findings.setup
     ends = {status.key: count for status, count in evaluator.ends.items() if count}
     about: dict[str, Any] = {"blocks": setup.samples, "evaluated": evaluator.count, "failed": evaluator.failed}
-    if found.interrupted:
+    if findings.interrupted:
         about["missing"] = evaluator.missing
     return about | {
         "by_status": ends,
@@ -211,13 +214,17 @@ def _samples(found: Findings) -> dict[str, Any]:
     }
 
 
-def _parameter(one: Parameter) -> dict[str, Any]:
-    spread = one.spread
+def _parameter(parameter: Parameter) -> dict[str, Any]:
+    spread = parameter.spread
     low, high = spread.ends
-    about = {"path": one.path, "distribution": spread.kind, "nominal": write_value(spread.nominal, one.dimension)}
+    about = {
+        "path": parameter.path,
+        "distribution": spread.kind,
+        "nominal": write_value(spread.nominal, parameter.dimension),
+    }
     if spread.kind == "normal":
-        about["deviation"] = write_value(spread.deviation, one.dimension)
-    return about | {"range": [write_value(low, one.dimension), write_value(high, one.dimension)]}
+        about["deviation"] = write_value(spread.deviation, parameter.dimension)
+    return about | {"range": [write_value(low, parameter.dimension), write_value(high, parameter.dimension)]}
 
 
 def _correlated_pairs(setup: Setup) -> list[dict[str, Any]]:

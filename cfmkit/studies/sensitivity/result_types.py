@@ -67,7 +67,7 @@ class Findings:
             return ()
         columns = self.outputs.reshape(-1, self.outputs.shape[-1]).T
         pairs = zip(self.setup.study.metrics, columns, strict=False)
-        return tuple(one.label for one, column in pairs if varies_not(column))
+        return tuple(metric.label for metric, column in pairs if varies_not(column))
 
     @property
     def lacking(self) -> int:
@@ -86,7 +86,7 @@ def lines_of(metric: Metric, names: tuple[str, ...], analysis: Analysis, samples
         for index in analysis:
             amount = index.name in IN_UNITS
             ends = (index.value[k], index.low[k], index.high[k])
-            value, low, high = (to_stated_value(float(one), metric.dimension if amount else "ratio") for one in ends)
+            value, low, high = (to_stated_value(float(end), metric.dimension if amount else "ratio") for end in ends)
             unit = border_unit(metric.dimension) if amount else "1"
             yield IndexLine(metric.label, name, index.name, value, low, high, unit, samples)
 

@@ -21,7 +21,7 @@ def carry_out(
     """Return what a study finds."""
     evaluator = Evaluator(setup.study, setup.parameters, compute, by_role=setup.record.by_role)
     try:
-        found: Findings = setup.record.run(setup, evaluator)
+        findings: Findings = setup.record.run(setup, evaluator)
     except Interrupted:
         return Findings(setup, evaluator, interrupted=True)
-    return found
+    return findings

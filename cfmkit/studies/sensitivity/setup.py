@@ -102,12 +102,16 @@ class Setup:
     @property
     def ends(self) -> FloatArray:
         """Ranges of the parameters, (d, 2)."""
-        return np.array([one.spread.ends for one in self.parameters])
+        return np.array([parameter.spread.ends for parameter in self.parameters])
 
     def limits(self, metric: Metric) -> tuple[Bounds, ...]:
         """Return the requirements on a metric over its window, as bounds."""
-        mine = [one for one in self.study.spec.part_requirements if _note_ends(one) == (metric.name, metric.over)]
-        return tuple(Bounds.from_requirement(one, metric.dimension) for one in mine)
+        mine = [
+            requirement
+            for requirement in self.study.spec.part_requirements
+            if _note_ends(requirement) == (metric.name, metric.over)
+        ]
+        return tuple(Bounds.from_requirement(requirement, metric.dimension) for requirement in mine)
 
 
 def prepare(
@@ -125,7 +129,7 @@ def prepare(
         raise UsageError(NOTHING_TO_VARY.replace("{path}", length_to_vary(spec)[0]))
     chosen = seed if seed is not None else block.seed or 0
     samples = block.samples or METHOD_NAMES[block.method].default_samples
-    parts = Parts.of_block(spec, block, samples, chosen)
+    parts = Parts.from_block(spec, block, samples, chosen)
     parameters, paths = parts.parameters, parts.paths
     _suits(spec, block, parameters)
     groups = together(block, paths)
@@ -144,19 +148,25 @@ def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) ->
     if block.method == "inverse" and not spec.part_requirements:
         lacking = "finds the tolerances that keep a yield: give 'requirements' that a part meets or misses"
         raise SpecError([Problem("", 0, 0, "sensitivity.method", lacking)])
-    unknown = [path for path in block.costs if path not in {one.path for one in parameters}]
+    unknown = [path for path in block.costs if path not in {parameter.path for parameter in parameters}]
     if unknown:
-        known = ", ".join(one.path for one in parameters)
-        missing = f"no such parameter; there are {known}"
+        paths = ", ".join(parameter.path for parameter in parameters)
+        missing = f"no such parameter; there are {paths}"
         raise SpecError([Problem("", 0, 0, f"sensitivity.costs.{path}", missing) for path in unknown])
-    outside = [one for one in parameters if not one.spread.low <= one.spread.nominal <= one.spread.high]
+    outside = [
+        parameter
+        for parameter in parameters
+        if not parameter.spread.low <= parameter.spread.nominal <= parameter.spread.high
+    ]
     if method_named(block.method).draws_parts and outside:
         reported = "the nominal value is outside the range; tolerances are tightened towards it"
-        raise SpecError([Problem("", 0, 0, f"sensitivity.parameters.{one.path}", reported) for one in outside])
+        raise SpecError(
+            [Problem("", 0, 0, f"sensitivity.parameters.{parameter.path}", reported) for parameter in outside]
+        )
 
 
-def _note_ends(one: Requirement) -> tuple[str, Ends | None]:
-    return one.metric, one.over
+def _note_ends(requirement: Requirement) -> tuple[str, Ends | None]:
+    return requirement.metric, requirement.over
 
 
 def _metrics(spec: Spec, block: Sensitivity, sample: Curve | None) -> tuple[Metric, ...]:
@@ -164,19 +174,25 @@ def _metrics(spec: Spec, block: Sensitivity, sample: Curve | None) -> tuple[Metr
     if block.metrics or not spec.part_requirements:
         return _numeric(metrics_of(spec, block.metrics, sample), block)
     wanted = dict.fromkeys(map(_note_ends, spec.part_requirements))
-    plain = {one.name: one for one in metrics_of(spec, [name for name, _ in wanted], sample)}
+    plain = {metric.name: metric for metric in metrics_of(spec, [name for name, _ in wanted], sample)}
     motion = sample.motion_dimension if sample is not None else "length"
-    labels = {one: _label(plain[one[0]].label, one[1], motion) for one in wanted}
-    return tuple(replace(plain[one[0]], over=one[1], label=labels[one]) for one in wanted)
+    labels = {
+        name_and_window: _label(plain[name_and_window[0]].label, name_and_window[1], motion)
+        for name_and_window in wanted
+    }
+    return tuple(
+        replace(plain[name_and_window[0]], over=name_and_window[1], label=labels[name_and_window])
+        for name_and_window in wanted
+    )
 
 
 def _numeric(metrics: tuple[Metric, ...], block: Sensitivity) -> tuple[Metric, ...]:
     """Return the metrics that are numbers: of a word there is no derivative and no variance."""
-    words = [one.name for one in metrics if one.words]
+    words = [metric.name for metric in metrics if metric.words]
     if words and block.metrics:
         reported = f"{words[0]!r} is a word, and a sensitivity is about numbers; name another metric"
         raise SpecError([Problem("", 0, 0, "sensitivity.metrics", reported)])
-    return tuple(one for one in metrics if not one.words)
+    return tuple(metric for metric in metrics if not metric.words)
 
 
 def _label(name: str, over: Ends | None, motion: str) -> str:
@@ -202,7 +218,7 @@ def _with_nominal(study: Study, result: Result) -> tuple[Study, Nominal, tuple[F
     """Return the study of those metrics that have a value, and the result without deviations as it sees it."""
     row = study.row(result)
     valued = [k for k, value in enumerate(row.values) if value is not None]
-    reported = {one.label: item.reason or "there is none" for one, item in _valueless(study, result)}
+    reported = {metric.label: item.reason or "there is none" for metric, item in _valueless(study, result)}
     if not valued:
         reasons = "; ".join(dict.fromkeys(row.message or reason for reason in reported.values()))
         raise SolutionError(f"none of the metrics has a value for the specification itself: {reasons}")
@@ -218,9 +234,9 @@ def _with_nominal(study: Study, result: Result) -> tuple[Study, Nominal, tuple[F
 
 def _valueless(study: Study, result: Result) -> Iterator[tuple[Metric, Quantity]]:
     """Yield the metrics without a value, with what is known instead."""
-    for one, item in zip(study.metrics, study.quantities(result), strict=True):
+    for metric, item in zip(study.metrics, study.quantities(result), strict=True):
         if item.value is None or not isfinite(item.value):
-            yield one, item
+            yield metric, item
 
 
 def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...], samples: int) -> Iterator[Finding]:
@@ -240,13 +256,15 @@ def _followers(spec: Spec, parameters: tuple[Parameter, ...]) -> Iterator[Findin
     if resolve is None:
         return
     base = dict(resolve(spec).leaves())
-    for one in parameters:
-        low, high = one.spread.ends
+    for parameter in parameters:
+        low, high = parameter.spread.ends
         try:
-            moved = dict(resolve(spec.replace({one.path: low + 0.75 * (high - low)})).leaves())
+            moved = dict(resolve(spec.replace({parameter.path: low + 0.75 * (high - low)})).leaves())
         except SpecError:
             continue
-        follow = [path for path, value in moved.items() if path != one.path and base.get(path) != value]
+        follow = [path for path, value in moved.items() if path != parameter.path and base.get(path) != value]
         if follow:
-            reported = f"{', '.join(follow)} follow {one.path}: every sample is another part, made for its own value"
+            reported = (
+                f"{', '.join(follow)} follow {parameter.path}: every sample is another part, made for its own value"
+            )
             yield Finding("derived_part", f"{reported}; `cfmkit design` writes a design.yaml in which they are fixed")

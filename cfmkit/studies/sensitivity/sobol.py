@@ -76,11 +76,11 @@ def analyze(outputs: FloatArray, seed: int) -> Analysis:
     from SALib.analyze import sobol
 
     # SALib takes a seed of zero for none.
-    found = sobol.analyze(
+    indices = sobol.analyze(
         problem(count), outputs.ravel(), calc_second_order=False, num_resamples=N_RESAMPLES, seed=seed + 1
     )
     return tuple(
-        _index(name, found[key], found[f"{key}_conf"]) for name, key in zip(INDEX_NAMES, ("S1", "ST"), strict=True)
+        _index(name, indices[key], indices[f"{key}_conf"]) for name, key in zip(INDEX_NAMES, ("S1", "ST"), strict=True)
     )
 
 
@@ -97,10 +97,10 @@ def stages(count: int) -> list[int]:
     >>> stages(256)
     [16, 32, 64, 128, 256]
     """
-    found = [count]
-    while found[0] // 2 >= MIN_BLOCKS:
-        found.insert(0, found[0] // 2)
-    return found
+    counts = [count]
+    while counts[0] // 2 >= MIN_BLOCKS:
+        counts.insert(0, counts[0] // 2)
+    return counts
 
 
 def convergence(outputs: FloatArray, seed: int) -> list[tuple[int, Analysis]]:
@@ -111,22 +111,22 @@ def convergence(outputs: FloatArray, seed: int) -> list[tuple[int, Analysis]]:
 def run(setup: Setup, evaluator: Evaluator) -> Findings:
     """Return the indices, and how they converge."""
     count, seed = len(setup.parameters), setup.seed
-    spreads = [one.spread for one in setup.parameters]
+    spreads = [parameter.spread for parameter in setup.parameters]
 
     unit = sample(0, setup.samples, count, seed)
     points = values_at(spreads, unit.reshape(-1, count)).reshape(unit.shape)
     roles = ["A", *(f"A with {path} of B" for path in setup.paths), "B"]
     outputs = evaluator.outputs(points, roles)
-    found: list[IndexLine] = []
+    index_lines: list[IndexLine] = []
     on_the_way: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         for size in stages(len(outputs)):
-            known = outputs[:size, ..., m]
-            analysis = analyze_complete(known, lambda one: analyze(one, seed), INDEX_NAMES, count)
+            solved = outputs[:size, ..., m]
+            analysis = analyze_complete(solved, lambda kept: analyze(kept, seed), INDEX_NAMES, count)
             lines = list(lines_of(metric, setup.paths, analysis, size))
             on_the_way += lines
-        found += lines
-    return Findings(setup, evaluator, tuple(found), tuple(on_the_way), points=points, outputs=outputs)
+        index_lines += lines
+    return Findings(setup, evaluator, tuple(index_lines), tuple(on_the_way), points=points, outputs=outputs)
 
 
 SENSITIVITY_METHOD = Method(

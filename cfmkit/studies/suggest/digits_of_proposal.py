@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from cfmkit.studies.stock_and_digits import in_digits, lengths_and_angles
+from cfmkit.specs.yamlio.path_notation import read_item_suffix
+from cfmkit.studies.stock_and_digits import lengths_and_angles, round_to_digits
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,8 +29,10 @@ def round_to_process(spec: Spec, request: Request, decimals: int) -> Spec:
     Raises SpecError if values that have to agree no longer do.
     """
     written = dict(lengths_and_angles(spec.model_dump(mode="json", exclude_unset=True), ROUNDED_BLOCKS))
-    rounded = {path: in_digits(text, decimals) for path, text in written.items()}
-    rounded |= {path: in_digits(text, decimals) for path, text in _make_up_for_thickness(written, rounded).items()}
+    rounded = {path: round_to_digits(text, decimals) for path, text in written.items()}
+    rounded |= {
+        path: round_to_digits(text, decimals) for path, text in _make_up_for_thickness(written, rounded).items()
+    }
     rounded |= _ends_of_motion(written, request, decimals)
     changes = {path: text for path, text in rounded.items() if text != written[path]}
     return spec.replace(changes) if changes else spec
@@ -40,7 +43,7 @@ def _make_up_for_thickness(written: Mapping[str, str], rounded: Mapping[str, str
     widths = {}
     for path, text in written.items():
         block, _, key = path.rpartition(".")
-        beside = [item for item in written if item.removesuffix(_index(item)) == f"{block}.thickness"]
+        beside = [item for item in written if item.removesuffix(read_item_suffix(item)) == f"{block}.thickness"]
         if key == "width" and beside:
             # tapered leaves are in series: their compliances add up
             before, after = (sum(_number(texts[item]) ** -3 for item in beside) for texts in (written, rounded))
@@ -54,16 +57,10 @@ def _ends_of_motion(written: Mapping[str, str], request: Request, decimals: int)
     if start is None or end is None:
         return {}
     unit, size = MOTION_UNITS[request.kind]
-    begin, tick = _number(in_digits(start, decimals)), 10.0**-decimals
+    begin, tick = _number(round_to_digits(start, decimals)), 10.0**-decimals
     last = begin + math.ceil(round(request.travel / size / tick, 6)) * tick
-    return {path: in_digits(f"{last} {unit}", decimals) for path, text in written.items() if text == end}
+    return {path: round_to_digits(f"{last} {unit}", decimals) for path, text in written.items() if text == end}
 
 
 def _number(text: str) -> float:
     return float(text.split()[0])
-
-
-def _index(path: str) -> str:
-    """Return the number of an item at the end of a path with its dot; "" if it has none."""
-    last = path.rpartition(".")[2]
-    return f".{last}" if last.isdecimal() else ""

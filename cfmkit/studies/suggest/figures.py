@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.plots.style import BAND_GREEN, NORMAL_FONT, SMALL_FONT, TEXT_GREY, apply_style, axes_mm, new_figure
-from cfmkit.studies.suggest.proposal_making_and_judging import by_own_model
+from cfmkit.studies.suggest.proposal_making_and_judging import use_own_model
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -102,7 +102,7 @@ def _scale_reported(request: Request) -> str:
 def _find_drawing(proposal: Proposal) -> Any:
     """Return what draws a proposal, and its own envelope."""
     record = family(proposal.family)
-    result = record.analyze(by_own_model(proposal), Run())
+    result = record.analyze(use_own_model(proposal), Run())
     assert record.draw is not None
     assert record.draw.moving is not None
     return record.draw.moving(result), record.envelope(result)

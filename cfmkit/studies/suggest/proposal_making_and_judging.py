@@ -164,7 +164,7 @@ class Proposal:
         }  # fmt: skip
 
     @classmethod
-    def of_record(cls, record: Mapping[str, Any]) -> Proposal:
+    def from_record(cls, record: Mapping[str, Any]) -> Proposal:
         """Return what a record says."""
         lists = {name: tuple(record[name]) for name in ("missed", "fails", "notes", "unjudged", "warnings")}
         return cls(**{**record, **lists})
@@ -180,7 +180,7 @@ def make_proposal(job: ProposalJob) -> Proposal:
     candidate, clock = job.candidate, Clock(job.deadline)
     try:
         if job.near is not None and job.near.pending and job.near.passes:
-            return _by_finest(job, job.near, clock)
+            return _judge_by_finest_model(job, job.near, clock)
         if job.near is not None:
             return _with_margins(job, job.near, clock)
         spec, reported = _design_candidate(job, clock)
@@ -227,13 +227,13 @@ def finest_of(name: str, spec: Spec) -> str:
 FIDELITY_KEY = "analysis.fidelity"
 
 
-def by_own_model(proposal: Proposal) -> Spec:
+def use_own_model(proposal: Proposal) -> Spec:
     """Return a proposal's specification with the model of its design: faster, and enough for pictures."""
     spec = proposal.spec
     return spec if proposal.own in ("", proposal.model) else spec.replace({FIDELITY_KEY: proposal.own})
 
 
-def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
+def _judge_by_finest_model(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
     """Return a proposal corrected and judged by the finest model of its family; the last of those that miss least."""
     spec, best, correct = remove_end_stop(near.spec, job.request), None, job.candidate.correct
     aimed = replace(job.request, safety=MESH_MARGIN * job.request.safety)
@@ -248,7 +248,7 @@ def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
             best = found
         if found.passes or not found.text:
             break
-        spec = remove_end_stop(by_own_model(found), job.request)
+        spec = remove_end_stop(use_own_model(found), job.request)
     return Proposal(job.family, near.variant, message=OUT_OF_TIME) if best is None else best
 
 

@@ -32,7 +32,7 @@ def block_for_redesign(
     if block is not None:
         stated: Mapping[str, Any] = block.model_dump(exclude_unset=True)
         return stated
-    return _of_own_springs(spec, request)
+    return _list_own_spring_targets(spec, request)
 
 
 def _range(path: str, value: float, request: Request) -> tuple[str, str]:
@@ -47,7 +47,7 @@ def _range(path: str, value: float, request: Request) -> tuple[str, str]:
     return written[0], written[1]
 
 
-def _of_own_springs(spec: Spec, request: Request) -> Mapping[str, Any] | None:
+def _list_own_spring_targets(spec: Spec, request: Request) -> Mapping[str, Any] | None:
     """Return the targets of a linkage, whose catalogue are the springs at its pins; None if it has none."""
     springs = getattr(spec.get_value("mechanism"), "springs", None)
     bought = getattr(springs, "bought", ())

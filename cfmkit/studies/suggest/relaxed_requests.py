@@ -149,7 +149,7 @@ def _only_needed(request: Request, asked: tuple[str, int], relaxed: Relaxed) -> 
         )
         if request.travel >= sides[1] and request.kind == "force":
             continue
-        fewer = _in_envelope(request, sides)
+        fewer = _resize_envelope(request, sides)
         if _offer(fewer[0], *asked):
             relaxed = fewer
     return relaxed
@@ -161,7 +161,7 @@ def _round_written(value: float, dimension: str, digits: int = 3) -> tuple[float
     return read_quantity(text, dimension), text
 
 
-def _in_envelope(request: Request, sides: Sequence[float]) -> Relaxed:
+def _resize_envelope(request: Request, sides: Sequence[float]) -> Relaxed:
     # a side that stays is as it was, to its last digit
     pairs = [
         _round_written(side, "length", 12 if side == old else 4)
@@ -171,7 +171,7 @@ def _in_envelope(request: Request, sides: Sequence[float]) -> Relaxed:
 
 
 def _larger(request: Request, factor: float) -> Relaxed:
-    return _in_envelope(request, [factor * side for side in request.envelope])
+    return _resize_envelope(request, [factor * side for side in request.envelope])
 
 
 def _weaker(request: Request, factor: float) -> Relaxed | None:

@@ -47,12 +47,12 @@ def list_requirements(
     """Return the requirements that say what is required of a mechanism, over the window of its analysis."""
     found = evaluate(result, None, None, values)
     return (
-        *_of_effort(request),
-        *_of_stress(request, result, found),
-        *_of_box(request, space),
-        *_of_loss(request, result),
-        *_of_lives(request, result, found),
-        *_of_adjustment(request, found),
+        *_require_effort(request),
+        *_require_stress(request, result, found),
+        *_require_box(request, space),
+        *_require_loss(request, result),
+        *_require_lives(request, result, found),
+        *_require_adjustment(request, found),
     )
 
 
@@ -107,7 +107,7 @@ def _value_of(found: Mapping[str, Quantity], name: str) -> float | None:
     return found[name].value if name in found else None
 
 
-def _of_effort(request: Request) -> Iterator[dict[str, Any]]:
+def _require_effort(request: Request) -> Iterator[dict[str, Any]]:
     yield {"metric": f"{request.kind}_ripple", "max": _share(request.ripple)}
     low, high = (format_short(value, request.kind, 12) for value in (request.low, request.high))
     if request.banded:
@@ -117,7 +117,7 @@ def _of_effort(request: Request) -> Iterator[dict[str, Any]]:
         yield {"metric": f"{request.kind}_mean", "min": low, "max": high}
 
 
-def _of_stress(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+def _require_stress(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
     least = f"{request.safety:.12g}"
     if _value_of(found, "safety_factor") is not None:
         yield {"metric": "safety_factor", "min": least, "over": stressed_motion(request, result.spec)}
@@ -128,7 +128,7 @@ def _of_stress(request: Request, result: Result, found: Mapping[str, Quantity]) 
         yield {"metric": "spring_safety_factor", "min": least}
 
 
-def _of_box(request: Request, space: BoundingBox | None) -> Iterator[dict[str, Any]]:
+def _require_box(request: Request, space: BoundingBox | None) -> Iterator[dict[str, Any]]:
     if space is None:
         return
     width, height, depth = space.sides
@@ -141,13 +141,13 @@ def _of_box(request: Request, space: BoundingBox | None) -> Iterator[dict[str, A
         yield {"metric": name, "max": format_short(most, "length", 12)}
 
 
-def _of_loss(request: Request, result: Result) -> Iterator[dict[str, Any]]:
+def _require_loss(request: Request, result: Result) -> Iterator[dict[str, Any]]:
     if request.hysteresis is not None and "unload" in result.curve.branches:
         lost = request.hysteresis * request.target * request.travel
         yield {"metric": "hysteresis_area", "max": format_short(lost, "energy", 12)}
 
 
-def _of_lives(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+def _require_lives(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
     if request.cycles is None:
         return
     if _bends(result) and "fatigue_life" in found and getattr(_block(result.spec), "fatigue", None) is not None:
@@ -190,7 +190,7 @@ def _material(result: Result) -> str:
     return getattr(_block(result.spec), "name", None) or "its material"
 
 
-def _of_adjustment(request: Request, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+def _require_adjustment(request: Request, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
     if request.adjustable is None or "adjusted_force_min" not in found:
         return
     low, high = request.adjustable

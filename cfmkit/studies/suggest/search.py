@@ -126,7 +126,7 @@ def suggest(
     return Suggestions(
         request,
         tuple(order_proposals([proposal for proposal in passing if proposal.good], prefer)),
-        tuple(_near(done, request)),
+        tuple(_list_near_misses(done, request)),
         tuple(replace(proposal, made=counts[proposal.family]) for proposal in answers),
         _failures(done),
         cut or (making.late() and bool(list(_next(queues, done, 1, enough)))),
@@ -174,7 +174,7 @@ class _Making:
         run, notes = self._run, self._run.notes
         keys = [_key(job) for job in jobs]
         records = {index: notes.find(key) for index, key in enumerate(keys)}
-        self._known = {index: Proposal.of_record(record) for index, record in records.items() if record is not None}
+        self._known = {index: Proposal.from_record(record) for index, record in records.items() if record is not None}
         self.reused += len(self._known)
         left = [index for index in range(len(jobs)) if index not in self._known]
         work = partial(_made_of, tuple(jobs))
@@ -414,7 +414,7 @@ def measure(proposal: Proposal, name: str) -> float:
 MAX_OVERSIZE = 1.5  # sides over those of the envelope up to which a mechanism is an alternative
 
 
-def _near(done: Sequence[Proposal], request: Request) -> list[Proposal]:
+def _list_near_misses(done: Sequence[Proposal], request: Request) -> list[Proposal]:
     """Return those that miss one requirement, and no side of the envelope by far; two of each family at most."""
     near_misses: list[Proposal] = []
     for name in dict.fromkeys(proposal.family for proposal in done):

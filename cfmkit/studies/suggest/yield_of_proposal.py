@@ -102,7 +102,7 @@ def good_parts(
         return GoodParts(
             None, "its yield is not known: the errors that the process causes in its dimensions are not known"
         )
-    parts = Parts.of_block(result.spec, result.spec.sensitivity, N_DRAWN, result.spec.sensitivity.seed or 0)
+    parts = Parts.from_block(result.spec, result.spec.sensitivity, N_DRAWN, result.spec.sensitivity.seed or 0)
     first = _first_order(result, parts)
     most = 1.0 if first is None else _most(first, found, request)
     if first is not None and first.good.value < wanted:
@@ -204,7 +204,7 @@ def moved_for_yield(candidate: Candidate, spec: Spec, request: Request, asked: f
     rows = requirement_rows(nominal, spec, run)
     if rows is None:
         return None
-    parts = Parts.of_block(spec, block, block.samples or N_DRAWN, run.seed)
+    parts = Parts.from_block(spec, block, block.samples or N_DRAWN, run.seed)
     numbers = PartNumbers(parts, tuple(free), rows, run)
     problem = numbers.problem(free, asked, Clock.from_budgets(run.time_budget))
     try:

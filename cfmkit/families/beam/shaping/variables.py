@@ -112,11 +112,11 @@ class Length:
 
 def lengths(variables: Variables, x: FloatArray, network: Network) -> dict[str, Length]:
     """Return the lengths of all beams of the network of some variables, by name."""
-    shaped = _of_polynomials(variables, x, network)
-    return {name: shaped[name] if name in shaped else _of_any(variables, network, name) for name in network.beams}
+    shaped = _measure_polynomials(variables, x, network)
+    return {name: shaped[name] if name in shaped else _measure_beam(variables, network, name) for name in network.beams}
 
 
-def _of_polynomials(variables: Variables, x: FloatArray, network: Network) -> dict[str, Length]:
+def _measure_polynomials(variables: Variables, x: FloatArray, network: Network) -> dict[str, Length]:
     """Return the lengths of the beams whose shape varies: chord / |chi| with chi the mean of exp(i eta)."""
     names, order = variables.task.shaped, variables.order
     first = len(variables.task.coordinates)
@@ -129,18 +129,18 @@ def _of_polynomials(variables: Variables, x: FloatArray, network: Network) -> di
         by_ratio[k, first + k * order : first + (k + 1) * order] = row
     reach = np.array([_reach(network, name) for name in names])
     chord = abs(reach)
-    by_reach = np.array([_by_reach(variables, name) for name in names]).reshape(len(names), -1)
+    by_reach = np.array([_differentiate_reach(variables, name) for name in names]).reshape(len(names), -1)
     by_chord = np.real(np.conj(reach)[:, None] * by_reach) / chord[:, None]
     by_length = by_chord / ratio[:, None] - (chord / ratio**2)[:, None] * by_ratio
     columns = (chord / ratio).tolist(), ratio.tolist(), by_length, by_ratio
     return {name: Length(*row) for name, row in zip(names, zip(*columns, strict=True), strict=True)}
 
 
-def _of_any(variables: Variables, network: Network, name: str) -> Length:
+def _measure_beam(variables: Variables, network: Network, name: str) -> Length:
     """Return the length of any other beam; derivatives by complex steps of the places of its nodes."""
     beam, reach = network.beams[name], _reach(network, name)
     length = float(np.real(fit(beam, (reach.real, reach.imag)).length))
-    by_reach = _by_reach(variables, name)
+    by_reach = _differentiate_reach(variables, name)
     by_length = np.zeros(variables.count)
     for k in np.flatnonzero(by_reach):
         moved = (reach.real + 1j * _COMPLEX_STEP * by_reach[k].real, reach.imag + 1j * _COMPLEX_STEP * by_reach[k].imag)
@@ -157,7 +157,7 @@ def _reach(network: Network, name: str) -> complex:
     return complex(end.x - start.x, end.y - start.y) + complex(*beam.end_offset) - complex(*beam.start_offset)
 
 
-def _by_reach(variables: Variables, name: str) -> FloatArray:
+def _differentiate_reach(variables: Variables, name: str) -> FloatArray:
     """Return the derivatives of that vector by the variables, complex (k,)."""
     beam = variables.task.network.beams[name]
     out = np.zeros(variables.count, dtype=complex)

@@ -18,7 +18,7 @@ class AxisGap(NamedTuple):
     velocity: Any  # for laws that depend on speed [m/s]
 
     @classmethod
-    def of_mirror_images(cls, center: Any, velocity: Any) -> AxisGap:
+    def from_outward_axes(cls, center: Any, velocity: Any) -> AxisGap:
         """Return the gap between axes (2, n) that are given with x outwards: the left one as its mirror image."""
         return cls(center[0] + center[1].conj(), velocity[0] + velocity[1].conj())
 

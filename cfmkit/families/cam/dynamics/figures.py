@@ -48,12 +48,12 @@ def motion(result: Result) -> Figure:
         Series(moved.static, "at rest", TEXT_GREY, True, prefer=0.1),
     ]
     ratio = [Series(force / moved.static, "in motion over at rest", LINE_BLUE, prefer=0.3)]
-    found = list(_regions(moved))
+    ranges = list(_regions(moved))
     name = "4KA + slider's weight" if moved.build.right.loads.slider_weight else "4KA"
     level = Limit(constant, f"{name} = {value_text(constant, 'force')}")
     diagrams = [
-        Diagram(times, TIME_SCALE, Scale("force", "force"), forces, [level], found),
-        Diagram(times, TIME_SCALE, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _drop_names(found)),
+        Diagram(times, TIME_SCALE, Scale("force", "force"), forces, [level], ranges),
+        Diagram(times, TIME_SCALE, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _drop_names(ranges)),
     ]
     return diagram_figure(Heading.from_result(result, f"force that the motion needs: {_motion_text(moved)}"), diagrams)
 
@@ -78,7 +78,7 @@ def motion_force(result: Result) -> Figure:
 def motion_contact(result: Result) -> Figure:
     """Return the forces of the cam on the rollers, and those in the braces, over time."""
     moved: MotionSolution = result.state
-    history, found = moved.history, list(_regions(moved))
+    history, ranges = moved.history, list(_regions(moved))
     contact = _sides(history.contact, "on a roller", (LINE_BLUE, LINE_VERMILLION))
     roller_end = _sides(history.brace, "brace, at the roller", (LINE_PURPLE, LINE_VERMILLION))
     slider_end = [
@@ -87,14 +87,14 @@ def motion_contact(result: Result) -> Figure:
     ]
     limits = [*limits_on(result, "contact_force_max"), *limits_on(result, "contact_force_min")]
     diagrams = [
-        Diagram(history.times, TIME_SCALE, Scale("contact force", "force"), contact, limits, found),
+        Diagram(history.times, TIME_SCALE, Scale("contact force", "force"), contact, limits, ranges),
         Diagram(
             history.times,
             TIME_SCALE,
             Scale("force in a brace", "force"),
             [*roller_end, *slider_end],
             (),
-            _drop_names(found),
+            _drop_names(ranges),
         ),
     ]
     return diagram_figure(Heading.from_result(result, "forces of the cam on the rollers, and in the braces"), diagrams)
@@ -145,5 +145,5 @@ def _drop_names(regions: list[MarkedRange]) -> list[MarkedRange]:
 
 def _motion_text(moved: MotionSolution) -> str:
     plan = moved.build.motion
-    way = "up" if plan.stroke > 0 else "down"
-    return f"{value_text(abs(plan.stroke), 'length')} {way} in {value_text(plan.time, 'time')}"
+    direction = "up" if plan.stroke > 0 else "down"
+    return f"{value_text(abs(plan.stroke), 'length')} {direction} in {value_text(plan.time, 'time')}"

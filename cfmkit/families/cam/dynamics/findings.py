@@ -33,7 +33,7 @@ INVERSE_OPTION = "analysis.dynamics.method=inverse"  # as ``--set`` takes it
 def findings_of(moved: MotionSolution) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
     checks = (_pressure, _slack_cable, _find_held, _find_on_corner, _springs, _inertias, _friction, _sideways)
-    return tuple(found for check in checks for found in check(moved))
+    return tuple(warning for check in checks for warning in check(moved))
 
 
 def leaves_profile(parts: Build, span: tuple[float, float]) -> Finding:

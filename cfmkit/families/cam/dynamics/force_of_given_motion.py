@@ -89,10 +89,10 @@ def _keep_inside(parts: Build, spec: CamSpec) -> tuple[FloatArray, tuple[Finding
     inside = (position >= low - slack) & (position <= high + slack)
     if inside.all():
         return times, ()
-    found = leaves_profile(parts, (low, high))
+    warning = leaves_profile(parts, (low, high))
     if inside[:2].sum() < 2:
-        raise CannotBuild(found)
-    return times[: int(np.argmin(inside))], (found,)
+        raise CannotBuild(warning)
+    return times[: int(np.argmin(inside))], (warning,)
 
 
 def _times_until(end: float, times: FloatArray, spec: CamSpec) -> FloatArray:
@@ -128,8 +128,8 @@ def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
     try:
         return multibody_history(parts.machine, parts.motion, stated_motion(spec).points, first=len(times))
     except CornerContact:
-        found = runs_on_corner(parts)
-        raise CannotBuild(found) from None
+        warning = runs_on_corner(parts)
+        raise CannotBuild(warning) from None
 
 
 def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
@@ -141,8 +141,8 @@ def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
     analysis = spec.analysis.model_copy(update=written_out)
     changes: dict[str, object] = {"analysis": analysis}
     if masses is not None:
-        own = parts.machine.right.parts
-        written = {"brace_inertia": own.brace_inertia, "roller_inertia": own.roller_inertia}
+        side = parts.machine.right.parts
+        written = {"brace_inertia": side.brace_inertia, "roller_inertia": side.roller_inertia}
         mechanism = resolved.mechanism.model_copy(update={"masses": masses.model_copy(update=written)})
         changes["mechanism"] = mechanism
     return resolved.model_copy(update=changes)
@@ -186,19 +186,19 @@ def _curve(moved: MotionSolution) -> Curve:
 
 def inverse_history(machine: Machine, motion: Cycloid, times: FloatArray) -> History:
     """Return the history by inverse dynamics."""
-    found = respond(machine, motion.evaluate(times))
+    response = respond(machine, motion.evaluate(times))
     return History(
         times=times,
-        moment=found.moment,
-        force=found.force,
-        contact=found.contact,
-        traction=found.traction,
-        spin=found.spin,
-        brace=np.abs(found.roller_pin),
-        pin=np.abs(found.slider_pin),
-        elongation=found.elongation,
-        center=found.at.center,
-        on_corner=found.on_corner,
+        moment=response.moment,
+        force=response.force,
+        contact=response.contact,
+        traction=response.traction,
+        spin=response.spin,
+        brace=np.abs(response.roller_pin),
+        pin=np.abs(response.slider_pin),
+        elongation=response.elongation,
+        center=response.at.center,
+        on_corner=response.on_corner,
     )
 
 
@@ -212,13 +212,13 @@ def multibody_history(
     Raises CornerContact if a roller runs on the corner of its cam.
     """
     model = NineCoordinates(machine)
-    found = model.run(motion, points, scheme, first)
-    right, left = reactions(model, found)
+    trajectory = model.run(motion, points, scheme, first)
+    right, left = reactions(model, trajectory)
     center = np.array([right.center, left.center])
     return History(
-        times=found.times,
-        moment=motion.evaluate(found.times),
-        force=found.force,
+        times=trajectory.times,
+        moment=motion.evaluate(trajectory.times),
+        force=trajectory.force,
         contact=np.array([right.contact, left.contact]),
         traction=np.array([right.traction, left.traction]),
         spin=np.array([right.spin, left.spin]),
@@ -226,7 +226,7 @@ def multibody_history(
         pin=np.abs([right.slider_pin, left.slider_pin]),
         elongation=machine.springs.elongation(np.abs(center[0] + center[1].conj())),
         center=center,
-        on_corner=np.zeros(len(found.times), dtype=bool),
+        on_corner=np.zeros(len(trajectory.times), dtype=bool),
     )
 
 
@@ -253,9 +253,9 @@ def ending(
     Raises CannotBuild if the first pose is impossible already.
     """
     machine, motion = parts.machine, parts.motion
-    known = _margins(machine, motion.evaluate(times))
+    margins = _margins(machine, motion.evaluate(times))
     first: tuple[int, str] | None = None
-    for name, margin in known.items():
+    for name, margin in margins.items():
         lost = margin < -_slack(name, margin, machine)
         if name == "spring_slack":
             lost &= np.maximum.accumulate(~lost)  # springs that are slack from the start on tighten later
@@ -265,7 +265,7 @@ def ending(
         return None
     index, name = first
     if not index:
-        raise CannotBuild(_describe_ending(name, known, machine, "at the first point of the motion"))
+        raise CannotBuild(_describe_ending(name, margins, machine, "at the first point of the motion"))
 
     def holds(time: float) -> bool:
         margin = _margins(machine, motion.evaluate(np.array([time])))[name]
@@ -276,20 +276,20 @@ def ending(
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     place = float(motion.evaluate(np.array([low])).position[0]) + origin
-    return MotionEnding(low, _describe_ending(name, known, machine, f"at {format_short(low, 'time')} ({mm(place)})"))
+    return MotionEnding(low, _describe_ending(name, margins, machine, f"at {format_short(low, 'time')} ({mm(place)})"))
 
 
 def _margins(machine: Machine, moment: tuple[FloatArray, FloatArray, FloatArray]) -> Mapping[str, FloatArray]:
     """Return what must not be negative, by the name of the finding that says so, (n,) each."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        found = respond(machine, moment)  # type: ignore[arg-type]
-    radius, center = machine.constants.radius, found.at.center
-    touching = (center + 1j * radius * found.at.tangent).real
+        response = respond(machine, moment)  # type: ignore[arg-type]
+    radius, center = machine.constants.radius, response.at.center
+    touching = (center + 1j * radius * response.at.tangent).real
     return {
         "flanks_collide": touching.min(axis=0),
         "rollers_collide": np.abs(center[0] + center[1].conj()) - float(radius.sum()),
-        "lift_off": found.contact.min(axis=0),  # NaN where friction holds a roller: no contact is lost there
-        "spring_slack": found.elongation,
+        "lift_off": response.contact.min(axis=0),  # NaN where friction holds a roller: no contact is lost there
+        "spring_slack": response.elongation,
     }
 
 
@@ -299,8 +299,8 @@ def _slack(name: str, margin: FloatArray, machine: Machine) -> float:
     return 1e-12 * max(machine.springs.rest_length, 1.0)
 
 
-def _describe_ending(name: str, known: Mapping[str, FloatArray], machine: Machine, when: str) -> Finding:
-    worst = float(np.nanmin(known[name]))
+def _describe_ending(name: str, margins: Mapping[str, FloatArray], machine: Machine, when: str) -> Finding:
+    worst = float(np.nanmin(margins[name]))
     reported: dict[str, Callable[[], Finding]] = {
         "flanks_collide": lambda: flanks_cross(worst),
         "rollers_collide": lambda: rollers_overlap(worst, f"{when} and after"),

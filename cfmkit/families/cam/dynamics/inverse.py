@@ -186,15 +186,15 @@ def kinematics(stances: tuple[Stance, Stance], position: FloatArray, length: Flo
     brace = center - 1j * position
     product = brace.conj() * tangent  # its real part is Re(conj(d) t), its imaginary part -Re(conj(d) i t)
     lever = product.real
-    way = brace.imag / lever
-    first = tangent * way
+    ratio = brace.imag / lever
+    first = tangent * ratio
     relative = first - 1j
-    bent = curvature * way * way
+    bent = curvature * ratio * ratio
     bend = (bent * product.imag - (relative.real**2 + relative.imag**2)) / lever
     second = tangent * (bend + 1j * bent)
     square = length * length
     swing, sway = _cross(brace, relative) / square, _cross(brace, second) / square
-    return Kinematics(center, tangent, brace, lever, way, bend, first, second, swing, sway)
+    return Kinematics(center, tangent, brace, lever, ratio, bend, first, second, swing, sway)
 
 
 def _loads(machine: Machine, parts: Constants, at: Kinematics, moment: Moment) -> MovingLoads:
@@ -205,7 +205,7 @@ def _loads(machine: Machine, parts: Constants, at: Kinematics, moment: Moment) -
     roller = at.first * push + at.second * square + lift
     middle: ComplexArray = 0.5 * (roller + (1j * push + lift))
     along = at.way * push + at.bend * square
-    pull = machine.springs.force(AxisGap.of_mirror_images(at.center, at.first * moment.speed))
+    pull = machine.springs.force(AxisGap.from_outward_axes(at.center, at.first * moment.speed))
     return MovingLoads(
         roller=roller,
         middle=middle,

@@ -283,8 +283,8 @@ class NineCoordinates:
             inwards = 1j * stance.tangent[0]
             brace, touch = stance.center[0] - 1j * motion.start, stance.center[0] + chain.radius * inwards
             contacts[index] = chain.line.estimate(touch.imag)
-            known = np.pi if chain.hand > 0 else 0.0
-            angles = [_angle(chain.hand, brace), _angle(chain.hand, inwards) - known, known]
+            contact_angle = np.pi if chain.hand > 0 else 0.0
+            angles = [_angle(chain.hand, brace), _angle(chain.hand, inwards) - contact_angle, contact_angle]
             x[chain.columns] = [*angles, touch.imag]
         free = [1, 2, 4, 5, 6, 8]
         for _ in range(4):
@@ -302,7 +302,7 @@ class NineCoordinates:
         rate = self._rate(motion, scheme, start[1])
         step = float(times[1]) / scheme.steps
         x: Any = start[0]
-        found, touched = [x], [start[1]]
+        coordinates, touched = [x], [start[1]]
         for index in range((len(times) - 1) * scheme.steps):
             t = index * step
             first, _ = rate(t, x)
@@ -311,25 +311,25 @@ class NineCoordinates:
             fourth, contacts = rate(t + step, x + step * third)
             x = x + (step / 6.0) * (first + 2.0 * (second + third) + fourth)
             if (index + 1) % scheme.steps == 0:
-                found.append(x)
+                coordinates.append(x)
                 touched.append(contacts)
-        return np.array(found), np.array(touched).T
+        return np.array(coordinates), np.array(touched).T
 
     def _rate(
         self, motion: Cycloid, scheme: Scheme, contacts: FloatArray
     ) -> Callable[[float, FloatArray], tuple[FloatArray, FloatArray]]:
         """Return the function that gives x' [SS, eq. 19 to 21] and the path coordinates at contact."""
         beta = scheme.stabilisation / motion.time
-        known = [float(contacts[0]), float(contacts[1])]
+        last_contacts = [float(contacts[0]), float(contacts[1])]
 
         def rate(t: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-            postures = self.postures(x, known)
-            known[:] = [float(posture.flank.parameter) for posture in postures]
+            postures = self.postures(x, last_contacts)
+            last_contacts[:] = [float(posture.flank.parameter) for posture in postures]
             position, speed, _ = motion.evaluate(np.float64(t))
             right = -beta * self.residual(x, postures)
             right[ROLLING_ROWS] = 0.0
             right[DRIVE_ROW] = speed - beta * (x[0] - position)
-            return _solve(self.jacobian(postures), right), np.array(known)
+            return _solve(self.jacobian(postures), right), np.array(last_contacts)
 
         return rate
 
@@ -368,26 +368,26 @@ class Reactions(NamedTuple):
     spin: FloatArray
 
 
-def reactions(model: NineCoordinates, found: Trajectory) -> tuple[Reactions, Reactions]:
+def reactions(model: NineCoordinates, trajectory: Trajectory) -> tuple[Reactions, Reactions]:
     """Return the reactions on the right and on the left."""
-    pull = model.spring_force(found.coordinates, found.velocities)
-    return _side(model, found, 0, pull), _side(model, found, 1, pull.conj())
+    pull = model.spring_force(trajectory.coordinates, trajectory.velocities)
+    return _side(model, trajectory, 0, pull), _side(model, trajectory, 1, pull.conj())
 
 
-def _side(model: NineCoordinates, found: Trajectory, index: int, springs: ComplexArray) -> Reactions:
-    chain, posture, parts = model.chains[index], found.postures[index], model.sides[index].parts
-    push = _contact_force(chain, posture, found.multipliers)
+def _side(model: NineCoordinates, trajectory: Trajectory, index: int, springs: ComplexArray) -> Reactions:
+    chain, posture, parts = model.chains[index], trajectory.postures[index], model.sides[index].parts
+    push = _contact_force(chain, posture, trajectory.multipliers)
     tangent = (posture.flank.first + 1j) / np.sqrt(1.0 + posture.flank.first**2)
-    arm, bent = _brace(chain, parts, found)
-    lift = 1j * (found.accelerations[:, 0] + model.machine.gravity)
+    arm, bent = _brace(chain, parts, trajectory)
+    lift = 1j * (trajectory.accelerations[:, 0] + model.machine.gravity)
     roller_pin = push + springs - parts.roller_mass * (bent + lift)
     return Reactions(
-        center=1j * found.coordinates[:, 0] + arm,
+        center=1j * trajectory.coordinates[:, 0] + arm,
         contact=(push * (-1j * tangent).conj()).real,
         traction=(push * tangent.conj()).real,
         roller_pin=roller_pin,
         slider_pin=parts.brace_mass * (0.5 * bent + lift) - roller_pin,
-        spin=chain.hand * found.velocities[:, chain.columns.start + 1],
+        spin=chain.hand * trajectory.velocities[:, chain.columns.start + 1],
     )
 
 
@@ -399,12 +399,12 @@ def _contact_force(chain: SideChain, posture: Posture, multipliers: FloatArray) 
     return _as_on_the_right(chain, force)
 
 
-def _brace(chain: SideChain, parts: SideParts, found: Trajectory) -> tuple[ComplexArray, ComplexArray]:
+def _brace(chain: SideChain, parts: SideParts, trajectory: Trajectory) -> tuple[ComplexArray, ComplexArray]:
     """Return the brace from slider to roller [m] and its second time derivative [m/s^2]."""
     column = chain.columns.start
-    angle, rate = found.coordinates[:, column], found.velocities[:, column]
+    angle, rate = trajectory.coordinates[:, column], trajectory.velocities[:, column]
     arm = parts.brace_length * np.exp(1j * angle)
-    bent = arm * (1j * found.accelerations[:, column] - rate * rate)
+    bent = arm * (1j * trajectory.accelerations[:, column] - rate * rate)
     return _as_on_the_right(chain, arm), _as_on_the_right(chain, bent)
 
 

@@ -69,12 +69,12 @@ def _angles(errors: Errors | None) -> tuple[float, float]:
     return errors.slider_deviation - errors.flank_angle, -errors.slider_deviation - errors.flank_angle
 
 
-def parts_of(mechanism: Mechanism, masses: Masses | None, own: LeftMasses | None = None) -> SideParts:
-    """Return brace and roller of a side; `own` replaces what it states. Defaults: a slender rod, a solid cylinder."""
+def parts_of(mechanism: Mechanism, masses: Masses | None, left_masses: LeftMasses | None = None) -> SideParts:
+    """Return brace and roller of a side; `left_masses` come first. Defaults: a slender rod, a solid cylinder."""
     length, radius = mechanism.brace_length, mechanism.roller_radius
 
     def get_stated(name: str) -> float | None:
-        value: float | None = getattr(own, name, None)
+        value: float | None = getattr(left_masses, name, None)
         return getattr(masses, name, None) if value is None else value
 
     brace, roller = get_stated("brace") or 0.0, get_stated("roller") or 0.0

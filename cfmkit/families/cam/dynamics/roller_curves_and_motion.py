@@ -95,7 +95,7 @@ class Moment(NamedTuple):
 
     def __repr__(self) -> str:
         """Return the three, each with a short text."""
-        return f"Moment{tuple(brief(one) for one in self)}"
+        return f"Moment{tuple(brief(array) for array in self)}"
 
 
 @dataclass(frozen=True)
@@ -291,21 +291,21 @@ class Side:
 
         Raises NoRise if there is none.
         """
-        found: list[RisingStretch] = []
+        stretches: list[RisingStretch] = []
         for piece in self.pieces:
             ends = self._rising(piece)
             if ends is None:
-                found = []
+                stretches = []
                 continue
             if ends[0] > piece.ends[0]:
-                found = []
+                stretches = []
             span = self.evaluate(piece, np.array(ends))[1]
-            found.append(RisingStretch(piece, ends, (float(span[0]), float(span[1]))))
+            stretches.append(RisingStretch(piece, ends, (float(span[0]), float(span[1]))))
             if ends[1] < piece.ends[1]:
                 break
-        if not found:
+        if not stretches:
             raise NoRise
-        return tuple(found)
+        return tuple(stretches)
 
     def _rising(self, piece: CurvePiece) -> tuple[float, float] | None:
         """Return between which values of the parameter the slider rises; None if nowhere."""
@@ -335,12 +335,12 @@ class Side:
 
         return bracketed_root(steepness, low, high)
 
-    def runs_like(self, other: Side) -> bool:
+    def runs_like(self, side: Side) -> bool:
         """Return whether the other side has the same geometry (its masses may differ)."""
         return (
-            self.pieces is other.pieces
-            and (self.angle, self.height) == (other.angle, other.height)
-            and self.parts.brace_length == other.parts.brace_length
+            self.pieces is side.pieces
+            and (self.angle, self.height) == (side.angle, side.height)
+            and self.parts.brace_length == side.parts.brace_length
         )
 
     @property
@@ -356,9 +356,11 @@ class Side:
         which = np.searchsorted(edges, slider, side="right")
         whole = Stance(*(np.empty(slider.shape, dtype=kind) for kind in (complex, complex, float, bool)))
         for index in np.unique(which):
-            here = which == index
-            for target, values in zip(whole, self._solve_stance(self.stretches[index], slider[here]), strict=True):
-                target[here] = values
+            on_stretch = which == index
+            for target, values in zip(
+                whole, self._solve_stance(self.stretches[index], slider[on_stretch]), strict=True
+            ):
+                target[on_stretch] = values
         return whole
 
     def _solve_stance(self, stretch: RisingStretch, slider: FloatArray) -> Stance:

@@ -26,9 +26,9 @@ SLOW_DURATION = 1.0  # duration of the motion that the paper compares with [s]
 def values_of(moved: MotionSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; None if a value does not exist."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        numbers = _shared_values(moved) | _own(moved)
-    known = {name: value if np.isfinite(value) else None for name, value in numbers.items()}
-    return {name: Quantity(value, *SCALAR_DEFINITIONS[name]) for name, value in known.items()}
+        numbers = _shared_values(moved) | _compute_values(moved)
+    finite = {name: value if np.isfinite(value) else None for name, value in numbers.items()}
+    return {name: Quantity(value, *SCALAR_DEFINITIONS[name]) for name, value in finite.items()}
 
 
 def _shared_values(moved: MotionSolution) -> dict[str, float]:
@@ -43,7 +43,7 @@ def _shared_values(moved: MotionSolution) -> dict[str, float]:
     }
 
 
-def _own(moved: MotionSolution) -> dict[str, float]:
+def _compute_values(moved: MotionSolution) -> dict[str, float]:
     history, machine = moved.history, moved.build.machine
     moving = respond(machine, history.moment)
     ratio = history.force / moved.static
@@ -76,7 +76,7 @@ def contact_pressure(moved: MotionSolution) -> FloatArray:
     machine = moved.build.machine
     low, high = machine.span
     stances = machine.stances(np.clip(history.moment.position, low, high))
-    radius, bend = machine.constants.radius, np.array([one.curvature for one in stances])
+    radius, bend = machine.constants.radius, np.array([stance.curvature for stance in stances])
     with np.errstate(divide="ignore", invalid="ignore"):
         pressed = pressure(history.contact, 1.0 / (radius * (1.0 - bend * radius)), contact).max(axis=0)
     return np.where(history.on_corner, np.nan, pressed)

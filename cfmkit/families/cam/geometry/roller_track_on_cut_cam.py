@@ -300,7 +300,7 @@ class Track:
             return _flat(self.states(np.atleast_1d(self.start)).x)
         return self._begins
 
-    def of_rows(self, _rows: Any) -> Track:
+    def select_rows(self, _rows: Any) -> Track:
         """Return the track itself: what many mechanisms share is the same for all of them."""
         return self
 
@@ -401,14 +401,14 @@ def _join(on_corner: NDArray[np.bool_], corner: NDArray[Any], flank: NDArray[Any
 class TrackRows(Track):
     """Tracks of one kind side by side: numbers that differ are columns (m, 1), slider positions are (m, n)."""
 
-    def of_rows(self, rows: Any) -> TrackRows:
+    def select_rows(self, rows: Any) -> TrackRows:
         """Return some of the tracks."""
-        found, own, profile = object.__new__(TrackRows), dict(vars(self)), self.profile
-        del own["profile"]
+        chosen, values, profile = object.__new__(TrackRows), dict(vars(self)), self.profile
+        del values["profile"]
         law, radius, end, corner = rows_of((profile.path.law, profile.roller_radius, profile.end, profile.corner), rows)
-        found.profile = CamProfile(RollerPath(law, end), radius, end, corner)
-        vars(found).update({name: rows_of(value, rows) for name, value in own.items()})
-        return found
+        chosen.profile = CamProfile(RollerPath(law, end), radius, end, corner)
+        vars(chosen).update({name: rows_of(value, rows) for name, value in values.items()})
+        return chosen
 
     def states(self, slider: FloatArray) -> TrackStates:
         """Return the rollers' states at slider positions of each track, (m, n) [m]."""

@@ -208,8 +208,8 @@ class CurveSlopeLaw(SlopeLaw):
         turn = (1.0 - self.friction * p) / (1.0 + self.friction**2) ** 0.5
         bend = np.asarray(turn * rise)
         radius: Any = np.asarray(1.0 + p * p) ** 1.5 / np.where(bend == 0.0, 1e-300, bend)
-        own: Any = radius if np.ndim(radius) else float(radius)
-        return own
+        curvature_radius: Any = radius if np.ndim(radius) else float(radius)
+        return curvature_radius
 
     def tightest(self, end: Any, start: Any = 0.0) -> tuple[Any, Any]:
         """Return where the path is bent most of all convex places from `start` to `end` [m], and the radius there.
@@ -240,10 +240,10 @@ class CurveSlopeLaw(SlopeLaw):
             return min(radius, 1e6 * roller_radius) - roller_radius
 
         grid = np.geomspace(1e-4, 1.0, 41) * self._largest_constant()
-        good = [margin(float(one)) >= 0 for one in grid]
+        good = [margin(float(constant)) >= 0 for constant in grid]
         if not good[-1]:
             return None
-        first = len(good) - next((k for k, one in enumerate(reversed(good)) if not one), len(good))
+        first = len(good) - next((k for k, fits in enumerate(reversed(good)) if not fits), len(good))
         if first == 0:
             return float(grid[0])
         return bracketed_root(margin, float(grid[first - 1]), float(grid[first])) * (1 + 1e-9)

@@ -47,16 +47,16 @@ class FinishedStrip:
 
 def judge(
     values: FloatArray,  # (n,): numbers of the form
-    found: FoundStrip,  # the search that they come from
+    search_result: FoundStrip,  # the search that they come from
     # ripple as a share and stress [Pa] that end the stroke, where it is what is sought
     limits: tuple[float | None, float | None],
     pins: FloatArray,  # (3, 2): where it is kinked, as `beam_chain_from_spec.pins_of` says [m]
 ) -> FinishedStrip | None:
     """Return the outcome of a strip; None if it has no equilibrium over its travel, or breaks its band at once."""
-    task, form = found.task, found.form
+    task, form = search_result.task, search_result.form
     strip = form.strip(values, task.corners)
     chain = strip_chain(strip, task.material, pins, task.direction)
-    end = found.program.stroke(found.descent.z)
+    end = search_result.program.stroke(search_result.descent.z)
     first = max(task.start, 1e-3 * end)
     travel = np.unique(
         np.concatenate([np.geomspace(first, end, N_AUDIT_PLACES // 4), np.linspace(first, end, N_AUDIT_PLACES)])
@@ -78,7 +78,7 @@ def judge(
         (task.start, stroke),
         float(np.abs(ratio[inside]).max()),
         _rms(chain_force(solution, task.start, stroke), task.force * task.share(_even_places(task.start, stroke))),
-        (*_find_at_bounds(found, values), *_find_active_limits(solution, ratio, inside, limits)),
+        (*_find_at_bounds(search_result, values), *_find_active_limits(solution, ratio, inside, limits)),
         1.0 if stress is None or task.goal == "stroke" else float(solution.stress.max() / stress),
     )
 
@@ -112,14 +112,14 @@ def _shares(form: Form, values: FloatArray) -> tuple[tuple[float, ...], ...] | N
     if not form.per_piece:
         return form.shares or None
     ends = np.cumsum((0, *form.per_piece))
-    own = values[form.count : form.count + form.placed]
-    return tuple(tuple(float(v) for v in own[a:b]) for a, b in itertools.pairwise(ends))
+    shares = values[form.count : form.count + form.placed]
+    return tuple(tuple(float(v) for v in shares[a:b]) for a, b in itertools.pairwise(ends))
 
 
-def _find_at_bounds(found: FoundStrip, values: FloatArray) -> list[str]:
+def _find_at_bounds(strip: FoundStrip, values: FloatArray) -> list[str]:
     """Return which numbers are at an end of their range."""
-    form, reasons = found.form, []
-    ends = find_active_bounds(values, found.ranges.form, *BOUND_TOLERANCES)
+    form, reasons = strip.form, []
+    ends = find_active_bounds(values, strip.ranges.form, *BOUND_TOLERANCES)
     for k in np.flatnonzero(ends).tolist():
         value, side = float(values[k]), "smallest" if ends[k] < 0 else "largest"
         if k < form.count:
@@ -128,8 +128,8 @@ def _find_at_bounds(found: FoundStrip, values: FloatArray) -> list[str]:
             reasons.append(f"mechanism.beam.shares, number {k - form.count + 1}, at its {side}, {value:.4g}")
         else:
             reasons.append(f"mechanism.beam.width at its {side}, {mm(value * 1e-3)}")
-    if found.task.goal == "stroke" and np.isclose(0.01 * found.descent.z[-1], found.ranges.longest, rtol=1e-6):
-        reasons.append(f"stroke at its longest, {mm(found.ranges.longest)}")
+    if strip.task.goal == "stroke" and np.isclose(0.01 * strip.descent.z[-1], strip.ranges.longest, rtol=1e-6):
+        reasons.append(f"stroke at its longest, {mm(strip.ranges.longest)}")
     return reasons
 
 

@@ -37,31 +37,33 @@ def elasticity(printed: Printed) -> Elasticity:
 
     Raises InputError if no material is given.
     """
-    given = printed.material
-    if given is None:
+    material = printed.material
+    if material is None:
         raise InputError("a part of flexures or a strip needs 'mechanism.material'")
-    return Elasticity(given.modulus, given.poisson, given.allowable(printed.safety_factor), printed.wide_beams)
+    return Elasticity(material.modulus, material.poisson, material.allowable(printed.safety_factor), printed.wide_beams)
 
 
 def flexures_of(printed: Printed) -> tuple[Flexure, ...]:
     """Return the flexures from the ground to the slider."""
     if printed.flexures is None:
         return ()
-    return tuple(Flexure(one.length, one.thickness, one.width, one.before) for one in printed.flexures.all)
+    return tuple(
+        Flexure(flexure.length, flexure.thickness, flexure.width, flexure.before) for flexure in printed.flexures.all
+    )
 
 
 def corners(printed: Printed, beam: StripSpec | None, linkage: Linkage, unloaded: float) -> FloatArray:
     """Return the centre line of a strip: through the ends of the flexures unless it is given [m]."""
     if beam is not None and beam.centreline is not None:
         return np.array(beam.centreline)
-    own = flexures_of(printed)
+    flexures = flexures_of(printed)
     if beam is not None and beam.flexure_length is not None:
-        own = ()
+        flexures = ()
         length = beam.flexure_length
     else:
         length = FLEXURE_SHARE * linkage.crank
-    lengths = [one.length for one in own] or [length] * 3
-    before = [one.before for one in own] or [0.5] * 3
+    lengths = [flexure.length for flexure in flexures] or [length] * 3
+    before = [flexure.before for flexure in flexures] or [0.5] * 3
     return flexure_ends(joints(linkage, unloaded), lengths, before)
 
 
@@ -94,7 +96,7 @@ def lumped_chain(printed: Printed, linkage: Linkage, unloaded: float) -> Chain:
 def chain_of_flexures(parts: Sequence[Flexure], made_of: Elasticity, linkage: Linkage, unloaded: float) -> Chain:
     """Return given flexures, with rigid links between them, as a chain to press."""
     pins = joints(linkage, unloaded)
-    ends = flexure_ends(pins, [one.length for one in parts], [one.before for one in parts])
+    ends = flexure_ends(pins, [part.length for part in parts], [part.before for part in parts])
 
     def knee(path: Path, index: int) -> FloatArray:
         dx, dy, turn = path.motion("crank")[index]

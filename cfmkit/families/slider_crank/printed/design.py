@@ -101,14 +101,14 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
     for reserve in SEARCH_RESERVES:
         made_of = replace(task.material, allowable_stress=allowed)
         searched_for = replace(task, ripple=task.ripple - reserve, material=made_of)
-        found = search(searched_for, form, ranges, wanted.seeds, run, f"{identity} {reserve} {allowed}", clock)
-        if isinstance(found, Design):
-            return kept or found
-        if not found.descent.feasible:
-            return kept or infeasible(found)
-        judged = judge(round_within_bounds(found.values, ranges.form, FORM_DECIMALS), found, limits, pins)
+        strip = search(searched_for, form, ranges, wanted.seeds, run, f"{identity} {reserve} {allowed}", clock)
+        if isinstance(strip, Design):
+            return kept or strip
+        if not strip.descent.feasible:
+            return kept or infeasible(strip)
+        judged = judge(round_within_bounds(strip.values, ranges.form, FORM_DECIMALS), strip, limits, pins)
         if judged is None:
-            refused = _not_pressed(found)
+            refused = _not_pressed(strip)
             continue
         if allowed is not None:
             allowed /= max(1.0, judged.overstress)
@@ -116,24 +116,24 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
         if not reported.keeps(*limits):
             refused = _not_kept(reported, judged.window, limits)
             continue
-        kept = _make_design(found, judged, reported)
+        kept = _make_design(strip, judged, reported)
         if (
-            judged.window[1] > MIN_STROKE_SHARE * found.program.stroke(found.descent.z)
+            judged.window[1] > MIN_STROKE_SHARE * strip.program.stroke(strip.descent.z)
             and allowed == made_of.allowable_stress
         ):
             break
     return kept or refused
 
 
-def _make_design(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> Design:
+def _make_design(strip: FoundStrip, judged: FinishedStrip, reported: Reported) -> Design:
     """Return a strip that keeps its limits as a design."""
     return Design(
         reported.spec,
         Status.COMPLETE,
-        _message(found, judged, reported),
+        _message(strip, judged, reported),
         active_bounds=judged.active,
-        warnings=_warnings(found, judged),
-        search=_search_of(found, judged),
+        warnings=_warnings(strip, judged),
+        search=_search_of(strip, judged),
     )
 
 
@@ -180,32 +180,32 @@ def _not_kept(reported: Reported, window: tuple[float, float], limits: tuple[flo
     return no_design(finding("target_unreachable", text))
 
 
-def _not_pressed(found: FoundStrip) -> Design:
+def _not_pressed(strip: FoundStrip) -> Design:
     """Return that a strip keeps its limits at the places of its search only."""
-    over = f"from {mm(found.task.start)} to {mm(found.program.stroke(found.descent.z))}"
+    over = f"from {mm(strip.task.start)} to {mm(strip.program.stroke(strip.descent.z))}"
     text = f"{over} the strip found keeps its band, or has its force, at the places of the search only"
     return no_design(finding("target_unreachable", f"{text}; change 'design.travel' or the ranges in 'design.beam'"))
 
 
-def _search_of(found: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
+def _search_of(strip: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
     """Return what only the search knows."""
     numbers: dict[str, tuple[float | None, str, str]] = {
-        "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed")
+        "strips_tried": (float(strip.descent.evaluations), "count", "strips that the last descent pressed")
     }
-    if _has_uniform_strip(found):
+    if _has_uniform_strip(strip):
         text = "longest travel that a strip of one thickness reaches within the band and the stress"
-        numbers["one_thickness_travel"] = (_one_thickness(found), "length", text)
+        numbers["one_thickness_travel"] = (_one_thickness(strip), "length", text)
     return search_values(numbers, "beam", judged.window)
 
 
-def _has_uniform_strip(found: FoundStrip) -> bool:
+def _has_uniform_strip(strip: FoundStrip) -> bool:
     """Return whether a strip of one thickness is known to compare with."""
-    return found.uniform is not None and found.uniform.feasible and found.form.count > 1 and found.task.goal == "stroke"
+    return strip.uniform is not None and strip.uniform.feasible and strip.form.count > 1 and strip.task.goal == "stroke"
 
 
-def _one_thickness(found: FoundStrip) -> float:
+def _one_thickness(strip: FoundStrip) -> float:
     """Return the stroke of a strip of one thickness [m]."""
-    return 0.0 if found.uniform is None else 0.01 * float(found.uniform.z[-1])
+    return 0.0 if strip.uniform is None else 0.01 * float(strip.uniform.z[-1])
 
 
 def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTask:
@@ -304,16 +304,16 @@ def _design_uniform_strip(
     """
     fixed = sheet_of(spec.mechanism.part) or (None if isinstance(wanted.width, tuple) else wanted.width)
     if fixed is not None:
-        return _of_width(spec, task, ranges, float(fixed), run)
-    found = uniform_for_stroke(task)
-    if found is None:
+        return _design_of_width(spec, task, ranges, float(fixed), run)
+    uniform = uniform_for_stroke(task)
+    if uniform is None:
         return no_design(
             finding(
                 "target_unreachable",
                 "the strip has no equilibrium over 'design.travel', or 'mechanism.material' no yield strength",
             )
         )
-    thickness, width = found
+    thickness, width = uniform
     low, high = ranges.form[0] / 1e3
     if thickness > THICKER_BY * high:
         text = f"the stress allows strips far thicker than 'design.beam.thickness', {mm(low)} to {mm(high)}; "
@@ -342,12 +342,12 @@ def _design_uniform_strip(
     return _analyse_strip(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
 
 
-def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: float, run: Run) -> Design:
+def _design_of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: float, run: Run) -> Design:
     """Return the uniform strip of a stated width, its thickness from the force."""
-    found = uniform_for_width(task, width)
-    if found is None:
+    uniform = uniform_for_width(task, width)
+    if uniform is None:
         return no_design(finding("target_unreachable", "the strip has no equilibrium over 'design.travel'"))
-    (thickness, stress), allowed = found, task.material.allowable_stress
+    (thickness, stress), allowed = uniform, task.material.allowable_stress
     low, high = ranges.form[0] / 1e3
     # the stress goes with the thickness, and the force with its cube
     thickest = high if allowed is None else min(high, thickness * allowed / stress)
@@ -411,28 +411,28 @@ def _write_strip(spec: SliderCrankSpec, judged: FinishedStrip, wanted: StripDesi
     return _with_part(spec, part, judged.window)
 
 
-def _message(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> str:
-    descent, count = found.descent, found.form.count
+def _message(strip: FoundStrip, judged: FinishedStrip, reported: Reported) -> str:
+    descent, count = strip.descent, strip.form.count
     what = "one thickness" if count == 1 else f"{count} thicknesses"
-    if found.task.goal == "rms":
+    if strip.task.goal == "rms":
         head = f"root mean square {newton(reported.rms or 0.0)} over {mm(judged.window[1])}"
     else:
         head = f"within {percent(reported.deviation or 0.0)} from {mm(judged.window[0])} to {mm(judged.window[1])}"
     compared = ""
-    if _has_uniform_strip(found):
-        within = percent(max(found.task.ripple, COARSE_RIPPLE))
-        compared = f"; one thickness reaches {mm(_one_thickness(found))} within {within}"
+    if _has_uniform_strip(strip):
+        within = percent(max(strip.task.ripple, COARSE_RIPPLE))
+        compared = f"; one thickness reaches {mm(_one_thickness(strip))} within {within}"
     shown = judged.active[:MAX_NAMED_LIMITS]
     more = f" and {len(judged.active) - MAX_NAMED_LIMITS} more" if len(judged.active) > MAX_NAMED_LIMITS else ""
     held = f"; limited by {', '.join(shown)}{more}" if shown else ""
     return f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips{held}"
 
 
-def _warnings(found: FoundStrip, judged: FinishedStrip) -> tuple[Finding, ...]:
+def _warnings(strip: FoundStrip, judged: FinishedStrip) -> tuple[Finding, ...]:
     findings = []
-    if found.descent.ending is not SearchEnding.OPTIMUM:
-        text = f"the search was {found.descent.ending.value}: a better strip may exist; try 'design.beam.seeds'"
+    if strip.descent.ending is not SearchEnding.OPTIMUM:
+        text = f"the search was {strip.descent.ending.value}: a better strip may exist; try 'design.beam.seeds'"
         findings.append(finding("optimizer_stopped", text))
-    if found.lost:
-        findings.append(finding("optimizer_stopped", f"some starts were lost: {'; '.join(found.lost)}"))
+    if strip.lost:
+        findings.append(finding("optimizer_stopped", f"some starts were lost: {'; '.join(strip.lost)}"))
     return tuple(findings)

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 
+ANALYSIS_TOLERANCE = 1e-7  # error of forces and positions, relative to the largest of the path
 FIRST_STEP = 1e-5  # of the travel
 STRAIGHT_OFFSET, DECISIVE_OFFSET = 1e-9, 2e-4
 """Offset of the crank pin, in lengths of the chain: below the first there is no kink, above the second it decides."""
@@ -112,28 +113,28 @@ class Chain(ShortRepr):
 
     def _reach(self, travel: FloatArray) -> FloatArray:
         """Return the distance of slider pin and pivot after some travel [m]."""
-        way = np.array([np.cos(self.direction), np.sin(self.direction)])
-        distance: FloatArray = np.hypot(*(self.pins[2] - self.pins[0] + np.outer(travel, way)).T)
+        along = np.array([np.cos(self.direction), np.sin(self.direction)])
+        distance: FloatArray = np.hypot(*(self.pins[2] - self.pins[0] + np.outer(travel, along)).T)
         return distance
 
     def press(
         self,
         travel: FloatArray,  # (n,): from the unloaded position, increasing [m]; may start with 0
         side: int = 0,  # 1, -1, or 0 for the side of the kink (left where there is none)
-        tolerance: float = 1e-7,  # as in `cfmkit.elastica.Control`
+        tolerance: float = ANALYSIS_TOLERANCE,  # as in `cfmkit.elastica.Control`
     ) -> Pressed:
         """Return the equilibria at travels on one side, that of the kink unless asked otherwise."""
         taut = np.flatnonzero(self._reach(travel) > (1.0 + 1e-9) * self.reach)
         if len(taut):
-            near = self.press(travel[: taut[0]] if taut[0] else np.zeros(1), side, tolerance)
+            until_taut = self.press(travel[: taut[0]] if taut[0] else np.zeros(1), side, tolerance)
             text = (
                 f"the chain is pulled taut before a travel of {travel[taut[0]] * 1e3:.4g} mm is reached; it cannot "
                 "follow beyond"
             )
             return (
-                replace(near, ending=PressingEnd.LIMIT_POINT, message=text)
-                if near.ending is PressingEnd.COMPLETE
-                else near
+                replace(until_taut, ending=PressingEnd.LIMIT_POINT, message=text)
+                if until_taut.ending is PressingEnd.COMPLETE
+                else until_taut
             )
         drive = Displacement(SLIDER_NODE, self.direction, travel)
         wanted = side or self.side or 1
@@ -142,9 +143,9 @@ class Chain(ShortRepr):
             path = _trace(self.build(self.points), drive, tolerance)
             if path.status is PathStatus.COMPLETE:
                 return self._classify_ending(path, wanted)
-        other = clear and wanted != self.side
-        helper = mirror_points(self.points, self.pins) if other else self._bend_to_side(wanted)
-        return self._trace_from_helper(helper, drive, wanted, tolerance, other)
+        is_other_side = clear and wanted != self.side
+        helper = mirror_points(self.points, self.pins) if is_other_side else self._bend_to_side(wanted)
+        return self._trace_from_helper(helper, drive, wanted, tolerance, is_other_side)
 
     def _bend_to_side(self, side: int) -> FloatArray:
         """Return the points with the crank pin moved a little to one side: a chain that cannot go the wrong way."""
@@ -158,18 +159,18 @@ class Chain(ShortRepr):
         return moved
 
     def _trace_from_helper(
-        self, helper: FloatArray, drive: Displacement, wanted: int, tolerance: float, other: bool
+        self, helper: FloatArray, drive: Displacement, wanted: int, tolerance: float, is_other_side: bool
     ) -> Pressed:
         """Return the equilibria nearest to those of a chain that is kinked to the side wanted.
 
         The branch to which the kink does not lead begins with a limit point: nothing before it, nor rest, is on it.
         """
-        known = _trace(self.build(helper), drive, tolerance)
-        if known.status is not PathStatus.COMPLETE:
-            return self._classify_ending(known, wanted, helped=True)
-        path = solve_near_known_path(known, self.build(self.points), drive)
-        first = _beginning(path, drive) if other else 0
-        if other and 0 < first < len(drive.points):
+        helper_path = _trace(self.build(helper), drive, tolerance)
+        if helper_path.status is not PathStatus.COMPLETE:
+            return self._classify_ending(helper_path, wanted, helped=True)
+        path = solve_near_known_path(helper_path, self.build(self.points), drive)
+        first = _beginning(path, drive) if is_other_side else 0
+        if is_other_side and 0 < first < len(drive.points):
             path = _from_its_limit(part_of(path, path.requested >= first), drive.points[:first])
             text = f"with its kink the other way the chain has an equilibrium only from {path.drive[0] * 1e3:.4g} mm on"
             return Pressed(path, PressingEnd.STARTS_LATE, text, wanted)
@@ -198,11 +199,11 @@ class Chain(ShortRepr):
         It is bent to the other side where the crank pin has moved there, and is beyond the line from pivot to slider
         pin, too: far on its way a chain turns with that line, and the pin comes back past where the line had been.
         """
-        way = np.array([np.cos(self.direction), np.sin(self.direction)])
+        along = np.array([np.cos(self.direction), np.sin(self.direction)])
         last = path.at_requested.tolist()
         pins = np.array([self.knee(path, at) for at in last])
         moved = np.array([kink(np.array([self.pins[0], pin, self.pins[2]])) for pin in pins]) - kink(self.pins)
-        ends = self.pins[2] + np.outer(path.drive[path.at_requested], way)
+        ends = self.pins[2] + np.outer(path.drive[path.at_requested], along)
         off = np.array([kink(np.array([self.pins[0], *pose])) for pose in zip(pins, ends, strict=True)])
         sides: FloatArray = np.where((np.sign(moved) == wanted) | (np.sign(off) == wanted), wanted, np.sign(moved))
         begins = np.flatnonzero(path.drive[path.at_requested] > 0.0)
@@ -230,10 +231,10 @@ _ENDING_BY_STATUS = {
 
 def _beginning(path: Path, drive: Displacement) -> int:
     """Return the number of the first point from which on nothing is missing, rest not counted."""
-    found = np.zeros(len(drive.points), dtype=bool)
-    found[path.requested] = True
-    found &= drive.points != 0.0
-    return int(np.flatnonzero(~found)[-1]) + 1 if not found.all() else 0
+    is_there = np.zeros(len(drive.points), dtype=bool)
+    is_there[path.requested] = True
+    is_there &= drive.points != 0.0
+    return int(np.flatnonzero(~is_there)[-1]) + 1 if not is_there.all() else 0
 
 
 def _from_its_limit(
@@ -242,11 +243,11 @@ def _from_its_limit(
     missing: FloatArray,
 ) -> Path:
     """Return a path that is followed back to the limit point that it begins with, which becomes its first point."""
-    found = _followed_back(path)
-    if not found:
+    spots = _followed_back(path)
+    if not spots:
         return path
-    free, drive = np.array([spot.x for spot in found[::-1]]), np.array([spot.drive for spot in found[::-1]])
-    back = path.with_states(np.zeros(len(found), np.int64), free, drive)
+    free, drive = np.array([spot.x for spot in spots[::-1]]), np.array([spot.drive for spot in spots[::-1]])
+    back = path.with_states(np.zeros(len(spots), np.int64), free, drive)
     longer = back.append(path)
     between, places = interpolate_path(longer), missing[missing > longer.drive[0]]
     if between is None:
@@ -262,23 +263,23 @@ def _from_its_limit(
 
 def _followed_back(path: Path) -> list[PathEquilibrium]:
     """Return equilibria from the first point of a path back to a limit point of its travel, in this order."""
-    own, y, drive = equations(path.mesh), path.free[0], float(path.at.drive[0])
-    beside = own.solve(y, drive * (1.0 + SLOPE_STEP))  # tells the slope
+    rest_equations, y, drive = equations(path.mesh), path.free[0], float(path.at.drive[0])
+    beside = rest_equations.solve(y, drive * (1.0 + SLOPE_STEP))  # tells the slope
     if beside is None:
         return []
     before, last, step = beside.x, beside.drive, SLOPE_STEP * drive
-    unstable, found, moves = int(path.unstable[0]), [], np.isinf(own.unit)
+    unstable, spots, moves = int(path.unstable[0]), [], np.isinf(rest_equations.unit)
     while step > NEAR_LIMIT * path.at.drive[0]:
         guess = y + (y - before) * (step / (last - drive))
-        spot = own.solve(guess, drive - step)
+        spot = rest_equations.solve(guess, drive - step)
         off = np.inf if spot is None else np.abs(spot.x - guess)[moves].max()
         if spot is None or spot.unstable > unstable or off > MAX_PREDICTION_ERROR * np.abs(guess - y)[moves].max():
             step *= 0.5
             continue
         y, before, drive, last = spot.x, y, spot.drive, drive
-        found.append(spot)
+        spots.append(spot)
         step = min(2.0 * step, 0.5 * drive)
-    return found
+    return spots
 
 
 def part_of(path: Path, keep: NDArray[np.bool_]) -> Path:
@@ -328,9 +329,9 @@ def _line(path: Path, index: int) -> FloatArray:
 def _find_contact(line: FloatArray, start: FloatArray, thickness: float) -> str:
     """Return what a chain meets; nothing while it is clear."""
     anchor, end = line[0], line[-1]
-    way = end - start
-    share = float(np.clip((anchor - start) @ way / max(float(way @ way), 1e-300), 0.0, 1.0))
-    if np.hypot(*(start + share * way - anchor)) < thickness:
+    side = end - start
+    share = float(np.clip((anchor - start) @ side / max(float(side @ side), 1e-300), 0.0, 1.0))
+    if np.hypot(*(start + share * side - anchor)) < thickness:
         return "is pressed through its own anchor"
     rows = np.unique(np.linspace(0, len(line) - 1, N_LINE_PIECES + 1).astype(int))
     return "crosses itself" if _crosses(line[rows]) else ""

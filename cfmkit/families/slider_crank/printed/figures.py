@@ -104,7 +104,7 @@ def part(result: Result) -> Figure:
     """Return the part to scale at some travels, with the place of the largest stress at the end."""
     solution: Solution = result.state
     points = choose_points(solution, N_DRAWN_POSES)
-    shown, view, room = _in_view(result, points)
+    shown, view, room = _frame_view(result, points)
     figure = new_figure(160.0, 120.0)
     heading = Heading.from_result(result, "the part to scale while it is pressed")
     write_heading(figure, heading)
@@ -131,7 +131,7 @@ def part(result: Result) -> Figure:
     return figure
 
 
-def _in_view(result: Result, points: NDArray[Any]) -> tuple[tuple[PosedBody, ...], parts.Box, float]:
+def _frame_view(result: Result, points: NDArray[Any]) -> tuple[tuple[PosedBody, ...], parts.Box, float]:
     """Return the leg at points of the travel, the box of all poses with a margin, and the margin's unit [m]."""
     _, _, *leg = bodies(result.spec, result.state, points)  # type: ignore[arg-type]
     view, size = parts.box_around(leg, (DRAWING_MARGIN, DRAWING_MARGIN, 2.5 * DRAWING_MARGIN, 2.0 * DRAWING_MARGIN))
@@ -170,7 +170,7 @@ def moving(result: Result) -> Moving | None:
         return None
     solution: Solution = result.state
     points = film_poses(len(solution.travel))
-    shown, view, room = _in_view(result, points)
+    shown, view, room = _frame_view(result, points)
 
     def draw(ax: Axes, number: int) -> None:
         _draw(ax, shown, number, True)

@@ -117,11 +117,12 @@ class FixedWidth:
 
         The force goes with h^3/L and the stress with h/L.
         """
-        least = max(length / one.length for length, one in zip(self.shortest, parts, strict=True))
+        least = max(length / part.length for length, part in zip(self.shortest, parts, strict=True))
         longer = 1.0 if self.stays else max(least, np.sqrt(by_stress**3 / by_force))
         thicker = (longer / by_force) ** (1.0 / 3.0)
         return tuple(
-            Flexure(float(one.length * longer), float(one.thickness * thicker), one.width, one.before) for one in parts
+            Flexure(float(part.length * longer), float(part.thickness * thicker), part.width, part.before)
+            for part in parts
         )
 
 
@@ -140,9 +141,9 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
             "flexures are sized for the rates of 'pivot', 'crank_pin' and 'slider_pin' in 'mechanism.springs', "
             "'design.travel' and the 'yield_strength' of 'mechanism.material'"
         )
-    own = flexures_of(spec.mechanism)
+    stated = flexures_of(spec.mechanism)
     length = wanted.flexures.length or FLEXURE_SHARE * linkage.crank
-    lengths = [length] * 3 if wanted.flexures.length or not own else [one.length for one in own]
+    lengths = [length] * 3 if wanted.flexures.length or not stated else [flexure.length for flexure in stated]
     stroke = float(wanted.travel[1])
     side = side_of(spec, linkage, unloaded)
     turn = np.abs(rotations(linkage, unloaded, np.array([stroke]), side)[:, 0])
@@ -150,9 +151,9 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     first = (
         one_width(rates, lengths, turn, made_of)
         if sheet is None
-        else of_width(rates, lengths, turn, made_of, sheet, stays)
+        else size_for_width(rates, lengths, turn, made_of, sheet, stays)
     )
-    stubby = next((one for one in first if one.length < _MIN_SLENDERNESS * one.thickness), None)
+    stubby = next((flexure for flexure in first if flexure.length < _MIN_SLENDERNESS * flexure.thickness), None)
     if stubby is not None:
         text = f"the stress would allow a thickness of {mm(stubby.thickness)} on a length of {mm(stubby.length)}"
         cure = "make the flexures longer ('design.flexures.length'), or increase the stroke ('design.travel')"
@@ -161,31 +162,31 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     springs_force = rates @ curves_along_slider(linkage, unloaded, side, travel).effort[:3]
     kept = None if sheet is None else FixedWidth(tuple(lengths), stays)
     bent = 0 if spec.analysis.side is None else side
-    found = correct_flexures(
+    sized = correct_flexures(
         first, made_of, (linkage, unloaded, bent), travel, springs_force, wanted.flexures.exact, kept
     )
-    if found is None:
+    if sized is None:
         return no_design(
             finding("not_converged", "the flexures of the closed forms have no equilibrium over 'design.travel'")
         )
-    if found.over > 1.0 + 1e-6 and sheet is not None:
+    if sized.over > 1.0 + 1e-6 and sheet is not None:
         # the stress goes with the power -2/3 of the length
-        longer = mm(1.01 * max(lengths) * found.over**1.5)
+        longer = mm(1.01 * max(lengths) * sized.over**1.5)
         text = (
-            f"flexures of {mm(max(lengths))} from a sheet of {mm(sheet)} have {found.over:.4g} times the stress allowed"
+            f"flexures of {mm(max(lengths))} from a sheet of {mm(sheet)} have {sized.over:.4g} times the stress allowed"
         )
         return no_design(finding("target_unreachable", text), {"design.flexures.length": longer})
-    if (thinnest := min(min(one.thickness, one.width) for one in found.flexures)) < 1.0 / PER_METRE:
+    if (thinnest := min(min(flexure.thickness, flexure.width) for flexure in sized.flexures)) < 1.0 / PER_METRE:
         text = f"stress and force allow flexures of {mm(thinnest)} at most: less travel, or a stronger material"
         return no_design(finding("target_unreachable", text))
     factors: dict[str, tuple[float | None, str, str]] = {
-        "closed_form_force": (found.force_factor, "factor", f"force {FACTOR_PHRASES[0]}"),
-        "closed_form_stress": (found.stress_factor, "factor", f"largest stress {FACTOR_PHRASES[1]}"),
+        "closed_form_force": (sized.force_factor, "factor", f"force {FACTOR_PHRASES[0]}"),
+        "closed_form_stress": (sized.stress_factor, "factor", f"largest stress {FACTOR_PHRASES[1]}"),
     }
     return Design(
-        _write_flexures(spec, found.flexures, stroke),
+        _write_flexures(spec, sized.flexures, stroke),
         Status.COMPLETE,
-        _message(found, wanted.flexures.exact),
+        _message(sized, wanted.flexures.exact),
         search=search_values(factors, "lumped", (0.1 * stroke, stroke)),
     )
 
@@ -209,7 +210,7 @@ def one_width(
     return tuple(Flexure(length, float(h), widest) for length, h in zip(lengths, thickness, strict=True))
 
 
-def of_width(
+def size_for_width(
     rates: FloatArray, lengths: Sequence[float], turn: FloatArray, made_of: Elasticity, width: float, stays: bool
 ) -> tuple[Flexure, ...]:
     """Return flexures of a width [m] with the rates [N m/rad], by the closed forms.
@@ -217,14 +218,14 @@ def of_width(
     Where their stress would be too large they are longer than stated, unless their lengths stay.
     """
     stress, young = (made_of.allowable_stress or np.inf) / PEAK_FACTOR, made_of.youngs_modulus
-    found = []
+    flexures = []
     for rate, length, psi in zip(rates, lengths, turn, strict=True):
         thickness = (12.0 * rate * length / (young * width)) ** (1.0 / 3.0)
         over = thickness / thickness_from_stress(stress, length, young, float(psi))
         # h goes with the cube root of L, so the stress with its power -2/3
         longer = 1.0 if stays else max(1.0, over**1.5)
-        found.append(Flexure(float(length * longer), float(thickness * longer ** (1.0 / 3.0)), width))
-    return tuple(found)
+        flexures.append(Flexure(float(length * longer), float(thickness * longer ** (1.0 / 3.0)), width))
+    return tuple(flexures)
 
 
 def correct_flexures(
@@ -253,14 +254,14 @@ def correct_flexures(
             break
         if fixed is not None:
             before, parts = parts, fixed.correct_sizes(parts, by_force, by_stress)
-            if all(abs(one.length / old.length - 1.0) < 1e-9 for one, old in zip(parts, before, strict=True)) and (
+            if all(abs(part.length / old.length - 1.0) < 1e-9 for part, old in zip(parts, before, strict=True)) and (
                 abs(by_force - 1.0) < 1e-9
             ):
                 break
             continue
         parts = tuple(
-            Flexure(one.length, one.thickness / by_stress, one.width / by_force * by_stress**3, one.before)
-            for one in parts
+            Flexure(part.length, part.thickness / by_stress, part.width / by_force * by_stress**3, part.before)
+            for part in parts
         )
     return Sized(parts, *factors, by_stress)
 
@@ -276,12 +277,12 @@ PER_METRE = 1e8  # thicknesses are whole parts of it, rounded down: the stress i
 def _write_flexures(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: float) -> SliderCrankSpec:
     blocks = [
         FlexureSpec(
-            length=round(one.length, 9),
-            thickness=float(np.floor(one.thickness * PER_METRE) / PER_METRE),
-            width=round(one.width, 8),
-            before=one.before,
+            length=round(part.length, 9),
+            thickness=float(np.floor(part.thickness * PER_METRE) / PER_METRE),
+            width=round(part.width, 8),
+            before=part.before,
         )
-        for one in parts
+        for part in parts
     ]
     flexures = Flexures(pivot=blocks[0], crank_pin=blocks[1], slider_pin=blocks[2])
     fidelity = None if spec.mechanism.beam is None else "lumped"
@@ -289,11 +290,11 @@ def _write_flexures(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: flo
     return with_values(spec, {"mechanism.flexures": flexures, **analysis})
 
 
-def _message(found: Sized, exact: bool) -> str:
-    parts = ", ".join(mm(one.thickness) for one in found.flexures)
+def _message(sized: Sized, exact: bool) -> str:
+    parts = ", ".join(mm(flexure.thickness) for flexure in sized.flexures)
     done = "which the sizes are corrected for" if exact else "which the sizes are not corrected for"
-    harder = format_short(found.force_factor - 1.0, "ratio")
+    harder = format_short(sized.force_factor - 1.0, "ratio")
     return (
-        f"thickness of pivot, crank pin and slider pin: {parts}, width {mm(found.flexures[0].width)}; flexures push "
-        f"{harder} harder than springs and have {found.stress_factor:.3g} times the stress of pure bending, {done}"
+        f"thickness of pivot, crank pin and slider pin: {parts}, width {mm(sized.flexures[0].width)}; flexures push "
+        f"{harder} harder than springs and have {sized.stress_factor:.3g} times the stress of pure bending, {done}"
     )

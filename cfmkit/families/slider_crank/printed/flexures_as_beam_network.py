@@ -156,8 +156,8 @@ def mirror_points(points: FloatArray, places: FloatArray) -> FloatArray:
     """Return points mirrored about the line from the pivot to the slider pin: the chain with its kink the other way."""
     axis = (places[2] - places[0]) / np.hypot(*(places[2] - places[0]))
     relative = points - places[0]
-    found: FloatArray = places[0] + 2.0 * np.outer(relative @ axis, axis) - relative
-    return found
+    mirrored: FloatArray = places[0] + 2.0 * np.outer(relative @ axis, axis) - relative
+    return mirrored
 
 
 def flexure_network(ends: FloatArray, flexures: Sequence[Flexure], material: Elasticity) -> Network:
@@ -179,7 +179,7 @@ def spread(
     """Return places along a polyline as fractions of its length, both ends included [B, eq. 13]."""
     lengths = np.hypot(*np.diff(corners, axis=0).T)
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
-    inner = [starts[k] + share * lengths[k] for k, own in enumerate(shares) for share in own]
+    inner = [starts[k] + share * lengths[k] for k, shares_of_piece in enumerate(shares) for share in shares_of_piece]
     places = np.concatenate([[0.0], np.array(inner) / starts[-1], [1.0]])
     return places
 

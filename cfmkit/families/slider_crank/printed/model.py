@@ -77,7 +77,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         return no_result(spec, pulled)
     side = side_of(spec, linkage, unloaded) if spec.analysis.side is not None else 0
     stops, grid = spec.mechanism.end_stops, np.linspace(low, high, spec.analysis.points)
-    pressed = chain.press(stops.mark_rows([grid])[0] if stops else grid, side, spec.analysis.accuracy)
+    pressed = chain.press(stops.mark_rows([grid])[0] if stops else grid, side)
     pressed = kept_clear(pressed, _thickness(chain))
     usable = len(pressed.travel) > 1 and pressed.ending is not PressingEnd.WRONG_BRANCH
     reported = (
@@ -97,7 +97,6 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         spec.mechanism.sets,
         window,
         side,
-        spec.analysis.accuracy,
         spec.mechanism.copies == "mirrored",
         spec,
     )
@@ -126,8 +125,8 @@ def _interpolate(solution: Solution) -> BetweenPoints | None:
 def _thickness(chain: Chain) -> float:
     """Return the mean thickness of both ends of a chain [m]."""
     beams = list(chain.build(chain.points).beams.values())
-    given = [beam.section.thickness for beam in (beams[0], beams[-1])]
-    first, last = ([one] if isinstance(one, float) else one.values for one in given)
+    thicknesses = [beam.section.thickness for beam in (beams[0], beams[-1])]
+    first, last = ([thickness] if isinstance(thickness, float) else thickness.values for thickness in thicknesses)
     return 0.5 * (float(first[0]) + float(last[-1]))
 
 

@@ -52,16 +52,17 @@ def _draw_leg(spec: SliderCrankSpec, leg: Leg) -> Drawing:
         made = merge_pieces(
             [OutlinePiece.from_contour(rounded), *map(OutlinePiece.polygon, frame)], leg.thinnest, fillet
         )
-    holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
+    holes = (circle(hole.at, 0.5 * hole.diameter, "cut", hole=True) for hole in part.holes)
     marks = [mark(pad, driven) for pad, driven in zip(leg.pads, (False, True), strict=True)]
-    marks += [mark(one, driven=False) for one in frame]
+    marks += [mark(shape, driven=False) for shape in frame]
     widest = float(leg.width.max())
-    thin = [one for one in leg.pieces if one.name and leg.width[one.start] < widest]
+    thin = [piece for piece in leg.pieces if piece.name and leg.width[piece.start] < widest]
     regions = [
         Region(
-            _rectangle_around(leg.points[one.start], leg.points[one.start + 1], leg.widest), float(leg.width[one.start])
+            _rectangle_around(leg.points[piece.start], leg.points[piece.start + 1], leg.widest),
+            float(leg.width[piece.start]),
         )
-        for one in thin
+        for piece in thin
     ]
     contours, bare = add_fixing_holes((*made, *holes), marks, part.screws)
     return Drawing(
@@ -140,9 +141,9 @@ def _moving(spec: SliderCrankSpec, leg: Leg) -> Iterator[PosedBody]:
     fidelity = {"analysis.fidelity": None} if spec.analysis.fidelity == "solid" else {}
     solution: Any = analyze(spec.replace(fidelity), Run()).state
     if solution is not None:
-        _, slider, *found = bodies(spec, solution, choose_points(solution, N_SWEPT_POSES))
+        _, slider, *leg_bodies = bodies(spec, solution, choose_points(solution, N_SWEPT_POSES))
         yield slider
-        yield PosedBody.line("leg", "free", np.concatenate([one.core for one in found], axis=1), leg.widest)
+        yield PosedBody.line("leg", "free", np.concatenate([body.core for body in leg_bodies], axis=1), leg.widest)
 
 
 def _dimensions(points: FloatArray) -> Iterator[DrawnDimension]:
@@ -157,7 +158,9 @@ def _facts(spec: SliderCrankSpec, leg: Leg) -> Iterator[tuple[str, str]]:
     """Yield what the piece is made of, and how thick it is along its centre line."""
     if spec.mechanism.material is not None:
         yield "material", spec.mechanism.material.words
-    limits = dict.fromkeys(format_short(float(one), "length") for one in (leg.thinnest, leg.thickness.max()))
+    limits = dict.fromkeys(
+        format_short(float(thickness), "length") for thickness in (leg.thinnest, leg.thickness.max())
+    )
     yield "thickness", " ... ".join(limits) + " along the centre line"
 
 

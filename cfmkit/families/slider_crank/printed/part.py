@@ -80,7 +80,9 @@ class Leg:
             return cls(points, shares * marks[-1], thickness, width, pieces, _pad_sizes(spec))
         flexures = flexures_of(spec.mechanism)
         points = corners(spec.mechanism, None, linkage, unloaded)
-        thickness, width = (np.repeat([getattr(one, key) for one in flexures], 2) for key in ("thickness", "width"))
+        thickness, width = (
+            np.repeat([getattr(flexure, key) for flexure in flexures], 2) for key in ("thickness", "width")
+        )
         half, bar = 0.5 * thickness[::2], 0.5 * LINK_RATIO * float(thickness.max())
         pieces = tuple(
             LegPiece("", k, (bar, bar)) if k % 2 else LegPiece(FLEXURE_BEAMS[k // 2], k, (float(half[k // 2]),) * 2)
@@ -105,9 +107,9 @@ class Leg:
         *depths, breadth = self.pad
         ends = []
         for k, sense, depth in ((0, -1.0, depths[0]), (len(self.points) - 1, 1.0, depths[1])):
-            way = sense * _direction(self.points, k)
-            side = 0.5 * breadth * np.array([-way[1], way[0]])
-            out = self.points[k] + depth * way
+            outward = sense * _direction(self.points, k)
+            side = 0.5 * breadth * np.array([-outward[1], outward[0]])
+            out = self.points[k] + depth * outward
             ends.append(np.array([self.points[k] + side, self.points[k] - side, out - side, out + side]))
         return ends[0], ends[1]
 
@@ -140,14 +142,14 @@ class Leg:
         length = np.hypot(*(ends[1] - ends[0]).T)
         # places that differ by rounding have no piece between them
         kept = np.flatnonzero(length > SAME_PLACE * self.place[-1])
-        way = (ends[1] - ends[0])[kept] / length[kept, None]
+        directions = (ends[1] - ends[0])[kept] / length[kept, None]
         half = np.array([self.pieces[k].half for k in kept])
         # at a bend without a step the outer edges meet beyond the ends
-        turn = np.abs(np.angle((way[1:] @ COMPLEX_AXES) / (way[:-1] @ COMPLEX_AXES)))
+        turn = np.abs(np.angle((directions[1:] @ COMPLEX_AXES) / (directions[:-1] @ COMPLEX_AXES)))
         beyond = np.where(half[:-1, 1] == half[1:, 0], half[1:, 0] * np.tan(0.5 * turn), 0.0)
         before, after = np.append(0.0, beyond), np.append(beyond, 0.0)
         for number, k in enumerate(kept.tolist()):
-            along, across = way[number], np.array([-way[number, 1], way[number, 0]])
+            along, across = directions[number], np.array([-directions[number, 1], directions[number, 0]])
             line = np.array([ends[0][k] - before[number] * along, ends[1][k] + after[number] * along])
             aside = half[number][:, None] * across
             middle, thickness = 0.5 * (ends[0][k] + ends[1][k]), float(half[number].sum())
@@ -185,25 +187,25 @@ def bodies(spec: SliderCrankSpec, solution: Solution, points: NDArray[Any]) -> t
     """
     leg, path = Leg.from_spec(spec, as_printed=True), solution.pressed.path
     at = [int(path.at_requested[point]) for point in points]
-    found: list[PosedBody] = []
+    pieces: list[PosedBody] = []
     for name, beam in path.network.beams.items():
         line = np.array([path.shape(name, point) for point in at])
-        if found:
-            link = np.stack([found[-1].core[:, -1], line[:, 0]], axis=1)
-            found.append(PosedBody.line("link", "free", link, leg.widest))
+        if pieces:
+            link = np.stack([pieces[-1].core[:, -1], line[:, 0]], axis=1)
+            pieces.append(PosedBody.line("link", "free", link, leg.widest))
         place, thickness = path.places(name), beam.section.thickness
         if isinstance(thickness, float):
             half: FloatArray = np.full(len(place), 0.5 * thickness)
         else:
             half = 0.5 * np.interp(place, thickness.stations, np.real(thickness.values))
-        found.append(PosedBody.line("flexure", "free", line, half))
+        pieces.append(PosedBody.line("flexure", "free", line, half))
     ground, slider = leg.pads
     angle = travel_direction(linkage_of(spec.mechanism))
     travel = solution.travel[points, None] * np.array([np.cos(angle), np.sin(angle)])
     return (
         PosedBody.polygon("pad", "held", ground),
         PosedBody.polygon("pad", "driven", slider + travel[:, None]),
-        *found,
+        *pieces,
     )
 
 
@@ -218,8 +220,8 @@ def _direction(points: FloatArray, k: int) -> FloatArray:
     before, after = apart[apart < k], apart[apart > k]
     start = points[before[-1]] if len(before) else points[k]
     stop = points[after[0]] if len(after) else points[k]
-    way: FloatArray = (stop - start) / np.hypot(*(stop - start))
-    return way
+    along: FloatArray = (stop - start) / np.hypot(*(stop - start))
+    return along
 
 
 @dataclass(frozen=True)
@@ -239,35 +241,35 @@ def _edge(line: FloatArray, half: FloatArray) -> list[FloatArray]:
     """
     sides = []
     for k in range(len(line) - 1):
-        way = line[k + 1] - line[k]
-        if (length := np.hypot(*way)) > 0:
-            normal = np.array([-way[1], way[0]]) / length
+        along = line[k + 1] - line[k]
+        if (length := np.hypot(*along)) > 0:
+            normal = np.array([-along[1], along[0]]) / length
             sides.append(
-                _ChainSide(way / length, line[k + 1], line[k] + half[k] * normal, line[k + 1] + half[k + 1] * normal)
+                _ChainSide(along / length, line[k + 1], line[k] + half[k] * normal, line[k + 1] + half[k + 1] * normal)
             )
-    inner = [corner for one, other in itertools.pairwise(sides) for corner in _corner(one, other)]
+    inner = [corner for side, following in itertools.pairwise(sides) for corner in _corner(side, following)]
     return [sides[0].first, *inner, sides[-1].last]
 
 
-def _corner(one: _ChainSide, other: _ChainSide) -> list[FloatArray]:
+def _corner(side: _ChainSide, following: _ChainSide) -> list[FloatArray]:
     """Return where two edges meet; where the width steps, both ends on the line that halves the angle."""
-    if abs(_cross(one.along, other.along)) < STRAIGHT_SINE:
-        return [one.last, other.first]
-    at, reach = one.end, float(np.hypot(*(one.last - one.end)))
-    ways = one.last - one.first, other.last - other.first
-    if np.isclose(reach, np.hypot(*(other.first - at)), rtol=1e-9, atol=0.0):
-        met = _meeting(one.last, ways[0], other.first, ways[1])
+    if abs(_cross(side.along, following.along)) < STRAIGHT_SINE:
+        return [side.last, following.first]
+    at, reach = side.end, float(np.hypot(*(side.last - side.end)))
+    ways = side.last - side.first, following.last - following.first
+    if np.isclose(reach, np.hypot(*(following.first - at)), rtol=1e-9, atol=0.0):
+        met = _meeting(side.last, ways[0], following.first, ways[1])
         if np.hypot(*(met - at)) <= MITRE_LIMIT * reach:
             return [met]
-        middle = one.last + other.first - 2.0 * at
+        middle = side.last + following.first - 2.0 * at
         return [at + reach * middle / np.hypot(*middle)]
-    halving = other.along - one.along
-    return [_meeting(one.last, ways[0], at, halving), _meeting(other.first, ways[1], at, halving)]
+    halving = following.along - side.along
+    return [_meeting(side.last, ways[0], at, halving), _meeting(following.first, ways[1], at, halving)]
 
 
-def _meeting(a: FloatArray, way: FloatArray, b: FloatArray, other: FloatArray) -> FloatArray:
+def _meeting(a: FloatArray, a_along: FloatArray, b: FloatArray, b_along: FloatArray) -> FloatArray:
     """Return where the lines through two points along two ways meet."""
-    met: FloatArray = a + _cross(b - a, other) / _cross(way, other) * way
+    met: FloatArray = a + _cross(b - a, b_along) / _cross(a_along, b_along) * a_along
     return met
 
 

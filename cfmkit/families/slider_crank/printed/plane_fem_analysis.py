@@ -141,14 +141,14 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     reached = read_only(asked[asked <= course.travel[-1] * (1 + 1e-12)])
     solution = SolidSolution(spec, solved, reached, chain_of(spec, linkage, unloaded))
     complete = course.ending is PathEnd.COMPLETE
-    found = tuple(_findings(solution))
+    warnings = tuple(_findings(solution))
     return Result(
         spec=spec,
         status=Status.COMPLETE if complete else Status.PARTIAL,
-        message="" if complete else found[0].message,
+        message="" if complete else warnings[0].message,
         curves=(_curve(solution),),
         values=_values(solution),
-        warnings=found,
+        warnings=warnings,
         travel=(low, high),
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
@@ -165,15 +165,15 @@ def part_of(spec: SliderCrankSpec) -> Part:
 
     piece = solved_piece(spec)
     made_of, material = elasticity(spec.mechanism), spec.mechanism.material
-    way = travel_direction(linkage_of(spec.mechanism))
-    driven = np.array([np.cos(way), np.sin(way), 0.0])
+    direction = travel_direction(linkage_of(spec.mechanism))
+    driven = np.array([np.cos(direction), np.sin(direction), 0.0])
     places = tuple(
         HeldOrDriven(name, (pad,), pad.mean(axis=0), motion, seams=(pad[:2],))
         for name, pad, motion in (("ground", piece.pads[0], np.zeros(3)), ("slider", piece.pads[1], driven))
     )
     assert material is not None  # or `elasticity` had refused
     law = MATERIAL_LAWS[material.law](made_of.youngs_modulus, made_of.poisson_ratio)
-    regions = tuple((one.polygon, one.thickness) for one in piece.sheet.regions)
+    regions = tuple((region.polygon, region.thickness) for region in piece.sheet.regions)
     rings = rings_of((piece.contour, *piece.holes), piece.thinnest)
     width = float(piece.sheet.thickness or 0.0)
     return Part(rings, piece.thinnest, width, law, places, regions, LINK_ELEMENT_RATIO, piece.frame, piece.sections)
@@ -217,11 +217,11 @@ def elastic_networks(spec: SliderCrankSpec) -> tuple[DrivenNetwork, ...]:
 def _stops(spec: SliderCrankSpec) -> list[float]:
     """Return the travels to solve for [m]: rest, closer ones where the travel begins, and the ends of every window."""
     low, high = spec.analysis.travel or (0.0, 0.0)
-    own = high * np.linspace(0.0, 1.0, spec.analysis.solid.poses) ** POSE_EXPONENT
-    windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
+    places = high * np.linspace(0.0, 1.0, spec.analysis.solid.poses) ** POSE_EXPONENT
+    windows = [spec.analysis.window, *(requirement.over for requirement in spec.requirements)]
     ends = [low, *(place for window in windows if window is not None for place in window_places(window, (low, high)))]
     inside = [place for place in ends if 0.0 < place < high]
-    return drop_repeats(np.concatenate([own, inside]), high).tolist()  # type: ignore[no-any-return]
+    return drop_repeats(np.concatenate([places, inside]), high).tolist()  # type: ignore[no-any-return]
 
 
 def _curve(solution: SolidSolution) -> Curve:
@@ -233,7 +233,7 @@ def _curve(solution: SolidSolution) -> Curve:
 def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; those that a solid does not know have no value."""
     limit = elasticity(solution.spec.mechanism).allowable_stress
-    known: dict[str, float | None] = {
+    values: dict[str, float | None] = {
         "kink": kink(solution.chain.pins),
         "run_in_95": first_at(solution.travel, solution.force, 0.95 * solution.level),
         "run_in_98": first_at(solution.travel, solution.force, 0.98 * solution.level),
@@ -241,11 +241,11 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
         "stress_stroke": None if limit is None else first_at(solution.travel, solution.stress, limit),
         **solution.error.values(),
     }
-    found = {
-        name: Quantity(known.get(name), *about, NOT_COMPUTED_TEXT if known.get(name) is None else "")
+    quantities = {
+        name: Quantity(values.get(name), *about, NOT_COMPUTED_TEXT if values.get(name) is None else "")
         for name, about in SCALAR_DEFINITIONS.items()
     }
-    return found | largest_concentration(solution.fillets)
+    return quantities | largest_concentration(solution.fillets)
 
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
@@ -289,12 +289,12 @@ def fillets(
 
     pads = {place.name: place.shapes for place in solved.part.places}
     rows = []
-    for one in stressed_fillets(solved, spec.mechanism.fillet):
-        nearest = FLEXURE_BEAMS[int(np.hypot(*(chain.pins - one.arc.middle).T).argmin())]
+    for fillet in stressed_fillets(solved, spec.mechanism.fillet):
+        nearest = FLEXURE_BEAMS[int(np.hypot(*(chain.pins - fillet.arc.middle).T).argmin())]
         names = [] if spec.piece == "beam" else [nearest]
-        names += one.arc.find_touched(pads) or ([] if names else ["strip"])
-        if (found := one.largest(*window)) is not None:
-            rows.append(FilletRow(": ".join(names), one.arc, *found))
+        names += fillet.arc.find_touched(pads) or ([] if names else ["strip"])
+        if (largest := fillet.largest(*window)) is not None:
+            rows.append(FilletRow(": ".join(names), fillet.arc, *largest))
     stresses = nominal_stresses(
         rows,
         np.array([row.motion for row in rows]),

@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.results.member_efforts import effort_error
 from cfmkit.families.end_stops import NO_STOPS
-from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
+from cfmkit.families.slider_crank.printed.equilibrium_path import ANALYSIS_TOLERANCE, PressingEnd
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, STRIP_BEAM
 from cfmkit.metrics.continuous_means_and_extremes import mean
 from cfmkit.numerics.chebyshev_panels import nodes_of, resolve_panels
@@ -60,10 +60,10 @@ class ChainCurve(ShortRepr):
         """Increasing travels: the nodes, and the ends of their panels [m]."""
         borders = self.laws[0].ends
         nodes = [nodes_of(ends) for ends in pairwise(borders.tolist())]
-        own = np.exp(np.sort(np.concatenate([borders, *nodes])))
-        own = np.union1d(own, self.stops.marks[self.stops.marks > 0]) if self.stops else own
+        places = np.exp(np.sort(np.concatenate([borders, *nodes])))
+        places = np.union1d(places, self.stops.marks[self.stops.marks > 0]) if self.stops else places
         low, high = self.ends
-        return np.concatenate([[low], own[(own > low) & (own < high)], [high]])
+        return np.concatenate([[low], places[(places > low) & (places < high)], [high]])
 
     @property
     def peaks(self) -> FloatArray:
@@ -86,9 +86,9 @@ class ChainCurve(ShortRepr):
         law, first = self.laws[which], self.first[which]
         nearest = float(np.exp(law.ends[0]))
         size = np.clip(np.ravel(places), *self.ends)
-        found = law.evaluate(np.clip(np.log(np.maximum(size, nearest)), law.ends[0], law.ends[-1]))
+        evaluated = law.evaluate(np.clip(np.log(np.maximum(size, nearest)), law.ends[0], law.ends[-1]))
         share = np.minimum(size / nearest, 1.0)
-        values = np.where(size < nearest, first + (found - first) * share, found)
+        values = np.where(size < nearest, first + (evaluated - first) * share, evaluated)
         if self.stops and which == 0:
             values = values + self.stops.force(size)
         return np.asarray(values.reshape(np.shape(places)))
@@ -120,8 +120,8 @@ def course(
     low, high = np.log(max(ends[0], FIRST_NODE_SHARE * ends[1])), np.log(ends[1])
 
     def values(places: FloatArray) -> FloatArray:
-        found = pressed(np.exp(places))
-        return np.full((2, len(places)), np.nan) if found is None else np.array(found)
+        values_there = pressed(np.exp(places))
+        return np.full((2, len(places)), np.nan) if values_there is None else np.array(values_there)
 
     borders = np.linspace(low, high, int(np.ceil((high - low) / INITIAL_PANEL_WIDTH)) + 1)
     force, stress = resolve_panels(values, borders, COEFFICIENT_RTOL, MAX_HALVINGS)
@@ -146,7 +146,6 @@ class Solution(ShortRepr):
     legs: int  # equal ones on one slider
     window: tuple[float, float]  # where metrics are taken [m]
     side: int = 0  # to which it was to bend, as `Chain.press` takes it
-    accuracy: float = 1e-7  # of the path, relative
     mirrored: bool = False  # whether a mirrored pair keeps the guide free of load
     spec: SliderCrankSpec | None = None  # None in a search, which has no findings
 
@@ -178,7 +177,7 @@ class Solution(ShortRepr):
     @property
     def effort_error(self) -> float:
         """Numerical error of the force of all legs [N]."""
-        return self.legs * effort_error(self.pressed.path, self.accuracy)
+        return self.legs * effort_error(self.pressed.path, ANALYSIS_TOLERANCE)
 
     @cached_property
     def stable(self) -> Any:
@@ -237,16 +236,16 @@ class Solution(ShortRepr):
     def course(self) -> ChainCurve | None:
         """Force and stress at every travel; None if the chain cannot be followed to places between its points."""
         low, high = float(self.travel[0]), float(self.travel[-1])
-        found = course(self._solve_travels, (low, high), (float(self.leg_force[0]), float(self.stress[0])))
-        return None if found is None else replace(found, stops=self.stops)
+        pressed_course = course(self._solve_travels, (low, high), (float(self.leg_force[0]), float(self.stress[0])))
+        return None if pressed_course is None else replace(pressed_course, stops=self.stops)
 
     def _solve_travels(self, travel: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return force [N] and stress [Pa] at other travels than those of the points; None if one is not reached."""
-        found = self.chain.press(travel, self.side, self.accuracy)
-        if found.ending not in COMPLETE_ENDINGS or len(found.travel) < len(travel):
+        pressed = self.chain.press(travel, self.side)
+        if pressed.ending not in COMPLETE_ENDINGS or len(pressed.travel) < len(travel):
             return None
-        other = replace(self, pressed=found)
-        return other.leg_force, other.stress
+        solved = replace(self, pressed=pressed)
+        return solved.leg_force, solved.stress
 
     @cached_property
     def level(self) -> float:
@@ -285,8 +284,8 @@ class Solution(ShortRepr):
         """Smallest thickness [m]."""
         values = []
         for beam in self.pressed.path.network.beams.values():
-            given = beam.section.thickness
-            values.append(float(np.min(given if isinstance(given, float) else given.values)))
+            thickness = beam.section.thickness
+            values.append(float(np.min(thickness if isinstance(thickness, float) else thickness.values)))
         return min(values)
 
 

@@ -76,8 +76,8 @@ class StripSpec(Model):
     @property
     def values(self) -> tuple[float, ...]:
         """The thicknesses as drawn [m], at least two."""
-        one = self.thickness
-        return one if isinstance(one, tuple) else (one, one)
+        thickness = self.thickness
+        return thickness if isinstance(thickness, tuple) else (thickness, thickness)
 
     @model_validator(mode="after")
     def _as_many_places_as_thicknesses(self) -> Self:
@@ -134,7 +134,13 @@ class Printed(RoundedCorners, Model):
     @property
     def thinnest(self) -> float:
         """Smallest thickness of the strip, or of the flexures [m]; 0 if there are neither."""
-        drawn = self.beam.values if self.beam else [one.thickness for one in self.flexures.all] if self.flexures else ()
+        drawn = (
+            self.beam.values
+            if self.beam
+            else [flexure.thickness for flexure in self.flexures.all]
+            if self.flexures
+            else ()
+        )
         return min(drawn, default=0.0)
 
     @property
@@ -143,8 +149,8 @@ class Printed(RoundedCorners, Model):
         position = thinnest = None
         if self.part is not None and self.part.process is not None:
             stated = self.part.process
-            known = stated.accuracy(PROCESSES_BY_NAME[stated.name]) if stated.name else stated
-            position, thinnest = known.position, known.least_feature
+            accuracy = stated.accuracy(PROCESSES_BY_NAME[stated.name]) if stated.name else stated
+            position, thinnest = accuracy.position, accuracy.least_feature
         return position, thinnest
 
     @property
@@ -199,7 +205,7 @@ class StripDesign(Model):
     def _ranges_increase(self) -> Self:
         ranges = [self.thickness, *(self.thicknesses or ()), *(self.shares or ())]
         ranges += [self.width] if isinstance(self.width, tuple) else []
-        if any(one is not None and not one[0] <= one[1] for one in ranges):
+        if any(ends is not None and not ends[0] <= ends[1] for ends in ranges):
             raise ValueError("a range goes from the smallest to the largest value")
         return self
 
@@ -221,6 +227,6 @@ class PrintedAnalysis(Analysis):
     """Analysis of flexures and strips."""
 
     removed_keys: ClassVar[dict[str, str]] = {
-        "recheck": "for a second opinion on force and stress write 'fidelity: solid', the part as a planar solid"
+        "recheck": "for a second opinion on force and stress write 'fidelity: solid', the part as a planar solid",
+        "accuracy": "forces are always solved to 1e-7: delete the line",
     }
-    accuracy: Annotated[Ratio, Field(ge=1e-10, le=1e-3)] = Field(1e-7, description="of the beams' forces")

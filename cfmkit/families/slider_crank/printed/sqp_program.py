@@ -99,8 +99,8 @@ class Form:
         if not self.per_piece:
             return spread(corners, self.shares) if self.shares else np.linspace(0.0, 1.0, self.count)
         ends = np.cumsum((0, *self.per_piece))
-        own = np.real(x[self.count : self.count + self.placed])
-        return spread(corners, [own[a:b].tolist() for a, b in itertools.pairwise(ends)])
+        shares = np.real(x[self.count : self.count + self.placed])
+        return spread(corners, [shares[a:b].tolist() for a, b in itertools.pairwise(ends)])
 
     def is_ordered(self, x: FloatArray, corners: FloatArray) -> bool:
         """Return whether stations that vary come one after the other."""
@@ -198,18 +198,18 @@ class StripProgram(DesignProgram):
         path = self._path(self.network(z[: self.form.size]), self.travel(z))
         if path is None:
             return None
-        found = self._build_state(path)
-        self.known, self._last = path, (z.copy(), found)
-        return found
+        built = self._build_state(path)
+        self.known, self._last = path, (z.copy(), built)
+        return built
 
     def _path(self, network: Network, travel: FloatArray) -> Path | None:
         """Return the equilibria near the last ones, else from rest."""
         drive = Displacement(SLIDER_NODE, self.task.direction, travel)
         if self.known is not None:
             with suppress(InputError):  # stations that move can change how finely the strip is cut
-                near = solve_near_known_path(self.known, network, drive)
-                if near.status is PathStatus.COMPLETE:
-                    return near
+                path = solve_near_known_path(self.known, network, drive)
+                if path.status is PathStatus.COMPLETE:
+                    return path
         return _trace(network, drive)
 
     def evaluate(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
@@ -261,14 +261,18 @@ class StripProgram(DesignProgram):
 
     def _derivatives(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray] | None:
         """Return the derivatives of force (p, n) and stress (r, n) by all variables; None if one has none."""
-        found = self._by_form(z, state)
-        if found is None or not self.extra:
-            return found
-        force, stress = found
-        last = self._by_stroke(z, state) if self.task.goal == "stroke" else (0.0 * state.force, 0.0 * state.stress)
+        slopes = self._differentiate_by_form(z, state)
+        if slopes is None or not self.extra:
+            return slopes
+        force, stress = slopes
+        last = (
+            self._differentiate_by_stroke(z, state)
+            if self.task.goal == "stroke"
+            else (0.0 * state.force, 0.0 * state.stress)
+        )
         return np.column_stack([force, last[0]]), np.column_stack([stress, last[1]])
 
-    def _by_form(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray] | None:
+    def _differentiate_by_form(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray] | None:
         """Return the derivatives of force (p, k) and stress (r, k) by the form's variables; None if one has none."""
         form, path, x = self.form, state.path, z[: self.form.size]
 
@@ -283,7 +287,7 @@ class StripProgram(DesignProgram):
         if form.width is None and self.task.material.wide:
             steps.append((form.size - 1, _DIFFERENCE_STEP * float(x[-1])))
         for k, step in steps:
-            by = self._by_difference(z, k, step, state)
+            by = self._differentiate_by_difference(z, k, step, state)
             if by is None:
                 return None
             force.append(by[0][:, None])
@@ -293,7 +297,9 @@ class StripProgram(DesignProgram):
             stress.append(np.zeros((len(state.stress), 1)))
         return np.concatenate(force, axis=1), np.concatenate(stress, axis=1)
 
-    def _by_difference(self, z: FloatArray, k: int, nudge: float, state: State) -> tuple[FloatArray, FloatArray] | None:
+    def _differentiate_by_difference(
+        self, z: FloatArray, k: int, nudge: float, state: State
+    ) -> tuple[FloatArray, FloatArray] | None:
         """Return the derivatives by one variable by a difference of neighbouring equilibria; None if there is none.
 
         It is central, but where only one neighbour has equilibria. Beside a strip with a station at the end of one of
@@ -317,10 +323,10 @@ class StripProgram(DesignProgram):
                     (nudge, beside),
                     (2.0 * nudge, solve_near_known_path(beside, build_shifted(2.0 * nudge), drive)),
                 ]
-        found = [pair for pair in paths if pair[1].status is PathStatus.COMPLETE]
-        if len(found) < 2:
+        complete = [pair for pair in paths if pair[1].status is PathStatus.COMPLETE]
+        if len(complete) < 2:
             return None
-        (first, low), (last, high) = found[-2:]
+        (first, low), (last, high) = complete[-2:]
         before, after = self._build_state(low), self._build_state(high)
         return (after.force - before.force) / (last - first), (after.stress - before.stress) / (last - first)
 
@@ -328,7 +334,7 @@ class StripProgram(DesignProgram):
         """Return the strip that is pressed along a path."""
         return State(path, path.effort[path.at_requested], stress_places(path, self.spots))
 
-    def _by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
+    def _differentiate_by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives by the stroke in cm: all points move with it, and the stress with its point."""
         travel, at = self.travel(z), state.path.at_requested
         first, last = np.sqrt(self.task.start), np.sqrt(self.stroke(z))
@@ -388,7 +394,7 @@ def stress_places(
     place = sections.place[0].reshape(-1, N_PLACES)
     tops = [_tops(sections.bending_stress[k], sections.axial_stress[k], place, breaks) for k in last]
     between = interpolation(spots[-N_STRESS_POINTS:], np.linspace(spots[-N_STRESS_POINTS], spots[-1], N_STRESS_PLACES))
-    return Watched(np.array([one[0] for one in tops]), np.array([one[1] for one in tops]), between)
+    return Watched(np.array([top[0] for top in tops]), np.array([top[1] for top in tops]), between)
 
 
 def _tops(bending: FloatArray, axial: FloatArray, place: FloatArray, breaks: FloatArray) -> FloatArray:
@@ -402,20 +408,20 @@ def _tops(bending: FloatArray, axial: FloatArray, place: FloatArray, breaks: Flo
     first = np.clip(best - N_STENCIL_POINTS // 2, 0, shape[1] - N_STENCIL_POINTS)
     rows = (lines * shape[1] + first)[:, None] + np.arange(N_STENCIL_POINTS)
     bend, pull = (np.sign(part.reshape(shape)[lines, best])[:, None] for part in (bending, axial))
-    near = bend * bending[rows] + pull * axial[rows]
-    weights = interpolation(_STENCIL_NODES, _top(near, best - first))
-    height = (weights * near).sum(axis=1)
+    around = bend * bending[rows] + pull * axial[rows]
+    weights = interpolation(_STENCIL_NODES, _top(around, best - first))
+    height = (weights * around).sum(axis=1)
     piece = np.searchsorted(breaks, place.mean(axis=1)) - 1
     chosen = [max(np.flatnonzero(piece == k), key=lambda line: height[line]) for k in range(len(breaks) - 1)]
-    found = np.zeros((2, len(chosen), len(bending)))
-    for sign, matrix in zip((bend, pull), found, strict=True):
+    rows_of_tops = np.zeros((2, len(chosen), len(bending)))
+    for sign, matrix in zip((bend, pull), rows_of_tops, strict=True):
         np.put_along_axis(matrix, rows[chosen], (sign * weights)[chosen], axis=1)
-    return found
+    return rows_of_tops
 
 
-def _top(near: FloatArray, best: Any) -> FloatArray:
+def _top(around: FloatArray, best: Any) -> FloatArray:
     """Return where polynomials through nine values (n, 9) are highest beside their highest value; Newton's method."""
-    slope = near @ _SLOPE_WEIGHTS.T
+    slope = around @ _SLOPE_WEIGHTS.T
     curve = slope @ _SLOPE_WEIGHTS.T
     low, high = np.maximum(best - 1.0, 0.0), np.minimum(best + 1.0, N_STENCIL_POINTS - 1.0)
     at: FloatArray = 0.5 * (low + high)

@@ -91,7 +91,7 @@ def uniform_thickness(task: StripTask, width: float, guess: float = INITIAL_THIC
 
     The force follows the third power of the thickness but for stretching and shear: a few corrections do.
     """
-    program = _of_one_thickness(task, width)
+    program = _make_uniform_program(task, width)
 
     def step(thickness: float) -> float | None:
         state = program.state(np.array([thickness / METRES_PER_MM, 1.0]))
@@ -100,8 +100,8 @@ def uniform_thickness(task: StripTask, width: float, guess: float = INITIAL_THIC
         wanted = np.asarray(task.share(program.travel(np.array([thickness / METRES_PER_MM, 1.0]))))
         return float((0.5 * task.force * (wanted.max() + wanted.min()) / _level(state)) ** (1.0 / 3.0))
 
-    found = _iterate_thickness(step, guess)
-    return guess if found is None else found
+    iterated = _iterate_thickness(step, guess)
+    return guess if iterated is None else iterated
 
 
 def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
@@ -116,7 +116,7 @@ def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
 
     def step(thickness: float) -> float | None:
         nonlocal width
-        state = _of_one_thickness(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
+        state = _make_uniform_program(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
         if state is None:
             return None
         factor = limit / _peak(state)
@@ -137,7 +137,7 @@ def uniform_for_width(task: StripTask, width: float) -> tuple[float, float] | No
 
     def step(thickness: float) -> float | None:
         nonlocal worst
-        state = _of_one_thickness(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
+        state = _make_uniform_program(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
         if state is None:
             return None
         worst = _peak(state)
@@ -160,7 +160,7 @@ def _iterate_thickness(step: Callable[[float], float | None], guess: float) -> f
     return thickness
 
 
-def _of_one_thickness(task: StripTask, width: float) -> StripProgram:
+def _make_uniform_program(task: StripTask, width: float) -> StripProgram:
     """Return the program of strips of one thickness and of a width [m], over the travel of a task."""
     return StripProgram(replace(task, goal="ripple"), Form(1, width=width))
 
@@ -227,26 +227,26 @@ def search(
     outcome = run_stage(Stage(OneStart(work.descend, clock), tuple(range(starts)), identity), means, clock, tell)
     if not outcome.records:
         return _nothing(outcome.lost)
-    found = [_with_its_ripple(work.read(outcome.records[number])) for number in sorted(outcome.records)]
-    best = min(found, key=lambda one: _rank(one.descent))
+    strips = [_with_its_ripple(work.read(outcome.records[number])) for number in sorted(outcome.records)]
+    best = min(strips, key=lambda strip: _rank(strip.descent))
     if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM):
-        best = min(filter(None, (best, _tighten_band(work))), key=lambda one: _rank(one.descent))
+        best = min(filter(None, (best, _tighten_band(work))), key=lambda strip: _rank(strip.descent))
     return replace(best, lost=outcome.lost)
 
 
-def _with_its_ripple(found: FoundStrip) -> FoundStrip:
+def _with_its_ripple(strip: FoundStrip) -> FoundStrip:
     """Return a strip with the ripple that it has, where a search for the smallest one ended with a smaller number.
 
     Such a search may stop on its way; no ripple is too large for it, and the strip is one.
     """
-    descent, program = found.descent, found.program
-    if found.task.goal != "ripple" or descent.feasible or (seen := program.evaluate(descent.z, False)) is None:
-        return found
+    descent, program = strip.descent, strip.program
+    if strip.task.goal != "ripple" or descent.feasible or (seen := program.evaluate(descent.z, False)) is None:
+        return strip
     z = descent.z.copy()
     z[-1] -= min(float(rows.values.min()) for rows in seen.rows if rows.name == "band")
     if z[-1] > MOST_RIPPLE or (answer := program.values(z)) is None:
-        return found
-    return replace(found, descent=replace(descent, z=z, objective=answer[0], constraints=answer[1]))
+        return strip
+    return replace(strip, descent=replace(descent, z=z, objective=answer[0], constraints=answer[1]))
 
 
 def _nothing(lost: tuple[str, ...]) -> Design:
@@ -281,8 +281,8 @@ def _climb(start: StripStarts, steps: tuple[int, ...], factors: FloatArray | Non
         x[: steps[0]] *= factors
     for count in steps:
         now = replace(form, count=count)
-        own = len(x) - (form.size - form.count)
-        x = np.concatenate([_refine_nodes(x[:own], count), x[own:]])
+        n_sizes = len(x) - (form.size - form.count)
+        x = np.concatenate([_refine_nodes(x[:n_sizes], count), x[n_sizes:]])
         coarse = count < steps[-1]
         goal = replace(task, ripple=max(task.ripple, COARSE_RIPPLE)) if coarse else task
         program = StripProgram(goal, now)
@@ -336,16 +336,16 @@ def _begin(
 
 def _first_goal(task: StripTask, uniform: Optimum | None) -> float:
     if task.goal == "stroke":
-        known = None if uniform is None or not np.isfinite(uniform.violation) else float(uniform.z[-1])
-        return known if known is not None else 100.0 * task.stroke
+        width = None if uniform is None or not np.isfinite(uniform.violation) else float(uniform.z[-1])
+        return width if width is not None else 100.0 * task.stroke
     return 2.0
 
 
 def _bounds(task: StripTask, ranges: Ranges, form: Form, count: int) -> FloatArray:
     """Return the bounds of a search with another number of thicknesses, and of its goal."""
-    own = ranges.form
-    thickness = own[: form.count] if count == form.count else np.tile(own[0], (count, 1))
-    rows = np.concatenate([thickness, own[form.count :]])
+    ends = ranges.form
+    thickness = ends[: form.count] if count == form.count else np.tile(ends[0], (count, 1))
+    rows = np.concatenate([thickness, ends[form.count :]])
     if task.goal == "rms":
         return rows
     goal = (
@@ -358,20 +358,20 @@ def _bounds(task: StripTask, ranges: Ranges, form: Form, count: int) -> FloatArr
 
 def _uniform(task: StripTask, form: Form, ranges: Ranges, clock: Clock) -> Optimum | None:
     """Return the best strip of one thickness."""
-    own = ranges.form
-    width = form.width or float(own[-1].mean()) * METRES_PER_MM
-    first = uniform_thickness(task, width, float(own[0].mean()) * METRES_PER_MM) / METRES_PER_MM
+    ends = ranges.form
+    width = form.width or float(ends[-1].mean()) * METRES_PER_MM
+    first = uniform_thickness(task, width, float(ends[0].mean()) * METRES_PER_MM) / METRES_PER_MM
     program = StripProgram(replace(task, ripple=max(task.ripple, COARSE_RIPPLE)), Form(1, width=width))
     last = [100.0 * task.stroke] if task.goal == "stroke" else [2.0]
-    bounds = _bounds(task, Ranges(own[:1], ranges.longest), Form(1, width=width), 1)
+    bounds = _bounds(task, Ranges(ends[:1], ranges.longest), Form(1, width=width), 1)
     start = np.array([first, *last]) if program.extra else np.array([first])
-    found = descend(program, start, bounds, clock=clock)
-    return None if found.ending is SearchEnding.NO_ANSWER else found
+    descent = descend(program, start, bounds, clock=clock)
+    return None if descent.ending is SearchEnding.NO_ANSWER else descent
 
 
-def infeasible(found: FoundStrip) -> Design:
+def infeasible(strip: FoundStrip) -> Design:
     """Return what the nearest strip misses, and the target that it would meet."""
-    descent, program, task = found.descent, found.program, found.task
+    descent, program, task = strip.descent, strip.program, strip.task
     if descent.ending is SearchEnding.NO_ANSWER:
         why = "could not begin: the first strip has no equilibrium over 'design.travel'; reduce it, or "
         why += "for other ranges in 'design.beam'"

@@ -106,8 +106,8 @@ def signs(curves: Monotone, start: FloatArray) -> NDArray[np.int8]:
     """Return the signs of the efforts, (m, k): 0 in the unloaded position and where only rounding is left."""
     scale = np.nanmax(np.abs(curves.value), axis=1, initial=0.0, keepdims=True)
     sign = np.sign(curves.value).astype(np.int8)
-    near = EFFORT_RTOL * np.maximum(np.ptp(curves.place, axis=1, keepdims=True), 1e-300)
-    sign[(np.abs(curves.value) <= EFFORT_RTOL * scale) | (np.abs(curves.place - start) <= near)] = 0
+    same_place = EFFORT_RTOL * np.maximum(np.ptp(curves.place, axis=1, keepdims=True), 1e-300)
+    sign[(np.abs(curves.value) <= EFFORT_RTOL * scale) | (np.abs(curves.place - start) <= same_place)] = 0
     return sign
 
 
@@ -115,10 +115,10 @@ def _equilibria(curves: Monotone, start: FloatArray) -> tuple[NDArray[np.intp], 
     """Return the numbers of stable and unstable equilibria, those at the ends included."""
     sign = signs(curves, start)
     ends = sign[:, [0]] == 0, sign[:, [-1]] == 0
-    known = _fill_zeros(sign)
-    ups = ((known[:, :-1] < 0) & (known[:, 1:] > 0)).sum(axis=1)
-    downs = ((known[:, :-1] > 0) & (known[:, 1:] < 0)).sum(axis=1)
-    first, last = known[:, 0], known[:, -1]
+    filled = _fill_zeros(sign)
+    ups = ((filled[:, :-1] < 0) & (filled[:, 1:] > 0)).sum(axis=1)
+    downs = ((filled[:, :-1] > 0) & (filled[:, 1:] < 0)).sum(axis=1)
+    first, last = filled[:, 0], filled[:, -1]
     # At an end of the interval the effort on the inner side alone says whether the equilibrium is stable.
     ups = ups + (ends[0][:, 0] & (first > 0)) + (ends[1][:, 0] & (last < 0))
     downs = downs + (ends[0][:, 0] & (first < 0)) + (ends[1][:, 0] & (last > 0))
@@ -176,10 +176,10 @@ def _highest(function: Callable[[FloatArray], FloatArray], low: Any, high: Any) 
         places = low + step * np.arange(count)
         values = function(places)
         top = values.argmax(axis=1)[:, None]
-        here = np.take_along_axis(np.broadcast_to(places, values.shape), top, 1)
-        found = np.take_along_axis(values, top, 1)[:, 0]
-        best = np.where(np.isinf(best) & (count < N_SAMPLES), best, found)
-        low, high = np.maximum(low, here - step), np.minimum(high, here + step)
+        place = np.take_along_axis(np.broadcast_to(places, values.shape), top, 1)
+        highest = np.take_along_axis(values, top, 1)[:, 0]
+        best = np.where(np.isinf(best) & (count < N_SAMPLES), best, highest)
+        low, high = np.maximum(low, place - step), np.minimum(high, place + step)
     return np.where(np.isfinite(best), np.maximum(best, 0.0), best)
 
 

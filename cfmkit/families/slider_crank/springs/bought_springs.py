@@ -26,7 +26,7 @@ from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.made_to_measure import PIN_SHARE
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, Offer, guide_rod_for, nearest
 from cfmkit.stock.springs.spec import offers, support_of, wire_of
-from cfmkit.stock.springs.stress_and_life import SpringInUse, in_the_sense_of_the_larger
+from cfmkit.stock.springs.stress_and_life import SpringInUse, orient_to_larger
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -138,7 +138,7 @@ def least_deviation(task: SpringTask, goal: RateGoal, window: tuple[float, float
 def _sets(goal: RateGoal, options: list[SpringOption], count: int) -> list[Chosen]:
     """Return the sets of options that hold the target best."""
     least = np.zeros(len(JOINT_NAMES)) if goal.lower is None else goal.lower
-    at = [_by_rate(options, joint, low) for joint, low in enumerate(least.tolist())]
+    at = [_group_by_rate(options, joint, low) for joint, low in enumerate(least.tolist())]
     ranked = best_sets(goal, [np.array(sorted(joint_options)) for joint_options in at], count)
     return [
         Chosen(
@@ -154,7 +154,7 @@ def _sets(goal: RateGoal, options: list[SpringOption], count: int) -> list[Chose
     ]
 
 
-def _by_rate(options: list[SpringOption], joint: int, least: float) -> dict[float, SpringOption | None]:
+def _group_by_rate(options: list[SpringOption], joint: int, least: float) -> dict[float, SpringOption | None]:
     """Return what gives each rate that a joint may have: of equal ones the fewest springs, and none for zero."""
     joint_options = sorted((option for option in options if option.joint == joint), key=lambda option: option.count)
     by_rate: dict[str, SpringOption | None] = {} if least > 0 else {"0": None}
@@ -190,7 +190,7 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
         cap = getattr(wanted.max_rates, name, None) if wanted.max_rates else None
         for offer in offers(wanted.catalogue or (), *kinds):
             label = f"{offer.name} at the {name.replace('_', ' ')}"
-            ends = in_the_sense_of_the_larger(float(high[joint]), float(low[joint]))
+            ends = orient_to_larger(float(high[joint]), float(low[joint]))
             reason = _why_not(offer, ends, wanted) or _binds(offer, max(map(abs, ends)), task.spec.mechanism.pins)
             if reason is not None:
                 refused.append(Miss(label, *reason))

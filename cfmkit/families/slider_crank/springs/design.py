@@ -72,9 +72,9 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         return Design(None, Status.INVALID, "this spec has no 'design' block: add 'torque' or 'force', and a window")
     solved, search = _search_lengths(spec, wanted, run)
     solved = _compensate_friction(solved)
-    found = _make_design(solved, search)
+    design = _make_design(solved, search)
     others = range(N_NEXT_SETS if solved.bought else 0)
-    return replace(found, next_best=tuple(partial(_with_next, solved, rank) for rank in others))
+    return replace(design, next_best=tuple(partial(_with_next, solved, rank) for rank in others))
 
 
 @refusals_answered
@@ -84,9 +84,11 @@ def _with_next(solved: Solved, rank: int) -> Design:
     sets = [] if goal is None else next_sets(solved.task, goal, solved.window, N_NEXT_SETS)
     if goal is None or rank >= len(sets):
         return no_design(finding("no_spring_fits", "no other springs of the catalogue hold the target"))
-    one = sets[rank]
-    rms = goal.rms(one.rates)
-    bought = replace(solved, rates=one.rates, deviation=one.deviation, rms=rms, bought=one.options, exact=False)
+    chosen = sets[rank]
+    rms = goal.rms(chosen.rates)
+    bought = replace(
+        solved, rates=chosen.rates, deviation=chosen.deviation, rms=rms, bought=chosen.options, exact=False
+    )
     return _make_design(bought, None)
 
 
@@ -145,8 +147,8 @@ def _keep_if_audited(solved: Solved) -> Solved:
 
 def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Solved, Lowest | None]:
     """Return the best design, and the search that led to its lengths."""
-    given = {name: ends for name in FREE_LENGTH_KEYS if (ends := getattr(wanted, name)) is not None}
-    axes = {name: BoxAxis(low, high, log=name != "offset") for name, (low, high) in given.items()}
+    ranges = {name: ends for name in FREE_LENGTH_KEYS if (ends := getattr(wanted, name)) is not None}
+    axes = {name: BoxAxis(low, high, log=name != "offset") for name, (low, high) in ranges.items()}
     if not axes:
         return solve(task_of(spec)), None
 
@@ -161,13 +163,13 @@ def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tup
         return value
 
     grid, fine = GRID_SIZES["widest" if wanted.window is None else wanted.objective]
-    found = lowest(height, tuple(axes.values()), grid if len(axes) < 3 else min(grid, 7), fine)
-    if not math.isfinite(found.value):
+    best_lengths = lowest(height, tuple(axes.values()), grid if len(axes) < 3 else min(grid, 7), fine)
+    if not math.isfinite(best_lengths.value):
         names = " or ".join(f"'design.{name}'" for name in axes)
         text = f"no lengths in the ranges given reach the window within the limits of the joints; widen {names}"
         raise finding.infeasible("infeasible_targets", text)
-    place = even_best(spec, tuple(axes), found) if wanted.slack else found.place
-    return solve(task_of(with_lengths(spec, dict(zip(axes, place, strict=True))))), found
+    place = even_best(spec, tuple(axes), best_lengths) if wanted.slack else best_lengths.place
+    return solve(task_of(with_lengths(spec, dict(zip(axes, place, strict=True))))), best_lengths
 
 
 def _height(spec: SliderCrankSpec, lengths: dict[str, float], best: float) -> float:
@@ -181,8 +183,8 @@ def _height(spec: SliderCrankSpec, lengths: dict[str, float], best: float) -> fl
         return math.inf
     wanted = task.wanted
     if wanted.window is None:
-        found = widest(task, wanted.tolerance or 0.0)
-        return math.inf if found is None else -found.width
+        window = widest(task, wanted.tolerance or 0.0)
+        return math.inf if window is None else -window.width
     first, last = task.allowed
     if wanted.window[0] < first - 1e-9 or wanted.window[1] > last + 1e-9:
         return math.inf
@@ -213,10 +215,10 @@ def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
     """
     wanted, proven = task.wanted, True
     if wanted.window is None:
-        found, proven = widest_of_all(task, tolerance or wanted.tolerance or 0.0)
-        if found is None:
+        fitted, proven = widest_of_all(task, tolerance or wanted.tolerance or 0.0)
+        if fitted is None:
             raise Infeasible(nowhere(task))
-        window = found.low, found.high
+        window = fitted.low, fitted.high
     else:
         window = wanted.window
         check_reach(task, window)
@@ -323,10 +325,10 @@ def chosen_rates(goal: RateGoal, best: FloatArray, wanted: CrankDesign, toleranc
     if wanted.prefer == "small-rotation":  # a matter of lengths only
         return best
     least, most = goal.deviation(best), math.inf if tolerance is None else tolerance
-    found = choose_preferred(
+    preferred = choose_preferred(
         goal, min(least + wanted.slack, max(least, most * (1.0 - TOLERANCE_RESERVE))), wanted.prefer
     )
-    return best if found is None or goal.deviation(found) > max(least, most) else found
+    return best if preferred is None or goal.deviation(preferred) > max(least, most) else preferred
 
 
 def even_best(spec: SliderCrankSpec, names: tuple[str, ...], search: Lowest) -> tuple[float, ...]:
@@ -364,7 +366,7 @@ def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
     """Return how far rates and lengths may move without harm, if they may move far."""
     if solved.bought:
         return ()
-    reported = [text for text in (_of_lengths(solved, search), _of_rates(solved)) if text]
+    reported = [text for text in (_find_length_range(solved, search), _find_rate_ranges(solved)) if text]
     if not reported:
         return ()
     wanted = solved.task.wanted
@@ -374,7 +376,7 @@ def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
     return (finding("near_optima", text),)
 
 
-def _of_rates(solved: Solved) -> str:
+def _find_rate_ranges(solved: Solved) -> str:
     """Return the range of each rate with nearly the same deviation; empty if all are well determined."""
     goal = solved.task.goal(solved.window, N_PROGRAMME_PLACES)
     if goal is None:
@@ -392,7 +394,7 @@ def _of_rates(solved: Solved) -> str:
     return ", ".join(reported) if len(reported) > 1 else ""
 
 
-def _of_lengths(solved: Solved, search: Lowest | None) -> str:
+def _find_length_range(solved: Solved, search: Lowest | None) -> str:
     """Return the range of the first free length with nearly the same deviation; empty if it is well determined."""
     wanted = solved.task.wanted
     if search is None or wanted.window is None:

@@ -56,15 +56,15 @@ def audit(solved: Solved, spec: SliderCrankSpec) -> Solved:
     if not result.curves or not (result.target or followed):
         return solved
     names = ("deviation_from_curve", "rms_to_curve") if followed else ("deviation_from_target", "rms_to_target")
-    way = ""
+    branch = ""
     if solved.task.assembly.rubbing.there:
-        way = solved.task.wanted.branch or "mean"
-        if way == "mean":  # no way of the curve is the mean of both
+        branch = solved.task.wanted.branch or "mean"
+        if branch == "mean":  # no way of the curve is the mean of both
             return solved
-        way = f"[{way}]"
+        branch = f"[{branch}]"
     (largest,), (rms,) = (
-        measure_metrics(result, solved.judged, f"{names[0]}{way}"),
-        measure_metrics(result, solved.window, f"{names[1]}{way}"),
+        measure_metrics(result, solved.judged, f"{names[0]}{branch}"),
+        measure_metrics(result, solved.window, f"{names[1]}{branch}"),
     )
     if largest is None or rms is None:
         return solved
@@ -114,8 +114,8 @@ def nowhere(task: SpringTask) -> Finding:
         text = "no springs come closer to 'design.target' than having none at all"
         return finding("infeasible_targets", f"{text}; change it, its window, or 'design.springs'")
     if goal is not None and task.assembly.drive == "torque" and (goal.matrix[:, :3] <= 0.0).all():
-        other = format_short(-task.wanted.size, "torque")
-        text = f"in the window torsion springs turn the crank the other way; request 'design.torque: {other}'"
+        reversed_torque = format_short(-task.wanted.size, "torque")
+        text = f"in the window torsion springs turn the crank the other way; request 'design.torque: {reversed_torque}'"
         return finding("infeasible_targets", text)
     if "slider" not in task.wanted.springs and task.assembly.drive == "torque":
         text = "torsion springs alone give no constant torque next to the stretched position; "
@@ -153,9 +153,9 @@ def too_far(task: SpringTask, deviation: float) -> tuple[Finding, dict[str, str]
     allowed = f"'design.tolerance' allows {percent(wanted.tolerance or 0)}"
     text = f"the best springs are off by {percent(deviation)}, and {allowed}"
     text += f"; allow more, or narrow 'design.{task.assembly.motion_name}'"
-    found = widest(task, wanted.tolerance or 0.0)
-    if found is not None:
-        low, high = (format_short(end, task.assembly.dimension) for end in (found.low, found.high))
+    widest_window = widest(task, wanted.tolerance or 0.0)
+    if widest_window is not None:
+        low, high = (format_short(end, task.assembly.dimension) for end in (widest_window.low, widest_window.high))
         nearest[f"design.{task.assembly.motion_name}"] = f"[{low}, {high}]"
         text += f": a window that keeps it is {low} to {high}"
     return finding("infeasible_targets", text), nearest
@@ -177,7 +177,7 @@ def active_bounds(solved: Solved, wanted: CrankDesign) -> tuple[str, ...]:
 
 def describe_springs(solved: Solved) -> tuple[Finding, ...]:
     """Return what to say about springs that are not needed, and about those that would like to be stiffer."""
-    found, wanted = [], solved.task.wanted
+    warnings, wanted = [], solved.task.wanted
     if solved.bought:
         return ()  # which joint gets none is the choice of the catalogue's springs
     gone = [
@@ -185,15 +185,15 @@ def describe_springs(solved: Solved) -> tuple[Finding, ...]:
     ]
     if gone:
         names = " and ".join(name.replace("_", " ") for name in gone)
-        found.append(finding("spring_dropped", f"the best rate at {names} is zero: no spring is needed there"))
+        warnings.append(finding("spring_dropped", f"the best rate at {names} is zero: no spring is needed there"))
     at_cap = [path for path in active_bounds(solved, wanted) if "max_rates" in path]
     if at_cap:
-        found.append(
+        warnings.append(
             finding(
                 "spring_at_bound", f"{' and '.join(at_cap)} limits the design: a larger value would give a better one"
             )
         )
-    return tuple(found)
+    return tuple(warnings)
 
 
 def not_proven(solved: Solved, of_lengths: bool) -> Finding:

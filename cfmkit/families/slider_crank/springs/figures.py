@@ -250,12 +250,12 @@ def energy(result: Result) -> Figure:
 
 
 def _name_wells(ax: Axes, solution: Solution) -> None:
-    dimension, found = motion_scale(solution).dimension, []
+    dimension, labels = motion_scale(solution).dimension, []
     for item in solution.equilibria:
         place = float(to_border(item.motion, dimension)), float(to_border(item.energy, "energy"))
         text = f"{'stable' if item.stable else 'unstable'} pose at {value_text(item.motion, dimension)}"
-        found.append(Label(text, TEXT_INK if item.stable else TEXT_GREY, np.array([place]), toward=(0.0, 1.0)))
-    place_labels(ax, found)
+        labels.append(Label(text, TEXT_INK if item.stable else TEXT_GREY, np.array([place]), toward=(0.0, 1.0)))
+    place_labels(ax, labels)
 
 
 @apply_style
@@ -263,14 +263,14 @@ def springs(result: Result) -> Figure:
     """Return the effort of each spring over the motion, and the stiffness of all."""
     solution: Solution = result.state
     drive, over = solution.drive, motion_scale(solution)
-    there = [k for k in range(4) if solution.assembly.rates[k] > 0.0]
+    joints = [k for k in range(4) if solution.assembly.rates[k] > 0.0]
     series = [
         Series(
             solution.spring_efforts[k, 0], JOINT_NAMES[k].replace("_", " "), SPRING_COLOURS[k], prefer=0.9 - 0.12 * n
         )
-        for n, k in enumerate(there)
+        for n, k in enumerate(joints)
     ]
-    if len(there) > 1:
+    if len(joints) > 1:
         series.insert(0, Series(solution.effort[0], "all springs", TEXT_INK, prefer=0.7))
     rate = "rotational_stiffness" if drive == "torque" else "stiffness"
     slope = [Series(solution.stiffness[0], "", TEXT_INK)]
@@ -376,15 +376,15 @@ def _names(solution: Solution, key: KeyPosition, view: PanelView) -> list[Label]
     """Return the names of the parts."""
     crank = np.linspace(0.2, 0.8, 20)[:, None] * np.array(key.crank_pin)
     coupler = key.crank_pin + np.linspace(0.3, 0.8, 20)[:, None] * (np.array(key.slider_pin) - key.crank_pin)
-    found = [
+    labels = [
         parts.part_name("crank", crank, (0.3, -1.0)),
         parts.part_name("coupler", coupler, (0.0, 1.0)),
         parts.part_name("slider", [key.slider_pin], (0.0, -1.0)),
     ]
     if solution.drive == "force":
         tail = np.array([key.slider_pin[0] + 1.8 * view.size * solution.assembly.linkage.branch, key.slider_pin[1]])
-        found.append(parts.part_name("F", [tail], (0.0, 1.0), LINE_VERMILLION))
-    return found
+        labels.append(parts.part_name("F", [tail], (0.0, 1.0), LINE_VERMILLION))
+    return labels
 
 
 def moving(result: Result) -> Moving:
@@ -406,7 +406,7 @@ def draw_as_made(result: Result, key: KeyPosition, ax: Axes, view: PanelView) ->
     spec: Any = result.spec
     half, hole = eye_and_hole(spec)
     rates, offset = solution.assembly.rates, solution.assembly.linkage.offset
-    way = np.array(
+    slider_path = np.array(
         [
             [at, offset]
             for at in (solution.unit_spring_curves.position.min(), solution.unit_spring_curves.position.max())
@@ -415,7 +415,7 @@ def draw_as_made(result: Result, key: KeyPosition, ax: Axes, view: PanelView) ->
     for held in hardware(spec, solution).bodies:
         outline = held.outline()
         parts.edge(ax, np.vstack([outline, outline[:1]]), held.name, color=TEXT_GREY, linewidth=0.6)
-    parts.edge(ax, way, "guide", color=TEXT_GREY, linewidth=0.6)
+    parts.edge(ax, slider_path, "guide", color=TEXT_GREY, linewidth=0.6)
     parts.slider(ax, key.slider_pin, 2.0 * half)
     *links, pivot, crank_pin, slider_pin = bodies(spec, solution, solution.assembly.units(np.array([key.motion])))
     for link in links:

@@ -137,7 +137,7 @@ def _rests_again(solution: Solution) -> Any:
 
 
 def _again(solution: Solution) -> Sentence:
-    rests = [one.motion for one in solution.equilibria if one.stable]
+    rests = [equilibrium.motion for equilibrium in solution.equilibria if equilibrium.stable]
     again = _same_poses(rests)
     different = len(set(rests) - {second for _, second in again})
     return (
@@ -191,8 +191,8 @@ def _run_in_end(solution: Solution) -> str:
     assembly, end = solution.assemblies[0], float(solution.motion[0, -1])
     motion = np.geomspace(1e-9, 1.0, 400) * end
     force = assembly.efforts(motion)
-    there = np.flatnonzero(force >= 0.95 * float(np.interp(0.5 * end, motion, force)))
-    return f"within {mm(float(motion[there[0]]))} it reaches 95 %" if len(there) else "it never reaches 95 %"
+    reaching = np.flatnonzero(force >= 0.95 * float(np.interp(0.5 * end, motion, force)))
+    return f"within {mm(float(motion[reaching[0]]))} it reaches 95 %" if len(reaching) else "it never reaches 95 %"
 
 
 def _run_in_in_short(solution: Solution) -> str:
@@ -213,8 +213,8 @@ def _nears_pole(solution: Solution) -> Any:
     if solution.drive != "force":
         return False
     end, span = solution.column(lambda assembly: assembly.reach[0]), solution.high - solution.low
-    near = (solution.low < end + 0.01 * span) & (end < -1e-9 * span)
-    return (np.abs(_knee(solution)) >= RUN_IN) & near[:, 0]
+    is_near = (solution.low < end + 0.01 * span) & (end < -1e-9 * span)
+    return (np.abs(_knee(solution)) >= RUN_IN) & is_near[:, 0]
 
 
 def _pole(solution: Solution) -> Sentence:
@@ -397,4 +397,8 @@ def rules_of(solution: Solution) -> tuple[Rule, ...]:
     if not solution.assemblies[0].rates.any():
         return (NO_SPRING,)
     springs = solution.spec.mechanism.springs.bought
-    return (*FINDING_RULES, *(_fails(*one) for one in enumerate(springs)), *(_overturns(joint) for joint in range(4)))
+    return (
+        *FINDING_RULES,
+        *(_fails(*number_and_spring) for number_and_spring in enumerate(springs)),
+        *(_overturns(joint) for joint in range(4)),
+    )

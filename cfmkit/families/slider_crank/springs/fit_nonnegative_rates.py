@@ -76,10 +76,10 @@ def minimax(goal: RateGoal) -> FloatArray | None:
         np.linspace(0, count - 1, count if count <= MAX_PROGRAMME_PLACES else N_FIRST_PLACES).round().astype(int)
     )
     while True:
-        found = _minimax(goal.select_rows(rows))
-        if found is None:
+        fit = _minimax(goal.select_rows(rows))
+        if fit is None:
             return None
-        rates, deviation = found
+        rates, deviation = fit
         residual = np.abs(goal.residual(rates))
         worse = _peaks(residual, deviation * (1 + 1e-9) + 1e-15)
         more = np.union1d(rows, worse)
@@ -134,12 +134,12 @@ def _peaks(residual: FloatArray, level: float) -> Any:
 
 
 def _minimax(goal: RateGoal) -> tuple[FloatArray, float] | None:
-    found = _smallest_deviation(goal)
-    if found is None:
+    smallest = _smallest_deviation(goal)
+    if smallest is None:
         return None
-    rates, unit = found[0], goal.deviation(found[0])
+    rates, unit = smallest[0], goal.deviation(smallest[0])
     if not 0.0 < unit < MIN_RESOLVED_DEVIATION:
-        return found
+        return smallest
     more = _smallest_deviation(_enlarge_goal(goal, rates, unit))
     if more is not None:
         rates = rates + more[0] * unit
@@ -179,8 +179,8 @@ def _solve_programme(
 
     scales = goal.scales()
     matrix = goal.matrix / scales
-    one = np.ones((len(goal.wanted), 1))
-    rows = np.vstack([np.hstack([matrix, -one]), np.hstack([-matrix, -one])])
+    ones = np.ones((len(goal.wanted), 1))
+    rows = np.vstack([np.hstack([matrix, -ones]), np.hstack([-matrix, -ones])])
     bounds = [
         (low * scale, None if top is None else top * scale)
         for (low, top), scale in zip(goal.bounds, scales, strict=True)
@@ -194,9 +194,9 @@ def _solve_programme(
         row, least = _normalise_row(goal.least[0] / scales, goal.least[1])
         rows = np.vstack([rows, np.append(-row, 0.0)[None]])
         limits = np.append(limits, -least)
-    found = linprog(cost, A_ub=rows, b_ub=limits, bounds=[*bounds, (0.0, worst)], method="highs", **equal)
+    solved = linprog(cost, A_ub=rows, b_ub=limits, bounds=[*bounds, (0.0, worst)], method="highs", **equal)
     lowest = np.array([*(low for low, _ in bounds), 0.0])
-    return None if found.status != 0 or found.x is None else np.maximum(found.x, lowest)
+    return None if solved.status != 0 or solved.x is None else np.maximum(solved.x, lowest)
 
 
 def _normalise_row(row: FloatArray, value: float) -> tuple[FloatArray, float]:
@@ -217,13 +217,15 @@ def least_squares(goal: RateGoal) -> FloatArray | None:
         )
         more = least_squares(above)
         return None if more is None else more + goal.lower
-    scales, there = goal.scales(), goal.upper > 0.0
+    scales, is_used = goal.scales(), goal.upper > 0.0
     matrix, scaled = goal.matrix / scales, np.zeros(len(goal.upper))
-    if np.isinf(goal.upper[there]).all():
-        scaled[there], _ = nnls(matrix[:, there], goal.wanted)
+    if np.isinf(goal.upper[is_used]).all():
+        scaled[is_used], _ = nnls(matrix[:, is_used], goal.wanted)
     else:
-        found = lsq_linear(matrix[:, there], goal.wanted, (0.0, (goal.upper * scales)[there]), method="bvls", tol=1e-14)
-        scaled[there] = found.x
+        solved = lsq_linear(
+            matrix[:, is_used], goal.wanted, (0.0, (goal.upper * scales)[is_used]), method="bvls", tol=1e-14
+        )
+        scaled[is_used] = solved.x
     rates: FloatArray = scaled / scales
     return rates
 
@@ -264,15 +266,15 @@ def _free_least_squares(
 def ranges(goal: RateGoal, worst: float) -> FloatArray:
     """Return the smallest and the largest rate of each spring, (m, 2), with no deviation above `worst`."""
     count = goal.matrix.shape[1]
-    found = np.full((count, 2), np.nan)
+    ranges = np.full((count, 2), np.nan)
     for k in range(count):
         for end, sign in enumerate((1.0, -1.0)):
             cost = np.zeros(count + 1)
             cost[k] = sign
             solved = _solve_programme(goal, cost, worst)
             if solved is not None:
-                found[k, end] = solved[k] / goal.scales()[k]
-    return found
+                ranges[k, end] = solved[k] / goal.scales()[k]
+    return ranges
 
 
 def choose_preferred(
@@ -314,10 +316,10 @@ def _most_even(goal: RateGoal, worst: float) -> FloatArray | None:
         row, held = _normalise_row(goal.held[0] * unit, goal.held[1])
         equal = {"A_eq": np.concatenate([row, [0.0, 0.0]])[None], "b_eq": [held]}
     cost = np.concatenate([np.zeros(count), [1.0, -1.0]])
-    own = [(low / unit, None if top is None else top / unit) for low, top in goal.bounds]
-    bounds = [*own, (0.0, None), (0.0, None)]
-    found = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs", **equal)
-    if found.status != 0 or found.x is None:
+    scaled_bounds = [(low / unit, None if top is None else top / unit) for low, top in goal.bounds]
+    bounds = [*scaled_bounds, (0.0, None), (0.0, None)]
+    solved = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs", **equal)
+    if solved.status != 0 or solved.x is None:
         return None
-    rates: FloatArray = np.maximum(found.x[:count], [low for low, _ in own]) * unit
+    rates: FloatArray = np.maximum(solved.x[:count], [low for low, _ in scaled_bounds]) * unit
     return rates

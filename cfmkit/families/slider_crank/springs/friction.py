@@ -37,22 +37,22 @@ class FrictionBranch:
     lost: dict[str, FloatArray]  # what ``pins`` and ``guide`` take from the effort [N m or N]
 
 
-def branch(assembly: Assembly, units: UnitCurves, way: float) -> FrictionBranch:
+def branch(assembly: Assembly, units: UnitCurves, direction: float) -> FrictionBranch:
     """Return efforts, forces inside and friction's share at the places of unit curves, of one mechanism or of m.
 
-    `way`: 1 while the motion grows, -1 on the way back.
+    `direction`: 1 while the motion grows, -1 on the way back.
     """
     link = assembly.linkage
     angle, beta = units.angle, coupler_angle(link, units)
     turns = assembly.rates_over(units.turn) * units.turn
     on_coupler, on_crank = -turns[1] - turns[2], turns[1] - turns[0]
     crank_rate, coupler_rate, slider_rate = _rates(assembly, angle, beta)
-    signs = [np.sign(way * rate) for rate in (crank_rate, coupler_rate - crank_rate, coupler_rate)]
+    signs = [np.sign(direction * rate) for rate in (crank_rate, coupler_rate - crank_rate, coupler_rate)]
     rubbing, torque = assembly.rubbing, assembly.drive == "torque"
     sine, cosine = np.sin(beta), np.cos(beta)
     with np.errstate(divide="ignore", invalid="ignore"):
         if torque:
-            toward = np.sign(way * slider_rate)
+            toward = np.sign(direction * slider_rate)
             along, held = -turns[3] - toward * rubbing.guide.drag, rubbing.guide.friction * toward
             rubbed = _pull_of_pressed_guide(held, along, (sine, cosine), on_coupler, signs, assembly)
         else:
@@ -69,7 +69,7 @@ def branch(assembly: Assembly, units: UnitCurves, way: float) -> FrictionBranch:
             dragged = (rubbing.guide.drag + rubbing.guide.friction * np.abs(across)) * np.abs(slider_rate)
         else:
             free = link.branch * (-turns[3] - pull[0])
-            effort = rubbing.guide.force(free, across, 0.0, way)
+            effort = rubbing.guide.force(free, across, 0.0, direction)
             dragged = np.abs(effort - free)
         swept = sum(np.abs(rate) for rate in (crank_rate, coupler_rate - crank_rate, coupler_rate))
         lost = {"pins": couple * swept, "guide": dragged}
@@ -121,7 +121,7 @@ def _pull_of_pressed_guide(
     """
     sine, cosine = direction
     length = assembly.linkage.coupler
-    found = None
+    forces = None
     for sign in (1.0, -1.0):
         # X + sign friction Y = along, and the coupler's balance about the crank pin
         rubs = 0.0 if assembly.rubbing.mirrored else sign * friction
@@ -129,12 +129,12 @@ def _pull_of_pressed_guide(
         straight = _balance(rows, along, -on_coupler)
         bent = _balance(rows, np.zeros_like(sine), signs[1] + signs[2])
         pull, couple = _pull_through_pins(straight, bent, assembly.rubbing.pin)
-        if found is None:
-            found = pull, couple
+        if forces is None:
+            forces = pull, couple
         else:
-            other = found[0][1] < 0.0
+            is_pushed = forces[0][1] < 0.0
             # pressed neither way: the guide's friction holds the slider, and no torque moves it
-            pull = np.where(other & (pull[1] > 0.0), np.nan, pull)
-            found = np.where(other, pull, found[0]), np.where(other, couple, found[1])
-    assert found is not None
-    return found
+            pull = np.where(is_pushed & (pull[1] > 0.0), np.nan, pull)
+            forces = np.where(is_pushed, pull, forces[0]), np.where(is_pushed, couple, forces[1])
+    assert forces is not None
+    return forces

@@ -19,9 +19,9 @@ from cfmkit.families.hardware import (
     GuideRods,
     Hardware,
     PartStrength,
+    describe_faults,
     guide_part,
     guide_rods,
-    in_sentences,
     mm,
     pin_for,
     pin_part,
@@ -108,7 +108,7 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     rubbing = {"pins": {"diameter": pin}, "guide": {}}
     heads, thicker = screw.head_height if reached else 0.0, max(rods.slider_thickness - sheet, 0.0)
     drawn = (*bodies, *moving)
-    return Hardware(with_faults(parts, faults), bodies, drawn, rubbing, in_sentences(faults), heads, thicker)
+    return Hardware(with_faults(parts, faults), bodies, drawn, rubbing, describe_faults(faults), heads, thicker)
 
 
 def _drawn_bodies(spec: SliderCrankSpec, solution: Solution, eye: float, pin: float) -> Iterator[PosedBody]:

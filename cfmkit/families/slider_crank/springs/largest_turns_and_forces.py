@@ -46,7 +46,7 @@ class MotionExtremes(ShortRepr):
     @cached_property
     def places(self) -> FloatArray:
         """A grid over the motion, (m, n), the unloaded position one of its places; the last one may stand twice."""
-        low, high, start = (np.reshape(one, (-1, 1)) for one in (self.low, self.high, self.assembly.start))
+        low, high, start = (np.reshape(column, (-1, 1)) for column in (self.low, self.high, self.assembly.start))
         wide = is_wide(self.assembly, self.low, self.high)
         share = np.linspace(0.0, 1.0, TURN_NODES if wide else GRID_SIZES)
         if self.assembly.drive == "force":  # the force runs like the square root of the travel from the stretched place
@@ -78,8 +78,8 @@ class MotionExtremes(ShortRepr):
 
         def turn(at: FloatArray) -> FloatArray:
             """Return each joint's turn at the places of its rows."""
-            each = at.reshape(4, count, -1)
-            units = self.assembly.units(each.swapaxes(0, 1).reshape(count, -1))
+            places = at.reshape(4, count, -1)
+            units = self.assembly.units(places.swapaxes(0, 1).reshape(count, -1))
             return np.asarray(np.einsum("jmjk->jmk", units.turn.reshape(4, count, 4, -1)).reshape(at.shape))
 
         high, low = extremes(turn, motion, values.reshape(4 * count, -1), uneven=True, last=last)

@@ -117,19 +117,19 @@ def link_loads(assembly: Assembly, motion: FloatArray, legs: Any) -> LinkLoads:
     per_leg = 1.0 / np.asarray(legs, dtype=float)[..., None]
     drive = assembly.total(units.effort) if assembly.drive == "force" else np.zeros(1)
     moments = assembly.weigh(units.turn)
-    own, other = moments[1], moments[2]
+    at_crank_pin, at_slider_pin = moments[1], moments[2]
     beta, angle = coupler_angle(link, units), units.angle
     pulled = -moments[3] - link.branch * drive  # on the slider, along its path
     with np.errstate(divide="ignore", invalid="ignore"):
-        across = (link.coupler * np.sin(beta) * pulled + own + other) / (link.coupler * np.cos(beta))
-        at_pivot = link.crank * (-pulled * np.sin(angle) + across * np.cos(angle)) + own
-        axial = [pulled * np.cos(one) + across * np.sin(one) for one in (angle, beta)]
-        moment = [np.maximum(np.abs(own), np.abs(one)) for one in (at_pivot, other)]
+        across = (link.coupler * np.sin(beta) * pulled + at_crank_pin + at_slider_pin) / (link.coupler * np.cos(beta))
+        at_pivot = link.crank * (-pulled * np.sin(angle) + across * np.cos(angle)) + at_crank_pin
+        axial = [pulled * np.cos(link_angle) + across * np.sin(link_angle) for link_angle in (angle, beta)]
+        moment = [np.maximum(np.abs(at_crank_pin), np.abs(at_end)) for at_end in (at_pivot, at_slider_pin)]
     loads = np.stack(np.broadcast_arrays(*axial, *moment, np.hypot(pulled, across))) * per_leg
     loads = np.where(np.isfinite(loads).all(axis=0), loads, 0.0)
     shape = assembly.rates.shape[1:2]  # () of one, (m,) of rows
     stiffest = (assembly.rates[k : k + 2].max(axis=0).reshape(shape) * per_leg[..., 0] for k in (0, 1))
-    lengths = tuple(np.reshape(one, np.shape(one)[:1]) for one in (link.crank, link.coupler))
+    lengths = tuple(np.reshape(length, np.shape(length)[:1]) for length in (link.crank, link.coupler))
     return LinkLoads((lengths[0], lengths[1]), loads[:2], loads[2:4], loads[4], (next(stiffest), next(stiffest)))
 
 
@@ -149,7 +149,7 @@ def allowable_of(spec: SliderCrankSpec) -> float | None:
 
 
 PIN_DIAMETERS = tuple(
-    one for series in ALL_SERIES if series.standard == "ISO 2338" for one in series.sizes if one >= 1e-3
+    diameter for series in ALL_SERIES if series.standard == "ISO 2338" for diameter in series.sizes if diameter >= 1e-3
 )
 """Pins of links [m]: the diameters of ISO 2338 from 1 mm on."""
 LARGEST_TURN_SHARE = 0.01  # turn of a link over that of its spring up to which links count as rigid

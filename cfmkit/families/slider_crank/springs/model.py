@@ -102,8 +102,8 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
 def _findings(solution: Solution, shortfalls: Sequence[Finding]) -> Iterator[Finding]:
     yield from shortfalls
     said = {item.name for item in shortfalls}
-    found = findings_of_one(rules_of(solution), finding, solution)
-    yield from (item for item in found if item.name not in said)
+    warnings = findings_of_one(rules_of(solution), finding, solution)
+    yield from (item for item in warnings if item.name not in said)
 
 
 def _hardware_parts(spec: SliderCrankSpec, solution: Solution) -> tuple[ListedPart, ...]:
@@ -127,8 +127,10 @@ def solve_rows(variants: Variants) -> Iterator[tuple[NDArray[np.intp], SolvedRow
         asked = asked_motion(resolved, assembly)
         if assembly.clip_motion(*asked) == asked:
             built[index] = resolved, assembly, asked
-            own = repr(_kind(resolved)) if kind is None else kind
-            alike.setdefault((own, spec.target_curve, *_flags(assembly), is_wide(assembly, *asked)), []).append(index)
+            own_kind = repr(_kind(resolved)) if kind is None else kind
+            alike.setdefault((own_kind, spec.target_curve, *_flags(assembly), is_wide(assembly, *asked)), []).append(
+                index
+            )
     for members in alike.values():
         for start in range(0, len(members), ROWS_TOGETHER):
             chosen = members[start : start + ROWS_TOGETHER]
@@ -264,8 +266,8 @@ def _curve(solution: Solution) -> Curve:
         return Curve(motion, solution.effort[0], extra=extra, kind=drive)
     forth, back = solution.friction_branches
 
-    def both(one: FloatArray, other: FloatArray) -> FloatArray:
-        return np.concatenate([one.ravel(), other.ravel()[::-1]])
+    def both(up: FloatArray, down: FloatArray) -> FloatArray:
+        return np.concatenate([up.ravel(), down.ravel()[::-1]])
 
     columns = {name: Column(both(item.values, item.values), item.dimension) for name, item in extra.items()}
     columns["coupler_force"] = Column(both(forth.coupler, back.coupler) / solution.legs[0], "force")
@@ -277,7 +279,9 @@ def _curve(solution: Solution) -> Curve:
 
 def _describe_locked(solution: Solution) -> str:
     """Return what to say of places where friction leaves no equilibrium; empty without any."""
-    failed = sum(int((~np.isfinite(way.effort[0, 1:])).sum()) for way in solution.friction_branches or ())
+    failed = sum(
+        int((~np.isfinite(friction_branch.effort[0, 1:])).sum()) for friction_branch in solution.friction_branches or ()
+    )
     points = 2 * solution.motion.shape[1]
     return f"{failed} of {points} points have no equilibrium: friction holds the mechanism" if failed else ""
 
@@ -296,10 +300,10 @@ def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str,
         return {}
     if short or not solution.assemblies[0].rates.any():
         return {}
-    known = {path: RATE_KEYS[path] for path in paths if path in RATE_KEYS}
+    rate_keys = {path: RATE_KEYS[path] for path in paths if path in RATE_KEYS}
     legs = spec.mechanism.sets
     slopes = dict(_slopes(solution))
-    return {name: {path: legs * float(by[row]) for path, row in known.items()} for name, by in slopes.items()}
+    return {name: {path: legs * float(by[row]) for path, row in rate_keys.items()} for name, by in slopes.items()}
 
 
 def _slopes(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
@@ -351,6 +355,6 @@ def _efforts_at_extreme(assembly: Assembly, places: FloatArray, sign: float) -> 
 def _energies_at_maximum(solution: Solution) -> FloatArray:
     """Return the energies of unit springs (4,) where the energy is largest: at an end, or where no effort is left."""
     (assembly,), (low, high) = solution.assemblies, solution.ends
-    inner = [one.motion for one in solution.equilibria if low < one.motion < high]
+    inner = [equilibrium.motion for equilibrium in solution.equilibria if low < equilibrium.motion < high]
     energy = 0.5 * assembly.units(np.array([low, *inner, high])).turn ** 2
     return np.asarray(energy[:, int(np.argmax(assembly.rates @ energy))])

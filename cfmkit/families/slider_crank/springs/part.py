@@ -79,7 +79,7 @@ def _depth(spec: SliderCrankSpec, rates: FloatArray, turns: FloatArray, joining:
     below, above = high.pop("pivot", 0.0), max(high.values(), default=0.0)
     links = (N_SHEETS - 1) * part.sheet + joining.slider_excess
     why = f"; {N_SHEETS} sheets and the springs on both sides of them"
-    return below + part.sheet + max(links + above, joining.heads), why
+    return below + part.sheet + max(links + above, joining.screw_head_height), why
 
 
 def height_of(name: str, coil: HelicalSpring, turn: float) -> float:
@@ -91,8 +91,8 @@ def height_of(name: str, coil: HelicalSpring, turn: float) -> float:
 
 
 def _sizes(springs: Springs) -> str:
-    found = [coil for name in JOINT_NAMES[:3] for coil in springs.coils_at(name)]
-    if not found:
+    coils = [coil for name in JOINT_NAMES[:3] for coil in springs.coils_at(name)]
+    if not coils:
         return "springs at pins have no size"
-    wide, long = (1e3 * max(getattr(one, name) for one in found) for name in ("outer_diameter", "body_length"))
+    wide, long = (1e3 * max(getattr(coil, name) for coil in coils) for name in ("outer_diameter", "body_length"))
     return f"torsion springs up to {wide:.3g} mm wide and {long:.3g} mm deep"

@@ -102,10 +102,10 @@ class SpringTask:
     def _travels(self, angle: FloatArray, last: float) -> FloatArray:
         """Return the travels at crank angles, of the two that each allows: those that lead up to a last one."""
         link = self.assembly.linkage
-        start, own = link.place(self.assembly.unloaded), link.slider_position(angle)
-        away: FloatArray = link.branch * (start - own)
-        other: FloatArray = link.branch * (start - (2.0 * link.crank * np.cos(angle) - own))
-        return away if abs(away[-1] - last) <= abs(other[-1] - last) else other
+        start, position = link.place(self.assembly.unloaded), link.slider_position(angle)
+        away: FloatArray = link.branch * (start - position)
+        mirrored: FloatArray = link.branch * (start - (2.0 * link.crank * np.cos(angle) - position))
+        return away if abs(away[-1] - last) <= abs(mirrored[-1] - last) else mirrored
 
     def goal(self, window: tuple[float, float], count: int | None = None) -> RateGoal | None:
         """Return the goal over a window; None if the linkage does not get there with finite efforts."""
@@ -134,7 +134,7 @@ class SpringTask:
         ways = {"load": (1.0,), "unload": (-1.0,), "mean": (1.0, -1.0)}[wanted]
         units = rubbed.units(places)
         free = rubbed.rates @ units.effort
-        added = sum(branch(rubbed, units, way).effort - free for way in ways) / len(ways)
+        added = sum(branch(rubbed, units, direction).effort - free for direction in ways) / len(ways)
         if not np.isfinite(added).all():
             text = "friction holds the mechanism within the window: the line of force runs through its pins"
             raise finding.infeasible("self_locks", f"{text}; use thinner pins ('mechanism.pins'), or another window")

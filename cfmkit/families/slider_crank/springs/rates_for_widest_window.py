@@ -71,8 +71,8 @@ def widest(task: SpringTask, tolerance: float) -> FittedWindow | None:
     if best is not None and best.width >= POOR_WIDTH_SHARE * width:
         return best
     elsewhere = _flattest(task, width)
-    found = None if elsewhere is None else _grow_window(task, tolerance, width, elsewhere, NEIGHBOUR_WIDTH_SHARE)
-    return max((item for item in (best, found) if item is not None), key=lambda item: item.width, default=None)
+    grown = None if elsewhere is None else _grow_window(task, tolerance, width, elsewhere, NEIGHBOUR_WIDTH_SHARE)
+    return max((item for item in (best, grown) if item is not None), key=lambda item: item.width, default=None)
 
 
 def widest_of_all(task: SpringTask, tolerance: float) -> tuple[FittedWindow | None, bool]:
@@ -81,10 +81,10 @@ def widest_of_all(task: SpringTask, tolerance: float) -> tuple[FittedWindow | No
     if not last > first:
         return None, True
     search = _Everywhere(task, tolerance * TOLERANCE_SHARE)
-    found = search.run()
-    if found is None:
+    ends = search.run()
+    if ends is None:
         return widest(task, tolerance), search.finished
-    low, high = found
+    low, high = ends
     return _grow_window(
         task, tolerance * TOLERANCE_SHARE, high - low, 0.5 * (low + high), NEIGHBOUR_WIDTH_SHARE
     ), search.finished
@@ -146,10 +146,10 @@ def _flattest(task: SpringTask, width: float) -> float | None:
     """Return the middle of the window of a width with the smallest deviation, of some all over the motion."""
     first, last = task.searched
     places = (first + (last - width - first) * k / (N_ELSEWHERE_PLACES - 1) for k in range(N_ELSEWHERE_PLACES))
-    found = [
+    windows = [
         item for item in (_solve_window(task, low, low + width, N_SEARCH_PLACES) for low in places) if item is not None
     ]
-    best = min(found, key=lambda item: item.deviation, default=None)
+    best = min(windows, key=lambda item: item.deviation, default=None)
     return None if best is None else 0.5 * (best.low + best.high)
 
 
@@ -160,20 +160,20 @@ def _grow_window(task: SpringTask, tolerance: float, width: float, middle: float
     low, high = 0.0, last - first
     for _ in range(MAX_STEPS):
         width = min(width, last - first)
-        found = _best_place(task, width, middle, look)
-        if found is not None:
-            middle, look = 0.5 * (found.low + found.high), NEIGHBOUR_WIDTH_SHARE
-        if found is not None and found.deviation <= tolerance:
-            best, low = found, max(low, width)
-            if found.deviation >= tolerance * MIN_TOLERANCE_SHARE or width >= last - first:
+        window = _best_place(task, width, middle, look)
+        if window is not None:
+            middle, look = 0.5 * (window.low + window.high), NEIGHBOUR_WIDTH_SHARE
+        if window is not None and window.deviation <= tolerance:
+            best, low = window, max(low, width)
+            if window.deviation >= tolerance * MIN_TOLERANCE_SHARE or width >= last - first:
                 break
-            if width > 0.9 * high and found.deviation < 0.5 * tolerance:
+            if width > 0.9 * high and window.deviation < 0.5 * tolerance:
                 high = last - first  # the window has moved on from where that width had failed
         else:
             high = min(high, width)
         if high - low <= 1e-6 * high:
             break
-        width = _next_width(found, tolerance, (low, high), width)
+        width = _next_width(window, tolerance, (low, high), width)
     return best
 
 
@@ -187,12 +187,12 @@ def _first_guess(task: SpringTask, tolerance: float) -> tuple[float, float]:
     return 0.1 * (last - first), first + 0.1 * (last - first)
 
 
-def _next_width(found: FittedWindow | None, tolerance: float, bracket: tuple[float, float], width: float) -> float:
+def _next_width(window: FittedWindow | None, tolerance: float, bracket: tuple[float, float], width: float) -> float:
     low, high = bracket
-    if found is None or found.deviation <= 0.0:
+    if window is None or window.deviation <= 0.0:
         return 0.5 * (low + high)
     wanted = tolerance * (0.5 + 0.5 * MIN_TOLERANCE_SHARE)
-    step = width * min(max((wanted / found.deviation) ** (1 / 3), 0.5), 2.0)
+    step = width * min(max((wanted / window.deviation) ** (1 / 3), 0.5), 2.0)
     return step if low < step < high else 0.5 * (low + high)
 
 
@@ -206,14 +206,16 @@ def _best_place(task: SpringTask, width: float, middle: float, look: float) -> F
         return evaluate_window(task, first, last)
 
     def deviation(low: float) -> float:
-        found = _solve_window(task, low, low + width, N_SEARCH_PLACES)
-        return found.deviation if found else 1e300
+        window = _solve_window(task, low, low + width, N_SEARCH_PLACES)
+        return window.deviation if window else 1e300
 
     start = min(max(middle - 0.5 * width, first), room)
     bracket = max(first, start - look * width), min(room, start + look * width)
-    found = minimize_scalar(deviation, bounds=bracket, method="bounded", options={"xatol": 1e-4 * width, "maxiter": 25})
+    minimum = minimize_scalar(
+        deviation, bounds=bracket, method="bounded", options={"xatol": 1e-4 * width, "maxiter": 25}
+    )
     ends = [end for end in (first, room) if end in bracket]
-    low = min([float(found.x), *ends], key=deviation) if ends else float(found.x)
+    low = min([float(minimum.x), *ends], key=deviation) if ends else float(minimum.x)
     if look < 0.5 and min(abs(low - bracket[0]), abs(low - bracket[1])) < 1e-3 * width and low not in ends:
         return _best_place(task, width, low + 0.5 * width, 0.6)
     return evaluate_window(task, low, low + width)

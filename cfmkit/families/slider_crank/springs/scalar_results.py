@@ -20,7 +20,7 @@ from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.stock.springs.stress_and_life import (
     WIRE_DEFINITIONS,
     SpringInUse,
-    in_the_sense_of_the_larger,
+    orient_to_larger,
     wire_quantities,
 )
 
@@ -41,16 +41,18 @@ NO_FACTOR = "it needs torsion springs and a spring at the slider"
 HELD_TEXT = "friction holds the mechanism in a part of its motion, next to which forces are unbounded"
 
 
-def _of_drive(drive: str, dimension: str, definition: str, function: Function, reason: str) -> ScalarQuantity[Solution]:
+def _make_drive_quantity(
+    drive: str, dimension: str, definition: str, function: Function, reason: str
+) -> ScalarQuantity[Solution]:
     """Return a quantity that only mechanisms with one kind of drive have."""
     return ScalarQuantity(dimension, definition, function, reason, lambda solution: solution.drive == drive)
 
 
-def _of_next_equilibrium(name: str, words: str, stable: bool) -> dict[str, ScalarQuantity[Solution]]:
+def _make_equilibrium_quantity(name: str, words: str, stable: bool) -> dict[str, ScalarQuantity[Solution]]:
     """Return where the next equilibrium of a kind is, over the motion of either drive."""
     reason = NO_SECOND if stable else NO_UNSTABLE
     return {
-        f"{name}_{motion}": _of_drive(
+        f"{name}_{motion}": _make_drive_quantity(
             drive,
             dimension,
             f"{motion_words} of the {words} equilibrium from the unloaded position",
@@ -64,44 +66,50 @@ def _of_next_equilibrium(name: str, words: str, stable: bool) -> dict[str, Scala
     }
 
 
-def _of_band(drive: str, motion: str, dimension: str) -> dict[str, ScalarQuantity[Solution]]:
+def _make_band_quantities(drive: str, motion: str, dimension: str) -> dict[str, ScalarQuantity[Solution]]:
     """Return width, start and end of the constant band over the motion of one kind of drive."""
     reason = f"the reference is outside the motion, or the {drive} there is zero"
     within = f"of the interval around {_REFERENCE_TEXT} with the {drive} within `analysis.tolerance`"
     name = f"constant_{motion}"
     return {
-        name: _of_drive(drive, dimension, f"width {within}", lambda one: one.band[1] - one.band[0], reason),
-        f"{name}_start": _of_drive(drive, dimension, f"start {within}", lambda one: one.band[0], reason),
-        f"{name}_end": _of_drive(drive, dimension, f"end {within}", lambda one: one.band[1], reason),
+        name: _make_drive_quantity(
+            drive, dimension, f"width {within}", lambda values: values.band[1] - values.band[0], reason
+        ),
+        f"{name}_start": _make_drive_quantity(
+            drive, dimension, f"start {within}", lambda values: values.band[0], reason
+        ),
+        f"{name}_end": _make_drive_quantity(drive, dimension, f"end {within}", lambda values: values.band[1], reason),
     }
 
 
 def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
     """Yield the largest stress in the wire of bought springs, and their shortest life, of each mechanism."""
-    return (wire_quantities(_in_use(solution, number)) for number in range(len(solution)))
+    return (wire_quantities(_list_springs_in_use(solution, number)) for number in range(len(solution)))
 
 
-def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
+def _list_springs_in_use(solution: Solution, number: int) -> list[SpringInUse]:
     """Return the bought springs of a mechanism between their smallest and their largest load over the motion."""
-    springs, found = solution.specs[number].mechanism.springs, []
-    for one in springs.bought:
-        joint = JOINT_NAMES.index(one.at)
+    springs, in_use = solution.specs[number].mechanism.springs, []
+    for spring in springs.bought:
+        joint = JOINT_NAMES.index(spring.at)
         high, low = (float(np.broadcast_to(ends[joint], len(solution))[number]) for ends in solution.extremes.turns)
-        least, largest = in_the_sense_of_the_larger(high, low)
+        least, largest = orient_to_larger(high, low)
         # springs of a joint turn alike: each bears its wire's share of the rate, which may be stated
-        wound = None if one.wound is None else one.wound.to_wound(one.kind)
-        each = wound.rate * springs.stated_over_wires(one.at) if wound is not None else 0.0
-        fatigue = None if one.wound is None or one.wound.fatigue is None else one.wound.fatigue.law
-        found.append(SpringInUse(wound, each * least, each * largest, fatigue, one.life))
-    return found
+        wound = None if spring.wound is None else spring.wound.to_wound(spring.kind)
+        rate_of_each = wound.rate * springs.stated_over_wires(spring.at) if wound is not None else 0.0
+        fatigue = None if spring.wound is None or spring.wound.fatigue is None else spring.wound.fatigue.law
+        in_use.append(SpringInUse(wound, rate_of_each * least, rate_of_each * largest, fatigue, spring.life))
+    return in_use
 
 
-def _of_link(name: str, function: Callable[[LinkBar, LinkLoads, FloatArray], Any]) -> ScalarQuantity[Solution]:
+def _make_link_quantity(
+    name: str, function: Callable[[LinkBar, LinkLoads, FloatArray], Any]
+) -> ScalarQuantity[Solution]:
     """Return what the links bear over the motion; mechanisms whose links are not described do not name it."""
 
     def read(solution: Solution) -> Any:
         bars = [link_of(spec) for spec in solution.specs]
-        numbers = [(one.width, one.sheet, one.hole, one.modulus) for one in bars if one is not None]
+        numbers = [(bar.width, bar.sheet, bar.hole, bar.modulus) for bar in bars if bar is not None]
         allowable = np.array([allowable_of(spec) for spec in solution.specs], dtype=float)
         motion = grid_over(solution.drive, solution.low, solution.high)
         loads = link_loads(solution.assembly, motion, solution.legs[:, 0])
@@ -122,15 +130,15 @@ def _lost_energy(solution: Solution, kind: str) -> FloatArray:
     lost = solution.broadcast(forth.lost[kind] + back.lost[kind])
     low, high = (np.broadcast_to(end, (len(solution), 1)) for end in solution.window_or_motion)
     low, high = np.maximum(low, motion[:, :1]), np.minimum(high, motion[:, -1:])
-    found = []
+    extremes = []
     for row in range(len(solution)):
         inner = motion[row][(motion[row] > low[row]) & (motion[row] < high[row])]
         at = np.concatenate([low[row], inner, high[row]])
-        found.append(np.trapezoid(np.interp(at, motion[row], lost[row]), at))
-    return np.array(found)
+        extremes.append(np.trapezoid(np.interp(at, motion[row], lost[row]), at))
+    return np.array(extremes)
 
 
-def _of_loop(name: str, dimension: str, definition: str) -> dict[str, ScalarQuantity[Solution]]:
+def _make_loop_quantity(name: str, dimension: str, definition: str) -> dict[str, ScalarQuantity[Solution]]:
     """Return what pins and guide take, as an energy or as shares of it."""
 
     def read(kind: str, solution: Solution) -> FloatArray:
@@ -206,18 +214,18 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "unstable equilibria in the motion; beyond each the mechanism snaps through",
         lambda solution: solution.classified.unstable,
     ),
-    **_of_next_equilibrium("snap_through", "first unstable", stable=False),
-    **_of_next_equilibrium("second_stable", "next stable", stable=True),
+    **_make_equilibrium_quantity("snap_through", "first unstable", stable=False),
+    **_make_equilibrium_quantity("second_stable", "next stable", stable=True),
     "energy_barrier": ScalarQuantity(
         "energy",
         "energy at the first unstable equilibrium",
         lambda solution: solution.nearest(stable=False)[1],
         NO_UNSTABLE,
     ),
-    **_of_band("torque", "angle", "angle"),
-    **_of_band("force", "travel", "length"),
+    **_make_band_quantities("torque", "angle", "angle"),
+    **_make_band_quantities("force", "travel", "length"),
     **{
-        f"reference_{drive}": _of_drive(
+        f"reference_{drive}": _make_drive_quantity(
             drive,
             drive,
             f"{drive} at {_REFERENCE_TEXT}",
@@ -226,21 +234,21 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         )
         for drive in ("torque", "force")
     },
-    "start_force": _of_drive(
+    "start_force": _make_drive_quantity(
         "force",
         "force",
         "force that moves the slider from the unloaded position; where stretched, the limit",
         lambda solution: solution.frictionless(np.zeros((1, 1))),
         "the force is unbounded there",
     ),
-    "stretched_torque": _of_drive(
+    "stretched_torque": _make_drive_quantity(
         "torque",
         "torque",
         "torque in the stretched position",
         lambda solution: solution.frictionless(solution.stretched),
         "the torque is unbounded there",
     ),
-    "stretched_stiffness": _of_drive(
+    "stretched_stiffness": _make_drive_quantity(
         "torque",
         "rotational_stiffness",
         "slope of the torque in the stretched position [LH, eq. 31]",
@@ -267,8 +275,8 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         lambda solution: solution.column(small_angle_number),
         "the unloaded position is the stretched one, or there is no torsion spring",
     ),
-    **_of_loop("loop_energy", "energy", "energy that {} over the window, back and forth"),
-    **_of_loop("loop_share", "ratio", "share of the loop's area that {}"),
+    **_make_loop_quantity("loop_energy", "energy", "energy that {} over the window, back and forth"),
+    **_make_loop_quantity("loop_share", "ratio", "share of the loop's area that {}"),
     "force_per_anchor": ScalarQuantity(
         "stiffness",
         "increase of the force per travel of the anchor of the slider's spring; the same over the whole motion, so "
@@ -276,7 +284,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         lambda solution: solution.assembly.rates[3],
         applies=lambda solution: solution.drive == "force" and solution.spec.mechanism.springs.anchor is not None,
     ),
-    "force_per_degree": _of_drive(
+    "force_per_degree": _make_drive_quantity(
         "force",
         "force",
         "increase of the mean force in the window per degree of the unloaded angle, at the same positions of the "
@@ -321,10 +329,12 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "force", "largest transverse force of the slider of one leg on its guide", _guide_force, HELD_TEXT
     ),
     **{name: quantity_of_each(name, about, _wires) for name, about in WIRE_DEFINITIONS.items()},
-    "link_stress_max": _of_link("link_stress_max", lambda bar, loads, _allowable: bar.stress(loads)),
-    "pin_bearing_max": _of_link("pin_bearing_max", lambda bar, loads, _allowable: bar.bearing(loads)),
-    "link_safety_factor": _of_link("link_safety_factor", LinkBar.safety),
-    "link_turn_share_max": _of_link("link_turn_share_max", lambda bar, loads, _allowable: bar.turn_share(loads)),
+    "link_stress_max": _make_link_quantity("link_stress_max", lambda bar, loads, _allowable: bar.stress(loads)),
+    "pin_bearing_max": _make_link_quantity("pin_bearing_max", lambda bar, loads, _allowable: bar.bearing(loads)),
+    "link_safety_factor": _make_link_quantity("link_safety_factor", LinkBar.safety),
+    "link_turn_share_max": _make_link_quantity(
+        "link_turn_share_max", lambda bar, loads, _allowable: bar.turn_share(loads)
+    ),
 }
 """Every scalar result, in the order in which they are shown."""
 SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()}

@@ -134,8 +134,8 @@ class Solution(ShortRepr):
     def equilibria(self) -> tuple[Equilibrium, ...]:
         """All its equilibria in the motion, in order; those at its ends and the unloaded position included."""
         rows, places, stable, energy = self.all_equilibria
-        own = zip(places[rows == 0].tolist(), stable[rows == 0].tolist(), energy[rows == 0].tolist(), strict=True)
-        return tuple(Equilibrium(*one) for one in own)
+        columns = [column[rows == 0].tolist() for column in (places, stable, energy)]
+        return tuple(Equilibrium(*values) for values in zip(*columns, strict=True))
 
     @property
     def class_name(self) -> str:
@@ -144,7 +144,7 @@ class Solution(ShortRepr):
 
     def nearest_of_one(self, stable: bool) -> Equilibrium | None:
         """Return its equilibrium next to the unloaded position, of one kind; None if there is none."""
-        place, energy = (float(one[0]) for one in self.nearest(stable))
+        place, energy = (float(column[0]) for column in self.nearest(stable))
         return None if np.isnan(place) else Equilibrium(place, stable, energy)
 
     # --- numbers of each mechanism, (m, 1) ----------------------------------------------------------------------------
@@ -195,8 +195,8 @@ class Solution(ShortRepr):
         """Window in which the effort is to be constant; None if the analysis does not state it."""
         if self.spec.analysis.window is None:
             return None
-        found = np.array([window_of(*pair) for pair in zip(self.specs, self.assemblies, strict=True)], dtype=float)
-        return Several((found[:, :1], found[:, 1:]))
+        windows = np.array([window_of(*pair) for pair in zip(self.specs, self.assemblies, strict=True)], dtype=float)
+        return Several((windows[:, :1], windows[:, 1:]))
 
     @property
     def window_or_motion(self) -> Ends:
@@ -294,7 +294,7 @@ class Solution(ShortRepr):
         if not np.isfinite(effort).all():
             slope = finite_samples(slope, effort, N_GRID_PLACES - 1)[0]
             grid, effort, end = finite_samples(grid, effort, N_GRID_PLACES - 1)
-            grid, effort, slope = (one[:, : int(end.max()) + 1] for one in (grid, effort, slope))
+            grid, effort, slope = (column[:, : int(end.max()) + 1] for column in (grid, effort, slope))
         return monotone(grid, effort, slope, self.assembly.efforts)
 
     @cached_property
@@ -306,10 +306,10 @@ class Solution(ShortRepr):
     def all_equilibria(self) -> tuple[NDArray[Any], ...]:
         """Row, place, stability and energy of every equilibrium, (k,) each, in order."""
         place, sign, rest = self.curve.place, signs(self.curve, self.rest), self.rest[:, 0]
-        found = [(row, *root) for row in range(len(self)) for root in _roots(place[row], sign[row], rest[row])]
-        if not found:
+        roots = [(row, *root) for row in range(len(self)) for root in _roots(place[row], sign[row], rest[row])]
+        if not roots:
             return Several((np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0)))
-        rows, low, high, stable = (np.array(one) for one in zip(*found, strict=True))
+        rows, low, high, stable = (np.array(column) for column in zip(*roots, strict=True))
         sense, assembly = np.where(stable, 1.0, -1.0)[:, None], rows_of(self.assembly, rows)
         size = np.abs(self.curve.value).max(axis=1)[rows, None]
 
@@ -319,9 +319,9 @@ class Solution(ShortRepr):
         root = last_places(excess, low[:, None], high[:, None])[:, 0]
         width = np.broadcast_to((self.high - self.low)[:, 0], len(self))[rows]
         root = np.where((low != high) & (np.abs(root - rest[rows]) <= MOTION_RTOL * width), rest[rows], root)
-        known = np.isfinite(root)
+        is_known = np.isfinite(root)
         energy = 0.5 * assembly.total(assembly.units(root[:, None]).turn ** 2)[:, 0]
-        return Several((rows[known], root[known], stable[known], np.broadcast_to(energy, len(root))[known]))
+        return Several((rows[is_known], root[is_known], stable[is_known], np.broadcast_to(energy, len(root))[is_known]))
 
     def nearest(self, stable: bool) -> Ends:
         """Return place and energy of the equilibrium next to the unloaded position, of one kind, (m,); NaN: none."""
@@ -350,22 +350,22 @@ class Solution(ShortRepr):
 
         NaN where that effort is zero, or the reference outside the motion.
         """
-        place, value, known = self.curve.place, self.curve.value, self.has_level
-        level, limit = np.where(known, self.level, 1.0)[:, None], self.tolerance * BAND_EDGE_FACTOR
+        place, value, has_level = self.curve.place, self.curve.value, self.has_level
+        level, limit = np.where(has_level, self.level, 1.0)[:, None], self.tolerance * BAND_EDGE_FACTOR
         outside, inner, beyond = np.abs(value / level - 1.0) > limit, [], []
         for sign in (-1.0, 1.0):  # towards the low end, and towards the high one
-            ahead, here = sign * place, sign * self.reference
-            first = np.where(outside & (ahead > here), ahead, np.inf).min(axis=1, keepdims=True)
-            before = np.maximum(np.where(ahead < first, ahead, -np.inf).max(axis=1, keepdims=True), here)
+            ahead, start = sign * place, sign * self.reference
+            first = np.where(outside & (ahead > start), ahead, np.inf).min(axis=1, keepdims=True)
+            before = np.maximum(np.where(ahead < first, ahead, -np.inf).max(axis=1, keepdims=True), start)
             inner.append(sign * before)
             beyond.append(sign * np.where(np.isfinite(first), first, before))
 
         def excess(at: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
-            own = ends // 2
-            return np.asarray(np.abs(rows_of(self.assembly, own).efforts(at) / level[own] - 1.0) - limit[own])
+            rows = ends // 2
+            return np.asarray(np.abs(rows_of(self.assembly, rows).efforts(at) / level[rows] - 1.0) - limit[rows])
 
         low, high = last_places(excess, np.hstack(inner), np.hstack(beyond)).T
-        return Several((np.where(known, low, np.nan), np.where(known, high, np.nan)))
+        return Several((np.where(has_level, low, np.nan), np.where(has_level, high, np.nan)))
 
     # --- extremes over the motion -------------------------------------------------------------------------------------
 
@@ -395,7 +395,7 @@ class Solution(ShortRepr):
         """Return extremes of both friction branches, of all legs; NaN if friction holds the mechanism somewhere."""
         places, last = self.extremes.places.copy(), self.extremes.last
         places[:, 0] += NEXT_TO_START * (places[:, -1] - places[:, 0])
-        found = []
+        of_ways = []
         for direction in (1.0, -1.0):
 
             def force(at: FloatArray, direction: float = direction) -> FloatArray:
@@ -404,8 +404,8 @@ class Solution(ShortRepr):
             values = force(places)
             high, low = extremes(force, places, values, uneven=True, last=np.broadcast_to(last, len(values)))
             held = ~np.isfinite(values).all(axis=1)
-            found.append((np.where(held, np.nan, high), np.where(held, np.nan, low)))
-        return np.max([top for top, _ in found], axis=0), np.min([bottom for _, bottom in found], axis=0)
+            of_ways.append((np.where(held, np.nan, high), np.where(held, np.nan, low)))
+        return np.max([top for top, _ in of_ways], axis=0), np.min([bottom for _, bottom in of_ways], axis=0)
 
     # --- rows for metrics ---------------------------------------------------------------------------------------------
 
@@ -441,19 +441,19 @@ def _roots(place: FloatArray, sign: NDArray[np.int8], rest: float) -> Iterator[t
 
     At an end of the motion the unloaded position itself is meant where it is no farther than the grid.
     """
-    known = np.flatnonzero(sign)
-    if not len(known):
+    nonzero = np.flatnonzero(sign)
+    if not len(nonzero):
         return
 
     def choose_end(end: float, inner: float) -> float:
         return rest if abs(end - rest) <= abs(end - inner) else end
 
-    first, last = int(known[0]), int(known[-1])
+    first, last = int(nonzero[0]), int(nonzero[-1])
     if first > 0:
         at = choose_end(float(place[0]), float(place[first]))
         yield at, at, bool(sign[first] > 0)
-    for k in np.flatnonzero(sign[known[:-1]] != sign[known[1:]]).tolist():
-        before, after = int(known[k]), int(known[k + 1])
+    for k in np.flatnonzero(sign[nonzero[:-1]] != sign[nonzero[1:]]).tolist():
+        before, after = int(nonzero[k]), int(nonzero[k + 1])
         low, high = float(place[before]), float(place[after])
         is_rest = low <= rest <= high and after - before > 1
         yield (rest if is_rest else low), (rest if is_rest else high), bool(sign[after] > 0)
@@ -481,8 +481,8 @@ class ClosedFormEffort(ShortRepr):
     def effort(self, name: str, places: FloatArray, /) -> FloatArray:
         """Return torque [N m] or force [N] of a branch at places of any shape."""
         whole = places.size == self.places.size and np.may_share_memory(places, self.places)  # as each metric begins
-        own = self.solution.curve.place if whole else np.reshape(places, (1, -1))
-        return self.solution.effort_at(own, None, name).reshape(np.shape(places))
+        own_places = self.solution.curve.place if whole else np.reshape(places, (1, -1))
+        return self.solution.effort_at(own_places, None, name).reshape(np.shape(places))
 
     def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return zeros: springs have no stress here."""

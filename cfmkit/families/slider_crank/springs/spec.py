@@ -93,8 +93,8 @@ class Springs(Model):
     @model_validator(mode="after")
     def _rates_are_those_of_the_wires(self, info: ValidationInfo) -> Self:
         """Take rates from the wires where none are stated, and refuse stated ones that contradict them."""
-        for joint in dict.fromkeys(one.at for one in self.bought):
-            parts = [one.rate for one in self.bought if one.at == joint]
+        for joint in dict.fromkeys(spring.at for spring in self.bought):
+            parts = [spring.rate for spring in self.bought if spring.at == joint]
             if None in parts:
                 if joint not in self.model_fields_set:
                     refuse("Springs", {(joint,): "missing: give it, or 'wound' of every spring bought for this joint"})
@@ -118,13 +118,13 @@ class Springs(Model):
 
     def stated_over_wires(self, joint: JointName) -> float:
         """Return the rate at a joint over that of its springs' wires; 1 where one of these is not known."""
-        rates = [one.rate for one in self.bought if one.at == joint]
-        known = [rate for rate in rates if rate is not None]
-        return float(getattr(self, joint) / sum(known)) if len(known) == len(rates) else 1.0
+        rates = [spring.rate for spring in self.bought if spring.at == joint]
+        stated = [rate for rate in rates if rate is not None]
+        return float(getattr(self, joint) / sum(stated)) if len(stated) == len(rates) else 1.0
 
     def coils_at(self, joint: str) -> list[HelicalSpring]:
         """Return the springs at a joint whose wire is known."""
-        return [one.coil for one in self.bought if one.at == joint and one.coil is not None]
+        return [spring.coil for spring in self.bought if spring.at == joint and spring.coil is not None]
 
     def pulled_outwards(self, high: float, low: float) -> bool:
         """Return whether the slider's spring has a known wire and is stretched by a slider that leaves the pivot.
@@ -331,9 +331,9 @@ class SpringDesign(DesignBlock):
         """Refuse what has no meaning beside a curve, and a curve that does not cover its window."""
         if target.stiffness is None and (self.torque, self.force) != (None, None):
             raise ValueError("give either 'torque' or 'force', or 'target', a curve of one")
-        given = [name for name in ("stiffness", "adjustment") if getattr(self, name) is not None]
-        if given or self.hold_stiffness:
-            raise ValueError(f"{(given or ['hold_stiffness'])[0]!r} is for a constant effort, not for a 'target'")
+        stated = [name for name in ("stiffness", "adjustment") if getattr(self, name) is not None]
+        if stated or self.hold_stiffness:
+            raise ValueError(f"{(stated or ['hold_stiffness'])[0]!r} is for a constant effort, not for a 'target'")
         name = "angle" if self.drive == "torque" else "travel"
         if self.window is None or (self.travel if name == "angle" else self.angle) is not None:
             raise ValueError(f"a 'target' of {self.drive} needs its window: give {name!r}")

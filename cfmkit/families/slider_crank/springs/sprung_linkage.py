@@ -114,12 +114,12 @@ class Assembly(ShortRepr):
     def forces(self, motion: FloatArray) -> FloatArray:
         """Return the efforts of `units` alone, (4, n)."""
         if self.drive == "torque":
-            found = crank_efforts(self.linkage, self.unloaded, motion)
+            forces = crank_efforts(self.linkage, self.unloaded, motion)
         else:
-            found = self.path.unit_forces(motion)
+            forces = self.path.unit_forces(motion)
         if np.any(self.anchor):
-            found = _with_more_at_slider(found, self.tight * self._slider_rates(motion)[0])
-        return found
+            forces = _with_more_at_slider(forces, self.tight * self._slider_rates(motion)[0])
+        return forces
 
     def rates_over(self, unit: FloatArray) -> FloatArray:
         """Return the rates with as many axes as unit curves (4, ..., n)."""
@@ -136,10 +136,10 @@ class Assembly(ShortRepr):
         if unit.ndim == 3 and unit.shape[1] == 1 and np.isfinite(unit).all():  # of one linkage: a product
             return np.asarray(self.rates.reshape(4, -1).T @ unit[:, 0])
         rates = self.rates_over(unit)
-        there = [(rate, row) for rate, row in zip(rates, unit, strict=True) if rate.any()]
+        rated = [(rate, row) for rate, row in zip(rates, unit, strict=True) if rate.any()]
         sums = np.zeros(np.broadcast_shapes(rates.shape[1:], unit.shape[1:]))
         with np.errstate(invalid="ignore"):
-            for rate, row in there:
+            for rate, row in rated:
                 sums += rate * row if rate.all() else np.where(rate == 0.0, 0.0, rate * row)
         return sums
 
@@ -201,7 +201,7 @@ class Assembly(ShortRepr):
             first, last = (held and math.isfinite(end) and end != self.unloaded for end in self.reach)
             return first, last
         link, held = self.linkage, bool(self.rates[:3].any())
-        ends = link.way(self.unloaded)[::-1]
+        ends = link.find_path_ends(self.unloaded)[::-1]
         first, last = (held and end != 0.0 and not rest for end, rest in zip(ends, self._relaxed_ends, strict=True))
         return first, last
 
@@ -229,8 +229,8 @@ class Assembly(ShortRepr):
         first, last = self.reach
         ways = [self.start - first, last - self.start]
         if self.drive == "force" and math.isnan(self.rest):
-            ends, far = self.linkage.way(self.unloaded)[::-1], self.linkage.stretched_position
-            ways = [way if abs(end) == far else last - first for way, end in zip(ways, ends, strict=True)]
+            ends, far = self.linkage.find_path_ends(self.unloaded)[::-1], self.linkage.stretched_position
+            ways = [arc if abs(end) == far else last - first for arc, end in zip(ways, ends, strict=True)]
         return ways[0], ways[1]
 
     @property
@@ -238,7 +238,7 @@ class Assembly(ShortRepr):
         """The motion in the stretched position nearest to the unloaded one."""
         if self.drive == "force":
             first, last = self.reach
-            return first if self.linkage.way(self.unloaded)[1] == self.linkage.stretched_position else last
+            return first if self.linkage.find_path_ends(self.unloaded)[1] == self.linkage.stretched_position else last
         return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, FULL_TURN)
 
 
@@ -354,12 +354,12 @@ def turn_unloaded(assembly: Assembly, angle: float) -> tuple[Assembly, float]:
     Travel is counted from the unloaded position: the same place has a travel smaller by the second value [m]; 0 where
     a torque drives, whose motion is the crank's angle itself.
     """
-    other = replace(assembly, unloaded=assembly.unloaded + angle)
+    turned = replace(assembly, unloaded=assembly.unloaded + angle)
     if assembly.drive == "torque":
-        return other, 0.0
+        return turned, 0.0
     link = assembly.linkage
-    before, after = (link.place(one.unloaded) for one in (assembly, other))
-    return other, link.branch * (before - after)
+    before, after = (link.place(assembly_of_two.unloaded) for assembly_of_two in (assembly, turned))
+    return turned, link.branch * (before - after)
 
 
 def mean_effort_per_angle(
@@ -372,7 +372,7 @@ def mean_effort_per_angle(
     places = np.linspace(np.reshape(low, -1), np.reshape(high, -1), N_WINDOW_PLACES, axis=1)
     rows = []
     for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
-        others, less = zip(*(turn_unloaded(one, step) for one in assemblies), strict=True)
+        others, less = zip(*(turn_unloaded(assembly, step) for assembly in assemblies), strict=True)
         rows.append(stack(others).forces(places - np.reshape(less, (-1, 1))))
     with np.errstate(invalid="ignore"):  # at the end of the reach some efforts are unbounded
         change = (rows[0] - rows[1]) / (2.0 * DIFFERENCE_STEP)

@@ -144,7 +144,7 @@ class CosineLeaf(LeafLaw):
 
         Found in a table by bisection, then refined between its neighbours by secants.
         """
-        drop, (table, known) = self.strip.rise - np.asarray(travel, dtype=float), self._table
+        drop, (table, coefficients_of_rows) = self.strip.rise - np.asarray(travel, dtype=float), self._table
 
         def excess(z: FloatArray, coefficients: tuple[FloatArray, ...]) -> FloatArray:
             constant, by_drop, by_square = coefficients
@@ -153,10 +153,10 @@ class CosineLeaf(LeafLaw):
         low, high = np.zeros(drop.shape, dtype=int), np.full(drop.shape, len(table) - 1)
         while (high - low > 1).any():
             middle = (low + high) // 2
-            over = excess(table[middle], tuple(item[middle] for item in known)) > 0
+            over = excess(table[middle], tuple(item[middle] for item in coefficients_of_rows)) > 0
             low, high = np.where(over, low, middle), np.where(over, middle, high)
         before, z = table[low], table[high]
-        size_before, size = (excess(table[at], tuple(item[at] for item in known)) for at in (low, high))
+        size_before, size = (excess(table[at], tuple(item[at] for item in coefficients_of_rows)) for at in (low, high))
         for _ in range(6):
             with np.errstate(all="ignore"):
                 step = size * (z - before) / (size - size_before)
@@ -187,8 +187,8 @@ class CosineLeaf(LeafLaw):
         a, c = np.pi / length, rise / 6.0
         slope, phase = (self.balance - travel) / length, np.pi * (1.0 + _BRACKET_PLACES)
         free = self.buckled_amplitude(travel)[..., None] * np.cos(phase)
-        own = -(c + 0.5 * rise) * a * a * np.cos(0.5 * phase) + 2.0 * a * slope[..., None] * np.sin(phase)
-        both = (np.abs(own + sign * 2.0 * a * free).max(axis=-1) for sign in (1.0, -1.0))
+        drawn_curvature = -(c + 0.5 * rise) * a * a * np.cos(0.5 * phase) + 2.0 * a * slope[..., None] * np.sin(phase)
+        both = (np.abs(drawn_curvature + sign * 2.0 * a * free).max(axis=-1) for sign in (1.0, -1.0))
         return np.asarray(np.maximum(*both))
 
     # --- shape ------------------------------------------------------------------------------------------------------
@@ -212,17 +212,17 @@ class CosineLeaf(LeafLaw):
         at = np.array([travel])
         z, length, rise = float(self.root(at)[0]), float(self.developed), float(self.strip.rise)
         eta = np.linspace(-1.0, 1.0, N_LINE_POINTS)
-        own = np.pi / length * np.cos(0.5 * np.pi * eta)
+        drawn_slope = np.pi / length * np.cos(0.5 * np.pi * eta)
         if z >= BUCKLING_LOAD:
             slope = (float(self.balance) - travel) / length
             free = float(self.buckled_amplitude(at)[0])
             phase = np.pi * (1.0 + eta)
-            turn = -rise / 6.0 * own + slope * (1.0 - np.cos(phase)) + free * np.sin(phase)
+            turn = -rise / 6.0 * drawn_slope + slope * (1.0 - np.cos(phase)) + free * np.sin(phase)
         else:
             q, _, c, g = (
                 complex(item[0]) if np.ndim(item) else complex(item) for item in self.waves(np.array([z]), at)
             )
-            turn = np.real(-c * own + g * (np.cos(q) - np.cos(q * eta)))
+            turn = np.real(-c * drawn_slope + g * (np.cos(q) - np.cos(q * eta)))
         end = (float(self.strip.reach), rise - travel)
         return line_between(np.arctan(turn), np.full(N_LINE_POINTS, length / N_LINE_POINTS), end)
 

@@ -107,8 +107,8 @@ class HybridLeaf(LeafLaw):
     @property
     def linear(self) -> tuple[Any, Any]:
         """Range in which the negative stiffness is at least half of its largest, from and to [m]."""
-        found: tuple[Any, Any] = self._steepest[1]
-        return found
+        limits: tuple[Any, Any] = self._steepest[1]
+        return limits
 
     def is_buckled(self, travel: Any) -> Any:
         """Return False everywhere: the model has no buckled form."""

@@ -190,13 +190,13 @@ class LeafSpring(ABC):
         lines, height = self.bent_lines(compression, corner)
         half, rim, foot = 0.5 * block, self.rim(fillet), top - block - height
         over = 0.5 * self.strip.thickness / float(np.cos(self.strip.angle))
-        found = [
+        bodies = [
             PosedBody.polygon("block", "driven", rectangle(-half, top - block - over, half, top)),
             PosedBody.polygon("base", "held", rectangle(-half, foot - block, half, foot + over)),
         ]
         for x, y in ((half + line[-1, 0], foot + line[-1, 1]) for line in lines[:-1]):
-            found.append(PosedBody.polygon("corner", "free", rectangle(x, y - rim, x + block, y + corner + rim)))
-        return foot, found
+            bodies.append(PosedBody.polygon("corner", "free", rectangle(x, y - rim, x + block, y + corner + rim)))
+        return foot, bodies
 
     def room(self, _corner: float) -> float:
         """Return by how much it can be compressed until its blocks meet [m]; infinite if they do not."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -45,6 +45,7 @@ class LawsOneByOne:
     """Laws that are asked one after the other, each for its row of travels (r, n)."""
 
     column: NDArray[np.object_]  # (r, 1)
+    one_by_one: ClassVar[bool] = True
 
     @property
     def laws(self) -> list[Any]:
@@ -58,11 +59,11 @@ class LawsOneByOne:
 
     def force(self, travel: FloatArray) -> FloatArray:
         """Return the force of each leaf along the motion [N]."""
-        return np.asarray(self._each("force", travel))
+        return np.asarray(self._evaluate_each("force", travel))
 
     def stress(self, travel: FloatArray) -> FloatArray:
         """Return the largest stress of each leaf [Pa]."""
-        return np.asarray(self._each("stress", travel))
+        return np.asarray(self._evaluate_each("stress", travel))
 
     def state(self, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return `force` and `stress`."""
@@ -70,11 +71,11 @@ class LawsOneByOne:
 
     def is_buckled(self, travel: FloatArray) -> Any:
         """Return whether each leaf is buckled."""
-        return self._each("is_buckled", travel)
+        return self._evaluate_each("is_buckled", travel)
 
-    def _each(self, name: str, travel: FloatArray) -> Any:
-        own = np.broadcast_to(travel, (len(self.laws), travel.shape[1]))
-        return np.stack([np.asarray(getattr(law, name)(row)) for law, row in zip(self.laws, own, strict=True)])
+    def _evaluate_each(self, name: str, travel: FloatArray) -> Any:
+        travel_rows = np.broadcast_to(travel, (len(self.laws), travel.shape[1]))
+        return np.stack([np.asarray(getattr(law, name)(row)) for law, row in zip(self.laws, travel_rows, strict=True)])
 
     def __getattr__(self, name: str) -> Any:
         """Return what the laws know of themselves: a column, or a column for each of several numbers."""

@@ -277,14 +277,14 @@ class StraightSpring(LeafSpring):
 
     def force(self, compression: Any) -> FloatArray:
         """Return the force [N] at a compression [m]."""
-        unit, found = self._leaf(compression)
-        return np.asarray(-2.0 * self.share * unit * found.along)
+        unit, form = self._leaf(compression)
+        return np.asarray(-2.0 * self.share * unit * form.along)
 
     def stress(self, compression: Any) -> FloatArray:
         """Return the largest stress, bending and axial [Pa]."""
-        unit, found = self._leaf(compression)
-        bent = 0.5 * self.strip.youngs_modulus * self.strip.thickness * found.curvature / self.strip.length
-        return np.asarray(bent + np.abs(4.0 * found.z * unit) / self.strip.area)
+        unit, form = self._leaf(compression)
+        bent = 0.5 * self.strip.youngs_modulus * self.strip.thickness * form.curvature / self.strip.length
+        return np.asarray(bent + np.abs(4.0 * form.z * unit) / self.strip.area)
 
     def _leaf(self, compression: Any) -> tuple[Any, Any]:
         strip = self.strip

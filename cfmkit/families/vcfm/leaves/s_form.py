@@ -82,9 +82,9 @@ def compliance(z: FloatArray) -> tuple[FloatArray, FloatArray]:
     pulled = z < -MAX_SERIES_LOAD
     if pulled.any():
         e[pulled], slope[pulled] = _tension_compliance(z[pulled])
-    near = np.abs(z) <= MAX_SERIES_LOAD
-    if near.any():
-        e[near], slope[near] = _series(z[near], _EXTENSION_SERIES), _series(z[near], _SLOPE_SERIES)
+    is_small = np.abs(z) <= MAX_SERIES_LOAD
+    if is_small.any():
+        e[is_small], slope[is_small] = _series(z[is_small], _EXTENSION_SERIES), _series(z[is_small], _SLOPE_SERIES)
     return e, slope
 
 
@@ -113,19 +113,19 @@ def end_curvature(z: FloatArray) -> FloatArray:
         w = -2.0 * z * s / (c - s)
         t = np.tanh(q) / q
         w = np.where(z < -MAX_SERIES_LOAD, -2.0 * z * t / (1.0 - t), w)
-    near = np.abs(z) <= MAX_SERIES_LOAD
-    if near.any():
-        w[near] = _series(z[near], _STIFFNESS_SERIES)
+    is_small = np.abs(z) <= MAX_SERIES_LOAD
+    if is_small.any():
+        w[is_small] = _series(z[is_small], _STIFFNESS_SERIES)
     return w
 
 
 def _series(z: FloatArray, terms: FloatArray) -> FloatArray:
     """Return the power series with these terms, lowest first: `polyval` without its checks, to the last bit."""
-    found: FloatArray = terms[-1] + 0.0 * z
+    total: FloatArray = terms[-1] + 0.0 * z
     for term in terms[-2::-1].tolist():
-        found *= z
-        found += term
-    return found
+        total *= z
+        total += term
+    return total
 
 
 def largest_curvature(z: FloatArray) -> FloatArray:
@@ -231,5 +231,5 @@ def line_between(angles: FloatArray, steps: FloatArray, end: tuple[float, float]
     middle = 0.5 * (along[1:] + along[:-1]) * steps[1:, None]
     line = np.concatenate([[[0.0, 0.0]], np.cumsum(middle, axis=0)])
     share = np.linspace(0.0, 1.0, len(line))[:, None]
-    found: FloatArray = line + share * (np.array(end) - line[-1])
-    return found
+    shifted: FloatArray = line + share * (np.array(end) - line[-1])
+    return shifted

@@ -189,18 +189,18 @@ class VBeam(LeafLaw):
 
     def _crossing(self, guess: Any, outward: Any) -> Any:
         """Return where both laws give one force, by secants; where there is no such place near, the closed form."""
-        before, here = guess + outward, np.asarray(guess, dtype=float)
+        before, place = guess + outward, np.asarray(guess, dtype=float)
         gap = self.s_force(before) - self.buckled_force(before)
         for _ in range(12):
-            gap_here = self.s_force(here) - self.buckled_force(here)
+            gap_here = self.s_force(place) - self.buckled_force(place)
             with np.errstate(all="ignore"):
-                step = gap_here * (here - before) / (gap_here - gap)
+                step = gap_here * (place - before) / (gap_here - gap)
             step = np.where(np.isfinite(step), step, 0.0)
-            before, gap, here = here, gap_here, here - step
-            if not (np.abs(step) > 1e-15 * np.abs(here)).any():
+            before, gap, place = place, gap_here, place - step
+            if not (np.abs(step) > 1e-15 * np.abs(place)).any():
                 break  # the last bit
-        near = np.abs(here - guess) <= 2.0 * np.abs(outward)
-        return np.where(near, here, guess)
+        is_near = np.abs(place - guess) <= 2.0 * np.abs(outward)
+        return np.where(is_near, place, guess)
 
     @property
     def overrating(self) -> Any:
@@ -234,13 +234,13 @@ class VBeam(LeafLaw):
     def state(self, travel: Any) -> tuple[FloatArray, FloatArray]:
         """Return `force` and `stress` at once: both come of one root."""
         buckled = np.asarray(self.is_buckled(travel))
-        strip, one = self.strip, all(np.ndim(item) == 0 for item in vars(self.strip).values())
-        wide = [] if one else [np.broadcast_to(np.asarray(item), buckled.shape) for item in vars(strip).values()]
+        strip, is_single = self.strip, all(np.ndim(item) == 0 for item in vars(self.strip).values())
+        wide = [] if is_single else [np.broadcast_to(np.asarray(item), buckled.shape) for item in vars(strip).values()]
         place = np.broadcast_to(np.asarray(travel, dtype=float), buckled.shape)
         force, stress = np.empty((2, *buckled.shape))
         for chosen, law in ((buckled, _buckled_form), (~buckled, _bent_form)):
             if chosen.any():
-                about = strip if one else type(strip)(*(item[chosen] for item in wide))
+                about = strip if is_single else type(strip)(*(item[chosen] for item in wide))
                 force[chosen], stress[chosen] = law(about, place[chosen])
         return force, stress
 
@@ -256,10 +256,10 @@ def _buckled_form(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:
 
 def _bent_form(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:
     unit = strip.bending / strip.length**2
-    found = s_force(strip.angle, strip.thickness / strip.length, travel / strip.length)
-    axial = np.abs(4.0 * found.z * unit) / strip.area
-    bending = 0.5 * strip.youngs_modulus * strip.thickness * found.curvature / strip.length
-    return unit * found.along, bending + axial
+    form = s_force(strip.angle, strip.thickness / strip.length, travel / strip.length)
+    axial = np.abs(4.0 * form.z * unit) / strip.area
+    bending = 0.5 * strip.youngs_modulus * strip.thickness * form.curvature / strip.length
+    return unit * form.along, bending + axial
 
 
 V_BEAM = LeafKind(
