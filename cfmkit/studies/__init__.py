@@ -21,7 +21,7 @@ __getattr__, __all__ = lazy_names(
         "metric_changes_since_earlier_batch": "BatchComparison",
         "point_evaluation": "Study",
         "serial_and_cluster_executors": "Lost serial",
-        "variable_paths": "leaf paths",
+        "variable_paths": "FIXED_BLOCKS CannotVary leaf paths",
         "variants_in_rows": "are_solved_together evaluate_rows",
     },
 )

@@ -9,7 +9,7 @@ import pytest
 
 import cfmkit
 from cfmkit.specs.units import format_quantity, to_border
-from cfmkit.studies.variable_paths import FIXED_BLOCKS, CannotVary, leaf, paths
+from cfmkit.studies import FIXED_BLOCKS, CannotVary, leaf, paths
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 STEMS = sorted(
