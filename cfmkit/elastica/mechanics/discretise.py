@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-from cfmkit.elastica.mechanics.designs import fill_arrays, join_held
 from cfmkit.elastica.mechanics.element_cuts import (
     TAUT_RATIO,
     MovingCuts,
@@ -27,6 +26,7 @@ from cfmkit.elastica.mechanics.element_cuts import (
     join_cut_laws,
     turns_little,
 )
+from cfmkit.elastica.mechanics.network_arrays import fill_arrays, join_held
 from cfmkit.elastica.mechanics.numbering import Numbering, Topology, find_free, number
 from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.model.beam_fits import BeamFits
