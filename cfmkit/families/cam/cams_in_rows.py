@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     Group = tuple[Rows, SolvedRows[Solution]]
 
 MAX_SAMPLES_AT_ONCE = 250_000
-"""Points that are worked on together: 520 curves of 481 points. A quarter of them takes twice the time a point."""
+"""Points that are worked on together: 520 curves of 481 points. A quarter at a time takes half as long again."""
 MIN_SHARED_CAMS, MIN_SHARED_UNCHECKED = 8, 400
 """Mechanisms around one cam from which on they are worth a solution of their own: where each other one is validated,
 and where bounds of its numbers are enough.
