@@ -18,6 +18,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from cfmkit._version import __version__
+from cfmkit.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from cfmkit.api import (
@@ -61,49 +62,30 @@ if TYPE_CHECKING:
     from cfmkit.runs.sweep_and_sensitivity_api import sensitivity, sweep
     from cfmkit.specs.spec import Spec
 
-_HOMES = {
-    "cfmkit.api": (
-        "analyze",
-        "check",
-        "design",
-        "drawing",
-        "dumps",
-        "evaluate",
-        "export",
-        "figures",
-        "load",
-        "loads",
-    ),
-    "cfmkit.runs.batch": ("BatchResult", "batch"),
-    "cfmkit.runs.examples": ("Example", "examples"),
-    "cfmkit.curves": ("Curve",),
-    "cfmkit.errors": (
-        "CfmError",
-        "DataError",
-        "ExitCode",
-        "FolderInUse",
-        "GeometryError",
-        "InputError",
-        "OutputError",
-        "Problem",
-        "QuantityError",
-        "SolutionError",
-        "SpecError",
-        "UsageError",
-    ),
-    "cfmkit.experiment.reading": ("Recording",),
-    "cfmkit.experiment.measurement_and_calibration_outputs": ("MeasureReport",),
-    "cfmkit.families.run_control": ("Run",),
-    "cfmkit.runs.measure_and_calibrate_api": ("calibrate", "correct", "measure"),
-    "cfmkit.runs.notebook_result": ("AnalysisView",),
-    "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
-    "cfmkit.specs.spec": ("Spec",),
-    "cfmkit.runs.register": ("metric", "register"),
-    "cfmkit.runs.study_result": ("StudyResult",),
-    "cfmkit.runs.suggest_api": ("suggest",),
-    "cfmkit.runs.sweep_and_sensitivity_api": ("sensitivity", "sweep"),
-}
-_HOME = {name: module for module, names in _HOMES.items() for name in names}
+__getattr__, _ = lazy_names(
+    __name__,
+    {
+        "api": "analyze check design drawing dumps evaluate export figures load loads",
+        "runs.batch": "BatchResult batch",
+        "runs.examples": "Example examples",
+        "curves": "Curve",
+        "errors": (
+            "CfmError DataError ExitCode FolderInUse GeometryError InputError OutputError Problem QuantityError "
+            "SolutionError SpecError UsageError"
+        ),
+        "experiment.reading": "Recording",
+        "experiment.measurement_and_calibration_outputs": "MeasureReport",
+        "families.run_control": "Run",
+        "runs.measure_and_calibrate_api": "calibrate correct measure",
+        "runs.notebook_result": "AnalysisView",
+        "results": "Design Finding Quantity Result Status",
+        "specs.spec": "Spec",
+        "runs.register": "metric register",
+        "runs.study_result": "StudyResult",
+        "runs.suggest_api": "suggest",
+        "runs.sweep_and_sensitivity_api": "sensitivity sweep",
+    },
+)
 
 __all__ = [
     "AnalysisView",
@@ -154,15 +136,6 @@ __all__ = [
     "suggest",
     "sweep",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first needed."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'cfmkit' has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value
 
 
 class _Package(ModuleType):

@@ -230,13 +230,18 @@ def evaluate(
     """
     from cfmkit.families.base import with_own_metrics
     from cfmkit.metrics import evaluate as measured
+    from cfmkit.metrics import values_of_family
     from cfmkit.runs.notebook_result import Metrics
     from cfmkit.runs.values_with_units import read_window
 
-    chosen = names_of(names)  # registers functions, which are values of the result then
+    chosen = None if names is None else tuple(names_of(names))  # registers functions, which are values of the result
     measurable = with_own_metrics(_result_of(result))
     over = read_window(window, measurable.curve.kind) if window is not None else None
-    return Metrics(measured(measurable, chosen, over))
+    if chosen is None:
+        return Metrics(measured(measurable, window=over))
+    record = family(measurable.spec.family)
+    measurable = record.with_envelope(measurable, chosen)
+    return Metrics(measured(measurable, chosen, over, values_of_family(record.outputs.values)))
 
 
 def check(spec: AnySpec, changes: Iterable[str] = ()) -> tuple[Problem, ...]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 MAX_REPR_LENGTH = 1500  # characters of a `repr`
 LONGEST_ITEM = 100  # characters of one item in it
 PLAIN_TYPES = (str, int, float, type(None))  # what has a text of its own that is short
-T = TypeVar("T")
+ValueT = TypeVar("ValueT")
 
 
 def __getattr__(name: str) -> Any:
@@ -62,14 +62,14 @@ def distinct(values: Any) -> NDArray[Any]:
     return ordered[keep]
 
 
-class Named(dict[str, T]):
+class Named(dict[str, ValueT]):
     """Values by name, whose text is short."""
 
     def __repr__(self) -> str:
         return "{" + _join_texts([f"{name!r}: {brief(value)}" for name, value in self.items()]) + "}"
 
 
-class Several(tuple[T, ...]):
+class Several(tuple[ValueT, ...]):
     """Values in order, whose text is short."""
 
     __slots__ = ()
@@ -78,7 +78,7 @@ class Several(tuple[T, ...]):
         return "(" + _join_texts([brief(value) for value in self]) + ")"
 
 
-class LazyMapping(Mapping[str, T]):
+class LazyMapping(Mapping[str, ValueT]):
     """Values by name, each computed when it is first read.
 
     Parameters
@@ -97,12 +97,14 @@ class LazyMapping(Mapping[str, T]):
     (4, ['cam', 'beam', 'x'])
     """
 
-    def __init__(self, names: Iterable[str], compute: Callable[[str], T], known: Mapping[str, T] | None = None) -> None:
+    def __init__(
+        self, names: Iterable[str], compute: Callable[[str], ValueT], known: Mapping[str, ValueT] | None = None
+    ) -> None:
         self._known = dict(known or {})
         self._names = dict.fromkeys((*names, *self._known))
         self._compute = compute
 
-    def __getitem__(self, name: str) -> T:
+    def __getitem__(self, name: str) -> ValueT:
         """Return a value; it is computed once."""
         if name not in self._known:
             if name not in self._names:
@@ -119,7 +121,7 @@ class LazyMapping(Mapping[str, T]):
     def __contains__(self, name: object) -> bool:
         return name in self._names
 
-    def __or__(self, other: Mapping[str, T]) -> LazyMapping[T]:
+    def __or__(self, other: Mapping[str, ValueT]) -> LazyMapping[ValueT]:
         """Return these values with others, which replace those of the same name."""
         return LazyMapping(self._names, self._compute, {**self._known, **other})
 
@@ -131,7 +133,7 @@ class LazyMapping(Mapping[str, T]):
         return f"<values by name: {_join_texts(list(self._names))}>"
 
 
-class LazySequence(Sequence[T]):
+class LazySequence(Sequence[ValueT]):
     """Values in order, all computed when one of them, or their number, is first read.
 
     Examples
@@ -141,22 +143,22 @@ class LazySequence(Sequence[T]):
     (0, 1, 4, 9, 16)
     """
 
-    def __init__(self, compute: Callable[[], Iterable[T]]) -> None:
-        self._compute: Callable[[], Iterable[T]] | None = compute
-        self._values: Several[T] = Several()
+    def __init__(self, compute: Callable[[], Iterable[ValueT]]) -> None:
+        self._compute: Callable[[], Iterable[ValueT]] | None = compute
+        self._values: Several[ValueT] = Several()
 
     @property
-    def values(self) -> Several[T]:
+    def values(self) -> Several[ValueT]:
         """All of them."""
         if self._compute is not None:
             self._values, self._compute = Several(self._compute()), None
         return self._values
 
     @overload
-    def __getitem__(self, index: int) -> T: ...
+    def __getitem__(self, index: int) -> ValueT: ...
     @overload
-    def __getitem__(self, index: slice) -> tuple[T, ...]: ...
-    def __getitem__(self, index: int | slice) -> T | tuple[T, ...]:
+    def __getitem__(self, index: slice) -> tuple[ValueT, ...]: ...
+    def __getitem__(self, index: int | slice) -> ValueT | tuple[ValueT, ...]:
         return self.values[index]
 
     def __len__(self) -> int:

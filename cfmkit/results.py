@@ -186,81 +186,63 @@ class WindingPath(Protocol):
 
 @dataclass(frozen=True)
 class Result:
-    """The outcome of one analysis.
-
-    Attributes
-    ----------
-    spec : Spec
-        The specification with every default and derived part written out.
-    status : Status
-        How far the solver came.
-    message : str
-        One sentence on the outcome; the status's own sentence if nothing more is known.
-    curves : tuple of Curve
-        All curves of the run, the nominal one first; empty if nothing was solved.
-    values : mapping
-        Scalar results that the family computes itself, by name; a `LazyMapping` computes them when they are read.
-    warnings : sequence of Finding
-        What the user must know; warnings never change the exit code. A `LazySequence` composes them when they are read.
-    travel : tuple of (float, float), optional
-        Where the motion was to start and to end [m or rad]: shares of the travel are of this. Default: the
-        nominal curve, as far as it goes.
-    valid : tuple of (float, float)
-        Intervals of the motion [m or rad] in which the mechanism works as intended
-        (for a cam: the roller runs on the flank). ``usable_stroke`` looks there only.
-    target : float, optional
-        Force or torque that the curve should have [N or N m].
-    target_curve : TargetCurve, optional
-        What the curve should follow where it is not to be constant; default: the specification's own.
-    reference : float, optional
-        Motion of the pose that the band ranges are measured around [m or rad].
-    allowable_stress : float, optional
-        What the column ``max_stress`` is compared with [Pa].
-    stress_overrated : float
-        By what share the model may overestimate the stress at most: so much above the allowable one is no finding.
-    load_cases : tuple of Curve
-        Curves of the same mechanism under other loads or settings whose stress counts beside that of the nominal one,
-        in ``stress_max``, ``safety_factor`` and ``usable_stroke``.
-    closed : ClosedForm, optional
-        The nominal curve at every place, where the model is so cheap.
-    winding : WindingPath, optional
-        The nominal curve at every place of its way, where its motion turns back; it has one branch.
-    ends : Curve, optional
-        Points of the nominal curve beside its own: where windows end between two of these.
-    effort_error : float, optional
-        Numerical error of the nominal curve's effort [N or N m]: rounding of the sum of what springs and members do
-        where that is a formula (`ROUND_OFF`), the accuracy of the solver where it is solved for. Nothing is measured
-        relative to an effort that is not above it. Default: 1e-12 of the largest effort.
-    part_efforts : callable, optional
-        ``part_efforts(branch, places)``, the largest effort of one spring or member of the nominal curve at places of
-        its motion, (n,) each [m or rad; N or N m]: that of a part is the derivative of its energy by the motion.
-    tables : mapping
-        More files of a run, by stem: what makes the table of each, ``adjustability`` for adjustability.csv.
-    state : Any
-        What the family's drawing functions need; not part of the public interface.
-    """
+    """The outcome of one analysis."""
 
     spec: Spec
+    """The specification with every default and derived part written out."""
     status: Status
+    """How far the solver came."""
     message: str = ""
+    """One sentence on the outcome; the status's own sentence if nothing more is known."""
     curves: tuple[Curve, ...] = ()
+    """All curves of the run, the nominal one first; empty if nothing was solved."""
     values: Mapping[str, Quantity] = field(default_factory=dict)
+    """Scalar results that the family computes itself, by name; a `LazyMapping` computes them when they are read."""
     warnings: Sequence[Finding] = ()
+    """What the user must know; warnings never change the exit code. A `LazySequence` composes them when they are
+    read.
+    """
     travel: tuple[float, float] | None = None
+    """Where the motion was to start and to end [m or rad]: shares of the travel are of this. Default: the nominal
+    curve, as far as it goes.
+    """
     valid: tuple[tuple[float, float], ...] | None = None
+    """Intervals of the motion [m or rad] in which the mechanism works as intended (for a cam: the roller runs on
+    the flank). ``usable_stroke`` looks there only.
+    """
     target: float | None = None
+    """Force or torque that the curve should have [N or N m]."""
     target_curve: TargetCurve | None = None
+    """What the curve should follow where it is not to be constant; default: the specification's own."""
     reference: float | None = None
+    """Motion of the pose that the band ranges are measured around [m or rad]."""
     allowable_stress: float | None = None
+    """What the column ``max_stress`` is compared with [Pa]."""
     stress_overrated: float = 0.0
+    """By what share the model may overestimate the stress at most: so much above the allowable one is no finding."""
     load_cases: tuple[Curve, ...] = ()
+    """Curves of the same mechanism under other loads or settings whose stress counts beside that of the nominal
+    one, in ``stress_max``, ``safety_factor`` and ``usable_stroke``.
+    """
     closed: ClosedForm | None = None
+    """The nominal curve at every place, where the model is so cheap."""
     winding: WindingPath | None = None
+    """The nominal curve at every place of its way, where its motion turns back; it has one branch."""
     ends: Curve | None = None
+    """Points of the nominal curve beside its own: where windows end between two of these."""
     effort_error: float | None = None
+    """Numerical error of the nominal curve's effort [N or N m]: rounding of the sum of what springs and members do
+    where that is a formula (`ROUND_OFF`), the accuracy of the solver where it is solved for. Nothing is measured
+    relative to an effort that is not above it. Default: 1e-12 of the largest effort.
+    """
     part_efforts: Callable[[str, FloatArray], FloatArray] | None = None
+    """``part_efforts(branch, places)``, the largest effort of one spring or member of the nominal curve at places
+    of its motion, (n,) each [m or rad; N or N m]: that of a part is the derivative of its energy by the motion.
+    """
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
+    """More files of a run, by stem: what makes the table of each, ``adjustability`` for adjustability.csv."""
     state: Any = None
+    """What the family's drawing functions need; not part of the public interface."""
 
     def __post_init__(self) -> None:
         if not self.message:
@@ -320,39 +302,28 @@ class Design:
     """The outcome of a design: a complete new specification, or why there is none.
 
     A design is never its own judge: its `spec` is analysed like any other.
-
-    Attributes
-    ----------
-    spec : Spec or None
-        The new specification.
-    status, message : Status and str
-        How the design ended.
-    active_bounds : tuple of str
-        What holds the design where it is.
-    nearest_feasible : mapping of str to str
-        Where there is no design: path of the specification -> the nearest value for which there would be one.
-    warnings : tuple of Finding
-        What the user must know.
-    search : mapping
-        What only the search knows, by name: of its starts, of its audit, of parts that it has drawn.
-    notes : tuple of (str, str)
-        Paragraphs of the page: the word that begins each, and the text.
-    tables : mapping
-        Name of a CSV file without its ending -> what makes it.
-    next_best : tuple of callable
-        What makes the designs with other bought springs, the best first: for who finds this one lacking.
     """
 
     spec: Spec | None
+    """The new specification; None if there is no design."""
     status: Status
+    """How the design ended."""
     message: str = ""
+    """One sentence on that."""
     active_bounds: tuple[str, ...] = ()
+    """What holds the design where it is."""
     nearest_feasible: Mapping[str, str] = field(default_factory=dict)
+    """Where there is no design: path of the specification -> the nearest value for which there would be one."""
     warnings: tuple[Finding, ...] = ()
+    """What the user must know."""
     search: Mapping[str, Searched] = field(default_factory=dict)
+    """What only the search knows, by name: of its starts, of its audit, of parts that it has drawn."""
     notes: tuple[tuple[str, str], ...] = ()
+    """Paragraphs of the page: the word that begins each, and the text."""
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
+    """Name of a CSV file without its ending -> what makes it."""
     next_best: tuple[Callable[[], Design], ...] = ()
+    """What makes the designs with other bought springs, the best first: for who finds this one lacking."""
 
     def __post_init__(self) -> None:
         if not self.message:

@@ -201,7 +201,13 @@ def _python() -> str:
         "```\n",
     ]
     return "\n".join(
-        [*parts, "## Types\n", "```{eval-rst}", *(f".. autoclass:: cfmkit.{name}\n" for name in classes), "```\n"]
+        [
+            *parts,
+            "## Types\n",
+            "```{eval-rst}",
+            *(f".. autoclass:: cfmkit.{name}\n   :members:\n" for name in classes),
+            "```\n",
+        ]
     )
 
 

@@ -14,3 +14,13 @@
 
 What a design is to do, the start it begins with and the words for what blocks it belong to the family.
 """
+
+from cfmkit.lazy_names import lazy_names
+
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "robust_design": "RobustProblem with_margins",
+        "run_many_starts": "UNLIMITED_CLOCK Clock",
+    },
+)

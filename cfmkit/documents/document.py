@@ -286,7 +286,7 @@ TONES_BY_EXIT_CODE = {0: "good", 3: "bad", 4: "bad", 5: "bad", 6: "warn", 7: "ba
 MAX_WARNING_LENGTH = 100  # characters of a warning on a page: its name, its consequence and a remedy
 MIN_CLAUSE_LENGTH = 24
 """Characters below which a clause says too little: rather a part of the next one is taken as well."""
-DOTS = "..."  # what ends a text that is cut inside a clause
+ELLIPSIS_MARK = "..."  # what ends a text that is cut inside a clause
 NUMBER_START = re.compile(r"(?<![A-Za-z_])\d")
 PLAIN_WORDS = re.compile(r"[a-z]+ [a-z]+ ")
 
@@ -327,7 +327,7 @@ def _beginning(text: str, limit: int) -> str:
     if whole:
         return text[: max(whole)]
     if (cut := text.rfind(" ", 0, max(limit - 3, 0))) > 0:
-        return f"{text[:cut]} {DOTS}"
+        return f"{text[:cut]} {ELLIPSIS_MARK}"
     cut = text.rfind(" ", 0, limit + 1)
     return text[:cut] if cut > 0 else text[:limit]
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.documents.document import (
     BLANK_LINE,
-    DOTS,
+    ELLIPSIS_MARK,
     LABEL_COLUMNS,
     MIN_CLAUSE_LENGTH,
     NUMBER_START,
@@ -132,7 +132,7 @@ def _with_remedy(word: Span, name: str, text: str, remedy: str, room: int) -> Te
     shown = shortened_to_clause(text, left) if left >= LEAST_TEXT else ""
     if remedy:
         beside = shortened_to_clause(text, max(left - len(remedy) - GAP_COLUMNS, 0))
-        kept = bool(NUMBER_START.search(beside)) if NUMBER_START.search(shown) else not beside.endswith(DOTS)
+        kept = bool(NUMBER_START.search(beside)) if NUMBER_START.search(shown) else not beside.endswith(ELLIPSIS_MARK)
         if beside != shown and (len(beside) < MIN_CLAUSE_LENGTH or not kept):
             remedy = ""
         else:

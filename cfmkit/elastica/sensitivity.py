@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,7 +36,6 @@ from cfmkit.elastica.mechanics.design_derivatives import (
 )
 from cfmkit.elastica.mechanics.designs import design_of, make_up, set_up
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.similar_arrays import discretise_alike
 from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results import beam_states, stress_extremes
@@ -282,8 +281,6 @@ def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any,
             raise InputError(
                 f"design variable {k} changes the make-up of the network: no derivative with respect to it exists"
             )
-    designs = set_up(
-        path.mesh, (path.network, path.load_case), pairs, partial(discretise_alike, path.mesh, cuts=path.mesh.cuts)
-    )
+    designs = set_up(path.mesh, (path.network, path.load_case), pairs)
     chosen = np.asarray(path.at_requested if points is None else points, dtype=np.int64)
     return Gradient(path, read_only(chosen, np.int64), designs)

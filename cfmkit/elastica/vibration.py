@@ -53,7 +53,9 @@ LONG_CHAIN, ORDER_IN_CHAIN = 8, 6
 MAX_DEGREE = 36
 MAX_UNKNOWNS = 4000  # dense matrices of this size take 130 MB each
 ZERO_FREQUENCY_RTOL = 1e-9  # share of the shift within which the square of a frequency is zero
-UNSTABLE = 1e-7  # the same for a negative square: the end of a branch is located to 1e-8, and has a frequency of zero
+INSTABILITY_RTOL = (
+    1e-7  # the same for a negative square: the end of a branch is located to 1e-8, and has a frequency of zero
+)
 FLEXIBILITY_RTOL = 1e-10  # share of the largest flexibility below which a negative one is none
 COMPLEX_SHARE = 1e-5  # imaginary part of a square of a frequency from which on two have met, of its size
 N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
@@ -300,7 +302,7 @@ def _squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[Float
         largest = float(np.abs(inverse).max(initial=0.0))
         lowest = inverse[inverse > np.finfo(float).eps * largest][::-1][:count]
         squares = 1 / lowest - shift
-        if inverse[0] < -FLEXIBILITY_RTOL * largest or (squares < -UNSTABLE * shift).any():
+        if inverse[0] < -FLEXIBILITY_RTOL * largest or (squares < -INSTABILITY_RTOL * shift).any():
             return found, False, False
         found[: len(squares)] = np.where(squares < ZERO_FREQUENCY_RTOL * shift, 0.0, squares)
         return found, False, False

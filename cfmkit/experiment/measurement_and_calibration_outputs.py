@@ -41,18 +41,12 @@ SHOWN_METRICS = 6  # metrics in the text of a report
 
 @dataclass(frozen=True, repr=False)
 class MeasureReport:
-    """A measured mechanism with everything that is read off it.
-
-    Attributes
-    ----------
-    source : MeasuredCurves
-        The curves.
-    numbers : Measurement
-        Their metrics.
-    """
+    """A measured mechanism with everything that is read off it."""
 
     source: MeasuredCurves
+    """The curves."""
     numbers: Measurement
+    """Their metrics."""
 
     def __repr__(self) -> str:
         """Return the recording, the first metrics that have a value, and the names of the warnings."""

@@ -65,38 +65,26 @@ class Decisions:
 
 @dataclass(frozen=True, repr=False)
 class Recording(ShortRepr):
-    """A measured curve as recorded: SI, in the order of the file.
-
-    Attributes
-    ----------
-    name : str
-        The file's name.
-    motion : (n,) array
-        Displacement [m] or angle [rad].
-    effort : (n,) array
-        Force [N] or torque [N m].
-    time : (n,) array or None
-        [s].
-    kind : {"force", "torque"}
-        Which pair `motion` and `effort` are.
-    decisions : Decisions or None
-        How the file was read.
-    notes : tuple of str
-        What was changed since.
-    zeros, signs : (float, float)
-        Of effort and motion: what was subtracted from the readings since [N, m] or [N m, rad], and -1 where the sign
-        was then reversed.
-    """
+    """A measured curve as recorded: SI, in the order of the file."""
 
     name: str
+    """The file's name."""
     motion: FloatArray
+    """Displacement [m] or angle [rad], (n,)."""
     effort: FloatArray
+    """Force [N] or torque [N m], (n,)."""
     time: FloatArray | None = None
+    """Of each sample, (n,) [s]; None if it was not recorded."""
     kind: Kind = "force"
+    """Which pair `motion` and `effort` are: "force" or "torque"."""
     decisions: Decisions | None = field(default=None, compare=False)
+    """How the file was read; None if no file was."""
     notes: tuple[str, ...] = field(default=(), compare=False)
+    """What was changed since."""
     zeros: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
+    """Of effort and motion: what was subtracted from the readings since [N, m] or [N m, rad]."""
     signs: tuple[float, float] = field(default=(1.0, 1.0), compare=False)
+    """Of effort and motion: -1 where the sign was reversed after that."""
 
     def __post_init__(self) -> None:
         """Freeze the arrays and refuse what no curve can be."""

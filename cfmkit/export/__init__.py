@@ -7,12 +7,37 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from cfmkit.export.contours import Arc, Contour, Curve2D, Drawing, Line, Smooth, circle, polygon, polygons
+from cfmkit.lazy_names import lazy_names
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.export.arc_outlines import Outline
-    from cfmkit.export.contours import Drawing
 
+__getattr__, _OFFERED_NAMES = lazy_names(
+    __name__,
+    {
+        "arc_outlines": "outlines",
+        "posed_part": "PosedBody box rectangle screw_positions swept",
+        "union": "OutlinePiece merge_pieces",
+    },
+)
+__all__ = [
+    "DEFAULT_FORMATS",
+    "FILE_FORMATS",
+    "Arc",
+    "Contour",
+    "Curve2D",
+    "Drawing",
+    "Line",
+    "Smooth",
+    "circle",
+    "files",
+    "polygon",
+    "polygons",
+    *_OFFERED_NAMES,
+]
 FILE_FORMATS = ("dxf", "svg", "csv", "stl", "3mf", "step")  # what `files` can write
 DEFAULT_FORMATS = FILE_FORMATS[:3]  # what it writes unless told: what a cutter needs
 

@@ -63,9 +63,9 @@ class DrawnBlock:
 class Join:
     """Two parts of a drawing that are one piece."""
 
-    # one, other: names
-    one: str
-    other: str
+    # names
+    first: str
+    second: str
     at: FloatArray  # (2,) where [m]
     gap: float  # between them before the outline was made [m]; negative where they overlap
 

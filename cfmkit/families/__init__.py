@@ -1,6 +1,7 @@
 """The registry of families: one line each, imported when first needed; other packages add theirs by entry points.
 
-A program adds one with `register`, and metrics of its own with `cfmkit.metric`: both hold for its process.
+A program adds one with `register`, and metrics of its own with `cfmkit.metric`: both hold for its process. What an
+author of a family needs is imported here when it is first used.
 """
 
 from __future__ import annotations
@@ -13,13 +14,19 @@ from typing import TYPE_CHECKING, get_args
 
 from cfmkit.errors import UsageError, visible
 from cfmkit.families import entry_point_plugins
-from cfmkit.families.entry_point_plugins import Unusable
+from cfmkit.families.entry_point_plugins import Unusable, forget_installed
+from cfmkit.lazy_names import lazy_names
 from cfmkit.specs import own_metrics
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.families.base import Family
+    from cfmkit.families.base import DesignMethod, ElasticParts, Family, Pictures, ResultNames, function_named
+    from cfmkit.families.findings import Finder
+    from cfmkit.families.hardware import PartStrength
+    from cfmkit.families.no_mechanism import CannotBuild, Infeasible
+    from cfmkit.families.rows import FindingRule, ScalarQuantity, SolvedRows, Variants
+    from cfmkit.families.suggestion_request import Candidate, FamilyOffer, Request
 
 FAMILY_MODULES = {
     "beam": "cfmkit.families.beam.record",
@@ -122,7 +129,7 @@ def _with_own_metrics(record: Family) -> Family:
 
 def _record(name: str) -> Family:
     if name in FAMILY_MODULES:
-        record: Family = import_module(FAMILY_MODULES[name]).FAMILY
+        record: Family = import_module(FAMILY_MODULES[name]).FAMILY_RECORD
         return record
     if name in _REGISTERED_FAMILIES:
         return _REGISTERED_FAMILIES[name]
@@ -190,12 +197,25 @@ def origins() -> dict[str, dict[str, str]]:
     return computed | ({"metrics": {"registered": own_metrics.stamp()}} if own_metrics.stamp() else {})
 
 
+__getattr__, _OFFERED_NAMES = lazy_names(
+    __name__,
+    {
+        "base": "DesignMethod ElasticParts Family Pictures ResultNames function_named",
+        "findings": "Finder",
+        "hardware": "PartStrength",
+        "no_mechanism": "CannotBuild Infeasible",
+        "rows": "FindingRule ScalarQuantity SolvedRows Variants",
+        "suggestion_request": "Candidate FamilyOffer Request",
+    },
+)
+
 __all__ = [
     "FAMILY_MODULES",
     "Unusable",
     "clashing",
     "examine_families",
     "family",
+    "forget_installed",
     "list_registered",
     "list_skipped",
     "names",
@@ -203,4 +223,5 @@ __all__ = [
     "origins",
     "records",
     "register",
+    *_OFFERED_NAMES,
 ]

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.families.end_stops_spec import EndStop
 
 SAME_PLACE = 1e-12  # motions that differ by less are one [m]
-DEFINITIONS = {
+CONTACT_QUANTITIES = {
     "first_contact": ("length", "displacement of the driven node at which the first contact begins"),
     "contact_force[contact]": (
         "force", "mean force in the window of the stop or the obstacle that is named, on one copy; of a stop with two "
@@ -37,8 +37,10 @@ LARGEST_FORCE = (
     "largest normal force: of a stop or an obstacle on one copy, or between tip and `analysis.surface` in both "
     "directions of the motion"
 )
-OF_STOPS = DEFINITIONS | {"contact_force_max": ("force", LARGEST_FORCE)}  # those of a family with end stops
-FINDINGS = {
+STOP_QUANTITIES = CONTACT_QUANTITIES | {
+    "contact_force_max": ("force", LARGEST_FORCE)
+}  # those of a family with end stops
+STOP_FINDINGS = {
     "contact_begins": "a stop is reached, or a pad touches an obstacle",
     "blocked": "a rigid contact leaves the drive no way to go on: the curve ends there",
 }
@@ -132,7 +134,7 @@ class EndStops:
             return {}
         start, end = float(motion[0]), float(motion[-1])
         reached = [event.place if event.kind != "ends" else start for event in self.events(motion, pressed)]
-        found = {"first_contact": Quantity(min(reached, default=None), *DEFINITIONS["first_contact"])}
+        found = {"first_contact": Quantity(min(reached, default=None), *CONTACT_QUANTITIES["first_contact"])}
         low, high = max(window[0], start), min(window[1], end)
         known = high > low and high - low >= (1 - 1e-9) * (window[1] - window[0])
         reason = "" if known else "the window is not on the curve"
@@ -145,9 +147,9 @@ class EndStops:
             untouched = "" if ripple is not None else reason or "there is no contact in the window"
             tops.append(float(np.abs(force).max()))
             found |= {
-                f"contact_force[{name}]": Quantity(mean, *DEFINITIONS["contact_force[contact]"], reason=reason),
+                f"contact_force[{name}]": Quantity(mean, *CONTACT_QUANTITIES["contact_force[contact]"], reason=reason),
                 f"contact_force_ripple[{name}]": Quantity(
-                    ripple, *DEFINITIONS["contact_force_ripple[contact]"], reason=untouched
+                    ripple, *CONTACT_QUANTITIES["contact_force_ripple[contact]"], reason=untouched
                 ),
             }
         return found | {"contact_force_max": Quantity(max(tops) if known else None, "force", LARGEST_FORCE)}

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from cfmkit.specs.spec import Requirement
 
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
+_NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 FreeWay = Annotated[Length, Field(ge=0)]
 
 BEFORE_STOP = 1e-6  # distance from a rigid stop at which a complete motion ends [m]: at the stop its drive is blocked
@@ -54,7 +54,7 @@ def stop_faults(
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Yield names of stops that cannot be columns, and requirements on the force of a stop that is not there."""
     for name in stops:
-        if not _NAME.fullmatch(name):
+        if not _NAME_PATTERN.fullmatch(name):
             yield ("mechanism", "stops", name), "a name is a letter and then at most 39 letters, digits, '_' or '-'"
     yield from contact_requirement_faults(stops, "a stop", requirements)
 

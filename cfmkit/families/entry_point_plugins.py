@@ -116,6 +116,12 @@ def record_of(offer: InstalledFamily, taken: Iterable[str]) -> Family:
     return found
 
 
+def forget_installed() -> None:
+    """Forget what packages offer: it is read anew, as after an installation while this process runs."""
+    _import_record.cache_clear()
+    _offers_on.cache_clear()
+
+
 def _clash(offer: InstalledFamily, taken: Iterable[str]) -> str:
     """Return why a name is not free; empty if it is."""
     if offer.name in taken:

@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from cfmkit.metrics.metrics_of_rows import CurveRows
     from cfmkit.results import Finding
 
-S = TypeVar("S")
+SolutionT = TypeVar("SolutionT")
 S_co = TypeVar("S_co", covariant=True)
 
-T = TypeVar("T")
+ItemT = TypeVar("ItemT")
 
 
-def stack(items: Sequence[T]) -> T:
+def stack(items: Sequence[ItemT]) -> ItemT:
     """Return dataclasses of numbers as one, with columns where they differ: (m, 1), of arrays (k,) (k, m, 1).
 
     Numbers that are equal in all stay plain, so that what mechanisms have in common is computed once. A class that
@@ -92,14 +92,14 @@ def fails(condition: Any) -> bool:
     return False if np.ndim(condition) else bool(condition)
 
 
-def remember_plain(count: int) -> Callable[[Callable[..., T]], Callable[..., T]]:
+def remember_plain(count: int) -> Callable[[Callable[..., ItemT]], Callable[..., ItemT]]:
     """Return a decorator that keeps the last results for plain numbers; those for columns are computed anew."""
 
-    def decorate(function: Callable[..., T]) -> Callable[..., T]:
+    def decorate(function: Callable[..., ItemT]) -> Callable[..., ItemT]:
         kept = lru_cache(maxsize=count)(function)
 
         @wraps(function)
-        def call(*given: Any) -> T:
+        def call(*given: Any) -> ItemT:
             try:
                 hash(given)
             except TypeError:
@@ -144,18 +144,18 @@ def root_between(function: Callable[[Any], Any], low: Any, high: Any) -> Any:
     return roots
 
 
-class PlacesKept(Generic[T]):
+class PlacesKept(Generic[ItemT]):
     """A function of places of all rows that keeps its last two results.
 
     What is wanted on the way up is wanted again on the way down, at other places in between.
     """
 
-    def __init__(self, function: Callable[[FloatArray], T]) -> None:
+    def __init__(self, function: Callable[[FloatArray], ItemT]) -> None:
         """Keep nothing yet."""
         self._function = function
-        self._kept: list[tuple[FloatArray, T]] = []
+        self._kept: list[tuple[FloatArray, ItemT]] = []
 
-    def __call__(self, places: FloatArray) -> T:
+    def __call__(self, places: FloatArray) -> ItemT:
         """Return the result at places."""
         for known, result in self._kept:
             if known is places or (known.shape == places.shape and (known == places).all()):
@@ -165,17 +165,17 @@ class PlacesKept(Generic[T]):
         return result
 
 
-def row_of(item: T, row: int) -> T:
+def row_of(item: ItemT, row: int) -> ItemT:
     """Return one row of what is stacked, in plain numbers."""
     return _map_columns(item, lambda column: column[..., row, 0].tolist())
 
 
-def rows_of(item: T, rows: Any) -> T:
+def rows_of(item: ItemT, rows: Any) -> ItemT:
     """Return some rows of what is stacked, with what is known of it; plain numbers hold for every row."""
     return _map_columns(item, lambda column: column[..., rows, :])
 
 
-def _map_columns(item: T, function: Callable[[FloatArray], Any]) -> T:
+def _map_columns(item: ItemT, function: Callable[[FloatArray], Any]) -> ItemT:
     """Return what is stacked with a function of each of its columns in place of that."""
     found: Any = item
     if isinstance(item, np.ndarray):
@@ -193,17 +193,17 @@ def _map_columns(item: T, function: Callable[[FloatArray], Any]) -> T:
 
 
 @dataclass(frozen=True)
-class ScalarQuantity(Generic[S]):
+class ScalarQuantity(Generic[SolutionT]):
     """A scalar result of a family: what it is, and how a solution gives it."""
 
     dimension: str
     definition: str
-    function: Callable[[S], Any]  # of a solution: (m,) values or one for all mechanisms [SI], NaN where there is none
-    reason: str | Callable[[S], str] = "there is none"  # why a solution of one mechanism has no value
-    applies: Callable[[S], bool] | None = None  # False: such mechanisms do not even name it; default: all do
+    function: Callable[[SolutionT], Any]  # of a solution: (m,) values or one for all mechanisms [SI], NaN if none
+    reason: str | Callable[[SolutionT], str] = "there is none"  # why a solution of one mechanism has no value
+    applies: Callable[[SolutionT], bool] | None = None  # False: such mechanisms do not even name it; default: all do
     words: tuple[str, ...] = ()  # what the values are indices of
 
-    def is_of(self, solution: S) -> bool:
+    def is_of(self, solution: SolutionT) -> bool:
         """Return True if mechanisms of this kind have such a value, or a reason why not."""
         return self.applies is None or self.applies(solution)
 
@@ -217,15 +217,15 @@ def quantity_of_each(
     name: str,
     about: tuple[str, str],  # dimension and definition
     # of a solution: for each mechanism the results, by name, that it has; in one that names it, the first has a reason
-    of_each: Callable[[S], Iterable[Mapping[str, Quantity]]],
-) -> ScalarQuantity[S]:
+    of_each: Callable[[SolutionT], Iterable[Mapping[str, Quantity]]],
+) -> ScalarQuantity[SolutionT]:
     """Return a result that is computed of one mechanism after the other, and that not all of them have."""
 
-    def function(solution: S) -> FloatArray:
+    def function(solution: SolutionT) -> FloatArray:
         found = [quantities.get(name) for quantities in of_each(solution)]
         return np.array([np.nan if one is None or one.value is None else one.value for one in found])
 
-    def first(solution: S) -> Mapping[str, Quantity]:
+    def first(solution: SolutionT) -> Mapping[str, Quantity]:
         return next(iter(of_each(solution)))
 
     return ScalarQuantity(
@@ -241,7 +241,7 @@ def columns_of_absent_values(definitions: Mapping[str, tuple[str, str]]) -> dict
     }
 
 
-def values_of_one(table: Mapping[str, ScalarQuantity[S]], solution: S) -> LazyMapping[Quantity]:
+def values_of_one(table: Mapping[str, ScalarQuantity[SolutionT]], solution: SolutionT) -> LazyMapping[Quantity]:
     """Return the scalar results of a solution of one mechanism by name, each computed when it is read."""
 
     @np.errstate(all="ignore")
@@ -257,16 +257,16 @@ def values_of_one(table: Mapping[str, ScalarQuantity[S]], solution: S) -> LazyMa
 
 
 @dataclass(frozen=True)
-class FindingRule(Generic[S]):
+class FindingRule(Generic[SolutionT]):
     """When a finding holds, for many mechanisms at once, and what it says of one that has it."""
 
     name: str
-    holds: Callable[[S], Any]  # of a solution: (m,) of bool, or one for all mechanisms
-    sentence: Callable[[S], tuple[Any, ...]]  # of a solution of one mechanism: message, then cures
-    short: Callable[[S], str] | None = None  # of the same: the consequence with its number, for pages
+    holds: Callable[[SolutionT], Any]  # of a solution: (m,) of bool, or one for all mechanisms
+    sentence: Callable[[SolutionT], tuple[Any, ...]]  # of a solution of one mechanism: message, then cures
+    short: Callable[[SolutionT], str] | None = None  # of the same: the consequence with its number, for pages
 
 
-def findings_of_one(rules: Iterable[FindingRule[S]], finding: Finder, solution: S) -> Iterator[Finding]:
+def findings_of_one(rules: Iterable[FindingRule[SolutionT]], finding: Finder, solution: SolutionT) -> Iterator[Finding]:
     """Yield the findings of a solution of one mechanism, in the order of the rules."""
     with np.errstate(all="ignore"):
         held = [rule for rule in rules if np.ravel(rule.holds(solution))[0]]
@@ -275,7 +275,9 @@ def findings_of_one(rules: Iterable[FindingRule[S]], finding: Finder, solution: 
 
 
 @np.errstate(all="ignore")
-def findings_of_rows(rules: Iterable[FindingRule[S]], solution: S, count: int) -> dict[str, NDArray[np.bool_]]:
+def findings_of_rows(
+    rules: Iterable[FindingRule[SolutionT]], solution: SolutionT, count: int
+) -> dict[str, NDArray[np.bool_]]:
     """Return which of `count` mechanisms have which finding, (m,) by name; findings that none has are left out."""
     held: dict[str, NDArray[np.bool_]] = {}
     for rule in rules:
@@ -294,19 +296,19 @@ class SeveralSolutions(Protocol[S_co]):
         ...
 
 
-def each_quantity(quantity: ScalarQuantity[S]) -> ScalarQuantity[Any]:
+def each_quantity(quantity: ScalarQuantity[SolutionT]) -> ScalarQuantity[Any]:
     """Return a quantity of one solution as that of several."""
 
-    def function(several: SeveralSolutions[S]) -> FloatArray:
+    def function(several: SeveralSolutions[SolutionT]) -> FloatArray:
         return np.array([float(np.ravel(quantity.function(one))[0]) for one in several.each])
 
     return ScalarQuantity(*quantity.about, function, words=quantity.words)
 
 
-def each_rule(rule: FindingRule[S]) -> FindingRule[Any]:
+def each_rule(rule: FindingRule[SolutionT]) -> FindingRule[Any]:
     """Return a rule on one solution as that on several."""
 
-    def holds(several: SeveralSolutions[S]) -> NDArray[np.bool_]:
+    def holds(several: SeveralSolutions[SolutionT]) -> NDArray[np.bool_]:
         return np.array([bool(np.ravel(rule.holds(one))[0]) for one in several.each])
 
     return FindingRule(rule.name, holds, lambda several: rule.sentence(several.each[0]))
@@ -325,7 +327,7 @@ class RowsSolution(Protocol):
         ...
 
 
-R = TypeVar("R", bound=RowsSolution)
+RowsT = TypeVar("RowsT", bound=RowsSolution)
 
 
 class Variants(Sequence[Any]):
@@ -391,7 +393,7 @@ class Variants(Sequence[Any]):
             yield index, with_values(self.spec, {path: column[index] for path, column in columns.items()})
 
 
-def valid(specs: Sequence[T], indices: Iterable[int] | None = None) -> Iterator[tuple[int, T]]:
+def valid(specs: Sequence[ItemT], indices: Iterable[int] | None = None) -> Iterator[tuple[int, ItemT]]:
     """Yield (index, specification) of those, or of some of those, whose values are valid."""
     for index in range(len(specs)) if indices is None else indices:
         try:
@@ -401,7 +403,7 @@ def valid(specs: Sequence[T], indices: Iterable[int] | None = None) -> Iterator[
         yield index, spec
 
 
-def with_values(block: T, values: Mapping[str, Any]) -> T:
+def with_values(block: ItemT, values: Mapping[str, Any]) -> ItemT:
     """Return a copy of a specification, or of a block of it, with other values at dotted paths; nothing is validated.
 
     Numbers may be columns (m, 1): then it is one of m mechanisms.
@@ -430,12 +432,12 @@ def drop_numbers(value: Any) -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class SolvedRows(Generic[R]):
+class SolvedRows(Generic[RowsT]):
     """Mechanisms that are solved together, one a row, with what a study reads of them."""
 
-    solution: R
-    quantities: Mapping[str, ScalarQuantity[R]]
-    rules: Sequence[FindingRule[R]]
+    solution: RowsT
+    quantities: Mapping[str, ScalarQuantity[RowsT]]
+    rules: Sequence[FindingRule[RowsT]]
     complete: NDArray[np.bool_]  # (m,) others have curves that end early: they are analysed one by one
     traced: bool = False  # whether the model is a path of each: then nothing of it is computed twice
 

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 Worst = Literal["largest", "smallest", "farthest-from-target"]
 Scope = Literal["branch", "cycle", "loop", "value"]
 
-_PLACEHOLDERS: Mapping[Kind, Mapping[str, str]] = {
+_DIMENSION_OF_PLACEHOLDER: Mapping[Kind, Mapping[str, str]] = {
     "force": {"effort": "force", "motion": "length", "work": "energy"},
     "torque": {"effort": "torque", "motion": "angle", "work": "energy"},
 }
-_WORDS = {"force": "displacement", "torque": "angle"}
+_MOTION_WORDS = {"force": "displacement", "torque": "angle"}
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class Definition:
     # takes a `Branch` (or the `Cycle`, see `scope`), returns SI or raises `Undefined`; None: the family computes it and
     # puts it into `Result.values`
     function: Callable[..., float] | None = None
-    # takes a `RowsInWindow`, returns the same of many curves, (d,), NaN where there is none; None: studies analyse each
-    # curve alone
+    # takes a `RowsInWindow` (or the `CycleRows`), returns the same of many curves, (d,), NaN where there is none; None:
+    # studies analyse each curve alone
     of_rows: Callable[[Any], FloatArray] | None = None
     worst: Worst = "largest"  # which branch counts where none is named; without a target the farthest is the smallest
     # what it belongs to: one branch; all branches together, or one of them alone; the closed loop only; or no curve at
@@ -52,5 +52,7 @@ class Definition:
 
     def in_units_of(self, kind: Kind) -> Definition:
         """Return the definition in the words and units of one kind of curve."""
-        text = self.definition.replace("{effort}", kind).replace("{motion}", _WORDS[kind])
-        return replace(self, dimension=_PLACEHOLDERS[kind].get(self.dimension, self.dimension), definition=text)
+        text = self.definition.replace("{effort}", kind).replace("{motion}", _MOTION_WORDS[kind])
+        return replace(
+            self, dimension=_DIMENSION_OF_PLACEHOLDER[kind].get(self.dimension, self.dimension), definition=text
+        )

@@ -7,8 +7,8 @@ which an extreme may stand, the same ends that are solved for. Curves may have d
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from cfmkit.metrics import ranges_many
 from cfmkit.metrics.branch_views import ZERO_EFFORT_SHARE
 from cfmkit.metrics.branches_cut_to_window import BAND_RTOL, WINDOW_RTOL
 from cfmkit.metrics.continuous_means_and_extremes import FEW_SAMPLES, extremes, extremes_of_all, mean_of_rows
-from cfmkit.metrics.metric_definitions import definitions
-from cfmkit.metrics.ranges_many import RANGE_FUNCTIONS, ManyBranches
+from cfmkit.metrics.ranges_many import ManyBranches
 from cfmkit.metrics.spread import ManyWindows, static_balance
 from cfmkit.metrics.window_metrics import NO_STRESS
 
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
+    from cfmkit.metrics.definition import Definition
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
     Ends = tuple[FloatArray, FloatArray]
@@ -223,10 +223,16 @@ class RowsInWindow:
 
     @cached_property
     def _peaks(self) -> tuple[FloatArray, FloatArray]:
-        """The peaks in the window and the efforts there, (d, k), in order; for others an end of the window stands."""
+        """The peaks in the window and the efforts there, (d, k), in order; for others an end of the window stands.
+
+        (d, 0) where no row has a peak in its window.
+        """
         curves, inside = self.curves, self.inside
-        places, heights = curves.dense if curves.peaks is None else curves.peaks, curves.heights
+        places = curves.dense if curves.peaks is None else curves.peaks
         low, high = (end[:, None] for end in self._cut)
+        if not ((places > low) & (places < high)).any():
+            return places[:, :0], places[:, :0]
+        heights = curves.heights
         if not np.isfinite(heights[(places > low) & (places < high)]).all():
             places = np.where(np.isfinite(heights), places, np.nan)  # places without an effort go behind all others
             order = np.argsort(places, axis=1)
@@ -309,18 +315,23 @@ class RowsInWindow:
         allowable, top = self.curves.stress.allowable, self.stress_max()
         return np.where(top > NO_STRESS * allowable, allowable / top, np.nan)
 
-    def range_of(self, name: str) -> FloatArray:
-        """Return one of `RANGES`."""
-        (first, last), many = self.curves.extent, self.branches
+    def rise_to_end(self, function: Callable[[ManyBranches], FloatArray]) -> FloatArray:
+        """Return `ranges_many.range_95` or its fraction."""
+        return np.where(self._reach(self.branches.high), function(self.branches), np.nan)
+
+    def band_range(self, tolerance: float) -> FloatArray:
+        """Return the width within one of the tolerances `ranges_many.BAND_RANGES` about the reference pose."""
+        many = self.branches
+        here = np.abs(many.interpolate(many.reference[:, None])[:, 0])
+        largest = np.nanmax(np.abs(self.curves.samples.values), axis=1, initial=0.0)
+        known = self._reach(many.reference) & (here > np.maximum(self.curves.error, ZERO_EFFORT_SHARE * largest))
+        return np.where(known, ranges_many.band_range(many, tolerance), np.nan)
+
+    def _reach(self, places: FloatArray) -> NDArray[np.bool_]:
+        """Return which curves reach places, (d,)."""
+        first, last = self.curves.extent
         slack = WINDOW_RTOL * (last - first)
-        place = many.high if name.startswith("range_95") else many.reference
-        reached = (place >= first - slack) & (place <= last + slack)
-        found = RANGE_FUNCTIONS[name](many)
-        if not name.startswith("range_95"):
-            here = np.abs(many.interpolate(many.reference[:, None])[:, 0])
-            largest = np.nanmax(np.abs(self.curves.samples.values), axis=1)
-            reached &= here > np.maximum(self.curves.error, ZERO_EFFORT_SHARE * largest)
-        return np.where(reached, found, np.nan)
+        return np.asarray((places >= first - slack) & (places <= last + slack))
 
     def rms_to_target(self) -> FloatArray:
         """Return the root mean square of F - target at places uniform in the motion."""
@@ -387,15 +398,38 @@ def _value_at(samples: RowSamples, place: FloatArray) -> FloatArray:
     return np.asarray(np.where(place == x1, y1, np.where(place == x0, y0, inner)))
 
 
-def _usable(branches: Mapping[str, RowsInWindow]) -> Ends:
-    """Return start and end of the largest interval in which every branch keeps its limits, (d,) each."""
-    branches = _level_branches(branches)
-    first = next(iter(branches.values()))
-    levels = np.mean([one.reference for one in branches.values()], axis=0)
-    known = np.isfinite(levels)
-    many = [one.branches for one in branches.values()]
-    start, end = ranges_many.usable_interval(many, np.where(known, levels, 1.0), first.curves.band, *first.curves.valid)
-    return np.where(known, start, np.nan), np.where(known, end, np.nan)
+class UsableInterval(NamedTuple):
+    """The largest interval in which every branch of many curves keeps its limits, (d,) each; NaN where nothing is."""
+
+    stroke: FloatArray  # its length: 0 where there is none
+    start: FloatArray
+    end: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class CycleRows:
+    """All branches of many curves together, by name."""
+
+    branches: Mapping[str, RowsInWindow]
+
+    @cached_property
+    def usable(self) -> UsableInterval:
+        """The largest interval in which every branch keeps its limits."""
+        levelled = tuple(_level_branches(self.branches).values())
+        levels = np.mean([one.reference for one in levelled], axis=0)
+        known, first = np.isfinite(levels), levelled[0].curves
+        many = [one.branches for one in levelled]
+        start, end = ranges_many.usable_interval(many, np.where(known, levels, 1.0), first.band, *first.valid)
+        stroke = np.where(np.isnan(start), 0.0, end - start)
+        return UsableInterval(*(np.where(known, values, np.nan) for values in (stroke, start, end)))
+
+    @property
+    def loop_area(self) -> FloatArray:
+        """Area between `load` and `unload` in the window, (d,) [J]; NaN without these branches."""
+        if not {"load", "unload"} <= set(self.branches):
+            return np.full(len(next(iter(self.branches.values())).ends[0]), np.nan)
+        load, unload = self.branches["load"], self.branches["unload"]
+        return np.where(load.covered & unload.covered, load.many.work - unload.many.work, np.nan)
 
 
 def _level_branches(branches: Mapping[str, RowsInWindow]) -> Mapping[str, RowsInWindow]:
@@ -414,64 +448,28 @@ def _level_branches(branches: Mapping[str, RowsInWindow]) -> Mapping[str, RowsIn
     return {name: RowsInWindow(curves, branches[name].ends) for name, curves in level.items()}
 
 
-def _usable_stroke(branches: Mapping[str, RowsInWindow]) -> FloatArray:
-    branches = _level_branches(branches)
-    known = np.all([np.isfinite(one.reference) for one in branches.values()], axis=0)
-    return np.where(known, ranges_many.usable_stroke(*_usable(branches)), np.nan)
-
-
-def _loop_area(branches: Mapping[str, RowsInWindow]) -> FloatArray:
-    """Return the area between `load` and `unload` in the window, (d,) [J]; NaN without these branches."""
-    first = next(iter(branches.values()))
-    if not {"load", "unload"} <= set(branches):
-        return np.full(len(first.ends[0]), np.nan)
-    load, unload = branches["load"], branches["unload"]
-    return np.where(load.covered & unload.covered, load.many.work - unload.many.work, np.nan)
-
-
-CYCLE_METRICS: Mapping[str, Callable[[Mapping[str, RowsInWindow]], FloatArray]] = {
-    "usable_stroke": _usable_stroke,
-    "usable_start": lambda branches: _usable(branches)[0],
-    "usable_end": lambda branches: _usable(branches)[1],
-}
-"""Metrics of all branches together."""
-
-
-@lru_cache(maxsize=4)
-def _functions(kind: Kind) -> Mapping[str, Callable[[RowsInWindow], FloatArray]]:
-    """Return the functions of metrics of one branch of many curves, by name."""
-    return {item.name: item.of_rows for item in definitions(kind) if item.of_rows is not None}
-
-
-def is_metric_of_rows(name: str, kind: Kind) -> bool:
-    """Return True if `metric_of_branches` knows a metric of curves of a kind."""
-    return name in CYCLE_METRICS or name in RANGE_FUNCTIONS or name == "hysteresis_area" or name in _functions(kind)
-
-
-def metric_of_branches(name: str, branches: Mapping[str, RowsInWindow]) -> Mapping[str, FloatArray] | None:
+@np.errstate(all="ignore")
+def metric_of_rows(definition: Definition, cycle: CycleRows) -> Mapping[str, FloatArray]:
     """Return a metric of many curves by branch, (d,) each [SI]; NaN where it has no value.
 
     Parameters
     ----------
-    name : str
-        Of the metric, without a branch in brackets.
-    branches : mapping of str to RowsInWindow
+    definition : Definition
+        The metric; one that is known of single curves only has no value.
+    cycle : CycleRows
         The branches of the curves over the window of the metric.
 
     Returns
     -------
-    mapping or None
-        What is no matter of one branch stands under the name "" alone. None: the metric is known of single curves only.
+    mapping
+        What is no matter of one branch stands under the name "" alone.
     """
-    kind = next(iter(branches.values())).curves.kind
-    with np.errstate(all="ignore"):
-        if name in CYCLE_METRICS:
-            return {"": CYCLE_METRICS[name](branches)}
-        if name == "hysteresis_area":
-            return {"": _loop_area(branches)}
-        if name in RANGE_FUNCTIONS:
-            return {branch: one.range_of(name) for branch, one in branches.items()}
-        function = _functions(kind).get(name)
-        if function is not None:
-            return {branch: np.where(one.covered, function(one), np.nan) for branch, one in branches.items()}
-    return None
+    function, branches = definition.of_rows, cycle.branches
+    if function is None or not branches:
+        return {}
+    if definition.scope != "branch":
+        return {"": function(cycle)}
+    values = {name: function(rows) for name, rows in branches.items()}
+    if not definition.windowed:
+        return values
+    return {name: np.where(rows.covered, values[name], np.nan) for name, rows in branches.items()}

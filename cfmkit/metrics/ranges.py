@@ -7,7 +7,9 @@ branches (`cfmkit.metrics.ranges_many`), of which one is a single row; here stan
 
 from __future__ import annotations
 
+from functools import partial
 from math import isfinite
+from operator import attrgetter, methodcaller
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,21 +64,6 @@ def _value_of_branch(values: FloatArray) -> float:
     return value
 
 
-def band_range_05pct(branch: Branch) -> float:
-    """Return `band_range` for 0.5 %."""
-    return band_range(branch, 0.005)
-
-
-def band_range_1pct(branch: Branch) -> float:
-    """Return `band_range` for 1 %."""
-    return band_range(branch, 0.01)
-
-
-def band_range_5pct(branch: Branch) -> float:
-    """Return `band_range` for 5 %."""
-    return band_range(branch, 0.05)
-
-
 def usable_stroke(cycle: Cycle) -> float:
     """Return the length of the largest usable interval; zero where there is none."""
     start, end = cycle.usable or (0.0, 0.0)
@@ -99,26 +86,36 @@ def _usable(cycle: Cycle) -> Interval:
     return cycle.usable
 
 
-_LAN = "d is the end of the window, c where the {effort} first reaches 0.95 of that at d [Lan 2010, sec. 2]"
+_RANGE_MEANING = "d is the end of the window, c where the {effort} first reaches 0.95 of that at d [Lan 2010, sec. 2]"
 TRAVEL_METRICS = (
-    Definition("range_95", "motion", f"d - c: {_LAN}", range_95, worst="smallest", windowed=False),
-    Definition("range_95_fraction", "ratio", f"(d - c)/d: {_LAN}", range_95_fraction, worst="smallest", windowed=False),
+    *(
+        Definition(
+            name,
+            dimension,
+            f"{formula}: {_RANGE_MEANING}",
+            function,
+            methodcaller("rise_to_end", of_rows),
+            worst="smallest",
+            windowed=False,
+        )
+        for name, dimension, formula, function, of_rows in (
+            ("range_95", "motion", "d - c", range_95, ranges_many.range_95),
+            ("range_95_fraction", "ratio", "(d - c)/d", range_95_fraction, ranges_many.range_95_fraction),
+        )
+    ),
     *(
         Definition(
             name,
             "motion",
             f"widest interval around the reference pose (default: the centre of the window; for the springs of a "
             f"slider-crank the stretched position, or half the travel of a force) in which the {{effort}} "
-            f"is within {percent} % of that at the pose [Li, Hao 2019, eq. 32]",
-            function,
+            f"is within {100 * tolerance:g} % of that at the pose [Li, Hao 2019, eq. 32]",
+            partial(band_range, tolerance=tolerance),
+            methodcaller("band_range", tolerance),
             worst="smallest",
             windowed=False,
         )
-        for name, percent, function in (
-            ("band_range_05pct", "0.5", band_range_05pct),
-            ("band_range_1pct", "1", band_range_1pct),
-            ("band_range_5pct", "5", band_range_5pct),
-        )
+        for name, tolerance in ranges_many.BAND_RANGES.items()
     ),
     *(
         Definition(
@@ -127,6 +124,7 @@ TRAVEL_METRICS = (
             f"{what} of the longest part of the travel on which every branch stays within the {{effort}} band (around "
             "the target, else around the mean in the window), the allowable stress and its valid range",
             function,
+            attrgetter(f"usable.{name.removeprefix('usable_')}"),
             worst="smallest",
             scope="cycle",
             windowed=False,

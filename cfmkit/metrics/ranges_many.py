@@ -259,11 +259,6 @@ def usable_interval(
     return np.where(some, start[rows, best], np.nan), np.where(some, stop[rows, best], np.nan)
 
 
-def usable_stroke(start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return how long the usable intervals between starts and ends are, (d,): zero where there is none."""
-    return np.where(np.isnan(start), 0.0, end - start)
-
-
 def _solved_interval(
     branches: Sequence[ManyBranches], target: FloatArray, width: FloatArray, valid: tuple[FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
@@ -359,11 +354,3 @@ def _narrow(motion: FloatArray, height: FloatArray, steps: _Steps) -> None:
 
 
 BAND_RANGES = {"band_range_05pct": 0.005, "band_range_1pct": 0.01, "band_range_5pct": 0.05}
-RANGE_FUNCTIONS: dict[str, Callable[[ManyBranches], FloatArray]] = {
-    "range_95": range_95,
-    "range_95_fraction": range_95_fraction,
-    "band_range_05pct": lambda many: band_range(many, BAND_RANGES["band_range_05pct"]),
-    "band_range_1pct": lambda many: band_range(many, BAND_RANGES["band_range_1pct"]),
-    "band_range_5pct": lambda many: band_range(many, BAND_RANGES["band_range_5pct"]),
-}
-"""What needs nothing but the branch."""

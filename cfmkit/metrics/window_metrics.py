@@ -258,7 +258,7 @@ def _where_known(function: Callable[[Any], FloatArray], rows: Any) -> FloatArray
 
 
 _TABLE_3 = "[Sanchez-Salinas 2022, Table 3]"
-_DING = "[Ding 2022, sec. 6.2]"
+_DING_SECTION = "[Ding 2022, sec. 6.2]"
 IN_WINDOW = (
     Definition(
         "force_mean",
@@ -293,7 +293,7 @@ IN_WINDOW = (
     Definition(
         "force_ripple",
         "ratio",
-        f"(max - min)/max of the {{effort}} in the window: the fluctuation of {_DING}",
+        f"(max - min)/max of the {{effort}} in the window: the fluctuation of {_DING_SECTION}",
         ripple,
         partial(_of_spread, spread.ripple),
     ),
@@ -307,7 +307,7 @@ IN_WINDOW = (
     Definition(
         "deviation_from_mean",
         "ratio",
-        f"largest |F - mean|/mean of the {{effort}} in the window {_DING}",
+        f"largest |F - mean|/mean of the {{effort}} in the window {_DING_SECTION}",
         deviation_from_mean,
         partial(_of_spread, spread.deviation_from_mean),
     ),
@@ -362,6 +362,7 @@ LOSS_AND_STRESS_METRICS = (
         "closed integral of the {effort} over the {motion} in the window, positive where 'load' lies above 'unload' "
         "[Sanchez-Salinas 2022, sec. 3]",
         hysteresis_area,
+        attrgetter("loop_area"),
         scope="loop",
     ),
     Definition(

@@ -1,1 +1,13 @@
 """Numerical methods; no mechanism words here."""
+
+from cfmkit.lazy_names import lazy_names
+
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "arc_chain": "ArcChain points_on",
+        "monotone_interpolation": "ThroughPoints",
+        "roots": "bracketed_root",
+        "sqp": "Effort Optimum SearchEnding minimize",
+    },
+)

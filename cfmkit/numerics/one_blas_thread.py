@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, ParamSpec, TypeVar
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-P = ParamSpec("P")
-R = TypeVar("R")
+Arguments = ParamSpec("Arguments")
+ReturnT = TypeVar("ReturnT")
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -28,11 +28,11 @@ ONE_THREAD = dict.fromkeys(THREAD_VARIABLES, "1")
 """What keeps the libraries of a process to one thread: processes share the cores, and sums come out the same."""
 
 
-def one_blas_thread(function: Callable[P, R]) -> Callable[P, R]:
+def one_blas_thread(function: Callable[Arguments, ReturnT]) -> Callable[Arguments, ReturnT]:
     """Return the function with one thread for BLAS while it runs, unless the environment chooses how many."""
 
     @functools.wraps(function)
-    def call_limited(*arguments: P.args, **options: P.kwargs) -> R:
+    def call_limited(*arguments: Arguments.args, **options: Arguments.kwargs) -> ReturnT:
         if any(name in os.environ for name in THREAD_VARIABLES):
             return function(*arguments, **options)
         from threadpoolctl import threadpool_limits

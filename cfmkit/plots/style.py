@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     from cfmkit.plots.overlay import EarlierCurve
 
 Look = dict[str, Any]  # arguments of a function of matplotlib that say how something looks
-P = ParamSpec("P")
-T = TypeVar("T")
+Arguments = ParamSpec("Arguments")
+ReturnT = TypeVar("ReturnT")
 INCHES_PER_MM = 1.0 / 25.4  # inches in a millimetre
 PNG_DPI = 200
 """Dots per inch of every PNG: 160 x 100 mm become 1260 x 787 pixels, which a screen shows whole and where a line of
@@ -124,11 +124,11 @@ def style() -> Iterator[None]:
         _INSIDE_STYLE.reset(mark)
 
 
-def apply_style(function: Callable[P, T]) -> Callable[P, T]:
+def apply_style(function: Callable[Arguments, ReturnT]) -> Callable[Arguments, ReturnT]:
     """Return a drawing function that works in our look, whoever calls it."""
 
     @wraps(function)
-    def call_styled(*args: P.args, **kwargs: P.kwargs) -> T:
+    def call_styled(*args: Arguments.args, **kwargs: Arguments.kwargs) -> ReturnT:
         with style():
             return function(*args, **kwargs)
 

@@ -1,1 +1,10 @@
 """A run over one specification or many: read and check it, compute, and write a folder of files."""
+
+from cfmkit.lazy_names import lazy_names
+
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "suggest_api": "read_request",
+    },
+)

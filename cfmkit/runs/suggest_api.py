@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-import re
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import Problem, SpecError
 from cfmkit.families.run_control import Run, read_time
 from cfmkit.runs.specfile import STDIN_PATH, content, rename_source, standard_input
-from cfmkit.runs.suggestion_record import as_json, exit_code, message
+from cfmkit.runs.suggestion_record import as_json
 from cfmkit.specs.yamlio import read_document
-from cfmkit.studies.suggest.search import Suggestions
+from cfmkit.studies.suggest.outcome_of_search import Suggestions
 from cfmkit.studies.suggest.spec import SuggestBlock, SuggestFile
 
 if TYPE_CHECKING:
@@ -135,19 +134,19 @@ def read_request(
         reported = error
     for key in keys:
         reported = rename_source(reported, f"--set suggest.{key}", f"{mark}{key}")
-    raise reported if name is not None else _name_missing_options(reported, mark)
+    raise reported if name is not None else _name_missing_options(reported, keys, mark)
 
 
-def _name_missing_options(error: SpecError, mark: str) -> SpecError:
-    """Return the error of a request without a file with a missing key as a missing option."""
-    return SpecError(
-        [
-            Problem("", 0, 0, "", re.sub(r"^the key '(\w+)' is missing.*", rf"{mark}\1 is missing", one.message))
-            if one.source == OPTIONS_SOURCE
-            else one
-            for one in error.problems
-        ]
-    )
+def _name_missing_options(error: SpecError, keys: Mapping[str, str], mark: str) -> SpecError:
+    """Return the error of a request without a file, with all missing keys in one sentence."""
+    duty, path = ("torque", "angle") if "torque" in keys else ("force", "travel")
+    missing = [mark + key for key in (duty, path, "envelope") if key not in keys]
+    if not missing:
+        return error
+    verb = "are" if missing[1:] else "is"
+    sentence = " and ".join(filter(None, (", ".join(missing[:-1]), missing[-1])))
+    others = [problem for problem in error.problems if problem.source != OPTIONS_SOURCE]
+    return SpecError([Problem("", 0, 0, "", f"{sentence} {verb} missing"), *others])
 
 
 @dataclass(frozen=True, repr=False)
@@ -164,7 +163,7 @@ class SuggestionsView(Suggestions):
     def __repr__(self) -> str:
         """Return the proposals in a line: family and variant of the first ten."""
         listed = [f"{proposal.family} {proposal.variant}"[:100] for proposal in self.listed[:10]]
-        return f"<Suggestions: {'; '.join([message(self), *listed])}>"
+        return f"<Suggestions: {'; '.join([self.message, *listed])}>"
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
@@ -174,4 +173,4 @@ class SuggestionsView(Suggestions):
 
         assert self.block is not None  # `answering`
         figures = {"proposals": lambda: to_one_scale(self.listed, self.request)} if self.listed else {}
-        return show_html(document_of(as_json(self, self.block), exit_code(self)), figures)
+        return show_html(document_of(as_json(self, self.block), self.exit_code), figures)

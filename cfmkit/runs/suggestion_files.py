@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.documents import html
 from cfmkit.documents.suggestion_document import document_of
-from cfmkit.runs.suggestion_record import RECORD_COLUMNS, as_json, exit_code, folder_name, numbers_in_border_units
+from cfmkit.runs.suggestion_record import RECORD_COLUMNS, as_json, folder_name, numbers_in_border_units
 from cfmkit.specs.units import format_short
 from cfmkit.studies.pool import give_up_at
 from cfmkit.tables.json_writing import json_bytes
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from cfmkit.errors import ExitCode
     from cfmkit.families.run_control import Run
     from cfmkit.specs.spec import Spec
+    from cfmkit.studies.suggest.outcome_of_search import Suggestions
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
-    from cfmkit.studies.suggest.search import Suggestions
     from cfmkit.studies.suggest.spec import SuggestBlock
 
 
@@ -61,7 +61,7 @@ def files(
             yield f"figures/{name}.png", png(figure)
     if command is not None:
         texts = {folder_name(number, proposal): proposal.text for number, proposal in enumerate(suggestions.listed, 1)}
-        yield html.REPORT_NAME, page(as_json(suggestions, block), exit_code(suggestions), texts, drawn, command)
+        yield html.REPORT_NAME, page(as_json(suggestions, block), suggestions.exit_code, texts, drawn, command)
     work = partial(_make_files, (plots, command is not None), deadlines, suggestions.listed)
     made = dict(
         give_up_at(run.executor, deadlines.files.deadline)(work, iter(range(len(suggestions.listed))), lambda: False)

@@ -1,4 +1,4 @@
-"""Record of a search by `suggest`: what metrics.json, ``--json`` and notebooks say of it, and its exit code."""
+"""Record of a search by `suggest`: what metrics.json, ``--json`` and notebooks say of it."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode
 from cfmkit.specs.units import to_border
-from cfmkit.studies.serial_and_cluster_executors import BUG_PREFIX
-from cfmkit.studies.suggest.relaxed_requests import LAST_FACTOR
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from cfmkit.studies.suggest.outcome_of_search import Suggestions
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
-    from cfmkit.studies.suggest.search import Suggestions
     from cfmkit.studies.suggest.spec import SuggestBlock
 
 
@@ -53,17 +51,6 @@ STATUS_BY_CODE = {
 """What metrics.json says of each end."""
 
 
-def exit_code(found: Suggestions) -> ExitCode:
-    """Return 0 if a proposal does all that is required, 70 if a bug ended all, 6 if not all was judged, else 4."""
-    if found.proposals:
-        return ExitCode.OK
-    reasons = [one.offer.reason for one in found.answers if one.offer.reason]
-    reasons += [reason for each in found.failed.values() for reason in each]
-    if found.bugs and not found.near and all(reason.startswith(BUG_PREFIX) for reason in reasons):
-        return ExitCode.BUG
-    return ExitCode.PARTIAL if found.late or found.unjudged else ExitCode.NO_SOLUTION
-
-
 def folder_name(number: int, proposal: Proposal) -> str:
     """Return the folder of a proposal: ``1-vcfm-2-vs``."""
     words = "".join(letter if letter.isalnum() else "-" for letter in proposal.variant.lower())
@@ -72,10 +59,9 @@ def folder_name(number: int, proposal: Proposal) -> str:
 
 def as_json(found: Suggestions, block: SuggestBlock) -> dict[str, Any]:
     """Return what metrics.json and ``--json`` say."""
-    code = exit_code(found)
     return {
-        "status": STATUS_BY_CODE[code],
-        "message": message(found),
+        "status": STATUS_BY_CODE[found.exit_code],
+        "message": found.message,
         "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
         "order": list(block.prefer),
         "proposals": [_record(found, one, number) for number, one in enumerate(found.proposals, 1)],
@@ -96,30 +82,6 @@ def as_json(found: Suggestions, block: SuggestBlock) -> dict[str, Any]:
         ],
         "warnings": list(_warnings(found)),
     }
-
-
-def message(found: Suggestions) -> str:
-    """Return how it ended, in one sentence."""
-    if found.proposals:
-        late = "; the time budget ended the search before everything was tried" if found.late else ""
-        count = len(found.proposals)
-        more = f", {len(found.unjudged)} more not judged in full" if found.unjudged else ""
-        return f"{count} mechanism{' meets' if count == 1 else 's meet'} the requirements{more}{late}"
-    if exit_code(found) is ExitCode.BUG:
-        return "bugs in cfmkit ended every candidate"
-    if found.unjudged:
-        count = len(found.unjudged)
-        late = "; increase the time budget (--time-budget)" if found.late else ""
-        were = "was" if count == 1 else "were"
-        return f"no mechanism is known to meet the requirements, {count} {were} not judged in full{late}"
-    if found.late:
-        return "the time budget ended the search before a mechanism met the requirements; increase it (--time-budget)"
-    if found.remote:
-        return (
-            "no mechanism meets the requirements, and none was found with one of them relaxed up to "
-            f"{LAST_FACTOR:g} times"
-        )
-    return "no mechanism meets the requirements"
 
 
 def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:

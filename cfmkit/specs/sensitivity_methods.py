@@ -1,6 +1,6 @@
 """Methods of a sensitivity study by name: what a specification and the command line need to know of them.
 
-What a method does is `METHOD` in the module of its name, which studies look up.
+What a method does is `SENSITIVITY_METHOD` in the module of its name, which studies look up.
 """
 
 from __future__ import annotations

@@ -9,3 +9,16 @@ remember what is finished, `engine` puts these together, `choose_metrics_to_note
 noted, `tables` writes it, `summary` sums it up, and `sweep_request_and_files` is the study that
 varies a specification.
 """
+
+from cfmkit.lazy_names import lazy_names
+
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "choose_metrics_to_note": "metrics_of",
+        "point_evaluation": "Study",
+        "serial_and_cluster_executors": "Lost serial",
+        "variable_paths": "leaf paths",
+        "variants_in_rows": "are_solved_together evaluate_rows",
+    },
+)

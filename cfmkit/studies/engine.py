@@ -13,7 +13,6 @@ import numpy as np
 
 from cfmkit.errors import OutputError, UsageError
 from cfmkit.families import family
-from cfmkit.studies.journal import Memory
 from cfmkit.studies.point_evaluation import Row
 from cfmkit.studies.row_blocks_for_journal import (
     ResultRows,
@@ -157,28 +156,17 @@ class NullMonitor:
 
 
 class Records:
-    """The rows of a study, as far as they are finished, in the order of the points.
+    """The rows of a study, as far as they are finished, in the order of the points."""
 
-    Attributes
-    ----------
-    work : Work
-        Study and plan.
-    reused : int
-        Points whose rows were in the journal before.
-    bugs : int
-        Points that a bug ended.
-    bug : str
-        The first traceback.
-    """
-
-    def __init__(self, work: Work, journal: Journal | Memory) -> None:
+    def __init__(self, work: Work, journal: Journal | None) -> None:
         """Start without rows."""
         self.work, self._journal = work, journal
         self._places = np.full(len(work.plan), ROW_MISSING, dtype=np.uint8)
         self._keys = np.zeros((len(work.plan), 16), dtype=np.uint8)
         self._held: dict[int, ResultRows] = {}
-        self.reused = self.bugs = 0
-        self.bug = ""
+        self.reused = 0  # points whose rows were in the journal before
+        self.bugs = 0  # points that a bug ended
+        self.bug = ""  # the first traceback
 
     def __len__(self) -> int:
         """Return the number of points of the study."""
@@ -191,7 +179,7 @@ class Records:
 
     def recall(self, job: Job) -> ResultRows | None:
         """Return rows that the journal had from before, and remember them; None if it had not."""
-        reported = self._journal.find(job.key)
+        reported = None if self._journal is None else self._journal.find(job.key)
         if reported is None:
             return None
         rows = self.work.recall(reported)
@@ -203,7 +191,7 @@ class Records:
 
     def keep(self, job: Job, rows: ResultRows) -> None:
         """Note rows: in the journal if they would be the same anywhere, else until the process ends."""
-        if rows.keepable:
+        if self._journal is not None and rows.keepable:
             self._journal.add(job.key, record(rows))
             self._mark_noted(job)
             return
@@ -262,6 +250,7 @@ class Records:
         return key.hex()
 
     def _read_record(self, index: int) -> Any:
+        assert self._journal is not None  # some row is in it
         return self._journal.read(self._key(index))
 
     def _read(self, index: int) -> ResultRows | Row:
@@ -280,14 +269,14 @@ class Records:
 def run(
     work: Work,  # study and plan
     executor: Executor = serial,  # how jobs get done: `serial`, a `Pool`, a `Cluster`
-    journal: Journal | Memory | None = None,  # where rows are noted; without one they are kept in memory
+    journal: Journal | None = None,  # where rows are noted; without one they are kept in memory
     monitor: Monitor | None = None,  # progress callback with cancellation
 ) -> Records:
     """Return the rows of a study; those that the journal has are not computed again."""
     study = work.study
     if study.design and family(study.spec.family).design is None:
         raise UsageError(f"{family(study.spec.family).phrase} cannot be designed, only analysed")
-    records, watch = Records(work, journal if journal is not None else Memory()), monitor or NullMonitor()
+    records, watch = Records(work, journal), monitor or NullMonitor()
     watch.total(len(work.plan))
     queue = _neighbours(_new(records, work.jobs(), watch), work.together)
     while True:

@@ -186,24 +186,6 @@ class Journal:
             raise OutputError(f"cannot {doing} {quote_path(self.path)}: {why}") from error
 
 
-class Memory:
-    """The same for studies that write nothing."""
-
-    def __init__(self) -> None:
-        self._records: dict[str, Any] = {}
-
-    def find(self, _key: str) -> None:
-        """Return None: nothing is there from before."""
-
-    def read(self, key: str) -> Any:
-        """Return the record of a key."""
-        return self._records[key]
-
-    def add(self, key: str, record: Any) -> None:
-        """Keep a record."""
-        self._records[key] = record
-
-
 class _Damaged(sqlite3.DatabaseError):
     sqlite_errorname = "SQLITE_CORRUPT"
 

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from cfmkit.errors import UsageError
 from cfmkit.numerics.unit_cube_samples import sample_unit_cube
-from cfmkit.specs.units import Place, format_quantity, from_border, place_of, to_border
+from cfmkit.specs.units import attach_dimension, format_quantity, from_border, to_border
 from cfmkit.specs.units.decimal_scaling_and_grids import even_grid, shift_decimal
-from cfmkit.studies.varied_axes import is_place
 from cfmkit.tables import border_values
 
 if TYPE_CHECKING:
@@ -39,13 +38,13 @@ class Variable:
     dimension: str  # of `cfmkit.specs.units`; "count" for whole numbers, "text" for words and switches
     values: Levels  # SI floats, whole numbers or words, as `Spec.replace` takes them
     shown: Levels  # the same in border units, for tables
-    place: bool = False  # whether a value is a place that knows if it is a length or an angle
+    several: bool = False  # whether a value may be of several dimensions: it knows which, as a length or an angle
 
     def value(self, index: int) -> Any:
         """Return one value as `Spec.replace` takes it."""
         value = self.values[index]
         plain = value.item() if isinstance(value, np.generic) else value
-        return place_of(plain, self.dimension) if self.place else plain
+        return attach_dimension(plain, self.dimension) if self.several else plain
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ class Plan:
     def part(self, start: int, stop: int) -> Plan:
         """Return the points from `start` up to `stop` as a plan of their own."""
         taken = zip(self.variables, self.block(start, stop), self.list_shown_values(start, stop), strict=True)
-        parts = (Variable(item.path, item.dimension, values, shown, item.place) for item, values, shown in taken)
+        parts = (Variable(item.path, item.dimension, values, shown, item.several) for item, values, shown in taken)
         return Plan(tuple(parts), stop - start, joint=True)
 
     def _levels(self, index: int) -> list[int]:
@@ -107,7 +106,7 @@ def _array(values: Levels) -> NDArray[Any]:
     if isinstance(values, np.ndarray):
         return values
     kinds = set(map(type, values))
-    return np.array(values, dtype=np.float64 if kinds <= {float, Place} else np.int64 if kinds == {int} else object)
+    return np.array(values, dtype=np.float64 if kinds == {float} else np.int64 if kinds == {int} else object)
 
 
 def grid(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
@@ -171,11 +170,11 @@ def refuse_too_many(size: int, most: int) -> None:
 
 def step_axis(axis: Axis) -> Variable:
     """Return the variable that goes through the values of an axis."""
-    place = is_place(axis)
+    several = axis.leaf.has_several_dimensions
     if axis.ends is None:
-        plain = tuple(float(value) if place else value for value in axis.listed)
+        plain = tuple(float(value) if several else value for value in axis.listed)
         return Variable(
-            axis.leaf.path, axis.dimension, plain, tuple(_show_value(v, axis.dimension) for v in plain), place
+            axis.leaf.path, axis.dimension, plain, tuple(_show_value(v, axis.dimension) for v in plain), several
         )
     count = axis.count or 0
     if axis.leaf.kind == "whole":
@@ -183,7 +182,7 @@ def step_axis(axis: Axis) -> Variable:
         return Variable(axis.leaf.path, axis.dimension, whole, whole)
     ends = [_show_value(end, axis.dimension) for end in axis.ends]
     shown = even_grid(ends[0], ends[1], count)
-    return Variable(axis.leaf.path, axis.dimension, _border_to_si(shown, axis.dimension), shown, place)
+    return Variable(axis.leaf.path, axis.dimension, _border_to_si(shown, axis.dimension), shown, several)
 
 
 def _show_value(value: Any, dimension: str) -> Any:
@@ -207,15 +206,15 @@ def _border_to_si(shown: FloatArray, dimension: str) -> FloatArray:
 
 def _drawn_variable(axis: Axis, unit: FloatArray) -> Variable:
     """Return the variable whose values are an axis at places in [0, 1)."""
-    path, dimension, place = axis.leaf.path, axis.dimension, is_place(axis)
+    path, dimension, several = axis.leaf.path, axis.dimension, axis.leaf.has_several_dimensions
     if axis.ends is None:
         levels = step_axis(axis)
         index = np.minimum((unit * len(levels.values)).astype(np.intp), len(levels.values) - 1)
-        return Variable(path, dimension, _array(levels.values)[index], _array(levels.shown)[index], place)
+        return Variable(path, dimension, _array(levels.values)[index], _array(levels.shown)[index], several)
     low, high = axis.ends
     if axis.leaf.kind == "whole":
         low, high = min(low, high), max(low, high)
         whole = np.minimum(np.floor(low + unit * (high - low + 1.0)), high).astype(np.int64)
         return Variable(path, dimension, whole, whole)
     values = low + unit * (high - low)
-    return Variable(path, dimension, values, border_values(values, dimension), place)
+    return Variable(path, dimension, values, border_values(values, dimension), several)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
-FIDELITY = "analysis.fidelity"
+FIDELITY_KEY = "analysis.fidelity"
 NO_LEVEL_MESSAGE = (
     "the requirements state no {0} that the mechanism could be designed for: require '{0}_mean', or a band of it"
 )
@@ -117,7 +117,7 @@ def _by_beams(spec: Spec) -> Spec:
         return spec
     for name in reversed([name for name in family(spec.family).models if name != "solid"]):
         try:
-            return spec.replace({FIDELITY: name})
+            return spec.replace({FIDELITY_KEY: name})
         except SpecError:  # what that model needs is not there
             continue
     return spec

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units import BareFloat, UnitField, place_of
+from cfmkit.specs.units import BareFloat, UnitField, attach_dimension
 from cfmkit.specs.units.fields import describe_value
 from cfmkit.specs.yamlio.allowed_at_path import Slot, describe_expected, required_keys
 from cfmkit.specs.yamlio.explain_validation_errors import not_among
@@ -41,6 +41,11 @@ class Leaf:
     quantity: UnitField | None = None  # how a quantity is read
     choices: tuple[Any, ...] = ()  # the words of a closed choice
 
+    @property
+    def has_several_dimensions(self) -> bool:
+        """Return whether a value has to know its own dimension, as a place that is a length or an angle."""
+        return self.quantity is not None and len(self.quantity.dimensions) > 1
+
     def read(self, given: Any) -> tuple[Value, str]:
         """Return (value as `Spec.replace` takes it, dimension) of what a user wrote.
 
@@ -66,7 +71,7 @@ class Leaf:
             value, dimension = quantity.read(marked)
         except QuantityError as error:
             raise CannotVary(str(error)) from None
-        return (place_of(value, dimension) if len(quantity.dimensions) > 1 else value), dimension
+        return (attach_dimension(value, dimension) if self.has_several_dimensions else value), dimension
 
     def _number(self, given: Any) -> tuple[Value, str]:
         if isinstance(given, bool) or not isinstance(given, int | float):

@@ -10,10 +10,10 @@ import numpy as np
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.rows import Variants, valid
-from cfmkit.metrics import other_name, split_name
+from cfmkit.metrics import split_name
 from cfmkit.metrics.branches_cut_to_window import WINDOW_RTOL
 from cfmkit.metrics.metric_values import worst_branch
-from cfmkit.metrics.metrics_of_rows import is_metric_of_rows, metric_of_branches
+from cfmkit.metrics.metrics_of_rows import CycleRows, metric_of_rows
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.specs.units import TravelShare, window_places
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gather_rows
@@ -56,7 +56,8 @@ class SolvedVariants:
     def __init__(self, study: Study, variants: Variants, rows: NDArray[np.intp], solved: SolvedRows[Any]) -> None:
         """Read nothing yet."""
         self.study, self.variants, self.members, self.solved = study, variants, rows, solved
-        self._values: dict[tuple[str, Ends | None], ByBranch | None] = {}
+        self._values: dict[tuple[str, str | None, Ends | None], ByBranch] = {}
+        self._cycles: dict[Ends | None, CycleRows] = {}
         self._windows: dict[Ends | None, tuple[FloatArray, FloatArray] | None] = {}
 
     def __len__(self) -> int:
@@ -108,22 +109,31 @@ class SolvedVariants:
                 good &= (curves.extent[0] <= low + slack) & (curves.extent[1] >= high - slack)
         return good
 
-    def values(self, name: str, over: Ends | None) -> ByBranch | None:
-        """Return a metric or a value of the family by branch, (m,) each; None if rows do not know it.
+    def values(self, name: str, over: Ends | None) -> ByBranch:
+        """Return a metric or a value of the family by branch, (m,) each; of the branch that is named alone.
 
-        What is no matter of one branch stands under the name "" alone.
+        What is no matter of one branch stands under the name "".
         """
-        key = name, over
-        if key not in self._values:
-            own = self.solved.value(name)
-            if own is not None:
-                self._values[key] = {"": own}
-            else:
-                window = self._window(over)
-                inside = {branch: curves.restrict_to_window(window) for branch, curves in self.solved.branches.items()}
-                found = metric_of_branches(name, inside)
-                self._values[key] = metric_of_branches(other_name(name), inside) if found is None else found
-        return self._values[key]
+        plain, branch = split_name(name)
+        alone = branch if self._definitions[plain].scope == "cycle" else None
+        if (plain, alone, over) not in self._values:
+            self._values[plain, alone, over] = self._compute(plain, alone, over)
+        by_branch = self._values[plain, alone, over]
+        chosen = branch is None or alone is not None
+        return by_branch if chosen else {name: item for name, item in by_branch.items() if name == branch}
+
+    def _compute(self, plain: str, alone: str | None, over: Ends | None) -> ByBranch:
+        """Return a metric of all branches, or of one alone."""
+        own = self.solved.value(plain)
+        if own is not None:
+            return {"": own}
+        if over not in self._cycles:
+            window, curves = self._window(over), self.solved.branches
+            self._cycles[over] = CycleRows({name: rows.restrict_to_window(window) for name, rows in curves.items()})
+        cycle = self._cycles[over]
+        if alone is not None:
+            cycle = CycleRows({name: rows for name, rows in cycle.branches.items() if name == alone})
+        return metric_of_rows(self._definitions[plain], cycle)
 
     @property
     def _asked(self) -> tuple[tuple[str, Ends | None], ...]:
@@ -134,14 +144,11 @@ class SolvedVariants:
     @property
     def known(self) -> bool:
         """True if rows have every column of the study."""
-        kind = next(iter(self.solved.branches.values())).kind
         names = {split_name(name)[0] for name, _ in self._asked}
-        return all(
-            name in self.solved.quantities or is_metric_of_rows(name, kind) or is_metric_of_rows(other_name(name), kind)
-            for name in names
-        )
+        definitions = self._definitions
+        return all(name in self.solved.quantities or definitions[name].of_rows is not None for name in names)
 
-    @property
+    @cached_property
     def _definitions(self) -> Mapping[str, Definition]:
         return self.study.definitions(next(iter(self.solved.branches.values())).kind)
 
@@ -153,28 +160,21 @@ class SolvedVariants:
         values[~np.isfinite(values)] = np.nan
         met = np.ones((len(self), len(self.study.spec.part_requirements)), dtype=bool)
         for k, one in enumerate(self.study.spec.part_requirements):
-            plain, branch = split_name(one.metric)
-            limits = Bounds.from_requirement(one, self._definitions[plain].dimension)
-            chosen = [item for name, item in self._by_branch(plain, one.over).items() if branch in (None, name)]
-            met[:, k] = np.logical_and.reduce([limits.met_by(item) for item in chosen]) if chosen else False
+            limits = Bounds.from_requirement(one, self._definitions[split_name(one.metric)[0]].dimension)
+            by_branch = self.values(one.metric, one.over).values()
+            met[:, k] = np.logical_and.reduce([limits.met_by(item) for item in by_branch]) if by_branch else False
         return ResultRows(values, met, warned=self._findings() if self.study.findings else {})
-
-    def _by_branch(self, plain: str, over: Ends | None) -> ByBranch:
-        found = self.values(plain, over)
-        assert found is not None  # `known`
-        return found
 
     def _worst(self, name: str, over: Ends | None) -> FloatArray:
         """Return a metric of the branch that is named, or of the worst, (m,)."""
-        plain, branch = split_name(name)
-        by_branch = self._by_branch(plain, over)
-        if branch is not None:
-            return by_branch.get(branch, np.full(len(self), np.nan))
+        by_branch = self.values(name, over)
+        if not by_branch:
+            return np.full(len(self), np.nan)
         if len(by_branch) == 1:
             return next(iter(by_branch.values()))
         stack = np.stack(list(by_branch.values()))
         target = next(iter(self.solved.branches.values())).target
-        chosen = worst_branch(self._definitions[plain].worst, stack, None if np.isnan(target).any() else target)
+        chosen = worst_branch(self._definitions[name].worst, stack, None if np.isnan(target).any() else target)
         return np.asarray(np.take_along_axis(stack, chosen[None], axis=0)[0])
 
     def _findings(self) -> dict[str, NDArray[np.bool_]]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import Problem, SpecError, UsageError
-from cfmkit.specs.units import Place, format_quantity
+from cfmkit.specs.units import format_quantity
 from cfmkit.studies.variable_paths import CannotVary, Leaf, leaf
 
 if TYPE_CHECKING:
@@ -194,10 +194,3 @@ def write_value(value: Any, dimension: str) -> str:
     if dimension == "text":
         return str(value).lower() if isinstance(value, bool) else str(value)
     return str(value) if isinstance(value, int) else format_quantity(float(value), dimension)
-
-
-def is_place(found: Axis) -> bool:
-    """Return whether the values are places: lengths or angles that know which of the two they are."""
-    sample = found.listed[0] if found.listed else None
-    several = found.leaf.quantity is not None and len(found.leaf.quantity.dimensions) > 1
-    return several or isinstance(sample, Place)

@@ -17,7 +17,7 @@ from cfmkit.families.beam.network_from_spec import assemble
 from cfmkit.families.beam.shaping.design import task_of
 from cfmkit.families.beam.shaping.report import judge_design
 from cfmkit.families.beam.shaping.response import respond
-from cfmkit.families.beam.shaping.search import Found, StartBudget, evaluate_in_model, flatten
+from cfmkit.families.beam.shaping.search import ShapeCandidate, StartBudget, evaluate_in_model, flatten
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task import TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
@@ -104,7 +104,7 @@ def test_the_goal_and_the_limits_of_a_force_on_a_workpiece_have_the_derivatives_
 def test_the_force_that_a_design_sees_is_the_column_of_the_contact():
     spec = gripper()
     task = task_of(spec, spec.design.optimise)
-    found = Found(np.array([12e-3 / task.size, 1.2]), 1, 9e-3, 0.2, 0.0, "", 0)
+    found = ShapeCandidate(np.array([12e-3 / task.size, 1.2]), 1, 9e-3, 0.2, 0.0, "", 0)
     judged = judge_design(spec, task, found)
     result = cfmkit.analyze(judged.spec)
     column = result.curve.extra["work_tip_force"].values[result.curve.displacement >= 9e-3 - 1e-12]
@@ -132,7 +132,7 @@ def test_a_pad_inside_an_obstacle_at_rest_is_no_design():
 def test_a_few_steps_make_the_force_on_a_workpiece_flatter_and_keep_its_mean():
     spec = gripper(force={"target": 1.0, "tolerance": 0.02})
     task = task_of(spec, spec.design.optimise)
-    before = evaluate_in_model(task, Found(np.array([12e-3 / task.size, 1.2]), 1, 9e-3, 1.0, 0.0, "", 0))
+    before = evaluate_in_model(task, ShapeCandidate(np.array([12e-3 / task.size, 1.2]), 1, 9e-3, 1.0, 0.0, "", 0))
     after = flatten(task, before, StartBudget(flattening=8))
     judged = judge_design(spec, task, after)
     assert after.feasible

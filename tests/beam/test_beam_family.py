@@ -13,8 +13,7 @@ import pytest
 from beam_support import MM, cantilever, config, solved, value, warned
 
 import cfmkit
-from cfmkit.elastica import Section, Taper
-from cfmkit.elastica.mechanics.march import engine
+from cfmkit.elastica import Section, Taper, engine
 from cfmkit.errors import SpecError
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.results import Status

@@ -10,17 +10,14 @@ import pytest
 from beam_support import CANTILEVER, MM, cantilever, config
 
 import cfmkit
-from cfmkit.cli.main import main
-from cfmkit.export import files
-from cfmkit.export.arc_outlines import outlines
-from cfmkit.export.contours import Drawing
-from cfmkit.export.union import OutlinePiece, merge_pieces
+from cfmkit.cli import run_command
+from cfmkit.export import Drawing, OutlinePiece, files, merge_pieces, outlines
 from cfmkit.families import family
 from cfmkit.families.beam import strips_and_gaps as strip_module
 from cfmkit.families.beam.network_from_spec import assemble, is_on_axis
 from cfmkit.families.beam.part import strips_of
 from cfmkit.families.beam.strips_and_gaps import mirror_points, smallest_gap
-from cfmkit.numerics.arc_chain import points_on
+from cfmkit.numerics import points_on
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * 10 * MM
 TWO = [OutlinePiece.polygon(SQUARE), OutlinePiece.polygon(SQUARE + 5 * MM)]
@@ -254,7 +251,7 @@ def test_a_part_that_cannot_be_drawn_within_its_tolerance_is_refused(tmp_path, c
     """Before, it was drawn with as many points as there may be, however far off."""
     source = str(Path(__file__).parents[2] / "configs" / "beam_lan2010_thin.yaml")
     large = [source, "--set", "mechanism.nodes.n3.at.1=1.877e10 mm", "-q", "-o", str(tmp_path / "out")]
-    assert main(["export", *large]) == 3
+    assert run_command(["export", *large]) == 3
     assert "coarser --tolerance" in capsys.readouterr().err
 
 

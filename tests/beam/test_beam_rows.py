@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.elastica.results.paths_of_designs import PathsOfDesigns
 from cfmkit.families.beam.beams_in_rows import solve_rows
 from cfmkit.families.beam.model import solve
 
@@ -31,6 +30,7 @@ def test_largest_stresses_of_many_paths_are_those_of_each():
         specs = [config(LAN, **{"mechanism.thickness": size, "analysis.stress": stress}) for size in (0.9e-3, 1.1e-3)]
         laws = [solve(spec).model_between_points for spec in specs]
         low, high = np.array([0.0031, 0.0]), np.array([0.0117, 0.018])
-        found = PathsOfDesigns(laws).largest_stress(low, high)
+        ((_, rows),) = solve_rows(specs)
+        found = rows.solution.branches["load"].stress.largest(low, high)
         own = [law.largest_stress("", *ends) for law, *ends in zip(laws, low, high, strict=True)]
         assert found == pytest.approx(own, rel=1e-12)

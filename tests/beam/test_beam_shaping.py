@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -11,16 +12,15 @@ import numpy as np
 import pytest
 from journal_support import NotesInMemory
 
-from cfmkit import analyze, dumps, evaluate, load, loads
-from cfmkit.designing.run_many_starts import Clock
-from cfmkit.elastica import Polynomial, trace
-from cfmkit.elastica.model.beam import fit
+from cfmkit import Run, analyze, dumps, evaluate, load, loads
+from cfmkit.designing import Clock
+from cfmkit.elastica import Polynomial, fit, trace
 from cfmkit.families.beam.shaping import multistart, search
 from cfmkit.families.beam.shaping.design import find_blocking, missed_by, optimise_shape, task_of
 from cfmkit.families.beam.shaping.multistart import explore
 from cfmkit.families.beam.shaping.report import judge_design, write_design
 from cfmkit.families.beam.shaping.response import looked_at
-from cfmkit.families.beam.shaping.search import Found, StartBudget, flatten, search_start, verify
+from cfmkit.families.beam.shaping.search import ShapeCandidate, StartBudget, flatten, search_start, verify
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
     NetworkScatter,
     audit_design,
@@ -32,11 +32,9 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
 from cfmkit.families.beam.shaping.sqp_program import Flattest, ForceRatio, Shaping, Widest
 from cfmkit.families.beam.shaping.task import STRESS_MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
-from cfmkit.families.findings import percent
-from cfmkit.families.run_control import Run
-from cfmkit.numerics.monotone_interpolation import ThroughPoints
+from cfmkit.numerics import ThroughPoints
 from cfmkit.results import Status
-from cfmkit.specs.evaluable_target_curve import TargetCurve
+from cfmkit.specs import TargetCurve
 
 TABLE_3 = np.array([0.0, 30.5, 18.77, 12.44, 24.0, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148])
 
@@ -56,8 +54,8 @@ def table_3(task: Task) -> np.ndarray:
     return x
 
 
-def found_of(task: Task, x: np.ndarray, start: float = 6.8e-3) -> Found:
-    return Found(x, 2, start, 0.03, 0.003, "", 0)
+def found_of(task: Task, x: np.ndarray, start: float = 6.8e-3) -> ShapeCandidate:
+    return ShapeCandidate(x, 2, start, 0.03, 0.003, "", 0)
 
 
 ALL = TaskLimits(
@@ -96,7 +94,7 @@ def test_derivatives_of_objective_and_all_limits_are_those_of_differences(goal: 
 def test_only_rows_that_hold_by_far_go_without_derivatives() -> None:
     spec = load("configs/beam_design_lan.yaml", ["analysis.fidelity=reissner"])
     task = replace(task_of(spec, spec.design.optimise), limits=ALL)
-    all_of, near = (Shaping(Variables(task, 2), 6.8e-3, Flattest(), near=most) for most in (np.inf, 0.5))
+    all_of, near = (Shaping(Variables(task, 2), 6.8e-3, Flattest(), slopes_below=most) for most in (np.inf, 0.5))
     z = all_of.begin(table_3(task))
     values, whole, some = all_of.values(z)[1], all_of.slopes(z)[1], near.slopes(z)[1]
     np.testing.assert_array_equal(near.values(z)[1], values)
@@ -105,7 +103,7 @@ def test_only_rows_that_hold_by_far_go_without_derivatives() -> None:
     assert left_out.sum() > 50
     np.testing.assert_allclose(some[~left_out], whole[~left_out], rtol=1e-12)
     assert not some[left_out].any()
-    none = Shaping(Variables(task, 2), 6.8e-3, Flattest(), near=-10.0).slopes(z)[1]
+    none = Shaping(Variables(task, 2), 6.8e-3, Flattest(), slopes_below=-10.0).slopes(z)[1]
     assert none.shape == whole.shape
 
 
@@ -141,7 +139,7 @@ def metric(spec: Any, name: str) -> float | None:
     return evaluate(analyze(spec), [name])[name].value
 
 
-def seen_at(points: int) -> tuple[Task, Found]:
+def seen_at(points: int) -> tuple[Task, ShapeCandidate]:
     """Table 3 from 9 mm on as a search with so many poses in the window sees it."""
     task = replace(lan(), points=points)
     program = Shaping(Variables(task, 2), 9e-3, Flattest())
@@ -174,7 +172,7 @@ def test_where_the_poses_do_not_show_the_force_the_search_goes_on_with_more_of_t
     task, found = seen_at(2)
     tried: list[int] = []
 
-    def again(finer: Task, design: Found) -> Found:
+    def again(finer: Task, design: ShapeCandidate) -> ShapeCandidate:
         tried.append(finer.points)
         return replace(design, objective=1.0 if finer.points > 33 else design.objective)
 
@@ -246,8 +244,9 @@ def test_a_design_says_of_itself_what_its_analysis_says(change: str) -> None:
     start, end = written_again.analysis.window
     assert band <= 0.015
     assert start < 6e-3
-    reported = f"force within ± {percent(band)} over {percent(1 - start / end)} of the travel"
-    assert reported in design.message
+    reported = re.search(r"force within ± (\S+) % over (\S+) % of the travel", design.message)
+    shares = [float(share) for share in reported.groups()]
+    assert shares == pytest.approx([100 * band, 100 * (1 - start / end)], rel=5e-3)
     other = evaluate(analyze(written_again.replace({"analysis.fidelity": "reissner"})), ["half_band"])["half_band"]
     known = design.search.get("audit_half_band_reissner")
     assert known is None if "reissner" in change else known.quantity.value == other.value
@@ -350,8 +349,8 @@ def test_finished_starts_are_noted_and_used_again() -> None:
     other = explore(task, plan, (2, 1), "y", Run(seed=1, notes=notes))
     assert (first.reused, again.reused, other.reused) == (0, 2, 0)
     for index in (0, 1):
-        if first.found[index] is not None:
-            np.testing.assert_array_equal(first.found[index].x, again.found[index].x)
+        if first.designs[index] is not None:
+            np.testing.assert_array_equal(first.designs[index].x, again.designs[index].x)
 
 
 def test_the_widest_designs_are_widened_again_in_finer_orders_and_none_gets_narrower(monkeypatch) -> None:
@@ -368,7 +367,7 @@ def test_the_widest_designs_are_widened_again_in_finer_orders_and_none_gets_narr
     monkeypatch.setattr(
         search, "widen", lambda _task, found, _plan: replace(found, start=found.start - gain[found.order])
     )
-    begun = Found(np.zeros(17), 3, 4e-3, 0.02, 0.0, "", 0)
+    begun = ShapeCandidate(np.zeros(17), 3, 4e-3, 0.02, 0.0, "", 0)
     ended = search.refine(task, begun, StartBudget())
     assert (ended.start, ended.order) == (3.5e-3, 4)
     assert search.refine(task, replace(begun, objective=0.5), StartBudget()).start == 4e-3
@@ -376,7 +375,7 @@ def test_the_widest_designs_are_widened_again_in_finer_orders_and_none_gets_narr
 
 def test_the_progress_of_a_search_never_goes_back_and_ends_at_one(monkeypatch) -> None:
     """It had gone from 1 to 0.75 where the widest designs are refined."""
-    flat = Found(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
+    flat = ShapeCandidate(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
     for name in ("search_start", "searched_far"):
         monkeypatch.setattr(multistart, name, lambda _task, _seed, _index, plan: flat)
     for name in ("widen", "nearer", "refine"):
@@ -394,14 +393,14 @@ def test_the_progress_of_a_search_never_goes_back_and_ends_at_one(monkeypatch) -
 
 def test_of_two_designs_of_a_start_the_wider_one_is_kept(monkeypatch) -> None:
     """One is of the requested window, one of a window that begins farther; the three flattest of these are led on."""
-    near, far = (Found(np.zeros(17), 3, start, 0.02, 0.0, "", 0) for start in (4e-3, 3.4e-3))
+    near, far = (ShapeCandidate(np.zeros(17), 3, start, 0.02, 0.0, "", 0) for start in (4e-3, 3.4e-3))
     bands = {0: 0.05, 1: 0.024, 2: 0.04, 3: 0.03, 4: 0.06}
     led = {0.05: 5e-3, 0.024: 3.8e-3, 0.04: 4.5e-3, 0.03: 3.9e-3, 0.06: 1e-3}
 
-    def searched_far(_task: Task, _seed: int, index: int, plan: StartBudget) -> Found:
+    def searched_far(_task: Task, _seed: int, index: int, plan: StartBudget) -> ShapeCandidate:
         return replace(far, objective=bands[index])
 
-    def nearer(_task: Task, found: Found, _plan: StartBudget) -> Found:
+    def nearer(_task: Task, found: ShapeCandidate, _plan: StartBudget) -> ShapeCandidate:
         return replace(found, start=led[found.objective], objective=0.02)
 
     monkeypatch.setattr(multistart, "search_start", lambda _task, _seed, _index, plan: near)
@@ -411,13 +410,19 @@ def test_of_two_designs_of_a_start_the_wider_one_is_kept(monkeypatch) -> None:
     monkeypatch.setattr(multistart, "nearer", nearer)
     task = replace(lan("range"), orders=(1, 3))
     ended = explore(task, StartBudget(), (5, 5), "x", Run())
-    assert {index: one.start for index, one in ended.found.items()} == {0: 4e-3, 1: 3.8e-3, 2: 4e-3, 3: 3.9e-3, 4: 4e-3}
+    assert {index: one.start for index, one in ended.designs.items()} == {
+        0: 4e-3,
+        1: 3.8e-3,
+        2: 4e-3,
+        3: 3.9e-3,
+        4: 4e-3,
+    }
 
 
 def test_a_widening_that_more_poses_refute_keeps_the_window_that_they_confirm(monkeypatch) -> None:
     """Of one whose repair fails all was given up, though what they refuted kept the band over nearly its window."""
     task = lan("range")
-    good = Found(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
+    good = ShapeCandidate(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
     wide = replace(good, start=3.4e-3, objective=task.half_band)
     monkeypatch.setattr(search, "_widest", lambda _task, _found, _plan: wide)
     monkeypatch.setattr(search, "_repair", lambda _task, _wide, kept, _plan: kept)
@@ -435,7 +440,7 @@ def test_no_time_means_no_start_and_nothing_noted() -> None:
     notes = NotesInMemory()
     late = StartBudget(clock=Clock(0.0))
     result = explore(lan(), late, (2, 1), "x", Run(notes=notes))
-    assert (result.found, result.missing, notes.keys) == ({}, 2, {})
+    assert (result.designs, result.missing, notes.keys) == ({}, 2, {})
     assert search_start(lan(), 0, 0, late) is None
 
 

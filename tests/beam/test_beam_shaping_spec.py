@@ -6,7 +6,7 @@ import pytest
 from beam_support import CONFIGS
 
 import cfmkit
-from cfmkit.designing.run_many_starts import Clock
+from cfmkit.designing import Clock
 from cfmkit.errors import SpecError
 from cfmkit.families.beam.shaping.design import _nothing, task_of, with_stretch_and_shear
 from cfmkit.families.beam.shaping.multistart import Explored

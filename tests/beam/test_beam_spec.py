@@ -11,8 +11,8 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.beam.network_from_spec import resolve
-from cfmkit.specs.keys_and_schema import keys
-from cfmkit.studies.variable_paths import leaf, paths
+from cfmkit.specs import keys
+from cfmkit.studies import leaf, paths
 
 
 def faults(*pairs, text=CANTILEVER):

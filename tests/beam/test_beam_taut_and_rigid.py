@@ -10,7 +10,7 @@ import pytest
 from beam_support import MM, cantilever, solved, warned
 
 import cfmkit
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import InputError
 from cfmkit.results import Status
 
@@ -218,7 +218,7 @@ def test_beams_that_over_determine_a_network_are_named(tmp_path, monkeypatch, ca
     text = text.replace("kind: rotation, node: m", "kind: displacement, node: m").replace("10 deg", "1 mm")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "tied.yaml").write_text(text, encoding="utf-8")
-    assert main(["analyze", "tied.yaml", "--no-plots", "--set", "mechanism.drive.direction=90 deg"]) == 4
+    assert run_command(["analyze", "tied.yaml", "--no-plots", "--set", "mechanism.drive.direction=90 deg"]) == 4
     page = " ".join(capsys.readouterr().out.split())
     assert "inextensible beams between places that do not move (left, right) hold the network rigid" in page
 
@@ -236,6 +236,6 @@ def test_beams_that_over_determine_a_network_are_named(tmp_path, monkeypatch, ca
 )
 def test_what_stands_in_the_way_of_a_network_is_said_with_its_cure(tmp_path, capsys, change, said):
     (tmp_path / "tied.yaml").write_text(TIED.replace("EXTRA", "spare"), encoding="utf-8")
-    assert main(["check", str(tmp_path / "tied.yaml"), "--set", change]) == 3
+    assert run_command(["check", str(tmp_path / "tied.yaml"), "--set", change]) == 3
     captured = capsys.readouterr()
     assert said in captured.out + captured.err

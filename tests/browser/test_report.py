@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 
 sync_api = pytest.importorskip("playwright.sync_api")
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -53,7 +53,7 @@ def opened(browser):
 
 
 def run(*arguments):
-    assert main([*map(str, arguments), "-q"]) == 0
+    assert run_command([*map(str, arguments), "-q"]) == 0
 
 
 def test_the_slider_moves_the_mechanism_the_cursor_and_the_text(opened, tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from cfmkit.export.contours import Arc, Line
+from cfmkit.export import Arc, Line
 from cfmkit.families.cam.clearance import _to_edges
 
 

@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 import cfmkit
-from cfmkit.families import family
 from cfmkit.families.cam.figures import draw_mechanism, figures, regions
 from cfmkit.families.cam.part import scene, start_curve, surface, swallowtail
-from cfmkit.plots.figures import figures as pictures
-from cfmkit.plots.style import axes_mm, new_figure, style
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CAM = CONFIGS / "cam.yaml"
@@ -59,7 +57,7 @@ def small_and_large():
 
 def drawn(result, index=0):
     """Return the axes of the mechanism at one point, and its named artists."""
-    ax = draw_mechanism(result.state, index, axes_mm(new_figure(100, 150), (15, 12, 80, 125)))
+    ax = draw_mechanism(result.state, index, Figure(figsize=(4, 6)).add_axes((0.15, 0.08, 0.8, 0.83)))
     named = {artist.get_gid(): artist for artist in ax.get_children() if artist.get_gid()}
     return ax, named
 
@@ -208,7 +206,7 @@ def test_there_is_a_picture_of_undercut_only_where_it_is():
 def test_a_cam_that_cannot_be_built_has_no_pictures():
     result = cfmkit.analyze(cfmkit.load(CAM, ["mechanism.brace_length=60 mm"]))
     assert not result.curves
-    assert pictures(family("cam"), result) == {}
+    assert cfmkit.figures(result) == {}
 
 
 def texts_of(figure):
@@ -295,9 +293,8 @@ def test_no_text_is_clipped_or_covers_another(name, make):
     for result in made if not hasattr(made, "curves") else [made]:
         for stem, draw in figures(result).items():
             figure = draw()
-            with style():
-                figure.draw_without_rendering()
-                assert_texts_are_legible(figure, f"{name} {stem}")
+            figure.draw_without_rendering()
+            assert_texts_are_legible(figure, f"{name} {stem}")
 
 
 def assert_texts_are_legible(figure, place):

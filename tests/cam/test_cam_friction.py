@@ -15,7 +15,6 @@ from cfmkit.errors import SpecError
 from cfmkit.families.cam.figures import figures
 from cfmkit.families.cam.scalar_results import SCALAR_QUANTITIES
 from cfmkit.families.cam.statics import Losses, leverage
-from cfmkit.families.rows import values_of_one
 
 PINS = {"diameter": "6 mm", "friction": 0.15}
 BEARINGS = {"bore": "8 mm", "friction": 0.004}
@@ -145,9 +144,10 @@ def test_a_smallest_contact_force_that_is_nowhere_finite_is_unknown():
     """Zero would say that a roller leaves the cam."""
     solution = analyze(cam(mounting={"elevation": "0 deg", "roll": "0 deg"}, analysis__points=11)).state
     least = np.concatenate([state.least_contact[1:] for state in (solution.up, solution.down)])
-    assert values_of_one(SCALAR_QUANTITIES, solution)["contact_force_least"].value == least.min()
+    least_contact = SCALAR_QUANTITIES["contact_force_least"].function
+    assert least_contact(solution) == least.min()
     up, down = (replace(state, least_contact=np.full(11, np.nan)) for state in (solution.up, solution.down))
-    assert values_of_one(SCALAR_QUANTITIES, replace(solution, up=up, down=down))["contact_force_least"].value is None
+    assert np.isnan(least_contact(replace(solution, up=up, down=down)))
 
 
 def test_hanging_down_the_weight_helps_by_what_it_hinders_standing_up():
@@ -261,7 +261,7 @@ def test_distances_are_those_of_points_on_the_parts():
     assert gaps["slider and roller"][at] == pytest.approx(np.hypot(*(box - [x, y]).T).min() - 0.010, abs=1e-6)
     share = np.linspace(0, 1, 20001)[:, None]
     brace = share * [x, y] + (1 - share) * [0.0, pin]
-    from cfmkit.export.contours import Arc
+    from cfmkit.export import Arc
     from cfmkit.families.cam.outline import drawing
 
     holes = [
@@ -276,7 +276,7 @@ def test_distances_are_those_of_points_on_the_parts():
 
 
 def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
-    from cfmkit.export.contours import Arc, polygons
+    from cfmkit.export import Arc, polygons
     from cfmkit.families.cam.outline import drawing
 
     def outline(radius):
@@ -299,7 +299,7 @@ def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
 
 
 def test_a_roller_meets_the_fillet_of_a_corner_not_the_rest_of_its_circle():
-    from cfmkit.export.contours import polygons
+    from cfmkit.export import polygons
     from cfmkit.families.cam.clearance import BESIDE_FLANKS_PAIR, nearest_pairs
     from cfmkit.families.cam.outline import drawing
 

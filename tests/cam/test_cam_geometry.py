@@ -12,12 +12,12 @@ from cam_support import MM, cam, fixed
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from cfmkit.families import CannotBuild
 from cfmkit.families.cam.geometry.flank_from_roller_path import WholeCamUndercut, cut_cam
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track, track_of
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.families.no_mechanism import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=25)
 FAST = settings(deadline=None, max_examples=200)

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from cam_motion import moving, response
 from cam_support import analyze, cam
+from plot_support import picture
 
+import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families.cam.dynamics.axis_springs import AxisSprings
 from cfmkit.families.cam.dynamics.force_of_given_motion import inverse_history, multibody_history
@@ -449,13 +451,13 @@ def test_friction_that_holds_a_roller_leaves_gaps_and_says_so():
 
 @pytest.mark.parametrize("changes", [{}, UNLIKE], ids=["prototype", "unlike sides"])
 def test_every_picture_is_drawn_twice_with_the_same_bytes(changes):
-    from cfmkit.families.cam.figures import figures
-    from cfmkit.plots.style import png
-
     result = analyze(moving(**changes))
-    first = {name: png(draw()) for name, draw in figures(result).items()}
-    assert set(first) == {"motion", "motion_force", "motion_contact", "motion_rollers"}
-    assert first == {name: png(draw()) for name, draw in figures(result).items()}
+
+    def drawn():
+        return {name: picture(draw()) for name, draw in cfmkit.figures(result).items()}
+
+    assert set(drawn()) == {"motion", "motion_force", "motion_contact", "motion_rollers"}
+    assert drawn() == drawn()
 
 
 def test_the_old_word_for_inverse_dynamics_is_refused_with_those_of_today():

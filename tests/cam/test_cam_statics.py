@@ -9,9 +9,9 @@ from cam_support import MM, analyze, at, cam, fixed
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from cfmkit.families import CannotBuild
 from cfmkit.families.cam.mechanism_from_spec import assemble, hanging_weights
 from cfmkit.families.cam.statics import STANDARD_GRAVITY
-from cfmkit.families.no_mechanism import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=60)
 

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -126,7 +126,7 @@ class Cli:
         """Run a command in this process; `timeout` is that of `program`, and nothing ends this process."""
         given = stdin.encode() if isinstance(stdin, str) else stdin
         with as_the_process(self.folder, self.environment(**environment), given) as (out, err):
-            code = main(arguments)
+            code = run_command(arguments)
             reported = []
             for stream, file in ((sys.stdout, out), (sys.stderr, err)):
                 stream.flush()

@@ -10,9 +10,9 @@ import time
 
 import pytest
 
+from cfmkit import Run
 from cfmkit.cli.failures import Stopped
 from cfmkit.cli.run_study_in_folder import open_journal
-from cfmkit.families.run_control import Run
 from cfmkit.runs.run import long_run
 from cfmkit.store import RunFolder
 

@@ -12,9 +12,8 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.main import main
-from cfmkit.documents.document import Written
-from cfmkit.documents.suggestion_document import document_of
-from cfmkit.errors import ExitCode
+from cfmkit.cli.verbs.suggest import SuggestOptions, keys, parse_envelope, seconds
+from cfmkit.errors import UsageError
 
 REQUESTS = Path(__file__).parents[1] / "requests"
 FEASIBLE = sorted(path.stem for path in (REQUESTS / "sources").glob("*.yaml"))
@@ -79,26 +78,6 @@ def test_the_next_line_is_a_command_that_writes_files_to_cut(published, tmp_path
     assert list((tmp_path / "cut").glob("*.dxf"))
 
 
-def test_a_proposal_whose_files_were_not_made_in_time_is_named(capsys):
-    one = {"family": "cam", "variant": "2 springs", "mean": 20.0, "ripple": 0.01, "across": 1.0, "along": 2.0}
-    one |= {"depth": None, "safety_factor": None, "parts": 3, "hysteresis": None, "model": "quasi-static"}
-    one |= {"unjudged": [], "warnings": [], "verdict": "meets", "life": None, "yield": None}
-    both = [one | {"folder": "1-cam-2-springs"}, one | {"folder": "10-cam"}]
-    data = {
-        "message": "2 mechanisms meet the requirements",
-        "proposals": both,
-        "suggest": {},
-        "near_misses": [],
-        "unjudged": [],
-        "order": ["size"],
-    }
-    written = Written("out", ("1-cam-2-springs/design.yaml", "10-cam/design.yaml", "10-cam/metrics.json"))
-    document = document_of(data | {"families": [], "warnings": []}, ExitCode.OK, written)
-    notes = [note.text for note in document.notes if note.word == "note"]
-    assert len(notes) == 1
-    assert "no time was left for the curve and figures of 1-cam-2-springs" in notes[0]
-
-
 def test_a_request_beyond_everybody_ends_with_4_and_a_reason_from_each_family(tmp_path):
     """A thousand times the torque that a coin cannot give: nobody begins a design."""
     code, found = suggested("unreachable-torque-of-a-coin", tmp_path / "out", "-j", "1", "--torque", "500 N*m")
@@ -151,3 +130,26 @@ def test_no_request_beyond_reach_gets_a_proposal(name, tmp_path):
 @pytest.mark.parametrize("name", CONTRADICTIONS)
 def test_every_contradiction_is_refused(name, tmp_path):
     assert suggested(name, tmp_path / "out") == (3, None)
+
+
+def test_a_material_named_again_is_one_more_and_replaces_none():
+    assert keys(SuggestOptions(material=["pom", "pla,abs"])) == {"material": "[pom,pla,abs]"}
+    assert keys(SuggestOptions(force="19N, 21 N")) == {"force": "[19N, 21 N]"}
+    assert keys(SuggestOptions(torque="[1 N*m, 2 N*m]", force="1,5 N")) == {
+        "torque": "[1 N*m, 2 N*m]",
+        "force": "1,5 N",
+    }
+    assert keys(SuggestOptions(material=["[pom]"], prefer=[])) == {"material": "[pom]"}
+    assert keys(SuggestOptions(material=["[pom, pla]", "abs"])) == {"material": "[pom, pla,abs]"}
+
+
+def test_a_room_and_a_time_may_be_written_short():
+    assert parse_envelope("80x60x6mm") == "[80 mm, 60 mm, 6 mm]"
+    assert parse_envelope("8cm x 60 mm") == "[8 cm, 60 mm]"
+    assert parse_envelope("8e1x6E1mm") == "[8e1 mm, 6E1 mm]"
+    with pytest.raises(UsageError, match="100x100x20 has no unit; write 100x100x20mm"):
+        parse_envelope("100x100x20")
+    assert seconds("90s") == 90.0
+    assert seconds("2 min") == 120.0
+    with pytest.raises(UsageError):
+        seconds("0s")

@@ -14,10 +14,10 @@ import spare_family
 
 import cfmkit
 from cfmkit import api, families
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.cli.verbs.new import template
 from cfmkit.documents import run_outcome
-from cfmkit.export.contours import Drawing
+from cfmkit.export import Drawing
 from cfmkit.families.deferred_imports import load_deferred
 from cfmkit.results import Status
 from cfmkit.runs.files_a_run_writes import files
@@ -297,7 +297,7 @@ def spare(monkeypatch, tmp_path):
 
 def test_a_family_without_drawings_gets_the_picture_of_its_curve(spare):
     assert set(api.figures(cfmkit.analyze(cfmkit.load(spare)))) == {"curve"}
-    assert main(["analyze", spare, "-o", "out", "-q"]) == 0
+    assert run_command(["analyze", spare, "-o", "out", "-q"]) == 0
     assert Path("out/figures/curve.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -306,7 +306,7 @@ def test_a_family_without_drawings_gets_the_picture_of_its_curve(spare):
 )
 def test_a_family_with_as_little_as_there_can_be_breaks_no_command(spare, command, capsys):
     verb, *options = command
-    assert main([verb, spare, *options, *(["-o", "out"] if verb != "check" else [])]) in (0, 2, 3)
+    assert run_command([verb, spare, *options, *(["-o", "out"] if verb != "check" else [])]) in (0, 2, 3)
     assert "bug" not in capsys.readouterr().err
 
 
@@ -314,5 +314,5 @@ def test_a_family_with_as_little_as_there_can_be_breaks_no_command(spare, comman
     "arguments", [("show", "spare"), ("show",), ("schema", "spare"), ("schema",), ("new", "spare")]
 )
 def test_a_family_without_a_template_or_references_is_explained_like_the_others(spare, arguments, capsys):
-    assert main(list(arguments)) in (0, 2)
+    assert run_command(list(arguments)) in (0, 2)
     assert "bug" not in capsys.readouterr().err

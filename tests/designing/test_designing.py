@@ -15,9 +15,9 @@ from cfmkit.designing import objective_and_constraints
 from cfmkit.designing.bounds_and_rounding import find_active_bounds, round_within_bounds
 from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint
 from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock, OneStart, Stage, from_record, run_stage
-from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
+from cfmkit.numerics import Effort, Optimum, SearchEnding, minimize
 from cfmkit.results import Status
-from cfmkit.studies.serial_and_cluster_executors import Lost
+from cfmkit.studies import Lost
 
 
 @dataclass

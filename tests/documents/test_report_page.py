@@ -171,11 +171,11 @@ def test_a_mechanism_without_a_curve_has_a_page_that_says_why(reports):
 
 def swept(tmp_path, **more):
     """Return the files of a small sweep, as the verb writes them."""
-    from cfmkit.cli.main import main
+    from cfmkit.cli import run_command
 
     arguments = ["sweep", str(CONFIGS / "cam.yaml"), "--vary", "mechanism.roller_radius=8 mm:10 mm:3", "--report"]
     arguments += ["-o", str(tmp_path / "out"), "--curves", "--metrics", "force_mean", "-q", "--no-plots"]
-    assert main(arguments) == 0
+    assert run_command(arguments) == 0
     return tmp_path / "out"
 
 

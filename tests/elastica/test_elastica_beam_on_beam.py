@@ -10,38 +10,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from contact_paths import assert_work_is_energy, at_drive, check_complementarity, place_of, shoot
-
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    PathStatus,
-    PointLoad,
-    Section,
-    SlideSpring,
-    arc,
-    slider_support,
-    trace,
+from contact_paths import (
+    DOWN,
+    EXACT,
+    HALF,
+    THIN,
+    TIP_LOAD,
+    assert_work_is_energy,
+    at_drive,
+    check_complementarity,
+    place_of,
+    shoot,
 )
+
+import cfmkit.elastica as el
 from cfmkit.elastica.contact.sliding import SlidingEquations
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam, NodeOnObstacle, line
 from cfmkit.elastica.results.between_points import interpolate_path
 
-DOWN = -np.pi / 2
-HALF = 0.005  # half the thickness
-THIN = Section(1.2e7, 1.0, 2 * HALF, axial=False, shear=False)  # EI = 1
-EXACT = Control(tolerance=1e-9)
-TIP_LOAD = (PointLoad("tip", 0.0, -1.0),)
 CONTACTS = (
-    BeamOnBeam("p", "upper", "lower"), BeamOnBeam("p", "lower", "upper", leads=False),
-    NodeOnBeam("p", "tip", "lower", HALF), NodeOnBeam("p", "end", "upper", HALF),
+    el.BeamOnBeam("p", "upper", "lower"), el.BeamOnBeam("p", "lower", "upper", leads=False),
+    el.NodeOnBeam("p", "tip", "lower", HALF), el.NodeOnBeam("p", "end", "upper", HALF),
 )  # fmt: skip
 UPPER, LOWER, TIP, END = range(4)  # numbers of these contacts
 
@@ -55,24 +45,27 @@ def end_of_arc(start, angle, bend, length):
 def two_leaves(upper, lower, soft=1.0):
     """Return two clamped leaves that are arcs, each from start, angle, bend and length, that may touch."""
     nodes = {
-        "root": Node(*upper[0], CLAMPED_SUPPORT), "tip": Node(*end_of_arc(*upper)),
-        "wall": Node(*lower[0], CLAMPED_SUPPORT), "end": Node(*end_of_arc(*lower)),
+        "root": el.Node(*upper[0], el.CLAMPED_SUPPORT), "tip": el.Node(*end_of_arc(*upper)),
+        "wall": el.Node(*lower[0], el.CLAMPED_SUPPORT), "end": el.Node(*end_of_arc(*lower)),
     }  # fmt: skip
     section = replace(THIN, youngs_modulus=THIN.youngs_modulus / soft)
-    beams = {"upper": Beam("root", "tip", THIN, arc(upper[2])), "lower": Beam("wall", "end", section, arc(lower[2]))}
-    return Network(nodes, beams, contacts=CONTACTS)
+    beams = {
+        "upper": el.Beam("root", "tip", THIN, el.arc(upper[2])),
+        "lower": el.Beam("wall", "end", section, el.arc(lower[2])),
+    }
+    return el.Network(nodes, beams, contacts=CONTACTS)
 
 
 def falling_leaf(stiffness=100.0, contacts=CONTACTS):
     """Return a straight leaf that is held at an angle and driven down onto another one."""
     angle = -np.pi / 9
     nodes = {
-        "root": Node(0, 0.4, slider_support(np.pi / 2)), "tip": Node(np.cos(angle), 0.4 + np.sin(angle)),
-        "wall": Node(-0.2, 0, CLAMPED_SUPPORT), "end": Node(1.5, 0),
+        "root": el.Node(0, 0.4, el.slider_support(np.pi / 2)), "tip": el.Node(np.cos(angle), 0.4 + np.sin(angle)),
+        "wall": el.Node(-0.2, 0, el.CLAMPED_SUPPORT), "end": el.Node(1.5, 0),
     }  # fmt: skip
     stiff = replace(THIN, youngs_modulus=stiffness * THIN.youngs_modulus)
-    beams = {"upper": Beam("root", "tip", THIN), "lower": Beam("wall", "end", stiff)}
-    return Network(nodes, beams, contacts=contacts)
+    beams = {"upper": el.Beam("root", "tip", THIN), "lower": el.Beam("wall", "end", stiff)}
+    return el.Network(nodes, beams, contacts=contacts)
 
 
 BULGE = two_leaves(((0, 0.1), -0.4, 1.0, 1.0), ((0, 0), 0.0, 0.0, 1.2))
@@ -87,7 +80,7 @@ def check_pair(path):
 
 
 def test_two_sides_have_the_force_and_the_places_of_shooting_both_ways():
-    path = trace(BULGE, Loading(TIP_LOAD, np.array([0.25, 0.5, 1, 1.5, 2, 1, 0.1])), EXACT)
+    path = el.trace(BULGE, el.Loading(TIP_LOAD, np.array([0.25, 0.5, 1, 1.5, 2, 1, 0.1])), EXACT)
     begin, end = path.contact_events
     assert (begin.kind, end.kind) == ("begins", "ends")
     assert end.drive == pytest.approx(begin.drive, abs=1e-11)
@@ -104,8 +97,8 @@ def test_two_sides_have_the_force_and_the_places_of_shooting_both_ways():
 
 
 def test_two_sides_that_begin_to_nest_end_the_path_where_shooting_says():
-    path = trace(BULGE, Loading(TIP_LOAD, np.array([1.0, 5.0])), EXACT)
-    assert path.status is PathStatus.LOST
+    path = el.trace(BULGE, el.Loading(TIP_LOAD, np.array([1.0, 5.0])), EXACT)
+    assert path.status is el.PathStatus.LOST
     assert path.contact_events[-1].kind == "spreads"
     assert path.contact_events[-1].drive == pytest.approx(3.0199, abs=5e-5)
     assert "contact of 'upper' and 'lower' spreads along a length at 3.0199" in path.message
@@ -114,7 +107,7 @@ def test_two_sides_that_begin_to_nest_end_the_path_where_shooting_says():
 @pytest.mark.parametrize(("bend", "lower", "load"), [(1.3, -0.2, (0.1, -2.5)), (0.9, 0.3, (-0.2, -2.0))])
 def test_two_sides_solve_the_equations_of_shooting(bend, lower, load):
     net = two_leaves(((0, 0.15), -0.4, bend, 1.0), ((0, 0), 0.0, lower * 1.2, 1.2))
-    path = trace(net, Loading((PointLoad("tip", *load),), np.array([0.5, 1.0])), Control(tolerance=1e-10))
+    path = el.trace(net, el.Loading((el.PointLoad("tip", *load),), np.array([0.5, 1.0])), el.Control(tolerance=1e-10))
     force = path.contact_force(UPPER)[-1]
     places = path.contact_places(UPPER)[-1, 0], path.contact_places(LOWER)[-1, 0] * 1.2
     root, wall = (path.states(name).moment[-1, 0] for name in ("upper", "lower"))
@@ -137,7 +130,9 @@ def test_two_sides_solve_the_equations_of_shooting(bend, lower, load):
 
 
 def test_a_tip_becomes_tangent_and_touches_with_its_side_and_goes_back():
-    path = trace(falling_leaf(), Displacement("root", DOWN, np.array([0.1, 0.2, 0.3, 0.34, 0.3, 0.2, 0.02])), EXACT)
+    path = el.trace(
+        falling_leaf(), el.Displacement("root", DOWN, np.array([0.1, 0.2, 0.3, 0.34, 0.3, 0.2, 0.02])), EXACT
+    )
     kinds, drives = zip(*((event.kind, event.drive) for event in path.contact_events), strict=True)
     assert kinds == ("begins", "moves", "moves", "ends")
     assert drives[:2] == pytest.approx(drives[:1:-1], abs=1e-11)
@@ -151,17 +146,17 @@ def test_a_tip_becomes_tangent_and_touches_with_its_side_and_goes_back():
 
 def test_a_leaf_that_falls_on_a_stiffer_and_stiffer_one_falls_on_a_floor():
     """Of the floor the numbers are those of shooting, `test_elastica_sides.py`."""
-    floor = line((0, HALF), 0.0)
-    alone = (NodeOnObstacle("floor", "tip", floor, HALF),)
-    drive = Displacement("root", DOWN, np.array([0.1, 0.2]))
-    known = trace(falling_leaf(contacts=alone), drive, EXACT).effort[-1]
-    missed = [abs(trace(falling_leaf(stiffness), drive, EXACT).effort[-1] / known - 1) for stiffness in (1e3, 1e5)]
+    floor = el.line_edge((0, HALF), 0.0)
+    alone = (el.NodeOnObstacle("floor", "tip", floor, HALF),)
+    drive = el.Displacement("root", DOWN, np.array([0.1, 0.2]))
+    known = el.trace(falling_leaf(contacts=alone), drive, EXACT).effort[-1]
+    missed = [abs(el.trace(falling_leaf(stiffness), drive, EXACT).effort[-1] / known - 1) for stiffness in (1e3, 1e5)]
     assert missed[1] == pytest.approx(missed[0] / 100, rel=0.05)
 
 
 def test_the_tangent_of_two_sides_that_touch_is_the_derivative_of_the_residual():
     mesh = discretise(
-        BULGE, Loading(TIP_LOAD, np.array([1.0])), flanks=[FlankPlace(UPPER, 0.5), FlankPlace(LOWER, 0.4)]
+        BULGE, el.Loading(TIP_LOAD, np.array([1.0])), flanks=[FlankPlace(UPPER, 0.5), FlankPlace(LOWER, 0.4)]
     )
     mesh = replace(mesh, contacts=tuple(contact._replace(closed=True) for contact in mesh.contacts))
     equation = SlidingEquations.from_mesh(mesh, False, equations)
@@ -185,15 +180,15 @@ def layout(seed):
         (start, angles[0], bends[0], lengths[0]), ((0, 0), angles[1], bends[1], lengths[1]), 10 ** rng.uniform(-1, 0.5)
     )
     up = np.linspace(0, 1, 7)[1:] * rng.uniform(1, 4)
-    load = PointLoad("tip", 0.2 * rng.normal(), -1.0), PointLoad("end", 0.0, 0.3 * rng.normal())
-    return net, Loading(load, np.concatenate([up, up[-2::-1], [0.0]]))
+    load = el.PointLoad("tip", 0.2 * rng.normal(), -1.0), el.PointLoad("end", 0.0, 0.3 * rng.normal())
+    return net, el.Loading(load, np.concatenate([up, up[-2::-1], [0.0]]))
 
 
 @pytest.mark.slow  # seconds each
 @pytest.mark.parametrize("seed", [4, 9, 10, 21, 23, 27])
 def test_a_random_pair_returns_to_its_own_points_and_keeps_every_condition(seed):
-    path = trace(*layout(seed), Control(tolerance=1e-8))
-    assert path.status is PathStatus.COMPLETE
+    path = el.trace(*layout(seed), el.Control(tolerance=1e-8))
+    assert path.status is el.PathStatus.COMPLETE
     assert path.contact_events
     check_pair(path)
     moved = np.stack([path.motion(node)[path.at_requested] for node in ("tip", "end")])
@@ -204,15 +199,15 @@ def test_stability_changes_with_two_sides_that_touch_where_the_load_has_its_limi
     """The side of a stiff leaf on a slide presses an arch through: stability changes at the limit of the load."""
     upper = (0.55, 0.62), -1.3, 2.6, 1.0
     nodes = {
-        "root": Node(*upper[0], slider_support(np.pi / 2)), "tip": Node(*end_of_arc(*upper)),
-        "wall": Node(0.5, 0, CLAMPED_SUPPORT), "end": Node(1.5, 0, CLAMPED_SUPPORT),
+        "root": el.Node(*upper[0], el.slider_support(np.pi / 2)), "tip": el.Node(*end_of_arc(*upper)),
+        "wall": el.Node(0.5, 0, el.CLAMPED_SUPPORT), "end": el.Node(1.5, 0, el.CLAMPED_SUPPORT),
     }  # fmt: skip
     stiff = replace(THIN, youngs_modulus=30 * THIN.youngs_modulus)
-    beams = {"upper": Beam("root", "tip", stiff, arc(2.6)), "lower": Beam("wall", "end", THIN, arc(-1.2))}
-    guide = SlideSpring("root", np.pi / 2, 1.0)
-    net = Network(nodes, beams, springs=(guide,), contacts=CONTACTS[:3])
-    drive = Loading((PointLoad("root", 0.0, -1.0),), np.array([30.0]))
-    path = trace(net, drive, Control(tolerance=1e-8, through_folds=True))
+    beams = {"upper": el.Beam("root", "tip", stiff, el.arc(2.6)), "lower": el.Beam("wall", "end", THIN, el.arc(-1.2))}
+    guide = el.SlideSpring("root", np.pi / 2, 1.0)
+    net = el.Network(nodes, beams, springs=(guide,), contacts=CONTACTS[:3])
+    drive = el.Loading((el.PointLoad("root", 0.0, -1.0),), np.array([30.0]))
+    path = el.trace(net, drive, el.Control(tolerance=1e-8, through_folds=True))
     (limit,) = path.events
     assert (limit.kind, limit.before, limit.after) == ("limit point", 0, 1)
     pressing = path.contact_force(UPPER) > 0
@@ -223,9 +218,9 @@ def test_stability_changes_with_two_sides_that_touch_where_the_load_has_its_limi
 
 
 def test_between_points_two_sides_touch_as_at_them():
-    drive = Displacement("tip", DOWN, np.array([0.1, 0.2, 0.3]))
-    between = interpolate_path(trace(BULGE, drive, EXACT)).solve_at(np.array([0.25]))
-    known = trace(BULGE, replace(drive, points=np.array([0.1, 0.25])), EXACT)
+    drive = el.Displacement("tip", DOWN, np.array([0.1, 0.2, 0.3]))
+    between = interpolate_path(el.trace(BULGE, drive, EXACT)).solve_at(np.array([0.25]))
+    known = el.trace(BULGE, replace(drive, points=np.array([0.1, 0.25])), EXACT)
     assert between.contact_force(UPPER)[0] == pytest.approx(known.contact_force(UPPER)[-1], rel=1e-9)
     assert known.contact_force(UPPER)[-1] > 0.1
 
@@ -233,10 +228,10 @@ def test_between_points_two_sides_touch_as_at_them():
 def test_the_work_of_the_drive_is_the_energy_of_two_leaves_that_shear():
     """So the tangent of both where they touch is the right one."""
     depth = 1 / 12
-    section = Section(12 / depth**3, 1.0, depth, axial=True, shear=True)
+    section = el.Section(12 / depth**3, 1.0, depth, axial=True, shear=True)
     beams = {name: replace(beam, section=section) for name, beam in BULGE.beams.items()}
     nodes = BULGE.nodes | {
-        "root": Node(0, 0.1 + depth, CLAMPED_SUPPORT),
+        "root": el.Node(0, 0.1 + depth, el.CLAMPED_SUPPORT),
         "tip": replace(BULGE.nodes["tip"], y=BULGE.nodes["tip"].y + depth),
     }
     assert_work_is_energy(replace(BULGE, nodes=nodes, beams=beams), "tip", 0.1, 0.3)

@@ -7,24 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from contact_layouts import THIN_SECTION, among_discs
+from contact_layouts import among_discs
+from contact_paths import THIN
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    LineLoad,
-    Link,
-    Loading,
-    Network,
-    Node,
-    PointLoad,
-    Polynomial,
-    Section,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.pair_gaps import make_gaps
 from cfmkit.elastica.contact.side_gaps import NEAR_GAP, LoadStage
@@ -32,42 +18,32 @@ from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE, load_compiled
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import CompiledSides, equations
-from cfmkit.elastica.model.contact import (
-    BeamOnBeam,
-    BeamOnObstacle,
-    BeamSide,
-    NodeOnBeam,
-    NodeOnObstacle,
-    circle,
-    line,
-    polyline,
-)
 
 pytestmark = pytest.mark.skipif(load_compiled() is None, reason="the compiled module was not built")
 OUTLINES = {
-    "disc": circle((0.4, -0.2), 0.1),
-    "roof": polyline([(-0.5, -1), (0.7, -0.2), (1.5, -1)], 0.05),
-    "hole": circle((0.0, 0.0), 1.4, hole=True),
+    "disc": el.circle_edge((0.4, -0.2), 0.1),
+    "roof": el.polyline_edge([(-0.5, -1), (0.7, -0.2), (1.5, -1)], 0.05),
+    "hole": el.circle_edge((0.0, 0.0), 1.4, hole=True),
 }
-SHAPES = {"straight": Polynomial(), "curved": Polynomial((0.1, 0.4, 0.2))}
+SHAPES = {"straight": el.Polynomial(), "curved": el.Polynomial((0.1, 0.4, 0.2))}
 LEAF_PLACES = FlankPlace(0, 0.3), FlankPlace(1, 0.7), FlankPlace(3, 0.4), FlankPlace(2, 0.6)
 DRIVE = np.array([0.3])
-WIDE_SECTION = Section(1e7, 0.2, 0.01, axial=True, poisson_ratio=0.3, wide=True)
-SECTIONS = {"stiff": THIN_SECTION, "soft": replace(THIN_SECTION, axial=True), "wide": WIDE_SECTION}
+WIDE_SECTION = el.Section(1e7, 0.2, 0.01, axial=True, poisson_ratio=0.3, wide=True)
+SECTIONS = {"stiff": THIN, "soft": replace(THIN, axial=True), "wide": WIDE_SECTION}
 
 
-def leaf(shape: str = "straight", section: str = "stiff") -> Network:
+def leaf(shape: str = "straight", section: str = "stiff") -> el.Network:
     """Return a leaf under its weight, with a pad at its tip, that may touch three obstacles with its side."""
-    pad = NodeOnObstacle("floor", "tip", line((0, -0.2), 0.1), 0.005)
-    contacts = (pad, *(BeamOnObstacle(name, "leaf", edge) for name, edge in OUTLINES.items()))
-    nodes = {"root": Node(0.0, 0.0, CLAMPED_SUPPORT), "tip": Node(1.0, 0.0)}
-    beams = {"leaf": Beam("root", "tip", SECTIONS[section], SHAPES[shape])}
-    return Network(nodes, beams, loads=(LineLoad("leaf", 0.3, -0.8),), contacts=contacts)
+    pad = el.NodeOnObstacle("floor", "tip", el.line_edge((0, -0.2), 0.1), 0.005)
+    contacts = (pad, *(el.BeamOnObstacle(name, "leaf", edge) for name, edge in OUTLINES.items()))
+    nodes = {"root": el.Node(0.0, 0.0, el.CLAMPED_SUPPORT), "tip": el.Node(1.0, 0.0)}
+    beams = {"leaf": el.Beam("root", "tip", SECTIONS[section], SHAPES[shape])}
+    return el.Network(nodes, beams, loads=(el.LineLoad("leaf", 0.3, -0.8),), contacts=contacts)
 
 
 def touching(closed: bool | None, places: tuple[float, ...] = (0.35, 0.6, 0.8), **network: str) -> Discretisation:
     """Return its arrays with places at which it touches each obstacle."""
-    load = Loading((PointLoad("tip", 0.0, -1.0),), np.array([1.0]))
+    load = el.Loading((el.PointLoad("tip", 0.0, -1.0),), np.array([1.0]))
     flanks = [FlankPlace(1 + k, place) for k, place in enumerate(places)]
     mesh = discretise(leaf(**network), load, 7, flanks=flanks)
     return replace(mesh, contacts=tuple(contact._replace(closed=closed) for contact in mesh.contacts))
@@ -76,19 +52,22 @@ def touching(closed: bool | None, places: tuple[float, ...] = (0.35, 0.6, 0.8), 
 def leaves_that_touch(closed: bool | None, places: tuple[float, ...] = (0.3, 0.7, 0.6, 0.4)) -> Discretisation:
     """Return two leaves that touch each other, a pad that is driven, and one on an arm."""
     nodes = {
-        "root": Node(0.0, 0.0, CLAMPED_SUPPORT), "tip": Node(1.0, 0.0), "arm": Node(1.05, 0.1),
-        "wall": Node(0.0, 0.05, CLAMPED_SUPPORT), "end": Node(1.2, 0.05), "post": Node(0.4, -0.1, slider_support(1.5)),
+        "root": el.Node(0.0, 0.0, el.CLAMPED_SUPPORT), "tip": el.Node(1.0, 0.0), "arm": el.Node(1.05, 0.1),
+        "wall": el.Node(0.0, 0.05, el.CLAMPED_SUPPORT), "end": el.Node(1.2, 0.05),
+        "post": el.Node(0.4, -0.1, el.slider_support(1.5)),
     }  # fmt: skip
     beams = {
-        "lower": Beam("root", "tip", SECTIONS["soft"], SHAPES["curved"]),
-        "upper": Beam("wall", "end", THIN_SECTION),
+        "lower": el.Beam("root", "tip", SECTIONS["soft"], SHAPES["curved"]),
+        "upper": el.Beam("wall", "end", THIN),
     }
     contacts = (
-        NodeOnBeam("post", "post", "lower", 0.02), BeamOnBeam("pair", "lower", "upper"),
-        BeamOnBeam("pair", "upper", "lower", leads=False), NodeOnBeam("arm", "arm", "upper", 0.01),
+        el.NodeOnBeam("post", "post", "lower", 0.02), el.BeamOnBeam("pair", "lower", "upper"),
+        el.BeamOnBeam("pair", "upper", "lower", leads=False), el.NodeOnBeam("arm", "arm", "upper", 0.01),
     )  # fmt: skip
-    net = Network(nodes, beams, links=(Link("tip", "arm"),), loads=(LineLoad("lower", 0.3, -0.8),), contacts=contacts)
-    mesh = discretise(net, Displacement("post", 1.5, np.array([0.1])), 7, flanks=places)
+    net = el.Network(
+        nodes, beams, links=(el.Link("tip", "arm"),), loads=(el.LineLoad("lower", 0.3, -0.8),), contacts=contacts
+    )
+    mesh = discretise(net, el.Displacement("post", 1.5, np.array([0.1])), 7, flanks=places)
     return replace(mesh, contacts=tuple(contact._replace(closed=closed) for contact in mesh.contacts))
 
 
@@ -156,7 +135,7 @@ def test_gaps_that_are_not_measured_again_are_below_those_that_would_be(mesh: Di
         ends = 0.1 * rng.standard_normal((2, mesh.size))
         states, stage = ends[0] + share * (ends[1] - ends[0]), LoadStage(share[:, 0])
         for item in mesh.fits.network.contacts:
-            if not isinstance(item, BeamSide):
+            if not isinstance(item, el.BeamSide):
                 continue
             gaps = make_gaps(mesh, item)
             watched, each = gaps.least(states, stage, watch=True), gaps.least(states, stage)
@@ -173,7 +152,7 @@ def assert_gaps_agree(mesh: Discretisation, states: Any, stage: LoadStage) -> No
     """Both find the same least gaps and places, of states near and far."""
     counts = np.zeros(2, int)
     for item in mesh.fits.network.contacts:
-        if not isinstance(item, BeamSide):
+        if not isinstance(item, el.BeamSide):
             continue
         fast, right = make_gaps(mesh, item, (0,)), make_gaps(mesh, item, (0,))
         vars(right)["packed"] = None
@@ -201,9 +180,9 @@ def test_states_on_other_elements_are_those_of_numpy(monkeypatch: pytest.MonkeyP
 
 
 def test_a_path_among_discs_is_that_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
-    fast = trace(*among_discs(1), Control(tolerance=1e-8))
+    fast = el.trace(*among_discs(1), el.Control(tolerance=1e-8))
     monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
-    slow = trace(*among_discs(1), Control(tolerance=1e-8))
+    slow = el.trace(*among_discs(1), el.Control(tolerance=1e-8))
     events = [[(event.kind, event.number) for event in path.contact_events] for path in (fast, slow)]
     assert len(events[0]) == 4
     assert events[0] == events[1]

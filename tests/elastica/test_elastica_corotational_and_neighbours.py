@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from buckling_structures import ding_leaf, press
 from corotational import recheck
 
 import cfmkit.elastica as el
@@ -120,13 +121,7 @@ def test_slope_of_the_force_is_that_of_differences(path: el.Path) -> None:
 
 def test_a_perfect_v_beam_on_its_bifurcated_branch_agrees_with_corotational_elements() -> None:
     """Forces and stability there, and on the symmetric branch that is left."""
-    length, angle = 35e-3, np.radians(7)
-    nodes = {
-        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
-        "d": el.Node(length * np.cos(angle), length * np.sin(angle), el.slider_support(np.pi / 2)),
-    }
-    network = el.Network(nodes, {"v": el.Beam("wall", "d", el.Section(1477e6, 6e-3, 1e-3))})
-    drive = el.Displacement("d", -np.pi / 2, np.array([0.5e-3, 2e-3, 3e-3, 4e-3, 6e-3]))
+    network, drive = ding_leaf(), press("d", [0.5e-3, 2e-3, 3e-3, 4e-3, 6e-3])
     stable = el.trace(network, drive, el.Control(tolerance=1e-9))
     symmetric = el.trace(network, drive, el.Control(tolerance=1e-9, branch="primary"))
     found, other = recheck(stable, elements=60), recheck(symmetric, elements=60)

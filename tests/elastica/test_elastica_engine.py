@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import cfmkit.elastica as el
+from cfmkit.elastica import BeamOnObstacle, NodeOnObstacle, circle_edge
 from cfmkit.elastica.model.beam_fits import BeamFits
-from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, circle
 from cfmkit.errors import InputError
 
 TIGHT = el.Control(tolerance=1e-10)
@@ -97,7 +97,7 @@ def test_a_scaled_network_has_scaled_forces(reference: el.Path, size: float) -> 
 def rubbing(size: float) -> el.Path:
     """Return the path of a cantilever whose clamp is lowered and raised, and whose round tip rubs on a disc."""
     nodes = {"root": el.Node(0, 0, el.slider_support(UP)), "tip": el.Node(size, 0)}
-    disc = NodeOnObstacle("disc", "tip", circle((1.1 * size, -0.4 * size), 0.3 * size), 0.05 * size, friction=0.2)
+    disc = NodeOnObstacle("disc", "tip", circle_edge((1.1 * size, -0.4 * size), 0.3 * size), 0.05 * size, friction=0.2)
     beam = el.Beam("root", "tip", el.Section(1.0, 12.0 * size, size, axial=False))
     drive = el.Displacement("root", -UP, size * np.array([0.2, 0.3, 0.1]))
     return el.trace(el.Network(nodes, {"b": beam}, contacts=(disc,)), drive, TIGHT)
@@ -106,7 +106,7 @@ def rubbing(size: float) -> el.Path:
 def wrapping(size: float) -> el.Path:
     """Return the path of a leaf whose side a force at its tip presses onto a disc."""
     nodes = {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "tip": el.Node(size, 0)}
-    disc = BeamOnObstacle("disc", "b", circle((0.5 * size, -0.1 * size), 0.045 * size))
+    disc = BeamOnObstacle("disc", "b", circle_edge((0.5 * size, -0.1 * size), 0.045 * size))
     beam = el.Beam("root", "tip", el.Section(1.2e7, size, 0.01 * size, axial=False))
     drive = el.Loading((el.PointLoad("tip", fy=-(size**2)),), np.array([0.4, 1.0, 3.0, 0.4]))
     return el.trace(el.Network(nodes, {"b": beam}, contacts=(disc,)), drive, TIGHT)

@@ -6,43 +6,39 @@ The numbers are of independent shooting (DOP853), as in `test_elastica_contact.p
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from contact_paths import DOWN, EXACT, SECTION
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from cfmkit.elastica import Beam, Control, Displacement, Network, Node, PathStatus, Section, slider_support, trace
+import cfmkit.elastica as el
 from cfmkit.elastica.contact.changes import PieceOfPath
 from cfmkit.elastica.contact.friction import choose_friction
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.model.contact import NodeOnObstacle, Stop, circle, line, polyline
 from cfmkit.elastica.results.between_points import interpolate_path
-from cfmkit.numerics.continuation.path import Options
-from cfmkit.numerics.continuation.problem import PathEquilibrium
-from cfmkit.numerics.quadrature import clenshaw_curtis
+from cfmkit.numerics.continuation import Options, PathEquilibrium
 
-SECTION = Section(1.0, 12.0, 1.0, axial=False, shear=False)  # EI = 1
-EXACT = Control(tolerance=1e-9)
-DOWN = -np.pi / 2
 ANGLE = np.radians(20)
 CENTRE, DISC = (1.1, -0.4), 0.3
 
 
 def lower(contact, places, angle=ANGLE):
     """Return the path of a straight cantilever, below the horizontal by an angle, whose clamp is lowered."""
-    nodes = {"root": Node(0, 0, slider_support(np.pi / 2)), "tip": Node(np.cos(angle), -np.sin(angle))}
-    net = Network(nodes, {"b": Beam("root", "tip", SECTION)}, contacts=(contact,))
-    return trace(net, Displacement("root", DOWN, np.array(places)), EXACT)
+    nodes = {"root": el.Node(0, 0, el.slider_support(np.pi / 2)), "tip": el.Node(np.cos(angle), -np.sin(angle))}
+    net = el.Network(nodes, {"b": el.Beam("root", "tip", SECTION)}, contacts=(contact,))
+    return el.trace(net, el.Displacement("root", DOWN, np.array(places)), EXACT)
 
 
 def on_floor(friction, radius=0.0):
-    return NodeOnObstacle("floor", "tip", line((0, -0.4), 0.0), radius, friction=friction)
+    return el.NodeOnObstacle("floor", "tip", el.line_edge((0, -0.4), 0.0), radius, friction=friction)
 
 
 def on_disc(friction, radius=0.0):
-    return NodeOnObstacle("disc", "tip", circle(CENTRE, DISC), radius, friction=friction)
+    return el.NodeOnObstacle("disc", "tip", el.circle_edge(CENTRE, DISC), radius, friction=friction)
 
 
 def tip_x(path):
@@ -53,10 +49,10 @@ def at_requested(path, values):
     return np.asarray(values)[path.at_requested]
 
 
-@pytest.mark.parametrize("contact", [on_floor(0.3), Stop("s", "tip", 0.4 - np.sin(ANGLE), DOWN, friction=0.3)])
+@pytest.mark.parametrize("contact", [on_floor(0.3), el.Stop("s", "tip", 0.4 - np.sin(ANGLE), DOWN, friction=0.3)])
 def test_a_tip_slides_out_sticks_and_slides_back_as_shooting_says(contact):
     path = lower(contact, [0.1, 0.15, 0.2, 0.15, 0.1])
-    assert path.status is PathStatus.COMPLETE
+    assert path.status is el.PathStatus.COMPLETE
     known = [0.152971940412703, 0.319403228732297, 0.473526569563413, 0.276844733824390, 0.127339701165245]
     assert at_requested(path, path.contact_force(0)) == pytest.approx(known, rel=1e-8)
     assert at_requested(path, tip_x(path))[[2, 4]] == pytest.approx([0.977555200121432, 0.953733369690108], rel=1e-8)
@@ -75,7 +71,7 @@ def test_friction_acts_at_the_rim_of_a_round_tip():
 @pytest.mark.parametrize(("friction", "radius"), [(0.2, 0.0), (0.2, 0.05), (0.9, 0.0)])
 def test_every_row_keeps_the_cone_and_sticks_where_it_is_said_to(friction, radius):
     path = lower(on_disc(friction, radius), [0.1, 0.25, 0.1, 0.0], angle=0.0)
-    assert path.status is PathStatus.COMPLETE
+    assert path.status is el.PathStatus.COMPLETE
     force, gap = path.contact_force(0), path.contact_gap(0)
     tangential, state = path.contact_friction(0)
     assert force.min() > -1e-9
@@ -120,11 +116,11 @@ def test_a_rounded_corner_rubs_as_the_disc_of_its_fillet():
     radius, turn = 0.3, np.radians(50)
     corner = np.add(CENTRE, [-radius * np.tan(turn / 2), radius])
     before = corner - [0.3 * np.cos(turn), 0.3 * np.sin(turn)]
-    edge = polyline([before, corner, np.add(corner, [0.5, 0.0])], radius)
+    edge = el.polyline_edge([before, corner, np.add(corner, [0.5, 0.0])], radius)
     places = [0.2, 0.25, 0.2]
     paths = [
-        lower(NodeOnObstacle("edge", "tip", outline, 0.0, friction=0.2), places, angle=0.0)
-        for outline in (edge, circle(CENTRE, radius))
+        lower(el.NodeOnObstacle("edge", "tip", outline, 0.0, friction=0.2), places, angle=0.0)
+        for outline in (edge, el.circle_edge(CENTRE, radius))
     ]
     forces = [at_requested(path, path.contact_force(0)) for path in paths]
     assert forces[0] == pytest.approx(forces[1], rel=1e-9)
@@ -133,8 +129,8 @@ def test_a_rounded_corner_rubs_as_the_disc_of_its_fillet():
 def test_what_a_cycle_costs_is_what_friction_takes():
     path = lower(on_floor(0.3), [*np.linspace(0.02, 0.2, 10), *np.linspace(0.18, 0.0, 10)])
     turn = int(np.flatnonzero(path.requested == 9)[0])
-    weights = clenshaw_curtis(33)
-    shares = 0.5 * (1 - np.cos(np.pi * np.arange(33) / 32))
+    nodes, weights = np.polynomial.legendre.leggauss(33)
+    shares, weights = 0.5 * (1 + nodes), 0.5 * weights
     works, rubbed = [], []
     for way, sense in ((path.take(np.arange(turn + 1)), 1), (path.take(np.arange(turn, len(path))), -1)):
         law = interpolate_path(way)
@@ -151,15 +147,16 @@ def test_what_a_cycle_costs_is_what_friction_takes():
 
 
 def test_without_friction_nothing_is_added():
-    smooth, plain = (lower(NodeOnObstacle("floor", "tip", line((0, -0.4), 0.0), **own), [0.1, 0.2]) for own in
-                     ({"friction": 0.0}, {}))  # fmt: skip
+    floor = el.NodeOnObstacle("floor", "tip", el.line_edge((0, -0.4), 0.0))
+    smooth, plain = (lower(one, [0.1, 0.2]) for one in (replace(floor, friction=0.0), floor))
     assert np.array_equal(smooth.at.z, plain.at.z)
     assert all(contact.rub < 0 for contact in smooth.mesh.contacts)
 
 
 def test_a_strut_that_leans_more_than_friction_lets_it_slide_blocks_the_drive():
-    path = lower(NodeOnObstacle("floor", "tip", line((0, -np.sin(1.2) - 0.02), 0.0), friction=0.8), [0.1], angle=1.2)
-    assert path.status is PathStatus.BLOCKED
+    floor = el.NodeOnObstacle("floor", "tip", el.line_edge((0, -np.sin(1.2) - 0.02), 0.0), friction=0.8)
+    path = lower(floor, [0.1], angle=1.2)
+    assert path.status is el.PathStatus.BLOCKED
     assert path.message == "the drive is blocked by 'tip' on 'floor' at 0.02"
     assert path.drive[-1] == pytest.approx(0.02)
 
@@ -167,11 +164,11 @@ def test_a_strut_that_leans_more_than_friction_lets_it_slide_blocks_the_drive():
 def test_it_is_counted_how_many_states_of_friction_can_go_on():
     # a stiff strut, steeper than the cone, that is dragged along the floor and very little away from it: it may stick
     # and jam, or slide and be pulled on to the floor [Painleve]; Coulomb's law says no more
-    stretches = Section(8000.0, 12.0, 0.05, axial=True, shear=False)  # EI = 1, 20 times as long as thick
-    nodes = {"root": Node(0, 0, slider_support(0.02)), "tip": Node(np.cos(1.2), -np.sin(1.2))}
-    floor = NodeOnObstacle("floor", "tip", line((0, -np.sin(1.2)), 0.0), friction=1.2)
-    net = Network(nodes, {"b": Beam("root", "tip", stretches)}, contacts=(floor,))
-    problem = NetworkProblem(discretise(net, Displacement("root", 0.02, np.array([0.01])), 9))
+    stretches = el.Section(8000.0, 12.0, 0.05, axial=True, shear=False)  # EI = 1, 20 times as long as thick
+    nodes = {"root": el.Node(0, 0, el.slider_support(0.02)), "tip": el.Node(np.cos(1.2), -np.sin(1.2))}
+    floor = el.NodeOnObstacle("floor", "tip", el.line_edge((0, -np.sin(1.2)), 0.0), friction=1.2)
+    net = el.Network(nodes, {"b": el.Beam("root", "tip", stretches)}, contacts=(floor,))
+    problem = NetworkProblem(discretise(net, el.Displacement("root", 0.02, np.array([0.01])), 9))
     piece = PieceOfPath(problem, frozenset({0}), Options(0.01))
     count = len(problem.mesh.free)
     touch = PathEquilibrium(np.zeros(count), 0.0, np.zeros(count), 0)

@@ -8,22 +8,10 @@ import numpy as np
 import pytest
 from varied_networks import KINDS, X, loaded, pushed, turned
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Network,
-    Node,
-    Polynomial,
-    Section,
-    gradient,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.errors import InputError
 
-FINE = Control(tolerance=1e-11)
+FINE = el.Control(tolerance=1e-11)
 
 
 def outputs(path: Any, at: Any = slice(None)) -> dict[str, Any]:
@@ -69,11 +57,11 @@ def slopes(g: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("build", [pushed, turned, loaded])
 def test_derivatives_of_all_outputs_are_those_of_differences(build: Any) -> None:
-    exact = slopes(gradient(trace(*build(X), FINE), build, X))
+    exact = slopes(el.gradient(el.trace(*build(X), FINE), build, X))
     rng = np.random.default_rng(5)
     for _ in range(2):
         way = X * rng.uniform(0.5, 1.0, len(X)) * rng.choice([-1.0, 1.0], len(X))
-        values = [outputs(trace(*build(X + step * 1e-3 * way), FINE)) for step in (-2, -1, 1, 2)]
+        values = [outputs(el.trace(*build(X + step * 1e-3 * way), FINE)) for step in (-2, -1, 1, 2)]
         for name, slope in exact.items():
             a, b, c, d = (one[name] for one in values)
             want = (a - 8 * b + 8 * c - d) / 12e-3
@@ -91,10 +79,10 @@ def test_derivatives_of_all_outputs_are_those_of_differences(build: Any) -> None
 def test_each_of_the_rarer_variables_has_its_own_derivative(name: str) -> None:
     """Effort and reactions by springs, loads, supports, corners: one by one, so that no error hides in a sum."""
     kind = KINDS.index(name)
-    found = gradient(trace(*pushed(X), FINE), pushed, X)
+    found = el.gradient(el.trace(*pushed(X), FINE), pushed, X)
     way = np.zeros(len(X))
     way[kind] = 1e-3 * X[kind]
-    values = [trace(*pushed(X + step * way), FINE) for step in (-2, -1, 1, 2)]
+    values = [el.trace(*pushed(X + step * way), FINE) for step in (-2, -1, 1, 2)]
     for slope, output in (
         (found.effort[:, kind], lambda p: p.effort[p.at_requested]),
         (found.reaction["c"][:, :, kind], lambda p: p.reaction("c")[p.at_requested]),
@@ -105,11 +93,13 @@ def test_each_of_the_rarer_variables_has_its_own_derivative(name: str) -> None:
 
 
 def test_a_variable_that_changes_the_make_up_is_refused() -> None:
-    def build(x: Any) -> Network:
+    def build(x: Any) -> el.Network:
         joint = "pin" if np.iscomplexobj(x) else "rigid"
-        beam = Beam("a", "b", Section(2e9, 8e-3, 1e-3), Polynomial((0.0, x[0])), end_joint=joint)  # type: ignore[arg-type]
-        return Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0, slider_support(np.pi / 2))}, {"ab": beam})
+        beam = el.Beam("a", "b", el.Section(2e9, 8e-3, 1e-3), el.Polynomial((0.0, x[0])), end_joint=joint)  # type: ignore[arg-type]
+        return el.Network(
+            {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.1, 0.0, el.slider_support(np.pi / 2))}, {"ab": beam}
+        )
 
-    path = trace(build(np.array([0.3])), Displacement("b", np.pi / 2, np.array([1e-3])))
+    path = el.trace(build(np.array([0.3])), el.Displacement("b", np.pi / 2, np.array([1e-3])))
     with pytest.raises(InputError, match="changes the make-up of the network"):
-        gradient(path, build, np.array([0.3]))
+        el.gradient(path, build, np.array([0.3]))

@@ -7,23 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    CosineArch,
-    Displacement,
-    Network,
-    Node,
-    Polyline,
-    Polynomial,
-    Section,
-    Spline,
-    Taper,
-    gradient,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.shapes import Bent
 from cfmkit.errors import InputError
@@ -31,53 +15,55 @@ from cfmkit.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-FINE = Control(tolerance=1e-11)
-DOWN = Displacement("d", -np.pi / 2, np.array([3e-3]))
+FINE = el.Control(tolerance=1e-11)
+DOWN = el.Displacement("d", -np.pi / 2, np.array([3e-3]))
 STATIONS = np.array([0, 0.3, 0.3, 0.75, 1])
 THICKNESS = {
     "constant": 1e-3,
-    "steps": Taper(STATIONS, np.array([1.2, 1.1, 0.8, 0.9, 1.0]) * 1e-3),
-    "kink": Taper(np.array([0, 0.3, 1]), np.array([1.2, 0.8, 1.1]) * 1e-3),
+    "steps": el.Taper(STATIONS, np.array([1.2, 1.1, 0.8, 0.9, 1.0]) * 1e-3),
+    "kink": el.Taper(np.array([0, 0.3, 1]), np.array([1.2, 0.8, 1.1]) * 1e-3),
 }
 BENDING = (0.05, 0.2, -0.1)
 
 
-def corner(r: Any) -> Polyline:
-    return Polyline(np.array([[0, 0], [0.03, 0], [0.1, 0]]) + np.array([[0, 0], [0.001, 0.01], [0, 0]]) * r)
+def corner(r: Any) -> el.Polyline:
+    return el.Polyline(np.array([[0, 0], [0.03, 0], [0.1, 0]]) + np.array([[0, 0], [0.001, 0.01], [0, 0]]) * r)
 
 
-def curve(r: Any) -> Spline:
+def curve(r: Any) -> el.Spline:
     points = np.array([[0, 0], [0.03, 0], [0.07, 0], [0.1, 0]])
-    return Spline(points + np.array([[0, 0], [0.002, 0.01], [0, 0], [0, 0]]) * r)
+    return el.Spline(points + np.array([[0, 0], [0.002, 0.01], [0, 0], [0, 0]]) * r)
 
 
 SHAPES: dict[str, Callable[[Any], Any]] = {
-    "polynomial": lambda r: Polynomial((0.0, 0.8 * r, 0.3)),
-    "cosine arch": lambda r: CosineArch(0.01 * r),
-    "half arch": lambda r: CosineArch(0.01 * r, 0.5),
+    "polynomial": lambda r: el.Polynomial((0.0, 0.8 * r, 0.3)),
+    "cosine arch": lambda r: el.CosineArch(0.01 * r),
+    "half arch": lambda r: el.CosineArch(0.01 * r, 0.5),
     "spline": curve,
-    "short spline": lambda r: Spline(
+    "short spline": lambda r: el.Spline(
         np.array([[0, 0], [0.03, 0], [0.1, 0]]) + np.array([[0, 0], [0, 0.01], [0, 0]]) * r
     ),
     "polyline": corner,
-    "bent arch": lambda r: Bent(CosineArch(0.01 * r), BENDING),
+    "bent arch": lambda r: Bent(el.CosineArch(0.01 * r), BENDING),
     "bent spline": lambda r: Bent(curve(r), BENDING),
     "bent polyline": lambda r: Bent(corner(r), BENDING),
 }
 
 
-def one_beam(shape: Callable[[Any], Any], thickness: Any, closure: Any = "rotscale") -> Callable[[Any], Network]:
+def one_beam(shape: Callable[[Any], Any], thickness: Any, closure: Any = "rotscale") -> Callable[[Any], el.Network]:
     """A beam by factors: on the size of its shape, the place of its end, its thickness, its first station."""
 
-    def build(x: Any) -> Network:
+    def build(x: Any) -> el.Network:
         given = thickness
-        if isinstance(given, Taper):
+        if isinstance(given, el.Taper):
             stations = given.stations * np.where(given.stations == given.stations[1], x[3], 1)
-            given = Taper(stations, given.values * x[2])
+            given = el.Taper(stations, given.values * x[2])
         else:
             given = given * x[2]
-        nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.1 * x[1], 0.02, slider_support(np.pi / 2))}
-        return Network(nodes, {"ad": Beam("a", "d", Section(2e9, 8e-3, given, shear=True), shape(x[0]), closure)})
+        nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "d": el.Node(0.1 * x[1], 0.02, el.slider_support(np.pi / 2))}
+        return el.Network(
+            nodes, {"ad": el.Beam("a", "d", el.Section(2e9, 8e-3, given, shear=True), shape(x[0]), closure)}
+        )
 
     return build
 
@@ -91,7 +77,7 @@ def difference(output: Callable[[Any], Any], x: Any, which: int, step: float = 1
 @pytest.mark.parametrize("shape", SHAPES)
 def test_derivatives_of_a_stepped_beam_are_those_of_differences(shape: str) -> None:
     build, x = one_beam(SHAPES[shape], THICKNESS["steps"]), np.ones(4)
-    found = gradient(trace(build(x), DOWN, FINE), build, x)
+    found = el.gradient(el.trace(build(x), DOWN, FINE), build, x)
     asked = {
         "effort": (found.effort[0], lambda p: p.effort[-1]),
         "energy": (found.energy[0], lambda p: p.energy[-1]),
@@ -102,7 +88,7 @@ def test_derivatives_of_a_stepped_beam_are_those_of_differences(shape: str) -> N
     }
 
     def outputs(values: Any) -> Any:
-        path = trace(build(values), DOWN, FINE)
+        path = el.trace(build(values), DOWN, FINE)
         return np.concatenate([np.ravel(output(path)) for _, output in asked.values()])
 
     sizes = np.cumsum([slopes[..., 0].size for slopes, _ in asked.values()])
@@ -119,30 +105,30 @@ def corner_of_the_polyline() -> float:
 
 
 def test_a_corner_that_moves_past_a_step_is_refused_and_one_that_stays_with_it_is_not() -> None:
-    def built(way: Any) -> tuple[Callable[[Any], Network], Any]:
-        def shape(r: Any) -> Polyline:
-            return Polyline(np.array([[0, 0], [0.05, 0.01], [0.1, 0]]) + np.array([[0, 0], way, [0, 0]]) * (r - 1))
+    def built(way: Any) -> tuple[Callable[[Any], el.Network], Any]:
+        def shape(r: Any) -> el.Polyline:
+            return el.Polyline(np.array([[0, 0], [0.05, 0.01], [0.1, 0]]) + np.array([[0, 0], way, [0, 0]]) * (r - 1))
 
-        build = one_beam(shape, Taper(np.array([0, 0.5, 0.5, 1]), np.array([1, 1, 0.8, 0.8]) * 1e-3))
+        build = one_beam(shape, el.Taper(np.array([0, 0.5, 0.5, 1]), np.array([1, 1, 0.8, 0.8]) * 1e-3))
         return lambda x: build([x[0], 1.0, 1.0, 1.0]), np.ones(1)
 
     build, x = built([0.01, 0.0])
     with pytest.raises(InputError, match="past each other"):
-        gradient(trace(build(x), DOWN), build, x)
+        el.gradient(el.trace(build(x), DOWN), build, x)
     build, x = built([0.0, 0.01])
-    found = gradient(trace(build(x), DOWN, FINE), build, x).effort[0, 0]
-    want = difference(lambda values: trace(build(values), DOWN, FINE).effort[-1], x, 0)
+    found = el.gradient(el.trace(build(x), DOWN, FINE), build, x).effort[0, 0]
+    want = difference(lambda values: el.trace(build(values), DOWN, FINE).effort[-1], x, 0)
     assert found == pytest.approx(want, rel=1e-6)
 
 
 def test_a_step_of_the_thickness_is_moved_as_a_whole() -> None:
-    def build(x: Any) -> Network:
-        steps = Taper(np.array([0, 0.5, x[0], 1]), np.array([1, 1, 0.8, 0.8]) * 1e-3)
+    def build(x: Any) -> el.Network:
+        steps = el.Taper(np.array([0, 0.5, x[0], 1]), np.array([1, 1, 0.8, 0.8]) * 1e-3)
         return one_beam(corner, steps)(np.ones(4))
 
     x = np.array([0.5])
     with pytest.raises(InputError, match="must move alike"):
-        gradient(trace(build(x), DOWN), build, x)
+        el.gradient(el.trace(build(x), DOWN), build, x)
 
 
 def knot_of_the_curve() -> float:
@@ -158,9 +144,9 @@ def knot_of_the_curve() -> float:
 def test_a_station_may_lie_where_smooth_pieces_of_the_shape_meet(shape: Any, station: Any, after: float) -> None:
     """A step of the thickness at a knot of a spline, or its kink at either: each moves as it does alone."""
     u = station()
-    build = one_beam(shape, Taper(np.array([0, u, u, 1]), np.array([1.0, 1.2, after, 1.0]) * 1e-3))
+    build = one_beam(shape, el.Taper(np.array([0, u, u, 1]), np.array([1.0, 1.2, after, 1.0]) * 1e-3))
     x = np.ones(4)
-    found = gradient(trace(build(x), DOWN, FINE), build, x).effort[0]
+    found = el.gradient(el.trace(build(x), DOWN, FINE), build, x).effort[0]
     for which in range(3):
-        want = difference(lambda values: trace(build(values), DOWN, FINE).effort[-1], x, which)
+        want = difference(lambda values: el.trace(build(values), DOWN, FINE).effort[-1], x, which)
         assert found[which] == pytest.approx(want, rel=1e-6)

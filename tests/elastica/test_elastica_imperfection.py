@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from buckling_structures import column, ding_leaf, press
 from scipy.special import ellipe, ellipk
 
 import cfmkit.elastica as el
@@ -13,13 +14,7 @@ TRAVEL = np.arange(1, 13) * 0.5e-3
 
 
 def pressed(imperfection: float = 0.0, thickness: float = 1e-3) -> el.Path:
-    length, angle = 35e-3, np.radians(7)
-    nodes = {
-        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
-        "d": el.Node(length * np.cos(angle), length * np.sin(angle), el.slider_support(np.pi / 2)),
-    }
-    network = el.Network(nodes, {"v": el.Beam("wall", "d", el.Section(1477e6, 6e-3, thickness))})
-    return el.trace(network, el.Displacement("d", -np.pi / 2, TRAVEL), el.Control(imperfection=imperfection))
+    return el.trace(ding_leaf(thickness), press("d", TRAVEL), el.Control(imperfection=imperfection))
 
 
 def test_an_imperfect_v_beam_is_stable_without_bifurcations_and_says_so() -> None:
@@ -71,23 +66,17 @@ def test_an_imperfection_must_be_finite() -> None:
 LENGTH = 0.1
 
 
-def column(slenderness: float, clamped: bool, cut: float | None = None, arm: float = 0.0) -> el.Network:
+def slender(slenderness: float, clamped: bool, cut: float | None = None, arm: float = 0.0) -> el.Network:
     """Return a straight column, perhaps of two beams, which may be held by rigid arms at the node between them."""
     section = el.Section(2e9, 10e-3, LENGTH * np.sqrt(12) / slenderness)
-    ends = (
-        (el.CLAMPED_SUPPORT, el.slider_support(0.0))
-        if clamped
-        else (el.PINNED_SUPPORT, el.slider_support(0.0, rotates=True))
-    )
-    nodes = {"a": el.Node(0, 0, ends[0]), "b": el.Node(LENGTH, 0, ends[1])}
+    whole = column(section, clamped)
     if cut is None:
-        return el.Network(nodes, {"x": el.Beam("a", "b", section)})
-    nodes["m"] = el.Node(cut * LENGTH, arm)
+        return whole
     halves = {
         "x": el.Beam("a", "m", section, end_offset=(0.0, -arm)),
         "y": el.Beam("m", "b", section, start_offset=(0.0, -arm)),
     }
-    return el.Network(nodes, halves)
+    return el.Network({**whole.nodes, "m": el.Node(cut * LENGTH, arm)}, halves)
 
 
 @pytest.mark.parametrize("arm", [0.0, 4e-3])
@@ -101,7 +90,7 @@ def test_a_column_of_two_beams_is_bent_as_one_beam_is(cut: float, clamped: bool,
         el.Displacement("b", np.pi, np.array([0.0065, 0.02, 0.1]) * LENGTH),
         el.Control(1e-5, imperfection=size),
     )
-    whole, cut_up = (el.trace(net, drive, control) for net in (column(100, clamped), column(100, clamped, cut, arm)))
+    whole, cut_up = (el.trace(net, drive, control) for net in (slender(100, clamped), slender(100, clamped, cut, arm)))
     assert cut_up.status is el.PathStatus.COMPLETE, cut_up.message
     assert cut_up.events == whole.events == ()
     assert not cut_up.unstable.any()
@@ -116,7 +105,7 @@ def test_a_bent_column_under_a_force_goes_where_a_displacement_meets_that_force(
     slenderness: float, clamped: bool, cut: float | None
 ) -> None:
     """Before, at and far behind the critical load; `shot` has the curve over the displacement."""
-    net = column(slenderness, clamped, cut)
+    net = slender(slenderness, clamped, cut)
     thickness = LENGTH * np.sqrt(12) / slenderness
     critical = (4 if clamped else 1) * np.pi**2 * 2e9 * 10e-3 * thickness**3 / 12 / LENGTH**2
     control = el.Control(1e-6, imperfection=0.05 * thickness)
@@ -134,13 +123,7 @@ def test_a_bent_column_under_a_force_goes_where_a_displacement_meets_that_force(
 @pytest.mark.parametrize("clamped", [False, True])
 def test_a_column_that_does_not_stretch_buckles_under_a_displacement_once_it_is_bent(clamped: bool) -> None:
     """The perfect one is rigid until its critical load. Bent by 1e-5 of its length it is nearly so: closed form."""
-    section = el.Section(2e9, 10e-3, 1e-3, axial=False)
-    ends = (
-        (el.CLAMPED_SUPPORT, el.slider_support(0.0))
-        if clamped
-        else (el.PINNED_SUPPORT, el.slider_support(0.0, rotates=True))
-    )
-    net = el.Network({"a": el.Node(0, 0, ends[0]), "b": el.Node(LENGTH, 0, ends[1])}, {"x": el.Beam("a", "b", section)})
+    net = column(el.Section(2e9, 10e-3, 1e-3, axial=False), clamped)
     modulus = np.sin(np.array([20.0, 50.0, 80.0]) * np.pi / 360) ** 2  # of the integrals, by the steepest slope
     shortened = 2 * (1 - ellipe(modulus) / ellipk(modulus)) * LENGTH
     perfect = el.trace(net, el.Displacement("b", np.pi, shortened))
@@ -174,7 +157,7 @@ def test_a_long_first_step_leads_to_the_side_that_a_column_is_bent_to(slendernes
     first = 26.6 * np.pi**2 / slenderness**2  # in critical shortenings
     drive = el.Displacement("b", np.pi, np.array([first, 0.1]) * LENGTH)
     bent = 0.0864 * LENGTH * np.sqrt(12) / slenderness
-    path = el.trace(column(slenderness, clamped=False), drive, el.Control(1e-4, imperfection=bent))
+    path = el.trace(slender(slenderness, clamped=False), drive, el.Control(1e-4, imperfection=bent))
     assert path.status is el.PathStatus.COMPLETE
     assert np.sign(path.motion("a")[1:, 2]).tolist() == [np.sign(path.fits["x"].angle(0.0, 0.5))] * (len(path) - 1)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import cfmkit.elastica as el
+from cfmkit.elastica import Stop
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.numbering import find_free, number
-from cfmkit.elastica.model.contact import Stop
 
 STRIP = el.Section(2e9, 1e-2, 1e-3)
 PLAIN = el.Network(

@@ -9,52 +9,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact_paths import at_drive, check_complementarity, place_of, shoot
+from contact_paths import DOWN, EXACT, HALF, THIN, TIP_LOAD, at_drive, check_complementarity, place_of, shoot
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Link,
-    Loading,
-    Network,
-    Node,
-    PathStatus,
-    PointLoad,
-    Section,
-    Support,
-    Taper,
-    arc,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnBeam, NodeOnObstacle, circle, line
 from cfmkit.elastica.sensitivity import gradient
 from cfmkit.errors import InputError
 
-DOWN = -np.pi / 2
-HALF = 0.005  # half the thickness
-THIN = Section(1.2e7, 1.0, 2 * HALF, axial=False, shear=False)  # EI = 1
-EXACT = Control(tolerance=1e-9)
-TIP_LOAD = (PointLoad("tip", 0.0, -1.0),)
-PAD = NodeOnBeam("tip_lower", "tip", "lower", HALF)
+PAD = el.NodeOnBeam("tip_lower", "tip", "lower", HALF)
 
 
 def two_leaves(*contacts, height=0.1, lower=1.3, section=THIN, upper=THIN, **changes):
     """Return a leaf of length 1 from `root` to `tip` above another one from `wall` to `end`."""
     nodes = {
-        "root": Node(0, height, CLAMPED_SUPPORT), "tip": Node(1, height),
-        "wall": Node(0, 0, CLAMPED_SUPPORT), "end": Node(lower, 0),
+        "root": el.Node(0, height, el.CLAMPED_SUPPORT), "tip": el.Node(1, height),
+        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT), "end": el.Node(lower, 0),
     }  # fmt: skip
-    beams = {"upper": Beam("root", "tip", upper), "lower": Beam("wall", "end", section)}
-    return Network(nodes | changes, beams, contacts=contacts or (PAD,))
+    beams = {"upper": el.Beam("root", "tip", upper), "lower": el.Beam("wall", "end", section)}
+    return el.Network(nodes | changes, beams, contacts=contacts or (PAD,))
 
 
 def test_the_tip_of_a_leaf_on_another_one_has_the_force_and_the_place_of_shooting_both_ways():
-    path = trace(two_leaves(), Loading(TIP_LOAD, np.array([0.25, 0.5, 1, 2, 3, 1, 0.25])), EXACT)
+    path = el.trace(two_leaves(), el.Loading(TIP_LOAD, np.array([0.25, 0.5, 1, 2, 3, 1, 0.25])), EXACT)
     begin, end = path.contact_events
     assert (begin.kind, end.kind) == ("begins", "ends")
     assert end.drive == pytest.approx(begin.drive, abs=1e-11)
@@ -71,9 +48,9 @@ def test_the_tip_of_a_leaf_on_another_one_has_the_force_and_the_place_of_shootin
 @pytest.mark.parametrize(("curvature", "radius", "load"), [(0.2, 0.02, 2.5), (-0.3, 0.0, 3.0), (0.4, 0.1, 4.0)])
 def test_a_pad_on_a_curved_leaf_solves_the_equations_of_shooting(curvature, radius, load):
     end = 1.2 * np.sin(1.2 * curvature) / (1.2 * curvature), 1.2 * (1 - np.cos(1.2 * curvature)) / (1.2 * curvature)
-    net = two_leaves(replace(PAD, radius=radius), height=0.4, end=Node(*end))
-    net = replace(net, beams={**net.beams, "lower": Beam("wall", "end", THIN, arc(1.2 * curvature))})
-    path = trace(net, Loading(TIP_LOAD, np.array([0.5, 1.0]) * load), Control(tolerance=1e-10))
+    net = two_leaves(replace(PAD, radius=radius), height=0.4, end=el.Node(*end))
+    net = replace(net, beams={**net.beams, "lower": el.Beam("wall", "end", THIN, el.arc(1.2 * curvature))})
+    path = el.trace(net, el.Loading(TIP_LOAD, np.array([0.5, 1.0]) * load), el.Control(tolerance=1e-10))
     force, place = path.contact_force(0)[-1], path.contact_places(0)[-1, 0]
     assert force > 0.05
     tip, lower = place_of(path, "tip", -1), path.states("lower")
@@ -90,38 +67,47 @@ def test_a_pad_on_a_curved_leaf_solves_the_equations_of_shooting(curvature, radi
 
 @pytest.mark.parametrize("load", [1.0, 3.0])
 def test_a_pad_of_a_node_that_is_held_is_a_disc(load):
-    leaf = {"tip": Node(1, 0), "root": Node(0, 0, CLAMPED_SUPPORT), "post": Node(0.5, -0.1, CLAMPED_SUPPORT)}
-    net = Network(leaf, {"leaf": Beam("root", "tip", THIN)}, contacts=(NodeOnBeam("p", "post", "leaf", 0.045),))
-    disc = replace(net, contacts=(BeamOnObstacle("p", "leaf", circle((0.5, -0.1), 0.045)),))
-    pad, known = (trace(case, Loading(TIP_LOAD, np.array([0.3, load, 0.4])), EXACT) for case in (net, disc))
+    leaf = {
+        "tip": el.Node(1, 0),
+        "root": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "post": el.Node(0.5, -0.1, el.CLAMPED_SUPPORT),
+    }
+    net = el.Network(
+        leaf, {"leaf": el.Beam("root", "tip", THIN)}, contacts=(el.NodeOnBeam("p", "post", "leaf", 0.045),)
+    )
+    disc = replace(net, contacts=(el.BeamOnObstacle("p", "leaf", el.circle_edge((0.5, -0.1), 0.045)),))
+    pad, known = (el.trace(case, el.Loading(TIP_LOAD, np.array([0.3, load, 0.4])), EXACT) for case in (net, disc))
     assert [event.drive for event in pad.contact_events] == pytest.approx([e.drive for e in known.contact_events])
     assert pad.contact_force(0) == pytest.approx(known.contact_force(0), rel=1e-11, abs=1e-12)
     assert pad.contact_places(0) == pytest.approx(known.contact_places(0), rel=1e-11, nan_ok=True)
 
 
 def test_a_pad_that_is_driven_against_a_leaf_needs_the_force_of_a_root_that_is_driven_against_a_disc():
-    pad = NodeOnBeam("p", "post", "leaf", 0.045)
-    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(1, 0), "post": Node(0.6, -0.1, slider_support(np.pi / 2))}
-    moving = Network(nodes, {"leaf": Beam("root", "tip", THIN)}, contacts=(pad,))
-    driven = trace(moving, Displacement("post", np.pi / 2, np.array([0.04, 0.2, 0.35])), EXACT)
-    resting = Network(
-        {"root": Node(0, 0, slider_support(np.pi / 2)), "tip": Node(1, 0)}, {"leaf": Beam("root", "tip", THIN)},
-        contacts=(BeamOnObstacle("p", "leaf", circle((0.6, -0.1), 0.045)),),
-    )  # fmt: skip
-    known = trace(resting, Displacement("root", DOWN, np.array([0.04, 0.2, 0.35])), EXACT)
+    pad = el.NodeOnBeam("p", "post", "leaf", 0.045)
+    nodes = {
+        "root": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "tip": el.Node(1, 0),
+        "post": el.Node(0.6, -0.1, el.slider_support(np.pi / 2)),
+    }
+    moving = el.Network(nodes, {"leaf": el.Beam("root", "tip", THIN)}, contacts=(pad,))
+    driven = el.trace(moving, el.Displacement("post", np.pi / 2, np.array([0.04, 0.2, 0.35])), EXACT)
+    nodes = {"root": el.Node(0, 0, el.slider_support(np.pi / 2)), "tip": el.Node(1, 0)}
+    disc = el.BeamOnObstacle("p", "leaf", el.circle_edge((0.6, -0.1), 0.045))
+    resting = el.Network(nodes, moving.beams, contacts=(disc,))
+    known = el.trace(resting, el.Displacement("root", DOWN, np.array([0.04, 0.2, 0.35])), EXACT)
     assert driven.contact_force(0)[-1] > 0
     assert driven.contact_force(0) == pytest.approx(known.contact_force(0), rel=1e-10, abs=1e-12)
     assert driven.effort == pytest.approx(known.effort, rel=1e-10, abs=1e-12)
 
 
 def test_a_leaf_that_is_stiffer_and_stiffer_becomes_a_floor():
-    floor = NodeOnObstacle("floor", "tip", line((0, HALF), 0.0), HALF)
-    load = Loading(TIP_LOAD, np.array([0.5, 2.0]))
-    known = trace(two_leaves(floor), load, EXACT).contact_force(0)[-1]
+    floor = el.NodeOnObstacle("floor", "tip", el.line_edge((0, HALF), 0.0), HALF)
+    load = el.Loading(TIP_LOAD, np.array([0.5, 2.0]))
+    known = el.trace(two_leaves(floor), load, EXACT).contact_force(0)[-1]
     missed = []
     for factor in (1e3, 1e5):
         stiff = replace(THIN, youngs_modulus=factor * THIN.youngs_modulus)
-        missed.append(abs(trace(two_leaves(section=stiff), load, EXACT).contact_force(0)[-1] / known - 1))
+        missed.append(abs(el.trace(two_leaves(section=stiff), load, EXACT).contact_force(0)[-1] / known - 1))
     assert missed[0] < 5e-3
     assert missed[1] == pytest.approx(missed[0] / 100, rel=0.05)
 
@@ -129,7 +115,7 @@ def test_a_leaf_that_is_stiffer_and_stiffer_becomes_a_floor():
 def test_a_mirrored_pair_gives_the_mirrored_curve():
     up = two_leaves(height=-0.1)
     paths = [
-        trace(net, Loading((PointLoad("tip", 0, sign),), np.array([1.0, 2.5])), EXACT)
+        el.trace(net, el.Loading((el.PointLoad("tip", 0, sign),), np.array([1.0, 2.5])), EXACT)
         for net, sign in ((two_leaves(), -1.0), (up, 1.0))
     ]
     assert paths[0].contact_force(0) == pytest.approx(paths[1].contact_force(0), rel=1e-11, abs=1e-13)
@@ -142,24 +128,24 @@ def layout(seed):
     bend, reach = rng.uniform(-0.5, 0.5), rng.uniform(1.15, 1.5)
     ends = reach * np.sinc(bend / np.pi), reach * (1 - np.cos(bend)) / bend
     height = ends[1] * (1 / reach) ** 2 + rng.uniform(0.05, 0.2)
-    taper = Taper(np.array([0.0, 1.0]), 2 * HALF * rng.uniform(0.7, 1.4, 2))
-    contacts = (replace(PAD, radius=rng.uniform(0.0, 0.03)), NodeOnBeam("end_upper", "end", "upper", HALF))
-    net = two_leaves(*contacts, height=height, end=Node(*ends))
+    taper = el.Taper(np.array([0.0, 1.0]), 2 * HALF * rng.uniform(0.7, 1.4, 2))
+    contacts = (replace(PAD, radius=rng.uniform(0.0, 0.03)), el.NodeOnBeam("end_upper", "end", "upper", HALF))
+    net = two_leaves(*contacts, height=height, end=el.Node(*ends))
     if rng.integers(2):
-        disc = circle((0.6, -0.5), 0.2)
-        net = replace(net, contacts=(*contacts, BeamOnObstacle("disc", "lower", disc)))
+        disc = el.circle_edge((0.6, -0.5), 0.2)
+        net = replace(net, contacts=(*contacts, el.BeamOnObstacle("disc", "lower", disc)))
     section = replace(THIN, thickness=taper) if rng.integers(2) else THIN
-    net = replace(net, beams={**net.beams, "lower": Beam("wall", "end", section, arc(bend))})
+    net = replace(net, beams={**net.beams, "lower": el.Beam("wall", "end", section, el.arc(bend))})
     up = np.linspace(0, 1, 7)[1:] * rng.uniform(1, 4)
-    load = (PointLoad("tip", 0.2 * rng.normal(), -1.0), PointLoad("end", 0.0, 0.3 * rng.normal()))
-    return net, Loading(load, np.concatenate([up, up[-2::-1], [0.0]]))
+    load = (el.PointLoad("tip", 0.2 * rng.normal(), -1.0), el.PointLoad("end", 0.0, 0.3 * rng.normal()))
+    return net, el.Loading(load, np.concatenate([up, up[-2::-1], [0.0]]))
 
 
 @pytest.mark.slow  # seconds each
 @pytest.mark.parametrize("seed", range(8))
 def test_a_random_pair_returns_to_its_own_points_and_keeps_every_condition(seed):
-    path = trace(*layout(seed), Control(tolerance=1e-8))
-    assert path.status is PathStatus.COMPLETE
+    path = el.trace(*layout(seed), el.Control(tolerance=1e-8))
+    assert path.status is el.PathStatus.COMPLETE
     check_complementarity(path)
     assert path.contact_events
     moved = np.stack([path.motion(node)[path.at_requested] for node in ("tip", "end")])
@@ -167,11 +153,11 @@ def test_a_random_pair_returns_to_its_own_points_and_keeps_every_condition(seed)
 
 
 def test_the_tangent_with_a_pad_on_an_arm_is_the_derivative_of_the_residual():
-    turned = Support(rotation=True, direction=0.4)
-    net = two_leaves(NodeOnBeam("p", "arm", "lower", 0.02), root=Node(0, 0.1, turned), arm=Node(0.9, 0.2))
-    section = replace(THIN, thickness=Taper(np.array([0.0, 1.0]), np.array([0.01, 0.015])))
-    net = replace(net, links=(Link("tip", "arm"),), beams={**net.beams, "lower": Beam("wall", "end", section)})
-    mesh = discretise(net, Displacement("root", 0.4, np.array([1.0])), flanks=[FlankPlace(0, 0.6)])
+    turned = el.Support(rotation=True, direction=0.4)
+    net = two_leaves(el.NodeOnBeam("p", "arm", "lower", 0.02), root=el.Node(0, 0.1, turned), arm=el.Node(0.9, 0.2))
+    section = replace(THIN, thickness=el.Taper(np.array([0.0, 1.0]), np.array([0.01, 0.015])))
+    net = replace(net, links=(el.Link("tip", "arm"),), beams={**net.beams, "lower": el.Beam("wall", "end", section)})
+    mesh = discretise(net, el.Displacement("root", 0.4, np.array([1.0])), flanks=[FlankPlace(0, 0.6)])
     mesh = replace(mesh, contacts=tuple(contact._replace(closed=True) for contact in mesh.contacts))
     own = equations(mesh)
     free = 0.1 * np.random.default_rng(1).normal(size=own.n)
@@ -189,47 +175,51 @@ def test_a_small_pad_is_not_stepped_over():
     """Both leaves pass each other's places within one step of the drive; the gap is negative in 2 % of it."""
     thin = replace(THIN, thickness=1e-3, youngs_modulus=1.2e10)
     net = two_leaves(replace(PAD, radius=0.0), section=thin, upper=thin, height=0.3)
-    path = trace(net, Loading(TIP_LOAD, np.array([5.0])), EXACT)
+    path = el.trace(net, el.Loading(TIP_LOAD, np.array([5.0])), EXACT)
     assert path.contact_events[0].kind == "begins"
     assert path.contact_gap(0).min() > -1e-9
 
 
 def test_a_pad_that_slides_to_the_end_of_the_leaf_ends_the_path_with_the_reason():
-    net = replace(two_leaves(root=Node(0, 0.1, slider_support(0.0))), loads=(PointLoad("tip", 0.0, -1.0),))
-    path = trace(net, Displacement("root", 0.0, np.array([0.1, 0.5])), EXACT)
-    assert path.status is PathStatus.LOST
+    net = replace(two_leaves(root=el.Node(0, 0.1, el.slider_support(0.0))), loads=(el.PointLoad("tip", 0.0, -1.0),))
+    path = el.trace(net, el.Displacement("root", 0.0, np.array([0.1, 0.5])), EXACT)
+    assert path.status is el.PathStatus.LOST
     assert "the contact of 'tip' on beam 'lower' reaches node 'end'" in path.message
     assert path.contact_places(0)[-1, 0] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_pad_that_meets_the_end_of_a_leaf_ends_the_path_with_the_reason():
     net = two_leaves(replace(PAD, radius=0.08), lower=0.93, height=0.2)
-    path = trace(net, Loading(TIP_LOAD, np.array([0.1, 3.0])), EXACT)
-    assert path.status is PathStatus.LOST
+    path = el.trace(net, el.Loading(TIP_LOAD, np.array([0.1, 3.0])), EXACT)
+    assert path.status is el.PathStatus.LOST
     assert "'tip' on beam 'lower' meets an end of the beam" in path.message
     tip = place_of(path, "tip", -1)
     assert np.hypot(*(tip - (0.93, 0.0))) > 0.08 + HALF
 
 
 def test_a_leaf_that_would_wrap_around_a_pad_ends_the_path_with_the_reason():
-    nodes = {"tip": Node(1, 0), "root": Node(0, 0, CLAMPED_SUPPORT), "post": Node(0.5, -0.51, CLAMPED_SUPPORT)}
-    net = Network(nodes, {"leaf": Beam("root", "tip", THIN)}, contacts=(NodeOnBeam("p", "post", "leaf", 0.5),))
-    path = trace(net, Loading(TIP_LOAD, np.array([0.5, 9.0])), EXACT)
-    assert path.status is PathStatus.LOST
+    nodes = {
+        "tip": el.Node(1, 0),
+        "root": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "post": el.Node(0.5, -0.51, el.CLAMPED_SUPPORT),
+    }
+    net = el.Network(nodes, {"leaf": el.Beam("root", "tip", THIN)}, contacts=(el.NodeOnBeam("p", "post", "leaf", 0.5),))
+    path = el.trace(net, el.Loading(TIP_LOAD, np.array([0.5, 9.0])), EXACT)
+    assert path.status is el.PathStatus.LOST
     assert path.contact_events[-1].kind == "spreads"
     assert "contact of 'post' on beam 'leaf' spreads along a length" in path.message
 
 
 def test_stability_changes_with_a_pad_where_the_load_has_its_limit():
     """A leaf presses an arch through with its tip: the loads at limit points are those at which stability changes."""
-    nodes = {"root": Node(0, 0.16, CLAMPED_SUPPORT), "tip": Node(1.05, 0.16), "a": Node(0.5, 0, CLAMPED_SUPPORT),
-             "b": Node(1.5, 0, CLAMPED_SUPPORT)}  # fmt: skip
-    arch = Beam("a", "b", replace(THIN, youngs_modulus=3e6), arc(-1.0))
+    held = {"root": (0, 0.16), "a": (0.5, 0), "b": (1.5, 0)}
+    nodes = {name: el.Node(*at, el.CLAMPED_SUPPORT) for name, at in held.items()} | {"tip": el.Node(1.05, 0.16)}
+    arch = el.Beam("a", "b", replace(THIN, youngs_modulus=3e6), el.arc(-1.0))
     upper = replace(THIN, youngs_modulus=1.2e5)
-    net = Network(nodes, {"upper": Beam("root", "tip", upper), "arch": arch},
-                  contacts=(NodeOnBeam("p", "tip", "arch", 0.02),))  # fmt: skip
-    drive = Loading(TIP_LOAD, np.array([3.0, 9.0]))
-    path = trace(net, drive, Control(tolerance=1e-8, through_folds=True))
+    net = el.Network(nodes, {"upper": el.Beam("root", "tip", upper), "arch": arch},
+                  contacts=(el.NodeOnBeam("p", "tip", "arch", 0.02),))  # fmt: skip
+    drive = el.Loading(TIP_LOAD, np.array([3.0, 9.0]))
+    path = el.trace(net, drive, el.Control(tolerance=1e-8, through_folds=True))
     limits = [event for event in path.events if event.kind == "limit point"]
     assert [(event.before, event.after) for event in limits] == [(0, 1), (1, 0)]
     closed = path.contact_force(0) > 0
@@ -239,6 +229,6 @@ def test_stability_changes_with_a_pad_where_the_load_has_its_limit():
 
 
 def test_derivatives_by_design_variables_are_refused():
-    path = trace(two_leaves(), Loading(TIP_LOAD, np.array([1.0])), EXACT)
+    path = el.trace(two_leaves(), el.Loading(TIP_LOAD, np.array([1.0])), EXACT)
     with pytest.raises(InputError, match="sides of beams"):
         gradient(path, lambda _: (path.network, path.load_case), np.zeros(1))

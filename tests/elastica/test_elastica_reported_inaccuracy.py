@@ -16,15 +16,6 @@ DOWN = -np.pi / 2
 BENDING = el.Displacement("d", DOWN, np.array([1e-3, 10e-3, 20e-3, 30e-3]))
 
 
-def v_beam() -> el.Network:
-    length, angle = 35e-3, np.radians(7)
-    nodes = {
-        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
-        "d": el.Node(length * np.cos(angle), length * np.sin(angle), el.slider_support(np.pi / 2)),
-    }
-    return el.Network(nodes, {"v": el.Beam("wall", "d", el.Section(1477e6, 6e-3, 1e-3))})
-
-
 def strip() -> el.Network:
     nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "d": el.Node(0.05, 0)}
     return el.Network(nodes, {"x": el.Beam("a", "d", el.Section(2e9, 8e-3, 1e-3))})

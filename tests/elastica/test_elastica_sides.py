@@ -10,65 +10,47 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contact_layouts import among_discs
-from contact_paths import assert_work_is_energy, check_complementarity, place_of
-
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    PathStatus,
-    PointLoad,
-    Section,
-    Support,
-    Taper,
-    arc,
-    slider_support,
-    trace,
+from contact_paths import (
+    DOWN,
+    EXACT,
+    HALF,
+    THIN,
+    TIP_LOAD,
+    assert_work_is_energy,
+    at_drive,
+    check_complementarity,
+    place_of,
+    residual_slopes,
 )
+
+import cfmkit.elastica as el
 from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, circle, line, polyline
-from cfmkit.elastica.model.contact import arc as edge_of_arc
-
-DOWN = -np.pi / 2
-HALF = 0.005  # half the thickness: radii of the references are those of the centre line
-THIN = Section(1.2e7, 1.0, 2 * HALF, axial=False, shear=False)  # EI = 1
-EXACT = Control(tolerance=1e-9)
-TIP_LOAD = (PointLoad("tip", 0.0, -1.0),)
 
 
-def leaf(*contacts, support=CLAMPED_SUPPORT, at=(0.0, 0.0), angle=0.0, section=THIN):
+def leaf(*contacts, support=el.CLAMPED_SUPPORT, at=(0.0, 0.0), angle=0.0, section=THIN):
     """Return a straight leaf of length 1 from `root` to `tip`."""
     end = at[0] + np.cos(angle), at[1] + np.sin(angle)
-    nodes = {"root": Node(*at, support), "tip": Node(*end)}
-    return Network(nodes, {"leaf": Beam("root", "tip", section)}, contacts=contacts)
+    nodes = {"root": el.Node(*at, support), "tip": el.Node(*end)}
+    return el.Network(nodes, {"leaf": el.Beam("root", "tip", section)}, contacts=contacts)
 
 
 def side(name, outline, beam="leaf"):
-    return BeamOnObstacle(name, beam, outline)
-
-
-def at_drive(path, drive):
-    """Return the number of the first point at a drive."""
-    return int(np.flatnonzero(np.abs(path.drive - drive) < 1e-12)[0])
+    return el.BeamOnObstacle(name, beam, outline)
 
 
 ROUND = 0.05 - HALF
 APEX = -0.1 + np.sqrt(2) * ROUND  # of a roof whose ridge is rounded about (0.5, -0.1)
 PINS = {
-    "disc": circle((0.5, -0.1), ROUND),
-    "fillet": polyline([(-0.5, APEX - 1), (0.5, APEX), (1.5, APEX - 1)], ROUND),
+    "disc": el.circle_edge((0.5, -0.1), ROUND),
+    "fillet": el.polyline_edge([(-0.5, APEX - 1), (0.5, APEX), (1.5, APEX - 1)], ROUND),
 }
 
 
 @pytest.mark.parametrize("pin", PINS)
 def test_a_pin_under_a_leaf_has_the_force_and_the_place_of_shooting_both_ways(pin):
-    path = trace(leaf(side("pin", PINS[pin])), Loading(TIP_LOAD, np.array([0.25, 0.5, 1, 2, 3, 1, 0.4])), EXACT)
+    path = el.trace(leaf(side("pin", PINS[pin])), el.Loading(TIP_LOAD, np.array([0.25, 0.5, 1, 2, 3, 1, 0.4])), EXACT)
     begin, end = path.contact_events
     assert (begin.kind, end.kind) == ("begins", "ends")
     assert begin.drive == pytest.approx(0.476636638220007, abs=1e-11)
@@ -86,10 +68,10 @@ def test_a_pin_under_a_leaf_has_the_force_and_the_place_of_shooting_both_ways(pi
 
 
 def test_a_tip_on_a_floor_becomes_tangent_and_lies_flank_on_and_goes_back():
-    floor = line((0, -HALF), 0.0)
-    net = leaf(NodeOnObstacle("floor", "tip", floor, HALF), side("floor", floor),
-               support=slider_support(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9)  # fmt: skip
-    path = trace(net, Displacement("root", DOWN, np.array([0.1, 0.2, 0.25, 0.3, 0.25, 0.1, 0.05])), EXACT)
+    floor = el.line_edge((0, -HALF), 0.0)
+    net = leaf(el.NodeOnObstacle("floor", "tip", floor, HALF), side("floor", floor),
+               support=el.slider_support(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9)  # fmt: skip
+    path = el.trace(net, el.Displacement("root", DOWN, np.array([0.1, 0.2, 0.25, 0.3, 0.25, 0.1, 0.05])), EXACT)
     known = [0.13898439286123, 0.448837794092424, 0.598397552260931, 0.936966252247794, 0.598397552260931]
     assert path.effort[path.at_requested] == pytest.approx([*known, known[0], 0.0], rel=1e-10, abs=1e-12)
     kinds, drives = zip(*((event.kind, event.drive) for event in path.contact_events), strict=True)
@@ -101,11 +83,11 @@ def test_a_tip_on_a_floor_becomes_tangent_and_lies_flank_on_and_goes_back():
 
 
 def test_a_tip_on_a_floor_that_stretches_has_the_forces_of_shooting():
-    floor = line((0, -0.025), 0.0)
-    section = Section(12 / 0.05**3, 1.0, 0.05, axial=True, shear=False)
-    net = leaf(NodeOnObstacle("floor", "tip", floor, 0.025), side("floor", floor),
-               support=slider_support(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9, section=section)  # fmt: skip
-    path = trace(net, Displacement("root", DOWN, np.array([0.1, 0.3])), EXACT)
+    floor = el.line_edge((0, -0.025), 0.0)
+    section = el.Section(12 / 0.05**3, 1.0, 0.05, axial=True, shear=False)
+    net = leaf(el.NodeOnObstacle("floor", "tip", floor, 0.025), side("floor", floor),
+               support=el.slider_support(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9, section=section)  # fmt: skip
+    path = el.trace(net, el.Displacement("root", DOWN, np.array([0.1, 0.3])), EXACT)
     assert path.effort[path.at_requested] == pytest.approx([0.13897712353818, 0.936909515319372], rel=1e-9)
     assert path.contact_places(1)[-1, 0] == pytest.approx(0.864983588188324, rel=1e-9)
 
@@ -124,11 +106,11 @@ def test_a_tip_on_a_floor_that_stretches_has_the_forces_of_shooting():
 @pytest.mark.parametrize("is_arc", [False, True])
 def test_a_leaf_wraps_around_a_disc_as_the_closed_form_says(radius, onset, known, is_arc):
     """An arc begins where the leaf is clamped; before it its edge is straight."""
-    drive = Loading(TIP_LOAD, np.array([1.0, 2, 4, 8, 4, 2, 0.5]))
+    drive = el.Loading(TIP_LOAD, np.array([1.0, 2, 4, 8, 4, 2, 0.5]))
     centre = (0, -radius), radius - HALF
-    drum = edge_of_arc(*centre, 0.5 * np.pi, -0.5) if is_arc else circle(*centre)
-    path = trace(leaf(side("drum", drum)), drive, EXACT)
-    assert path.status is PathStatus.COMPLETE
+    drum = el.arc_edge(*centre, 0.5 * np.pi, -0.5) if is_arc else el.circle_edge(*centre)
+    path = el.trace(leaf(side("drum", drum)), drive, EXACT)
+    assert path.status is el.PathStatus.COMPLETE
     kinds, drives = zip(*((event.kind, event.drive) for event in path.contact_events), strict=True)
     assert kinds == ("spreads", "closes")
     assert drives == pytest.approx([onset, onset], rel=1e-9)
@@ -144,34 +126,38 @@ def test_a_leaf_wraps_around_a_disc_as_the_closed_form_says(radius, onset, known
 
 def test_a_leaf_wraps_around_a_disc_without_compiled_code(monkeypatch):
     monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
-    path = trace(leaf(side("drum", circle((0, -0.5), 0.5 - HALF))), Loading(TIP_LOAD, np.array([2.0, 4.0])), EXACT)
+    path = el.trace(
+        leaf(side("drum", el.circle_edge((0, -0.5), 0.5 - HALF))), el.Loading(TIP_LOAD, np.array([2.0, 4.0])), EXACT
+    )
     assert path.contact_places(0)[-1] == pytest.approx([0.0, 0.1998403214625088], rel=1e-10)
 
 
 @pytest.mark.slow  # it ends where a search for a path that goes on fails
 def test_a_pinned_column_between_walls_touches_lies_flat_and_buckles_again():
-    walls = side("top", line((0, 0.05 + HALF), np.pi)), side("bottom", line((0, -0.05 - HALF), 0.0))
-    nodes = {"root": Node(0, 0, Support(True, True, False)), "tip": Node(1, 0, Support(False, True, False))}
-    net = Network(nodes, {"leaf": Beam("root", "tip", THIN)}, contacts=walls)
+    walls = side("top", el.line_edge((0, 0.05 + HALF), np.pi)), side("bottom", el.line_edge((0, -0.05 - HALF), 0.0))
+    nodes = {"root": el.Node(0, 0, el.Support(True, True, False)), "tip": el.Node(1, 0, el.Support(False, True, False))}
+    net = el.Network(nodes, {"leaf": el.Beam("root", "tip", THIN)}, contacts=walls)
     euler = np.pi**2
-    drive = Loading(
-        (PointLoad("tip", -1.0),), euler * np.array([0.5, 1.001, 2.0, 3.0, 3.9, 5.0, 8.0, 12.0, 15.0, 16.0])
+    drive = el.Loading(
+        (el.PointLoad("tip", -1.0),), euler * np.array([0.5, 1.001, 2.0, 3.0, 3.9, 5.0, 8.0, 12.0, 15.0, 16.0])
     )
-    path = trace(net, drive, EXACT)
+    path = el.trace(net, drive, EXACT)
     first, flat = (event.drive / euler for event in path.contact_events)
     assert first == pytest.approx(1.00310705881604, abs=1e-9)
     assert flat == pytest.approx(3.984869364316, abs=1e-7)
     assert path.events[-1].drive / euler == pytest.approx(15.8743698018842, abs=1e-7)
-    assert path.status is PathStatus.JUMPS
+    assert path.status is el.PathStatus.JUMPS
     assert "buckles away" in path.message
 
 
 def test_a_ring_between_plates_has_the_forces_of_shooting_and_lies_flat():
-    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(1, 1, Support(False, False, True))}
-    net = Network(
-        nodes, {"leaf": Beam("root", "tip", THIN, arc(np.pi / 2))}, contacts=(side("floor", line((0, -HALF), 0)),)
+    nodes = {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "tip": el.Node(1, 1, el.Support(False, False, True))}
+    net = el.Network(
+        nodes,
+        {"leaf": el.Beam("root", "tip", THIN, el.arc(np.pi / 2))},
+        contacts=(side("floor", el.line_edge((0, -HALF), 0)),),
     )
-    path = trace(net, Displacement("tip", DOWN, np.array([0.1, 0.2, 0.35, 0.4, 0.5, 0.35, 0.1])), EXACT)
+    path = el.trace(net, el.Displacement("tip", DOWN, np.array([0.1, 0.2, 0.35, 0.4, 0.5, 0.35, 0.1])), EXACT)
     known = [0.587165757200244, 1.057650189060502, 1.698863931470137, 1.993805586239256, 2.871080044184531]
     assert path.effort[path.at_requested] == pytest.approx([*known, known[2], known[0]], rel=1e-10)
     flat = [path.contact_places(0)[at_drive(path, drive), 1] * np.pi / 2 for drive in (0.35, 0.4, 0.5)]
@@ -181,12 +167,12 @@ def test_a_ring_between_plates_has_the_forces_of_shooting_and_lies_flat():
 
 @pytest.mark.slow
 def test_a_snap_is_caught_by_a_disc_where_the_path_becomes_stable_again():
-    held = Support(True, True, True, displacement=(-0.02, 0, 0))
-    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "mid": Node(0.5, 0), "tip": Node(1, 0, held)}
-    beams = {"leaf": Beam("root", "mid", THIN), "other": Beam("mid", "tip", THIN)}
-    net = Network(nodes, beams, contacts=(side("pin", circle((0.25, -0.07), 0.05 - HALF)),))
-    drive = Loading((PointLoad("mid", 0, -1.0, 0.02),), np.array([2.0, 10, 20]))
-    path = trace(net, drive, replace(EXACT, through_folds=True, sign=-1))
+    held = el.Support(True, True, True, displacement=(-0.02, 0, 0))
+    nodes = {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "mid": el.Node(0.5, 0), "tip": el.Node(1, 0, held)}
+    beams = {"leaf": el.Beam("root", "mid", THIN), "other": el.Beam("mid", "tip", THIN)}
+    net = el.Network(nodes, beams, contacts=(side("pin", el.circle_edge((0.25, -0.07), 0.05 - HALF)),))
+    drive = el.Loading((el.PointLoad("mid", 0, -1.0, 0.02),), np.array([2.0, 10, 20]))
+    path = el.trace(net, drive, replace(EXACT, through_folds=True, sign=-1))
     (begin,) = path.contact_events
     assert begin.drive == pytest.approx(7.04366432533202, abs=1e-9)
     assert (begin.before, begin.after) == (1, 0)
@@ -195,9 +181,9 @@ def test_a_snap_is_caught_by_a_disc_where_the_path_becomes_stable_again():
 
 
 def test_a_compressed_leaf_between_arcs_touches_at_a_point_and_does_not_lie_where_it_would_be_pulled():
-    net = leaf(side("low", circle((0, -1.0), 1 - HALF)), side("up", circle((0, 1.0), 1 - HALF)))
-    net = replace(net, loads=(PointLoad("tip", -0.95 * np.pi**2 / 4, 0.0),))
-    path = trace(net, Displacement("tip", DOWN, np.array([0.05, 0.2, 0.3, 0.4, 0.43, 0.45])), EXACT)
+    net = leaf(side("low", el.circle_edge((0, -1.0), 1 - HALF)), side("up", el.circle_edge((0, 1.0), 1 - HALF)))
+    net = replace(net, loads=(el.PointLoad("tip", -0.95 * np.pi**2 / 4, 0.0),))
+    path = el.trace(net, el.Displacement("tip", DOWN, np.array([0.05, 0.2, 0.3, 0.4, 0.43, 0.45])), EXACT)
     known = [
         0.007735992349689,
         0.039352758581935,
@@ -216,8 +202,8 @@ def test_a_compressed_leaf_between_arcs_touches_at_a_point_and_does_not_lie_wher
 
 def test_a_small_disc_beside_the_way_of_a_leaf_is_found():
     """The leaf sweeps over a pin that is a fortieth of the way of its middle."""
-    net = leaf(side("pin", circle((0.6, -0.12), 0.01)))
-    path = trace(net, Loading(TIP_LOAD, np.array([4.0])), EXACT)
+    net = leaf(side("pin", el.circle_edge((0.6, -0.12), 0.01)))
+    path = el.trace(net, el.Loading(TIP_LOAD, np.array([4.0])), EXACT)
     assert path.contact_events[0].kind == "begins"
     assert path.contact_gap(0).min() > -1e-10
     assert path.contact_places(0)[-1, 0] == pytest.approx(0.6, abs=0.05)
@@ -225,9 +211,9 @@ def test_a_small_disc_beside_the_way_of_a_leaf_is_found():
 
 def test_a_leaf_that_cannot_lie_on_a_disc_ends_with_the_reason():
     section = replace(THIN, axial=True, shear=True)
-    net = leaf(side("drum", circle((0, -1.0), 1 - HALF)), section=section)
-    path = trace(net, Loading(TIP_LOAD, np.array([0.5, 4.0])), EXACT)
-    assert path.status is PathStatus.LOST
+    net = leaf(side("drum", el.circle_edge((0, -1.0), 1 - HALF)), section=section)
+    path = el.trace(net, el.Loading(TIP_LOAD, np.array([0.5, 4.0])), EXACT)
+    assert path.status is el.PathStatus.LOST
     assert "begins to lie on it along a length" in path.message
     assert "shear" in path.message
 
@@ -236,25 +222,22 @@ def test_a_leaf_that_cannot_lie_on_a_disc_ends_with_the_reason():
 @pytest.mark.parametrize("first", range(0, 200, 50))
 def test_random_layouts_of_discs_return_to_their_own_points_and_keep_every_condition(first):
     for seed in range(first, first + 50):
-        path = trace(*among_discs(seed), Control(tolerance=1e-8))
-        assert path.status is PathStatus.COMPLETE, seed
+        path = el.trace(*among_discs(seed), el.Control(tolerance=1e-8))
+        assert path.status is el.PathStatus.COMPLETE, seed
         check_complementarity(path)
         moved = path.motion("tip")[path.at_requested]
         assert moved[:5] == pytest.approx(moved[10:5:-1], abs=1e-9), seed
 
 
 def test_the_tangent_of_a_side_that_lies_and_one_that_touches_is_the_derivative_of_the_residual():
-    net = leaf(side("drum", circle((0, -1.0), 1 - HALF)), side("pin", circle((0.7, -0.4), 0.1)))
-    mesh = discretise(net, Loading(TIP_LOAD, np.array([1.0])), flanks=[FlankPlace(0, 0.3, -1), FlankPlace(1, 0.6)])
+    net = leaf(side("drum", el.circle_edge((0, -1.0), 1 - HALF)), side("pin", el.circle_edge((0.7, -0.4), 0.1)))
+    mesh = discretise(net, el.Loading(TIP_LOAD, np.array([1.0])), flanks=[FlankPlace(0, 0.3, -1), FlankPlace(1, 0.6)])
     mesh = replace(mesh, contacts=tuple(one._replace(closed=True) for one in mesh.contacts))
     own = equations(mesh)
     free = 0.1 * np.random.default_rng(0).normal(size=own.n)
     for one, place, force, flag in zip(mesh.contacts, (0.3, 0.6), (0.7, 0.4), (-1, 0), strict=True):
         free[own.slots[[one.slide, one.unknown, one.flag]]] = place, force, flag
-    at, step = own.linearise(free, 0.7), 1e-6
-    sides = [own.linearise(free + step * unit, 0.7).residual - own.linearise(free - step * unit, 0.7).residual
-             for unit in np.eye(own.n)]  # fmt: skip
-    slopes = np.array(sides).T / (2 * step)
+    at, slopes = own.linearise(free, 0.7), residual_slopes(own, free, 0.7)
     drum = mesh.contacts[0]
     near = np.ones(own.n, bool)
     near[own.slots[mesh.elements.unknowns[0, -2]]] = False  # its curvature is that of the closed gap: exact there
@@ -264,29 +247,31 @@ def test_the_tangent_of_a_side_that_lies_and_one_that_touches_is_the_derivative_
 
 @pytest.mark.parametrize("with_pad", [False, True])
 def test_a_leaf_parallel_to_a_floor_ends_with_the_reason(with_pad):
-    floor = line((0, -HALF), 0.0)
-    pads = (NodeOnObstacle("floor", "tip", floor, HALF),) if with_pad else ()
-    net = leaf(*pads, side("floor", floor), support=slider_support(np.pi / 2), at=(0.0, 0.1))
-    path = trace(net, Displacement("root", DOWN, np.array([0.05, 0.2])), EXACT)
-    assert path.status is PathStatus.LOST
+    floor = el.line_edge((0, -HALF), 0.0)
+    pads = (el.NodeOnObstacle("floor", "tip", floor, HALF),) if with_pad else ()
+    net = leaf(*pads, side("floor", floor), support=el.slider_support(np.pi / 2), at=(0.0, 0.1))
+    path = el.trace(net, el.Displacement("root", DOWN, np.array([0.05, 0.2])), EXACT)
+    assert path.status is el.PathStatus.LOST
     assert path.message == "beam 'leaf' on 'floor' is met along the whole length at 0.1: no place touches first"
 
 
 def test_a_constant_load_may_close_a_contact_of_a_side_before_the_drive_moves():
-    net = replace(leaf(side("pin", PINS["disc"])), loads=(PointLoad("tip", 0.0, -1.0),))
-    path = trace(net, Loading((PointLoad("tip", 0.0, -1.0),), np.array([0.0, 2.0])), EXACT)
+    net = replace(leaf(side("pin", PINS["disc"])), loads=(el.PointLoad("tip", 0.0, -1.0),))
+    path = el.trace(net, el.Loading((el.PointLoad("tip", 0.0, -1.0),), np.array([0.0, 2.0])), EXACT)
     assert path.contact_force(0)[[0, -1]] == pytest.approx([1.224370708397327, 5.552993116405933], rel=1e-9)
 
 
 def soft(slenderness, thickness=None):
     """Return a section with EI = 1 that stretches and shears, of a leaf so many times as long as thick."""
     depth = 1 / slenderness
-    return Section(12 / depth**3, 1.0, depth if thickness is None else thickness, axial=True, shear=thickness is None)
+    return el.Section(
+        12 / depth**3, 1.0, depth if thickness is None else thickness, axial=True, shear=thickness is None
+    )
 
 
 def over_disc(slenderness, radius):
     depth = 1 / slenderness
-    return leaf(side("pin", circle((0.5, -0.05 - radius - depth / 2), radius)), section=soft(slenderness))
+    return leaf(side("pin", el.circle_edge((0.5, -0.05 - radius - depth / 2), radius)), section=soft(slenderness))
 
 
 @pytest.mark.parametrize(
@@ -302,7 +287,7 @@ def over_disc(slenderness, radius):
 )  # fmt: skip
 def test_a_leaf_that_shears_has_the_force_and_the_place_of_shooting(slenderness, radius, load, known, spread):
     """`spread` is of shooting with the force spread over the length along which the leaf follows the disc."""
-    path = trace(over_disc(slenderness, radius), Loading(TIP_LOAD, np.array([0.5, load])), EXACT)
+    path = el.trace(over_disc(slenderness, radius), el.Loading(TIP_LOAD, np.array([0.5, load])), EXACT)
     force, place, tip = path.contact_force(0)[-1], path.contact_places(0)[-1, 0], place_of(path, "tip", -1)
     assert (force, place, *tip) == pytest.approx(known, abs=1e-10)
     assert (force, tip[1]) == pytest.approx(spread[:2], abs=spread[2])
@@ -311,14 +296,14 @@ def test_a_leaf_that_shears_has_the_force_and_the_place_of_shooting(slenderness,
 
 def falling(slenderness, flips=False):
     """Return a leaf that shears, falls on a floor with its tip, and touches it with its side after that."""
-    floor, depth, angle = line((0, -0.5 / slenderness), 0.0), 1 / slenderness, -np.pi / 9
-    pads = NodeOnObstacle("floor", "tip", floor, depth / 2), side("floor", floor)
-    net = leaf(*pads, support=slider_support(np.pi / 2), at=(0.0, 0.4), angle=angle, section=soft(slenderness))
-    return replace(net, beams={"leaf": Beam("tip", "root", soft(slenderness))}) if flips else net
+    floor, depth, angle = el.line_edge((0, -0.5 / slenderness), 0.0), 1 / slenderness, -np.pi / 9
+    pads = el.NodeOnObstacle("floor", "tip", floor, depth / 2), side("floor", floor)
+    net = leaf(*pads, support=el.slider_support(np.pi / 2), at=(0.0, 0.4), angle=angle, section=soft(slenderness))
+    return replace(net, beams={"leaf": el.Beam("tip", "root", soft(slenderness))}) if flips else net
 
 
-STRETCHING = Taper(np.array([0, 0.4, 1.0]), np.array([0.065, 0.05, 0.03]))
-TAPERED = leaf(side("pin", circle((0.6, -0.275), 0.2)), section=soft(20, STRETCHING))
+STRETCHING = el.Taper(np.array([0, 0.4, 1.0]), np.array([0.065, 0.05, 0.03]))
+TAPERED = leaf(side("pin", el.circle_edge((0.6, -0.275), 0.2)), section=soft(20, STRETCHING))
 
 
 @pytest.mark.parametrize(

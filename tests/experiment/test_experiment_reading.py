@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from cfmkit.errors import CfmError, DataError, UsageError
 from cfmkit.experiment import reading
 from cfmkit.experiment.reading import read_recording
-from cfmkit.tables.lab_file import split_header
 
 TIME, MOTION, FORCE = loop_columns()
 COLUMNS = (TIME, MOTION, FORCE)
@@ -91,17 +90,6 @@ def test_of_several_columns_the_usual_name_counts_and_the_option_before_it(tmp_p
     text = "Weg [mm];Dicke [mm];Kraft [N]\n" + rows((MOTION, 2 * MOTION, FORCE))
     assert read(tmp_path, text).motion.max() == pytest.approx(0.1)
     assert read(tmp_path, text, "Dicke=mm").motion.max() == pytest.approx(0.2)
-
-
-@pytest.mark.parametrize(
-    ("text", "name", "unit"),
-    [
-        ("Kraft [N]", "Kraft", "N"), ("Kraft (N)", "Kraft", "N"), ("s/mm", "s", "mm"), ("travel in mm", "travel", "mm"),
-        ("ratio a/b", "ratio a/b", None), ("Force", "Force", None), ("made in Spain", "made in Spain", None),
-    ],
-)  # fmt: skip
-def test_a_unit_in_a_header_is_told_from_a_name(text, name, unit):
-    assert split_header(text) == (name, unit)
 
 
 def at(index, column, text):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from experiment_support import triangle
+from plot_support import picture
 
 from cfmkit.experiment.curves_and_metrics_of_recording import measure_recording
 from cfmkit.experiment.figures import figures
 from cfmkit.experiment.measurement_and_calibration_outputs import report_on
 from cfmkit.experiment.reading import Recording
 from cfmkit.metrics import Window
-from cfmkit.plots.style import png
 
 
 def report(rise):
@@ -33,5 +33,5 @@ def test_forces_outside_the_window_are_shown_where_they_do_not_flatten_the_loop(
 
 def test_a_picture_has_the_same_bytes_every_time():
     found = report(0.01)
-    first, second = (png(figures(found.source, found.numbers)["loop"]()) for _ in range(2))
+    first, second = (picture(figures(found.source, found.numbers)["loop"]()) for _ in range(2))
     assert first == second

@@ -15,7 +15,6 @@ from cfmkit.experiment.parameters_to_fit import parameters
 from cfmkit.experiment.reading import Recording
 from cfmkit.experiment.zeros_and_signs import correct_recording
 from cfmkit.metrics import Window
-from cfmkit.numerics.robust_statistics import spikes
 
 
 def ripples(numbers, gap=1.0):
@@ -161,19 +160,6 @@ def test_one_glitch_of_the_displacement_changes_neither_filter_nor_tare_nor_boun
     spec = cfmkit.load("configs/cam.yaml")
     zeros = [parameters(spec, ["data.displacement_offset"], recording=one)[0] for one in (glitch, case)]
     assert zeros[0] == zeros[1]
-
-
-@pytest.mark.parametrize("gap", [0.0, 1.0])
-@pytest.mark.parametrize("noise", [0.0, 0.02, 0.5])
-def test_no_sample_of_a_sound_recording_is_a_spike(gap, noise):
-    for seed in range(3):
-        for points in (30, 400):
-            case = lossy_loop(triangle(3, points), gap, noise=noise, seed=seed)
-            assert not spikes(case.effort).any()
-            assert not spikes(case.motion).any()
-    assert not spikes(reference_case().effort).any()
-    steps = np.repeat([0.0, 50.0, 20.0], 50)
-    assert not spikes(steps).any()
 
 
 def test_a_corner_that_every_stroke_shows_is_no_spike():

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
-from cfmkit.export.arc_outlines import outlines
+from cfmkit.export.arc_outlines import ArcChain, outlines
 from cfmkit.export.contours import Arc, Contour, Drawing, Line, Smooth, circle, polygon
 from cfmkit.export.kerf import parallel, with_kerf
-from cfmkit.numerics.arc_chain import ArcChain
 
 HALF = 1e-4
 

@@ -10,8 +10,6 @@ from shapely import Point, Polygon
 
 import cfmkit
 from cfmkit.export.fixing_holes import SCREWS_BY_NAME
-from cfmkit.families import family
-from cfmkit.studies.suggest.material_and_fastening_of_proposal import add_screws
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -54,10 +52,3 @@ def test_holes_for_screws_do_not_change_what_is_solved():
     spec = cfmkit.load(CONFIGS / "make_pom_strip.yaml", ["analysis.fidelity=solid", "analysis.points=5"])
     plain, fastened = (cfmkit.analyze(one).curve.force for one in (spec, spec.replace({"mechanism.part.screws": "M3"})))
     assert plain.tolist() == fastened.tolist()
-
-
-@pytest.mark.parametrize(("config", "screw"), [("vcfm_pla", "M3"), ("beam_design_arch", "M1.6"), ("cam", None)])
-def test_proposals_have_the_largest_usual_screws_that_fit(config, screw):
-    spec = cfmkit.load(CONFIGS / f"{config}.yaml")
-    fastened = add_screws(family(spec.family), spec)
-    assert fastened == (spec if screw is None else spec.replace({"mechanism.part.screws": screw}))

@@ -48,12 +48,10 @@ def test_a_frame_and_the_part_are_one_valid_piece_with_bodies(name):
 
 def test_the_frame_stays_clear_of_beams_over_the_travel():
     # bars stop short of the ring by nothing but what clears the beams: poses of the engine are looked at again here
-    from cfmkit.families.beam.model import solve
-
     spec = loaded("beam_lan2010", GROUND)
     held = [Polygon(one.points(1e-7)) for one in cfmkit.drawing(spec).contours if one.layer == "held"]
     sides = sorted(held, key=lambda one: -max(one.bounds[2] - one.bounds[0], one.bounds[3] - one.bounds[1]))[:4]
-    path = solve(spec).path
+    path = cfmkit.analyze(spec).state.path
     gaps = [
         LineString(path.shape(name, point)).distance(side) - 0.5e-3
         for point in range(0, len(path), 5)
@@ -89,10 +87,8 @@ def test_a_frame_in_the_way_is_told_with_its_place():
 
 
 def test_a_solid_that_comes_to_its_frame_ends_there():
-    from cfmkit.export.contours import polygon
-    from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
-    from cfmkit.solid.path_following import PathEnd
-    from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
+    from cfmkit.export import polygon
+    from cfmkit.solid import MATERIAL_LAWS, HeldOrDriven, Part, PathEnd, rings_of
 
     strip = polygon([(0.0, 0.0), (0.05, 0.0), (0.05, 0.001), (0.0, 0.001)], "cut")
     law = MATERIAL_LAWS["st-venant-kirchhoff"](2e9, 0.3)

@@ -9,7 +9,7 @@ import pytest
 from cfmkit.families.findings import Finder, deg, format_at_least, format_at_most, mm, mpa, newton, percent, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design, no_result, refusals_answered
 from cfmkit.results import Finding, Status
-from cfmkit.specs.spec import Spec
+from cfmkit.specs import Spec
 
 SHORT = Finding("brace_too_short", "the braces do not reach the rollers", ("mechanism.brace_length=200 mm",))
 

@@ -14,7 +14,7 @@ import spare_family
 
 import cfmkit
 from cfmkit import families
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.families.base import ResultNames
 
 pytestmark = pytest.mark.lists
@@ -121,20 +121,20 @@ def test_a_metric_does_not_hide_one_of_cfmkit(name):
 def test_a_registered_family_is_one_like_any_other_until_another_of_its_name_is():
     with pytest.raises(cfmkit.SpecError, match="'spare'"):
         cfmkit.loads(spare_family.TEXT)
-    cfmkit.register(spare_family.FAMILY)
+    cfmkit.register(spare_family.FAMILY_RECORD)
     result = cfmkit.analyze(cfmkit.loads(spare_family.TEXT))
     np.testing.assert_allclose(result.curve.effort, 2000 * result.curve.motion)
     assert "force" in result._repr_html_()
     assert "spare" in families.names()
-    cfmkit.register(replace(spare_family.FAMILY, summary="another"))
+    cfmkit.register(replace(spare_family.FAMILY_RECORD, summary="another"))
     assert families.family("spare").summary == "another"
 
 
 def test_the_page_of_a_family_names_no_command_for_which_it_has_no_file(capsys):
-    cfmkit.register(spare_family.FAMILY)
-    assert main(["show", "spare"]) == 0
+    cfmkit.register(spare_family.FAMILY_RECORD)
+    assert run_command(["show", "spare"]) == 0
     assert "cfmkit new" not in capsys.readouterr().out
-    assert main(["show", "cam"]) == 0
+    assert run_command(["show", "cam"]) == 0
     assert "cfmkit new cam" in capsys.readouterr().out
 
 
@@ -143,11 +143,11 @@ def test_the_page_of_a_family_names_no_command_for_which_it_has_no_file(capsys):
     [
         (lambda: families.family("cam"), "cfmkit itself has a family of this name"),
         (
-            lambda: replace(spare_family.FAMILY, outputs=ResultNames(branches=["load"])),
+            lambda: replace(spare_family.FAMILY_RECORD, outputs=ResultNames(branches=["load"])),
             "the field 'outputs.branches' of its record",
         ),
-        (lambda: replace(spare_family.FAMILY, interface=99), "is for interface 99"),
-        (lambda: replace(spare_family.FAMILY, name="other"), "'family' of its specifications is 'spare'"),
+        (lambda: replace(spare_family.FAMILY_RECORD, interface=99), "is for interface 99"),
+        (lambda: replace(spare_family.FAMILY_RECORD, name="other"), "'family' of its specifications is 'spare'"),
         (lambda: "cam", "a cfmkit.families.base.Family is needed, not str"),
     ],
 )
@@ -158,7 +158,7 @@ def test_a_record_that_cannot_be_used_is_refused(record, reported):
 
 
 def test_other_processes_compute_registered_families_and_metrics_of_modules():
-    cfmkit.register(spare_family.FAMILY)
+    cfmkit.register(spare_family.FAMILY_RECORD)
     spec, vary = cfmkit.loads(spare_family.TEXT), {"mechanism.stiffness": ["1 N/mm", "3 N/mm"]}
     metrics = [own_definitions.peak_to_peak]
     alone, together = (cfmkit.sweep(spec, jobs, vary=vary, metrics=metrics).table for jobs in (1, 2))
@@ -195,8 +195,8 @@ def test_signatures_name_every_argument(name):
 
 
 def test_signatures_have_the_keys_of_the_blocks_that_they_stand_for():
-    from cfmkit.specs.study_spec import Sensitivity, Sweep
-    from cfmkit.studies.suggest.spec import SuggestBlock
+    from cfmkit.specs import Sensitivity, Sweep
+    from cfmkit.studies.suggest import SuggestBlock
 
     for function, block, others in (
         (cfmkit.sweep, Sweep, {"spec", "jobs", "seed"}),

@@ -9,6 +9,7 @@ import pytest
 from beam_support import cantilever
 
 import cfmkit
+from cfmkit.export import box as box_of
 from cfmkit.families import family
 
 
@@ -83,28 +84,6 @@ def test_links_and_pins_have_no_known_depth():
     assert "springs" in room.assumed
 
 
-def test_what_proposals_draw_of_a_linkage_is_what_its_box_counts():
-    from matplotlib.figure import Figure
-
-    from cfmkit.families.slider_crank.springs.figures import draw_as_made, key, moving, scene
-    from cfmkit.plots.poses_in_one_svg import choose_poses
-
-    spring = {"at": "pivot", "name": "wide", "wound": {"wire": "1 mm", "coil": "13 mm", "turns": 8.05}}
-    room, result = room_of("slider_crank_bilancia2019", **{"mechanism.springs.bought": (spring,)})
-    solution, bounds = result.state, []
-    for place in solution.motion[0, choose_poses(solution.motion.shape[1], 9)]:
-        ax = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
-        draw_as_made(result, key(solution, "", float(place)), ax, scene(result))
-        bounds += [one.get_path().transformed(one.get_patch_transform()).get_extents() for one in ax.patches]
-        bounds += [one.get_path().transformed(one.get_patch_transform()).get_extents() for one in ax.artists]
-        bounds += [one.get_path().get_extents() for one in ax.lines]
-    low, high = ([f(one.extents[k] for one in bounds) for k in pair] for f, pair in ((min, (0, 1)), (max, (2, 3))))
-    corner = [1e3 * at for at in room.corner]
-    assert low == pytest.approx(corner, abs=0.3)
-    assert high == pytest.approx([corner[0] + 1e3 * room.along, corner[1] + 1e3 * room.across], abs=0.3)
-    assert moving(result).draw_as_made is not None
-
-
 def test_the_box_of_a_part_with_fillets_ends_where_its_material_does():
     room, result = room_of("beam_lan2010")
     points = np.concatenate([one.points(1e-8) for one in cfmkit.drawing(result.spec).contours if one.layer == "cut"])
@@ -120,8 +99,6 @@ def test_the_box_of_a_straight_spring_counts_its_middle_block_as_it_is_drawn():
 
 
 def test_films_stay_within_the_box_of_what_moves():
-    from cfmkit.export.posed_part import box as box_of
-
     for name in ("vcfm_pla", "beam_lan2010", "slider_crank_lumped", "cam"):
         room, result = room_of(name)
         part = family(result.spec.family).part(result)

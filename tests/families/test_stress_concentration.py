@@ -21,7 +21,7 @@ from cfmkit.families.fem_results import (
     nominal_stresses,
     with_steps,
 )
-from cfmkit.solid.stress_along_fillets import FilletArc
+from cfmkit.solid import FilletArc
 
 if TYPE_CHECKING:
     from cfmkit.results import Result

@@ -6,12 +6,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import cfmkit
 from cfmkit import api
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import GeometryError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -153,9 +152,9 @@ def test_beams_that_lie_on_each_other_bend_as_one_and_the_solid_says_so():
 
 def test_export_prints_the_warning_and_has_it_in_its_document(tmp_path, capsys):
     (tmp_path / "own.yaml").write_text(api.dumps(JOINED["crossing"][0]))
-    assert main(["export", str(tmp_path / "own.yaml"), "-o", str(tmp_path / "out")]) == 0
+    assert run_command(["export", str(tmp_path / "own.yaml"), "-o", str(tmp_path / "out")]) == 0
     assert "joined_away_from_nodes: drawn as one piece" in capsys.readouterr().out
-    assert main(["export", str(tmp_path / "own.yaml"), "-o", str(tmp_path / "out"), "--json"]) == 0
+    assert run_command(["export", str(tmp_path / "own.yaml"), "-o", str(tmp_path / "out"), "--json"]) == 0
     (warning,) = json.loads(capsys.readouterr().out)["warnings"]
     assert warning["name"] == "joined_away_from_nodes"
 
@@ -172,28 +171,6 @@ def test_leaves_of_neighbouring_vs_that_overlap_are_refused():
     with pytest.raises(GeometryError, match=r"overlap, at .*touch at 1.008 mm.*mechanism\.frame\.spacing"):
         api.drawing(mechanism.replace({"mechanism.frame.spacing": "1 mm"}))
     assert api.drawing(mechanism.replace({"mechanism.frame.spacing": "1.02 mm"})).contours
-
-
-def test_levels_of_cosine_leaves_touch_where_they_are_steepest():
-    """The contours of leaves that just do not overlap do not cross, those of a bit less do."""
-    from shapely import Polygon
-
-    from cfmkit.families.vcfm import part
-
-    mechanism = cfmkit.load(CONFIGS / "vcfm_cosine.yaml")
-    with pytest.raises(GeometryError) as refused:
-        api.drawing(mechanism.replace({"mechanism.frame.spacing": "0.5 mm"}))
-    least = float(str(refused.value).partition("touch at ")[2].split(" mm")[0])
-
-    def between(spacing: float) -> Any:
-        wider = mechanism.replace({"mechanism.frame.spacing": f"{spacing} mm"})
-        law, sides = part._leaf(wider), ((1.0, 0), (-1.0, 1))
-        edges = [np.concatenate([item.points for item in part._edge(law, side, (0.0, level * 1e-3 * spacing))])
-                 for side, level in sides]  # fmt: skip
-        return Polygon(np.concatenate([edges[0], edges[1][::-1]]))
-
-    assert between(1.01 * least).is_valid
-    assert not between(0.99 * least).is_valid
 
 
 def test_a_leg_that_crosses_itself_is_not_hidden_by_its_frame():

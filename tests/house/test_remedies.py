@@ -14,7 +14,7 @@ from beam_support import TOGGLE
 from sources import PACKAGE, nodes
 from vee_leaf import VEE
 
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -247,7 +247,7 @@ def test_a_warning_that_states_a_key_with_its_value_has_it_as_a_command():
 
 def run(capsys, *words):
     """Return exit code, page and warnings of a command."""
-    code = main([*words, "-v", "-o", "out", "--no-plots"])
+    code = run_command([*words, "-v", "-o", "out", "--no-plots"])
     found = json.loads(Path("out/metrics.json").read_text(encoding="utf-8"))
     return code, capsys.readouterr().out, [item["name"] for item in found["warnings"]]
 

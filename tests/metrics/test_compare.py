@@ -20,8 +20,6 @@ from cfmkit.metrics.compare import (
     overlap,
     rms,
 )
-from cfmkit.plots.curves import plot_curve
-from cfmkit.plots.style import new_figure
 from cfmkit.tables import curve_table, read_csv, to_csv
 
 MEASURES = {"d_rms": (rms, "rms of {}"), "d_max": (largest, "largest of {}"), "d_mean": (mean, "mean of {}")}
@@ -88,13 +86,6 @@ def test_a_word_that_tells_curves_apart_leads_the_table_without_a_unit():
     table = read_csv(to_csv(curve_table(curves)))
     assert table.headers[:2] == ("model", "branch")
     assert list(table["model"]) == ["fine", "fine", "a coarse one"]
-
-
-def test_a_word_that_tells_curves_apart_names_their_lines():
-    ax = new_figure().add_axes((0.1, 0.1, 0.8, 0.8))
-    motion = np.linspace(0, 1, 20)
-    plot_curve([line(motion, motion, model="fine"), line(motion, 1 + motion, model="coarse")], ax)
-    assert {"fine", "coarse"} <= {text.get_text() for text in ax.texts}
 
 
 def test_two_curves_a_measurement_and_metrics_are_compared_by_one_function():

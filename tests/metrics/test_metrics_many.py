@@ -1,5 +1,6 @@
 """Range metrics of many curves at once are those of each curve."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,11 +10,25 @@ from cfmkit.curves import Curve
 from cfmkit.metrics import MeasuringFrame, Window
 from cfmkit.metrics.metric_definitions import METRIC_TABLE
 from cfmkit.metrics.metric_values import survey
-from cfmkit.metrics.ranges_many import RANGE_FUNCTIONS, ManyBranches, rms_to_target, usable_interval
+from cfmkit.metrics.ranges_many import (
+    BAND_RANGES,
+    ManyBranches,
+    band_range,
+    range_95,
+    range_95_fraction,
+    rms_to_target,
+    usable_interval,
+)
 from cfmkit.metrics.spread import ManyWindows, Spread
 
 DEFINED = {item.name: item for item in METRIC_TABLE}
 COUNT, POINTS = 300, 41
+FUNCTIONS = {
+    "range_95": range_95,
+    "range_95_fraction": range_95_fraction,
+    "rms_to_target": partial(rms_to_target, target=np.full(COUNT, 10.0)),
+    **{name: partial(band_range, tolerance=tolerance) for name, tolerance in BAND_RANGES.items()},
+}
 
 
 def curves(seed):
@@ -42,14 +57,14 @@ def alone(motion, efforts, window, name, until=np.inf):
 
 
 @pytest.mark.parametrize("window", [None, (0.2, 0.8)])
-@pytest.mark.parametrize("name", [*RANGE_FUNCTIONS, "rms_to_target"])
+@pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_range_of_many_curves_is_that_of_each(name, window):
     motion, effort = curves(1)
     motion[:, -1] = 1.0
     low, high = (np.full(COUNT, end) for end in window) if window else (motion[:, 0], motion[:, -1])
     many = ManyBranches(motion, effort, low, high)
     with np.errstate(all="ignore"):
-        found = rms_to_target(many, np.full(COUNT, 10.0)) if name == "rms_to_target" else RANGE_FUNCTIONS[name](many)
+        found = FUNCTIONS[name](many)
     wanted = [alone(motion[k], [effort[k]], Window(*window) if window else None, name) for k in range(COUNT)]
     assert np.allclose(found, wanted, rtol=1e-12, atol=1e-13, equal_nan=True)
     assert np.ptp(found[np.isfinite(found)]) > 0.01

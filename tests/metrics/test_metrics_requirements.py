@@ -3,19 +3,20 @@
 import numpy as np
 import pytest
 
+import cfmkit
+from cfmkit import Spec
 from cfmkit.curves import Curve
 from cfmkit.errors import SpecError
 from cfmkit.metrics import check, definitions, requirement_problems, validate_requirements, values_of_family
 from cfmkit.results import Quantity, Result, Status
-from cfmkit.specs.spec import Requirement, Spec
 
+REQUIREMENT = type(cfmkit.load("configs/cam.yaml").requirements[0])
 OWN = values_of_family({"spring_elongation": ("length", "largest elongation of the springs")})
 
 
 def require(**entry):
-    return Requirement.model_validate(
-        {key: tuple(item) if isinstance(item, list) else item for key, item in entry.items()}
-    )
+    plain = {key: tuple(item) if isinstance(item, list) else item for key, item in entry.items()}
+    return REQUIREMENT.model_validate(plain)
 
 
 def result(kind="force", **kept):

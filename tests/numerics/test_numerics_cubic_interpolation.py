@@ -1,4 +1,4 @@
-"""Local cubics and formulas: exact on cubics, fourth order, and nothing but formulas."""
+"""Local cubics: exact on cubics, fourth order."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at, values_at
-from cfmkit.specs.formula_of_x import formula
 
 X = np.array([0.0, 0.3, 1.0, 1.4, 2.0, 3.1])
 
@@ -43,31 +42,3 @@ def test_crossings_and_extremes_of_a_sine():
 
 def test_bisection_finds_where_a_condition_begins_to_hold():
     assert bisect(lambda place: place > 0.25, 0.0, 1.0) == pytest.approx(0.25, abs=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [("2", 2.0), ("x**2 - 1", 3.0), ("-x + max(x, 3)", 1.0), ("sin(pi*x/4)", 1.0), ("sqrt(abs(-x*2))", 2.0)],
-)
-def test_formulas_are_computed(text, expected):
-    np.testing.assert_allclose(formula(text)(np.full(3, 2.0)), expected)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("x +", "is not a formula"),
-        ("", "is not a formula"),
-        ("y*2", "'y' is unknown here"),
-        ("__import__('os')", "is unknown here"),
-        ("x.real", "is unknown here"),
-        ("[x]", "is unknown here"),
-        ("sin(x, x)", "takes 1 value"),
-        ("True", "is unknown here"),
-        ("'a'", "is unknown here"),
-        ("x" * 600, "at most 500"),
-    ],
-)
-def test_anything_else_is_refused(text, words):
-    with pytest.raises(ValueError, match=words.replace("(", r"\(")):
-        formula(text)

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import cfmkit
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.families import family
 from cfmkit.plots.animation import FRAME_DURATION, animation, frames
 from cfmkit.plots.figures import moving_of
@@ -46,7 +46,7 @@ def test_mechanism_and_cursor_move_and_the_rest_stands_still(solved):
 
 def test_a_film_needs_ffmpeg_and_says_so_before_anything_is_computed(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert main(["analyze", SPEC, "--animate", "mp4", "-o", str(tmp_path / "out")]) == 2
+    assert run_command(["analyze", SPEC, "--animate", "mp4", "-o", str(tmp_path / "out")]) == 2
     assert "needs the program ffmpeg" in capsys.readouterr().err
     assert not os.path.exists(tmp_path / "out")
 
@@ -59,13 +59,13 @@ def test_a_film_is_an_mp4(solved):
 
 
 def test_the_option_writes_the_file(tmp_path):
-    assert main(["analyze", SPEC, "--animate", "gif", "--no-plots", "-o", str(tmp_path / "out"), "-q"]) == 0
+    assert run_command(["analyze", SPEC, "--animate", "gif", "--no-plots", "-o", str(tmp_path / "out"), "-q"]) == 0
     assert sorted(path.name for path in (tmp_path / "out" / "figures").iterdir()) == ["motion.gif"]
 
 
 def test_a_run_without_poses_says_that_it_has_no_film(tmp_path, capsys):
     lift = ["analyze", "configs/cam_dynamics.yaml", "--animate", "gif", "--no-plots", "-q"]
-    assert main([*lift, "-o", str(tmp_path / "out")]) == 0
+    assert run_command([*lift, "-o", str(tmp_path / "out")]) == 0
     assert "no film was written" in capsys.readouterr().err
     assert not os.path.exists(tmp_path / "out" / "figures")
 
@@ -73,7 +73,7 @@ def test_a_run_without_poses_says_that_it_has_no_film(tmp_path, capsys):
 def test_a_sensitivity_study_has_a_page_with_indices_and_shares(tmp_path):
     out = tmp_path / "out"
     command = ["sensitivity", "configs/studies/cam_tolerance.yaml", "--samples", "20", "--report", "--no-plots"]
-    assert main([*command, "-j", "1", "-o", str(out), "-q"]) in (0, 5)
+    assert run_command([*command, "-j", "1", "-o", str(out), "-q"]) in (0, 5)
     page = (out / "report.html").read_text()
     assert "a sensitivity study" in page
     assert "yield reached" in page

@@ -8,7 +8,6 @@ import pytest
 
 import cfmkit
 from cfmkit import api
-from cfmkit.cli.verbs.analyze import AnalyzeOptions
 from cfmkit.errors import UsageError
 from cfmkit.plots import style
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
@@ -73,16 +72,6 @@ def test_without_titles_the_heading_and_its_room_are_gone():
     assert without.texts == []
     free = [style.size_mm(one)[1] - tight(one)[:, 3].max() for one in (with_heading, without)]
     assert free[1] < 3.0 < free[0]
-
-
-def test_options_of_a_command_are_the_form_of_its_figures(tmp_path):
-    (style_file := tmp_path / "own.mplstyle").write_text("lines.linewidth: 3")
-    common = {"spec": "x.yaml", "figures": "svg", "figure_width": "84 mm", "figure_style": str(style_file)}
-    assert AnalyzeOptions(**common, plain=True).form == form_of("svg", "84 mm", True, str(style_file), True)
-    assert AnalyzeOptions(**common, no_titles=True).form == form_of("svg", "84 mm", False, str(style_file))
-    assert AnalyzeOptions(**common).form.settings == (("lines.linewidth", 3.0),)
-    with pytest.raises(UsageError, match="draws no figures and cannot be combined with --no-titles"):
-        _ = AnalyzeOptions(spec="x.yaml", no_plots=True, no_titles=True).form
 
 
 def test_what_is_wrong_is_said_without_titles_too():

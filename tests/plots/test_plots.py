@@ -18,7 +18,7 @@ from PIL import Image
 from plot_support import axes, data_lines, loop_curve, result_of
 
 from cfmkit import Spec
-from cfmkit.families.base import Family
+from cfmkit.families import Family
 from cfmkit.plots.axis_labels_and_headings import Heading, axis_label, top_axis, value_text, write_heading
 from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import plot_curve

@@ -9,7 +9,7 @@ from plot_support import axes, data_lines, loop_curve
 from cfmkit.curves import Curve
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.stacked_line_diagrams import Limit, MarkedRange
-from cfmkit.plots.style import png
+from cfmkit.plots.style import new_figure, png
 
 
 def folded():
@@ -101,3 +101,13 @@ def test_levels_and_regions_stand_where_they_should():
     (region,) = (patch for patch in ax.patches if patch.get_gid() == "no-obstacle" and patch.get_alpha() == 0.12)
     assert (region.get_x(), region.get_width()) == (0.0, pytest.approx(4.0))
     assert {"theory", "corner"} <= {text.get_text() for text in ax.texts}
+
+
+def test_a_word_that_tells_curves_apart_names_their_lines():
+    ax = new_figure().add_axes((0.1, 0.1, 0.8, 0.8))
+    motion = np.linspace(0, 1, 20)
+    branch, stable = np.repeat("load", 20), np.ones(20, bool)
+    words = ("fine", "coarse")
+    curves = [Curve(motion, motion + k, branch, stable, label={"model": (words[k], "text")}) for k in (0, 1)]
+    plot_curve(curves, ax)
+    assert {"fine", "coarse"} <= {text.get_text() for text in ax.texts}

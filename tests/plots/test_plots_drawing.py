@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.documents.run_outcome import report_on
 from cfmkit.plots.workshop_drawing import PAPER_SCALES, drawing_figure, holes, length_in_words
-from cfmkit.runs.files_a_run_writes import files, part_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 EXAMPLES = ("cam", "vcfm_ding2022", "beam_lan2010", "slider_crank_li2019", "slider_crank_strip", "slider_crank_lumped")
@@ -21,7 +19,7 @@ def texts(figure):
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_every_part_is_drawn_to_a_scale_of_paper_with_its_dimensions(name):
-    drawing = part_of(cfmkit.load(CONFIGS / f"{name}.yaml"))
+    drawing = cfmkit.drawing(cfmkit.load(CONFIGS / f"{name}.yaml"))
     figure = drawing_figure(drawing, name)
     ax = figure.axes[0]
     width = np.ptp(ax.get_xlim())
@@ -39,7 +37,7 @@ def test_every_part_is_drawn_to_a_scale_of_paper_with_its_dimensions(name):
 
 
 def test_holes_are_given_from_the_lower_left_corner_of_the_plate():
-    drawing = part_of(cfmkit.load(CONFIGS / "cam.yaml"))
+    drawing = cfmkit.drawing(cfmkit.load(CONFIGS / "cam.yaml"))
     found = list(holes(drawing))
     assert [round(one.diameter * 1e3, 6) for one in found] == [6.6] * 4
     x0, _, x1, _ = drawing.extents
@@ -51,39 +49,17 @@ def test_holes_are_given_from_the_lower_left_corner_of_the_plate():
 def test_what_a_leaf_measures_is_what_its_drawing_says():
     spec = cfmkit.load(CONFIGS / "vcfm_ding2022.yaml")
     span, rise = (
-        {one.name: one.value for one in part_of(spec).dimensions}[name] for name in ("span of a leaf", "rise h")
+        {one.name: one.value for one in cfmkit.drawing(spec).dimensions}[name] for name in ("span of a leaf", "rise h")
     )
     assert np.hypot(span, rise) == pytest.approx(spec.mechanism.bistable.length, rel=1e-12)
     assert np.arctan2(rise, span) == pytest.approx(spec.mechanism.bistable.angle, rel=1e-12)
-
-
-def test_a_design_writes_its_drawing_and_names_its_tolerances():
-    spec = cfmkit.load(CONFIGS / "cam.yaml").replace(
-        {"design.tolerances": {"mechanism.brace_length": {"normal": "0.1 mm"}}}
-    )
-    design = cfmkit.design(spec)
-    report = report_on(cfmkit.analyze(design.spec), design)
-    assert "figures/drawing.png" in dict(files(report))
-    assert "figures/drawing.png" not in dict(files(report, plots=False))
-    from cfmkit.runs.part_on_paper import stated_tolerances
-
-    (line,) = stated_tolerances(design.spec)
-    assert line == "mechanism.brace_length: normal 0.1 mm"
-
-
-def test_a_drawing_without_stated_tolerances_names_the_process_that_is_assumed():
-    from cfmkit.runs.part_on_paper import assumed_tolerances
-
-    lines = assumed_tolerances(cfmkit.load(CONFIGS / "make_finger.yaml"))
-    assert lines[:2] == ("process: fdm, assumed", "thickness +- 0.05 mm (standard deviation)")
-    assert lines[-1] == "inside corners from 0.2 mm, walls from 0.4 mm"
 
 
 def test_the_holes_of_links_are_those_of_their_pins():
     spec = cfmkit.load(CONFIGS / "slider_crank_bought.yaml").replace(
         {"mechanism.pins": {"diameter": "6 mm", "friction": 0.1}}
     )
-    drawing = part_of(spec)
+    drawing = cfmkit.drawing(spec)
     assert [one.diameter for one in holes(drawing)] == pytest.approx([0.006] * 4)
     assert dict(drawing.facts)["links"] == "12 mm wide, ends round"
 
@@ -91,7 +67,7 @@ def test_the_holes_of_links_are_those_of_their_pins():
 def test_numbers_of_holes_stand_clear_of_every_line():
     from matplotlib.path import Path as Line
 
-    drawing = part_of(cfmkit.load(CONFIGS / "slider_crank_bought.yaml"))
+    drawing = cfmkit.drawing(cfmkit.load(CONFIGS / "slider_crank_bought.yaml"))
     figure = drawing_figure(drawing, "links")
     figure.canvas.draw()
     ax = figure.axes[0]
@@ -103,36 +79,27 @@ def test_numbers_of_holes_stand_clear_of_every_line():
         assert not any(line.intersects_bbox(box.shrunk(0.9, 0.9), filled=False) for line in cut)
 
 
-def test_a_drawing_with_stated_tolerances_names_the_process_too():
-    from cfmkit.runs.part_on_paper import part_on_paper
-
-    spec = cfmkit.load(CONFIGS / "studies" / "cam_bought_parts.yaml")
-    found = texts(part_on_paper(part_of(spec), spec))
-    assert "process: laser, assumed" in found
-    assert "kerf 0.2 mm" in found
-    assert "mechanism.springs.stiffness: normal 2 %" in found
-    assert "position +-" not in found
-
-
 @pytest.mark.parametrize(
     ("name", "across"), [("beam_lan2010", 69e-3), ("beam_two_layers", 69e-3), ("vcfm_ding2022", None)]
 )
 def test_a_drawing_says_how_far_apart_the_clamps_are(name, across):
     spec = cfmkit.load(CONFIGS / f"{name}.yaml")
-    found = {one.name: one.value for one in part_of(spec).dimensions}
+    found = {one.name: one.value for one in cfmkit.drawing(spec).dimensions}
     if across is None:  # a leaf on each side of the shuttle
         across = 2 * found["span of a leaf"] + found["shuttle"]
     assert found["across clamps"] == pytest.approx(across, rel=1e-12)
 
 
 def test_one_clamp_is_at_no_distance_from_another():
-    assert [one.name for one in part_of(cfmkit.load(CONFIGS / "beam_cantilever.yaml")).dimensions] == ["tip from root"]
+    assert [one.name for one in cfmkit.drawing(cfmkit.load(CONFIGS / "beam_cantilever.yaml")).dimensions] == [
+        "tip from root"
+    ]
 
 
 @pytest.mark.parametrize("name", ["beam_lan2010", "beam_design_lan", "vcfm_ding2022", "slider_crank_lumped"])
 def test_the_overall_size_of_a_part_with_fillets_is_that_of_its_material(name):
     """Circles that fillets are arcs of lie in the waste: they counted, and the size and the datum of holes were off."""
-    drawing = part_of(cfmkit.load(CONFIGS / f"{name}.yaml").replace({"mechanism.part.fillet": "0.4 mm"}))
+    drawing = cfmkit.drawing(cfmkit.load(CONFIGS / f"{name}.yaml").replace({"mechanism.part.fillet": "0.4 mm"}))
     points = np.concatenate([one.points(1e-9) for one in drawing.contours if one.layer == "cut"])
     assert drawing.extents == pytest.approx((*points.min(axis=0), *points.max(axis=0)), abs=2e-9)
 
@@ -140,40 +107,8 @@ def test_the_overall_size_of_a_part_with_fillets_is_that_of_its_material(name):
 @pytest.mark.parametrize("name", ["vcfm_titanium", "slider_crank_strip", "slider_crank_tapered", "beam_lan2010"])
 def test_the_thickness_on_which_the_force_depends_is_drawn_across_its_beam(name):
     """It was said in words at most: the force goes with its cube."""
-    drawing = part_of(cfmkit.load(CONFIGS / f"{name}.yaml"))
+    drawing = cfmkit.drawing(cfmkit.load(CONFIGS / f"{name}.yaml"))
     drawn = [one.get_text() for one in drawing_figure(drawing, name).axes[0].texts if one.get_gid() == "thickness"]
     wanted = {one.thickness for one in drawing.sections}
     assert {f"t {length_in_words(min(wanted), 3)}", f"t {length_in_words(max(wanted), 3)}"} <= set(drawn)
     assert len(drawn) == len(set(drawn))
-
-
-def test_a_drawing_has_a_title_block_whose_weight_is_volume_times_density():
-    from cfmkit.runs.part_on_paper import part_on_paper, weight_in_words
-
-    spec = cfmkit.load(
-        CONFIGS / "slider_crank_li2019.yaml",
-        [
-            "mechanism.material=steel-s235",
-            "mechanism.part.sheet=5 mm",
-            "mechanism.pins={diameter: 6 mm}",
-            "mechanism.links={width: 20 mm}",
-        ],
-    )
-    drawing = part_of(spec)
-    long = sum(one.value for one in drawing.dimensions)
-    area = 2 * np.pi * 0.010**2 + 0.020 * long - 4 * np.pi * 0.003**2  # two links with round ends, four holes
-    assert weight_in_words(drawing, spec) == f"{1e3 * 7850.0 * 0.005 * area:.3g} g, cut part"
-    found = texts(part_on_paper(drawing, spec))
-    for word in ("revision", "date", "weight", "scale", "projection", "first angle"):
-        assert word in found
-
-
-def test_the_revision_of_a_drawing_changes_with_a_dimension_and_not_with_a_name():
-    from cfmkit.runs.part_on_paper import part_on_paper
-
-    def revision(*changes):
-        spec = cfmkit.load(CONFIGS / "slider_crank_strip.yaml", changes)
-        drawn = [one.get_text() for one in part_on_paper(part_of(spec), spec).axes[1].texts]
-        return drawn[drawn.index("revision") + 1]
-
-    assert revision() == revision("name=other") != revision("mechanism.beam.thickness=0.95 mm")

@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.plots.study import figures
+from cfmkit.plots.study import draw_map, draw_metric, figures
 from cfmkit.plots.study_data_to_draw import DrawnScale, StudyCurve, StudyMarks
 from cfmkit.plots.style import png
-from cfmkit.studies.engine import run
-from cfmkit.studies.pictures import _nominal, findings
-from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare, summary_of
-from cfmkit.studies.varied_axes import collect_variations
-from cfmkit.tables import Table, TableColumn
 
 X = np.repeat(np.linspace(1.0, 3.0, 5), 4)
 Y = np.tile(np.array([4.0, 3.0, 2.0, 1.0]), 5)
@@ -205,68 +200,6 @@ def test_a_key_has_only_the_marks_that_occur():
     assert not draw().legends
 
 
-def test_shares_are_drawn_in_per_cent_as_the_page_has_them():
-    spec = cfmkit.load("configs/cam.yaml").replace({"requirements": ()})
-    request = collect_variations({"mechanism.rolling_friction": (0.001, 0.002)})
-    work = prepare(spec, SweepRequest(vary=request, metrics=("force_ripple", "force_mean")))
-    records = run(work)
-    summary = summary_of(records)
-    for batch in records.batches():
-        summary.add(*batch)
-    ripple = next(one for one in findings(records, summary).metrics if one.name == "force_ripple")
-    assert ripple.label == "force ripple [%]"
-    assert ripple.values == pytest.approx(100 * summary.kept[0][1][:, 0])
-
-
-def test_points_that_are_as_good_as_the_best_are_counted():
-    spec = cfmkit.load("configs/cam.yaml")
-    request = collect_variations({"mechanism.contact.width": ("8 mm", "9 mm", "10 mm")})
-    records = run(prepare(spec, SweepRequest(vary=request, metrics=("force_ripple",))))
-    summary = summary_of(records)
-    for batch in records.batches(1):  # one at a time: ties are counted across batches
-        summary.add(*batch)
-    assert (summary.best, summary.ties) == (0, 3)
-    assert summary.as_json(records)["best"]["ties"] == 3
-
-
-@pytest.mark.parametrize("at_once", [1, 3])
-def test_of_points_that_only_rounding_tells_apart_the_first_is_the_best(at_once):
-    request = collect_variations({"mechanism.contact.width": ("8 mm", "9 mm", "10 mm")})
-    records = run(prepare(cfmkit.load("configs/cam.yaml"), SweepRequest(vary=request, metrics=("force_ripple",))))
-    summary = summary_of(records)
-    for indices, rows in records.batches(at_once):
-        rounding = 1.0 - 1e-13 * np.asarray(indices)[:, None]
-        summary.add(indices, replace(rows, values=rows.values * rounding))
-    assert (summary.best, summary.ties) == (0, 3)
-
-
-def test_the_nominal_curve_is_read_in_one_pass_over_the_cells(monkeypatch):
-    """Cells of a column are made once: once a row took 28 times the time of the study."""
-    rows = 500
-    columns = ("preload", "branch", "displacement", "force", "more")
-    values = [0.0] * rows, ["load"] * rows, list(range(rows)), [1.0] * rows, [2.0] * rows
-    table = Table(tuple(TableColumn(name, tuple(one)) for name, one in zip(columns, values, strict=True)))
-    calls, plain = [], TableColumn.cells
-    monkeypatch.setattr(TableColumn, "cells", lambda self: calls.append(self.name) or plain(self))
-    nominal = _nominal(table)
-    assert len(nominal) == rows
-    assert len(calls) <= len(columns)
-
-
-def test_parameters_of_the_same_last_name_are_told_apart():
-    """A map of two structures had 'structure' on both axes."""
-    spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"requirements": ()})
-    request = collect_variations({f"mechanism.{part}.width": ("5 mm", "6 mm") for part in ("bistable", "positive")})
-    records = run(prepare(spec, SweepRequest(vary=request, metrics=("force_ripple",))))
-    summary = summary_of(records)
-    for batch in records.batches():
-        summary.add(*batch)
-    seen = findings(records, summary)
-    assert [one.label for one in seen.varied] == ["bistable width [mm]", "positive width [mm]"]
-    title = next(text for text in _texts(figures(seen)["force_ripple"]()) if text.startswith("ding-2022: "))
-    assert " ".join(title.split()).endswith("force ripple over positive width and bistable width")
-
-
 def of_one_parameter(values):
     x = np.linspace(7.0, 9.0, 11)
     varied, metric = DrawnScale("roller_radius", "length", x), DrawnScale("force_mean", "force", values(x))
@@ -308,3 +241,28 @@ def test_the_ends_of_an_axis_of_parallel_axes_are_told_apart_by_their_numbers():
     (draw,) = figures(case, [], ("", "")).values()
     texts = [text.get_text() for text in draw().axes[0].texts]
     assert {"50.6601", "50.6612"} <= set(texts)
+
+
+def test_words_are_drawn_as_regions_and_as_steps():
+    x, y = np.repeat([1.0, 2.0, 3.0], 4), np.tile([1.0, 2.0, 3.0, 4.0], 3)
+    words = ("positive", "zero", "bistable")
+    metric = DrawnScale("stiffness_class", "text", (x > 1.5) * 1.0 + (y > 2.5), words)
+    scales = DrawnScale("a.rate", "stiffness", x), DrawnScale("b.rate", "stiffness", y)
+    found = StudyMarks(scales, (metric,), (3, 4), np.ones(12, bool))
+    figure = draw_map(found, metric)
+    assert [text.get_text() for text in figure.axes[1].get_yticklabels()] == list(words)
+    assert len(png(figure)) > 1000
+    line = StudyMarks((DrawnScale("a.rate", "stiffness", x[::4]),), (), (), np.ones(3, bool))
+    steps = DrawnScale("stiffness_class", "text", np.array([0.0, 1.0, 2.0]), words)
+    assert [text.get_text() for text in draw_metric(line, steps).axes[0].get_yticklabels()] == list(words)
+
+
+def test_parameters_of_the_same_last_name_are_told_apart():
+    """A map of two structures had 'structure' on both axes."""
+    spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"requirements": ()})
+    vary = {f"mechanism.{part}.width": ["5 mm", "6 mm"] for part in ("bistable", "positive")}
+    figure = cfmkit.sweep(spec, vary=vary, metrics=["force_ripple"]).figures["force_ripple"]()
+    labels = {label.partition(":")[0] for label in (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel())}
+    assert labels == {"bistable.width", "positive.width"}
+    title = next(text for text in _texts(figure) if text.startswith("ding-2022: "))
+    assert " ".join(title.split()).endswith("force ripple over positive width and bistable width")

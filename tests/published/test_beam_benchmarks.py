@@ -13,22 +13,37 @@ LBF, INCH = 4.4482216152605, 0.0254
 UNIT = 0.125
 """EI/L^2 of the cantilever [N]."""
 
-# Mattiasson, Int. J. Numer. Meth. Engng 17 (1981) 145: PL2/EI, w/L, u/L
+# Mattiasson, Int. J. Numer. Meth. Engng 17 (1981) 145: PL2/EI, w/L, u/L, tip angle
 MATTIASSON = [
-    (0.2, 0.06636, 0.00265),
-    (1.0, 0.30172, 0.05643),
-    (2.0, 0.49346, 0.16064),
-    (5.0, 0.71379, 0.38763),
-    (10.0, 0.81061, 0.55500),
+    (0.2, 0.06636, 0.00265, 0.09964),
+    (1.0, 0.30172, 0.05643, 0.46135),
+    (2.0, 0.49346, 0.16064, 0.78175),
+    (5.0, 0.71379, 0.38763, 1.21537),
+    (10.0, 0.81061, 0.55500, 1.43029),
 ]
 
 
-@pytest.mark.parametrize(("load", "down", "inward"), MATTIASSON)
-def test_cantilever_of_mattiasson(load, down, inward):
+@pytest.mark.parametrize(("load", "down", "inward", "turn"), MATTIASSON)
+def test_cantilever_of_mattiasson(load, down, inward, turn):
     result = cfmkit.analyze(config("beam_cantilever", f"analysis.force={load * UNIT!r} N", "analysis.points=5"))
     moved = result.state.path.motion("tip")[-1]
     assert value(result, "travel_end") / 0.4 == pytest.approx(down, abs=5.1e-6)
     assert -moved[0] / 0.4 == pytest.approx(inward, abs=5.1e-6)
+    assert -moved[2] == pytest.approx(turn, abs=5.1e-6)
+
+
+@pytest.mark.parametrize(("load", "down", "inward", "turn"), MATTIASSON[1:])
+def test_parallel_guiding_beam_is_two_cantilevers_of_half_its_length(load, down, inward, turn):
+    """Its middle is an inflection point: the digits are Mattiasson's."""
+    spec = cantilever(
+        ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: parallel}"),
+        ("kind: displacement, node: tip, direction: -90 deg", "kind: force, node: tip, direction: -90 deg"),
+        ("travel: 100 mm", f"force: {4 * load * UNIT} N"),
+    )
+    path = cfmkit.analyze(spec).state.path
+    assert path.motion("tip")[-1] == pytest.approx((-0.4 * inward, -0.4 * down, 0), abs=0.4 * 5.1e-6)
+    middle = int(np.abs(path.places("beam") - 0.5).argmin())
+    assert -path.states("beam").turn[-1, middle] == pytest.approx(turn, abs=5.1e-6)
 
 
 def test_lee_frame_snaps_at_its_published_load():
@@ -38,6 +53,9 @@ def test_lee_frame_snaps_at_its_published_load():
     reported = next(item.message for item in result.warnings if item.name == "limit_point")
     assert reported == "limit points at 1.856 N, -0.9421 N"
     assert not result.curve.stable.all()
+    path = result.state.path
+    assert [(event.before, event.after) for event in path.events] == [(0, 1), (1, 0)]
+    assert np.diff(path.motion(result.spec.mechanism.drive.node)[:, 1]).max() > 0, "goes back between the limit points"
 
 
 def test_lee_frame_by_its_load_alone_ends_at_the_limit_point():
@@ -67,14 +85,18 @@ def test_column_buckles_at_euler_s_load_and_the_stable_branch_is_followed():
     assert value(cfmkit.analyze(column.replace({"analysis.branch": "primary"})), "travel_end") == pytest.approx(0)
 
 
-def test_cantilever_rolls_into_a_half_circle_under_a_moment():
+@pytest.mark.parametrize("angle", np.array([0.5, 1.0, 2.0]) * np.pi)
+def test_cantilever_rolls_into_a_circle_under_a_moment(angle):
+    """Its curvature M/EI is the same everywhere."""
     spec = cantilever(
         ("kind: displacement, node: tip, direction: -90 deg", "kind: moment, node: tip"),
-        ("travel: 100 mm", f"moment: {np.pi * 0.02 / 0.4!r} N*m"),
+        ("travel: 100 mm", f"moment: {angle * 0.02 / 0.4} N*m"),
     )
     result = cfmkit.analyze(spec)
     assert result.curve.kind == "torque"
-    assert result.curve.angle[-1] == pytest.approx(np.pi, rel=1e-8)
+    assert result.curve.angle[-1] == pytest.approx(angle, rel=1e-8)
+    x, y, _ = result.state.path.motion("tip")[-1]
+    assert (x + 0.4, y) == pytest.approx((0.4 * np.sin(angle) / angle, 0.4 * (1 - np.cos(angle)) / angle), abs=1e-8)
 
 
 def test_tapered_cantilever_bends_as_its_integral_says():

@@ -11,7 +11,7 @@ from cam_support import MM, analyze, at, cam, design, fixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cfmkit.families.cam.geometry.slope_law import SlopeLaw
+from cfmkit.families.cam.geometry import SlopeLaw
 
 TABLE_2 = (0.683, 0.682, 0.681, 0.686, 0.686, 0.679)
 """Measured stiffness of springs 1 to 6 [N/mm]."""

@@ -12,6 +12,7 @@ import itertools
 
 import numpy as np
 import pytest
+from buckling_structures import column
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
@@ -27,17 +28,11 @@ def elastica(approach: float) -> float:
     return float((2 * ellipk(m) / np.pi) ** 2)
 
 
-def column(slenderness: float, clamped: bool) -> tuple[el.Network, float]:
+def slender(slenderness: float, clamped: bool) -> tuple[el.Network, float]:
     """Return a column whose far end is guided along it, and its critical load [N]."""
-    section = el.Section(2e9, 1e-2, LENGTH * np.sqrt(12) / slenderness)
-    ends = (
-        (el.CLAMPED_SUPPORT, el.slider_support(0.0))
-        if clamped
-        else (el.PINNED_SUPPORT, el.slider_support(0.0, rotates=True))
-    )
-    nodes = {"a": el.Node(0, 0, ends[0]), "b": el.Node(LENGTH, 0, ends[1])}
-    rigidity = 2e9 * 1e-2 * section.thickness**3 / 12  # type: ignore[operator]
-    return el.Network(nodes, {"x": el.Beam("a", "b", section)}), (4 if clamped else 1) * np.pi**2 * rigidity / LENGTH**2
+    thickness = LENGTH * np.sqrt(12) / slenderness
+    critical = (4 if clamped else 1) * np.pi**2 * 2e9 * 1e-2 * thickness**3 / 12 / LENGTH**2
+    return column(el.Section(2e9, 1e-2, thickness), clamped), critical
 
 
 @pytest.mark.parametrize("imperfection", [0.0, 1e-5 * LENGTH, 1e-3 * LENGTH])
@@ -47,7 +42,7 @@ def test_a_column_is_followed_far_beyond_its_critical_load(
     slenderness: float, clamped: bool, imperfection: float
 ) -> None:
     """The first requested point lies far behind the bifurcation: 20 to 300 times the critical approach."""
-    network, critical = column(slenderness, clamped)
+    network, critical = slender(slenderness, clamped)
     path = el.trace(network, el.Displacement("b", np.pi, APPROACH * LENGTH), el.Control(imperfection=imperfection))
     assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.stable[path.at_requested].all()

@@ -14,9 +14,8 @@ from slider_crank import ALPHA, BILANCIA, TABLE_1, config, force
 
 import cfmkit
 from cfmkit import api
-from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, least_squares
-from cfmkit.families.slider_crank.unit_springs import curves_along_slider
+from cfmkit.families.slider_crank import Linkage, curves_along_crank, curves_along_slider
+from cfmkit.families.slider_crank.springs import RateGoal, least_squares
 from cfmkit.metrics import Window
 
 TABLE = {
@@ -195,8 +194,6 @@ def test_a_crank_of_12_mm_cannot_make_the_stroke():
 
 def test_both_papers_have_the_same_model():
     """The force is the torque over the slider's velocity ratio, -T/x'."""
-    from cfmkit.families.slider_crank.unit_springs import curves_along_crank
-
     units = curves_along_slider(BILANCIA, 0.542, 1, np.array([1.0, 10.0, 35.0]))
     torque = curves_along_crank(BILANCIA, 0.542, units.angle)
     ratio = curves_along_crank(BILANCIA, 0.542, units.angle).effort[3] / torque.turn[3]

@@ -19,12 +19,10 @@ from flexure_support import (
     lumped_chain,
     strip_chain,
 )
+from scipy.optimize import brentq
 
-from cfmkit.families.slider_crank.printed.equilibrium_path import Chain, PressingEnd
-from cfmkit.families.slider_crank.printed.flexure_sizing import rotations
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity, Flexure
-from cfmkit.families.slider_crank.unit_springs import curves_along_slider
-from cfmkit.numerics.roots import bracketed_root
+from cfmkit.families.slider_crank import curves_along_slider
+from cfmkit.families.slider_crank.printed import Chain, Elasticity, Flexure, PressingEnd, rotations
 
 STRETCHED = LINKAGE.stretched_angle
 DOWN = 2 * STRETCHED - UNLOADED
@@ -43,7 +41,7 @@ def stress(chain: Chain, travel: list[float], side: int = 0) -> np.ndarray:
 
 def stroke(chain: Chain, side: int = 0, limit: float = 42.5) -> float:
     """Return the travel at which the stress limit is reached [mm]."""
-    return bracketed_root(lambda d: float(stress(chain, [d], side)[-1]) - limit, 2.0, 40.0)
+    return brentq(lambda d: float(stress(chain, [d], side)[-1]) - limit, 2.0, 40.0, xtol=1e-9)
 
 
 # --- Table 2 and eq. 12 -------------------------------------------------------------------------------------------

@@ -13,10 +13,8 @@ import pytest
 from slider_crank import DEG, LI, START, config, li
 
 import cfmkit
-from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.springs.bistability_class import scale_factors, small_angle_number
-from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
-from cfmkit.families.slider_crank.unit_springs import curves_along_crank
+from cfmkit.families.slider_crank import Linkage, curves_along_crank
+from cfmkit.families.slider_crank.springs import assemble, scale_factors, small_angle_number
 
 T2 = LI.stretched_angle
 PER_DEG = 180 / math.pi

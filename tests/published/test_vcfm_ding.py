@@ -10,14 +10,7 @@ import pytest
 from vcfm_support import CONFIGS, MM, analyzed, force_at
 
 import cfmkit
-from cfmkit import api
-from cfmkit.families.vcfm.design import closed_form, fit_widths
 from cfmkit.results import Status
-from cfmkit.studies.engine import run
-from cfmkit.studies.sensitivity.output import outputs
-from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
-from cfmkit.studies.sensitivity.setup import prepare
-from cfmkit.tables import read_csv
 
 WINDOW = np.arange(2.0, 4.001, 0.02)
 COARSE = np.array([2.0, 2.5, 3.0, 3.5, 4.0])
@@ -234,35 +227,11 @@ def test_exact_cosine_arches():
     assert found.values["first_stiffness"].value / 1e3 == pytest.approx(8.257, rel=1e-2)  # reference: a secant
 
 
-DESIGNS = {
-    # changes: closed form (Q, t2, L2, theta2 in deg, b2, L1, b1), then b2 and b1 after the fit
-    "vcfm_pla": ([], (4.22283, 1.00999, 30.22753, 8.1113, 3.59771, 27.052, 10.3268), (3.59411, 10.4295)),
-    "vcfm_aluminium": ([], (3.6276, 0.4135, 26.836, None, None, 21.474, None), (9.638, 21.174)),
-}
-
-
-@pytest.mark.parametrize("stem", DESIGNS)
-def test_worked_designs_by_closed_forms_and_one_exact_pass(stem):
-    _, closed, fitted = DESIGNS[stem]
-    spec = cfmkit.load(CONFIGS / f"{stem}.yaml")
-    sizes = closed_form(spec, spec.design)
-    leaf, spring_leaf = sizes.leaf, sizes.spring_leaf
-    mm = [leaf.thickness, leaf.length, leaf.width, spring_leaf.length, spring_leaf.width]
-    t2, l2, b2, l1, b1 = (value / MM for value in mm)
-    found = (leaf.slenderness, t2, l2, np.degrees(leaf.angle), b2, l1, b1)
-    digits = (5e-5, 5e-5, 5e-4, 5e-5, 5e-5, 5e-4, 5e-4)
-    for value, wanted, digit in zip(found, closed, digits, strict=True):
-        assert wanted is None or value == pytest.approx(wanted, abs=1.1 * digit)
-    after, (stress, _) = fit_widths(spec, spec.design, sizes)
-    assert (after.leaf.width / MM, after.spring_leaf.width / MM) == pytest.approx(fitted, rel=2e-4)
-    assert stress == pytest.approx(spec.mechanism.allowable_stress, rel=2e-3)
-
-
 def test_the_first_worked_design_is_refused_and_the_nearest_is_a_config():
     """Its leaves would be 1.573 mm wide and 1.621 mm thick, and buckle out of the plane."""
     changes = ["design={force: 11.15 N, adjustment: 10.5 N, stroke: 2 mm, preload: 5 mm}"]
     spec = cfmkit.load(CONFIGS / "vcfm_pla_adjustable.yaml", changes)
-    found = api.design(spec)
+    found = cfmkit.design(spec)
     assert found.status is Status.INFEASIBLE
     assert found.warnings[0].name == "out_of_plane_buckling"
     assert "39.55 mm would be 1.573 mm wide and 1.621 mm thick" in found.message
@@ -291,9 +260,9 @@ def test_sobol_total_indices_of_l1_t1_theta2_and_t2(stem, model):
 
     Within the confidence intervals of 512 base samples on either side.
     """
-    spec = cfmkit.load(CONFIGS / "studies" / f"{stem}.yaml", [f"analysis.fidelity={model}"])
-    found = carry_out(prepare(spec), run)
-    table = read_csv(dict(outputs(found))["indices.csv"])
+    table = cfmkit.sensitivity(
+        cfmkit.load(CONFIGS / "studies" / f"{stem}.yaml", [f"analysis.fidelity={model}"])
+    ).indices
     for metric, wanted in SOBOL[stem, model].items():
         rows = [
             row

@@ -7,8 +7,9 @@ import pytest
 
 import cfmkit
 import cfmkit.metrics
+from cfmkit import Run
 from cfmkit.families.beam.shaping.design import missed_by, task_of
-from cfmkit.families.beam.shaping.search import Found
+from cfmkit.families.beam.shaping.search import ShapeCandidate
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
     NetworkScatter,
     audit_design,
@@ -16,7 +17,6 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
 )
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.findings import percent
-from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.studies.pool import Pool
 
@@ -27,7 +27,7 @@ def test_the_shapes_of_the_config_meet_all_limits_and_pass_the_audit() -> None:
     spec = cfmkit.load(CONFIG)
     task = task_of(spec, spec.design.optimise)
     variables = Variables(task, 3)
-    found = Found(variables.read(), 3, 3.37e-3, 0.0, 0.0, "", 0)
+    found = ShapeCandidate(variables.read(), 3, 3.37e-3, 0.0, 0.0, "", 0)
     assert missed_by(task, found) == {}
     assert audit_design(variables, found).sound
     window = cfmkit.metrics.Window(3.37e-3, 13.6e-3)

@@ -17,6 +17,7 @@ from cfmkit.errors import ExitCode, SpecError
 from cfmkit.results import Design, Finding, Result, Status
 from cfmkit.runs import specfile
 from cfmkit.runs.files_a_run_writes import files
+from cfmkit.runs.specfile import read_spec
 from cfmkit.specs import keys_and_schema as keys
 from cfmkit.specs.yamlio import read_document
 
@@ -83,6 +84,7 @@ def test_evaluate_takes_names_and_branches(result):
     assert found["force_constant"].value == pytest.approx(0.009058)
     with pytest.raises(cfmkit.UsageError, match="did you mean 'force_mean'"):
         cfmkit.evaluate(result, ["force_men"])
+    assert cfmkit.evaluate(result, ["clearance_min"])["clearance_min"].value is None  # nothing is known of its plate
 
 
 def test_check_gives_an_outcome_for_each_requirement(spec, result):
@@ -295,3 +297,10 @@ def test_export_gives_the_files_and_writes_them_where_a_folder_is_named(tmp_path
     for kerf in (0.0, "0 mm", float("nan")):
         with pytest.raises(cfmkit.UsageError, match="must be > 0"):
             cfmkit.export(CAM, kerf=kerf)
+
+
+def test_the_place_of_what_a_base_says_is_where_the_base_is_named(tmp_path):
+    (tmp_path / "cam.yaml").write_bytes(CAM.read_bytes())
+    (tmp_path / "own.yaml").write_text("name: mine\nbase: cam.yaml\n")
+    document = read_spec(str(tmp_path / "own.yaml"))
+    assert (document.place("requirements.0"), document.place("name")) == ((2, 7), (1, 7))

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 import cfmkit
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.cli.verbs.batch import BatchOptions
 from cfmkit.documents import batch_document
 from cfmkit.documents.annotations import workflow_commands
@@ -192,7 +192,7 @@ def test_a_missed_requirement_is_annotated_at_its_line(folder, capsys):
     strict = re.sub(r"metric: force_ripple, max: [^,}]+", "metric: force_ripple, max: 0.001 %", SPEC)
     line = next(number for number, row in enumerate(strict.splitlines(), 1) if "max: 0.001 %" in row)
     (folder / "a.yaml").write_text(strict)
-    assert main(["batch", "a.yaml", "-o", "out", "--no-plots", "-j", "1", "-q", "--annotations", "github"]) == 5
+    assert run_command(["batch", "a.yaml", "-o", "out", "--no-plots", "-j", "1", "-q", "--annotations", "github"]) == 5
     err = capsys.readouterr().err
     assert re.search(rf"^::error file=a\.yaml,line={line},col=\d+,title=requirement missed::", err, re.MULTILINE)
 
@@ -208,8 +208,8 @@ def test_the_summary_is_a_table_in_which_no_name_becomes_markup():
 
 
 def test_the_tolerance_needs_a_comparison(folder, capsys):
-    assert main(["batch", "a.yaml", "--compare-tolerance", "1 %"]) == 2
-    assert main(["batch", "a.yaml", "--compare", "out", "--compare-tolerance", "1 mm"]) == 2
+    assert run_command(["batch", "a.yaml", "--compare-tolerance", "1 %"]) == 2
+    assert run_command(["batch", "a.yaml", "--compare", "out", "--compare-tolerance", "1 mm"]) == 2
     assert "--compare-tolerance" in capsys.readouterr().err
 
 

@@ -10,8 +10,7 @@ import pytest
 
 import cfmkit
 from cfmkit import families
-from cfmkit.cli import shell_completion
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command, shell_completion
 from cfmkit.runs.editor_schema import SCHEMA_LINE_START, metric_names, schema
 
 pytestmark = pytest.mark.lists
@@ -39,23 +38,23 @@ def test_the_schema_lists_every_metric_that_an_example_requires(name):
 
 def test_new_and_examples_write_the_schema_that_their_first_line_names(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main(["new", "vcfm", "--json"]) == 0
-    assert main(["examples", "cam_as_built", "--json"]) == 0
+    assert run_command(["new", "vcfm", "--json"]) == 0
+    assert run_command(["examples", "cam_as_built", "--json"]) == 0
     for spec in ("vcfm.yaml", "cam_as_built.yaml"):
         first = Path(spec).read_text().splitlines()[0]
         assert first.startswith(SCHEMA_LINE_START)
         assert json.loads(Path(first.removeprefix(SCHEMA_LINE_START)).read_text())["$defs"]["Requirement"]
         cfmkit.load(spec)
-    assert main(["examples", "--schema"]) == 2
+    assert run_command(["examples", "--schema"]) == 2
 
 
 def test_a_file_of_its_own_on_request(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["new", "cam", "--no-schema", "--json"]) == 0
+    assert run_command(["new", "cam", "--no-schema", "--json"]) == 0
     assert [one.name for one in tmp_path.iterdir()] == ["cam.yaml"]
     assert not Path("cam.yaml").read_text().startswith(SCHEMA_LINE_START)
     capsys.readouterr()
-    assert main(["new", "cam", "--out", "-"]) == 0
+    assert run_command(["new", "cam", "--out", "-"]) == 0
     assert SCHEMA_LINE_START not in capsys.readouterr().out
 
 
@@ -78,7 +77,7 @@ def test_vary_is_completed_with_the_same_keys(verb, monkeypatch, capsys):
     spec = ROOT / "configs" / "cam.yaml"
     monkeypatch.setenv("_TYPER_COMPLETE_ARGS", f"cfmkit {verb} {spec} --vary mechanism.roller_r")
     with contextlib.suppress(SystemExit):
-        main([])
+        run_command([])
     assert "mechanism.roller_radius=" in capsys.readouterr().out
 
 

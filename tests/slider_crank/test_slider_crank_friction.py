@@ -90,7 +90,7 @@ def test_a_mirrored_pair_has_twice_the_force_and_a_free_guide():
 
 
 def test_the_outline_of_a_mirrored_pair_holds_every_part_twice():
-    from cfmkit.export.contours import polygons
+    from cfmkit.export import polygons
     from cfmkit.families.slider_crank.outline import drawing
 
     one, pair = (drawing(spec("strip", copies=copies)) for copies in ("single", "mirrored"))

@@ -41,8 +41,6 @@ from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
 from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import Ranges
-from cfmkit.numerics import sqp
-from cfmkit.numerics.barycentric import differentiation, interpolation
 from cfmkit.results import Status
 
 if TYPE_CHECKING:
@@ -304,12 +302,6 @@ def test_a_strip_that_is_pulled_to_many_times_its_length_has_no_answer_or_one_fa
     assert answer is None or answer[1].min() < -1000.0
 
 
-def test_polynomials_through_nodes_are_exact() -> None:
-    nodes, places = np.cos(np.linspace(0, np.pi, 6)), np.linspace(-1, 1, 9)
-    np.testing.assert_allclose(interpolation(nodes, places) @ nodes**5, places**5, atol=1e-14)
-    np.testing.assert_allclose(differentiation(nodes) @ nodes**5, 5 * nodes**4, atol=1e-13)
-
-
 def test_first_at_is_the_first_crossing_and_none_where_there_is_none() -> None:
     x, y = np.arange(4.0), np.array([0.0, 2.0, 1.0, 3.0])
     assert first_at(x, y, 1.5) == pytest.approx(0.75)
@@ -537,7 +529,7 @@ def test_an_optimiser_that_stops_is_told() -> None:
     """The root mean square of 25 mm has a flat valley: the steps allowed do not reach its end."""
     wanted = "design={force: 1.5 N, travel: [1 mm, 25 mm], beam: {goal: rms, nodes: 5}}"
     found = api.design(spec("taper_design", wanted))
-    assert sqp.SearchEnding.OPTIMUM.value not in found.message
+    assert "optimum" not in found.message
     assert "optimizer_stopped" in {item.name for item in found.warnings}
 
 

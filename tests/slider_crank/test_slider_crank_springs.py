@@ -15,8 +15,6 @@ from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, choose_preferred, minimax, ranges
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, reactions
 from cfmkit.families.slider_crank.unit_springs import crank_efforts, curves_along_crank, curves_along_slider
-from cfmkit.numerics.box_search import BoxAxis, lowest
-from cfmkit.numerics.hermite_cubic_turning_points import monotone
 
 rng = np.random.default_rng(20)
 
@@ -338,31 +336,6 @@ def test_no_rates_do_better_than_the_linear_programme():
     assert goal.deviation(choose_preferred(goal, 1.2 * worst, "even-rates")) <= 1.2 * worst * (1 + 1e-9)
 
 
-def test_a_box_is_searched_to_its_bounds():
-    found = lowest(
-        lambda at: (at[0] - 2.0) ** 2 + (at[1] - 1e-4) ** 2, (BoxAxis(0.0, 1.0), BoxAxis(0.0, 1.0, log=True))
-    )
-    assert found.place[0] == 1.0
-    assert found.place[1] == pytest.approx(1e-4, abs=1e-6)
-
-
-def test_turning_points_between_samples_are_found():
-    x = np.linspace(0.0, 3.0, 4)
-    curves, slopes = (
-        np.array([x**3 - 4 * x, (x - 1.5) ** 3 - 0.1 * x]),
-        np.array([3 * x**2 - 4, 3 * (x - 1.5) ** 2 - 0.1]),
-    )
-
-    def cubics(places):
-        return np.stack([places[0] ** 3 - 4 * places[0], (places[1] - 1.5) ** 3 - 0.1 * places[1]])
-
-    cut = monotone(x, curves, slopes, cubics)
-    assert (np.diff(cut.place, axis=1) >= 0).all()
-    assert cut.value[0].min() == pytest.approx(-16 / 27**0.5)
-    steps = np.diff(cut.value[1])
-    assert (np.diff(np.sign(steps[steps != 0])) != 0).sum() == 2  # both within one cell
-
-
 @pytest.mark.parametrize("name", ["li2019_prototype", "bilancia2019"])
 def test_gradients_are_those_of_differences(name):
     spec = config(name)
@@ -383,12 +356,11 @@ def test_gradients_are_those_of_differences(name):
 
 
 def test_a_mechanism_without_a_curve_misses_requirements_in_degrees():
-    from cfmkit.documents import run_outcome
-
-    found = run_outcome.report_on(cfmkit.analyze(config("li2019", mechanism__offset="700 mm")))
-    assert found.exit_code == 4
-    assert found.missed[0].dimension == "angle"
-    assert "no value" in found.missed[0].sentence
+    found = cfmkit.analyze(config("li2019", mechanism__offset="700 mm"))
+    assert found.status.exit_code == 4
+    missed = next(outcome for outcome in found.requirements if not outcome.ok)
+    assert missed.dimension == "angle"
+    assert "no value" in missed.sentence
 
 
 def test_whatever_the_linkage_the_curve_is_finite_or_a_finding_says_why():

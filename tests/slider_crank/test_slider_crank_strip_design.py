@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,12 @@ from flexure_support import ABS, LINKAGE, MM, UNLOADED, WIDTH, corners
 import cfmkit
 from cfmkit import Run
 from cfmkit.elastica import PathStatus
+from cfmkit.families.slider_crank.printed import Elasticity, sqp_program, strip_thickness_search
 from cfmkit.families.slider_crank.printed import design as printed
-from cfmkit.families.slider_crank.printed import sqp_program, strip_thickness_search
 from cfmkit.families.slider_crank.printed.audit import judge
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import joints
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import FoundStrip, Ranges, infeasible
-from cfmkit.numerics.sqp import Optimum, SearchEnding
 from cfmkit.results import Design, Status
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -33,7 +33,7 @@ def spec(name: str, *changes: str) -> Any:
 def found(task: StripTask, z: list[float]) -> FoundStrip:
     """Return a strip of two thicknesses as where a search ended."""
     form = Form(2, width=WIDTH)
-    end = Optimum(np.array(z), 0.0, np.zeros(0), SearchEnding.OPTIMUM, 1, 0.0)
+    end: Any = SimpleNamespace(z=np.array(z), feasible=True, ending=SimpleNamespace(value="ended"))
     return FoundStrip(task, form, Ranges(np.tile([0.5, 2.0], (2, 1)), 40 * MM), StripProgram(task, form), end, None)
 
 
@@ -70,10 +70,14 @@ def test_the_force_proposed_after_a_search_is_the_middle_of_the_band_that_all_st
 def test_a_search_for_the_smallest_ripple_that_stops_on_its_way_has_a_strip(monkeypatch: pytest.MonkeyPatch) -> None:
     """It had been infeasible, being off the force by more than the number that was minimised."""
 
-    def stopped(program: StripProgram, start: Any, *_: Any, **__: Any) -> Optimum:
+    descend = strip_thickness_search.descend
+
+    def stopped(program: StripProgram, start: Any, *given: Any, **more: Any) -> Any:
         z = np.append(start[:-1], 0.1)
         objective, rows = program.values(z)  # type: ignore[misc]
-        return Optimum(z, objective, rows, SearchEnding.STUCK, 1, 5e-3)
+        return replace(
+            descend(program, start, *given, **more), z=z, objective=objective, constraints=rows, allowed=5e-3
+        )
 
     monkeypatch.setattr(strip_thickness_search, "descend", stopped)
     task, ranges = replace(TASK, goal="ripple"), Ranges(np.tile([0.5, 2.0], (2, 1)), 40 * MM)
@@ -211,3 +215,13 @@ def test_flexures_are_designed_for_the_side_to_which_they_are_to_bend(side: str)
     result = cfmkit.analyze(cfmkit.design(spec("lumped", *about)).spec)
     assert result.curve.extra["max_stress"].values.max() == pytest.approx(42.5e6, rel=1e-4)
     assert "overstressed" not in {item.name for item in result.warnings}
+
+
+def test_the_force_of_a_wide_strip_is_not_proportional_to_its_width():
+    """The derivative by the width was the force over the width: 9 % too small."""
+    material = Elasticity(1.8e9, 0.35, wide=True)
+    program = StripProgram(StripTask(corners(), np.pi, material, 8.0, 1e-3, 21e-3, 0.01), Form(2))
+    z = np.array([0.95, 1.02, 30.0, 2.1])
+    _, slopes = program.slopes(z)
+    low, high = (program.values(z + np.array([0.0, 0.0, step, 0.0]))[1] for step in (-1e-3, 1e-3))
+    assert slopes[:, 2] == pytest.approx((high - low) / 2e-3, rel=1e-5)

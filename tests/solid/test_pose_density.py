@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cfmkit.export.contours import polygon
+from cfmkit.export import polygon
 from cfmkit.solid.meshed_part import MAX_EFFORT_ERROR, HeldOrDriven, Part, _check_interval, refine_path, rings_of
 from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,16 +13,14 @@ from hypothesis import strategies as st
 from shoulder_fillets import handbook
 
 from cfmkit.errors import GeometryError
-from cfmkit.export import contours
-from cfmkit.plots.stress_map import boundary_nodes
+from cfmkit.export import circle as circle_contour
 from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
-from cfmkit.solid.equilibrium import SolidProblem
+from cfmkit.solid.equilibrium import Balance, SolidProblem
 from cfmkit.solid.followed_part import FollowedPart
 from cfmkit.solid.mesh import TriangleMesh, mesh
-from cfmkit.solid.mesh_refinement import refine
 from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
-from cfmkit.solid.path_following import PathEnd, PosePath, follow
+from cfmkit.solid.path_following import PathEnd, PosePath, follow, pose_between
 from cfmkit.solid.plane_stress_law import NeoHookean, SaintVenantKirchhoff
 from cfmkit.solid.rigid_groups import Group, Supports
 
@@ -73,17 +73,6 @@ def test_a_part_has_two_elements_across_its_thin_places():
     grid = mesh((Ring.from_points(arms, False),), 1e-3)
     a, b = grid.nodes[grid.edges[:, 0]], grid.nodes[grid.edges[:, 1]]
     assert np.hypot(*(b - a).T).max() < 1.6 * 0.1e-3  # where the arms meet the part is thicker
-
-
-def test_the_boundary_of_a_refined_mesh_is_drawn_from_edge_to_edge():
-    """Before, halved edges stood behind all others, and stress maps had grey areas between places far apart."""
-    ring = Ring.from_points(box(0, 0, 10e-3, 2e-3), False)
-    coarse = mesh((ring,), 1e-3)
-    fine = refine(coarse, (ring,), np.arange(len(coarse.triangles)) < 5).mesh
-    assert len(fine.edges) > len(coarse.edges)
-    (nodes,) = boundary_nodes(fine)
-    x, y = fine.nodes[nodes].T
-    assert 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) == pytest.approx(20e-6)
 
 
 def test_elements_meet_along_a_seam():
@@ -433,7 +422,7 @@ def test_uniaxial_stretch_is_the_closed_form_of_either_law():
 
 def test_the_lines_that_stand_for_an_arc_turn_by_a_degree_at_most():
     # coarser ones are corners beside which the stress of a small fillet is wrong, and grows with finer meshes
-    (ring,) = rings_of([contours.circle((0.0, 0.0), 0.2e-3, "cut")])
+    (ring,) = rings_of([circle_contour((0.0, 0.0), 0.2e-3, "cut")])
     assert np.degrees(np.abs(ring.turns)).max() <= 1.0 + 1e-9
 
 
@@ -474,3 +463,19 @@ def test_a_path_ends_at_the_first_pose_that_is_enough():
     assert course.ending is PathEnd.COMPLETE
     assert course.poses[-2].effort < 0.25 * euler < course.poses[-1].effort
     assert len(course.poses) < len(stops)
+
+
+def test_turns_do_not_count_as_displacements_where_branches_are_told_apart():
+    """The radians of a driven node that turns at once in a bifurcation had been taken for metres off the branch."""
+    rest = Balance(0.0, np.zeros(5), 0.0, 1.0, 0, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), None)
+
+    last = replace(rest, travel=2e-6, unknowns=np.array([0.0, 2e-6, 0.0, 0.0, 0.0]))
+    groups = (SimpleNamespace(free=np.array([[0.0], [0.0], [1.0]])),)
+    supports = SimpleNamespace(loose=np.arange(4), groups=groups, size=5)
+
+    def problem(off, turn):
+        answer = replace(rest, travel=1e-6, unknowns=np.array([off, 1e-6, 0.0, 0.0, turn]), factors=object())
+        return SimpleNamespace(size=0.06, supports=supports, solve=lambda _guess, _travel, _border: answer)
+
+    assert pose_between(problem(1e-5, 2e-3), rest, last, 1e-6) is not None
+    assert pose_between(problem(1e-3, 0.0), rest, last, 1e-6) is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.export.union import OutlinePiece, merge_pieces
+from cfmkit.export import OutlinePiece, merge_pieces
 from cfmkit.solid.boundary_and_element_sizes import SIZE_GRADING, Ring, Sizes
 from cfmkit.solid.mesh import _lattice, mesh
 from cfmkit.solid.meshed_part import rings_of

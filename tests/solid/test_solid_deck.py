@@ -12,11 +12,7 @@ import pytest
 import cfmkit
 from cfmkit.elastica import Control, Displacement, trace
 from cfmkit.errors import UsageError
-from cfmkit.export.beam_deck_for_abaqus import beam_deck
 from cfmkit.families import family
-from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
-from cfmkit.families.vcfm.part import solved_leaf, solved_spring
-from cfmkit.families.vcfm.plane_fem_analysis import part_of
 
 QUICK = ("analysis.solid.error=0.1", "analysis.solid.poses=8", "analysis.travel=0.8 mm", "analysis.fidelity=solid")
 
@@ -52,7 +48,8 @@ def test_a_deck_read_back_is_the_mesh_that_is_solved(made):
         "vcfm-spring-as-beams.inp",
         "vcfm-spring.inp",
     ]
-    problem = part_of(spec, solved_leaf(spec)).create_mesh().refine()[0].problem
+    leaf, _ = family("vcfm").elastic.solids(spec)
+    problem = leaf.part.create_mesh().refine()[0].problem
     read = blocks(files["vcfm-leaf.inp"])
     nodes = np.array(numbers(next(lines for head, lines in read if head.startswith("*NODE, NSET=ALL"))))
     rows = np.array(numbers(next(lines for head, lines in read if head.startswith("*ELEMENT")))).astype(int)
@@ -86,18 +83,15 @@ def test_the_width_is_so_small_that_elements_are_in_plane_stress(made):
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 def test_calculix_finds_the_same_force(made, tmp_path):
     spec, files = made
-    for name, piece, share_of_travel in (("leaf", solved_leaf(spec), 1.0), ("spring", solved_spring(spec), 0.5)):
+    solids = family("vcfm").elastic.solids(spec)
+    for name, solid, share_of_travel in zip(("leaf", "spring"), solids, (1.0, 0.5), strict=True):
         data = files[f"vcfm-{name}.inp"]
         (tmp_path / f"{name}.inp").write_bytes(data)
         subprocess.run(["ccx", "-i", name], cwd=tmp_path, check=True, capture_output=True, timeout=120)
         reported = (tmp_path / f"{name}.dat").read_text()
         share = float(re.search(rb"widths are (\S+) times", data)[1])
         force = re.findall(r"for set SHUTTLE-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)\s+(\S+)", reported)
-        own = (
-            part_of(spec, piece)
-            .create_mesh(1e-3)
-            .follow_stops([0.0, 0.4e-3 * share_of_travel, 0.8e-3 * share_of_travel])
-        )
+        own = solid.part.create_mesh(1e-3).follow_stops([0.0, 0.4e-3 * share_of_travel, 0.8e-3 * share_of_travel])
         assert -float(force[0][1]) / share == pytest.approx(own.course.poses[-1].effort, rel=1e-3)
 
 
@@ -115,16 +109,17 @@ def force_at_the_end(folder, data):
 def test_a_deck_of_beams_read_back_is_the_network(made):
     spec, files = made
     read = blocks(files["vcfm-leaf-as-beams.inp"])
-    about, strip = spec.mechanism.bistable, strip_of(spec.mechanism.bistable, spec.mechanism.material)
+    about = spec.mechanism.bistable
+    reach, rise = 1e3 * about.length * np.array([np.cos(about.angle), np.sin(about.angle)])
     nodes = {
         int(row[0]): np.array(row[1:]) for head, lines in read if head == "*NODE, NSET=ALL" for row in numbers(lines)
     }
     rows = [row for head, lines in read if head.startswith("*ELEMENT, TYPE=B32") for row in numbers(lines)]
     ends = {tuple(nodes[int(row[k])]) for row in rows for k in (1, 3)}
     assert (0.0, 0.0, 0.0) in ends
-    assert any(end == pytest.approx((1e3 * strip.reach, 1e3 * strip.rise, 0.0)) for end in ends)
+    assert any(end == pytest.approx((reach, rise, 0.0)) for end in ends)
     along = np.array([[nodes[int(row[k])] for k in (1, 2, 3)] for row in rows])
-    assert np.hypot(*(along[:, 2] - along[:, 0]).T[:2]).sum() == pytest.approx(1e3 * np.hypot(strip.reach, strip.rise))
+    assert np.hypot(*(along[:, 2] - along[:, 0]).T[:2]).sum() == pytest.approx(1e3 * about.length)
     assert along[:, 1] == pytest.approx(0.5 * (along[:, 0] + along[:, 2]))
     (section,) = (numbers(lines) for head, lines in read if head.startswith("*BEAM SECTION"))
     assert section == [[1e3 * about.width, 1e3 * about.thickness], [0, 0, 1]]
@@ -135,9 +130,8 @@ def test_a_deck_of_beams_read_back_is_the_network(made):
 
 def test_links_of_a_deck_of_beams_are_stiff_and_every_set_that_is_used_is_there():
     spec = cfmkit.load("configs/slider_crank_lumped.yaml", ["analysis.travel=[0 mm, 2 mm]"])
-    (network,) = family(spec.family).elastic.beams(spec)
-    text = beam_deck("title", network, 10)
-    read = blocks(text)
+    (deck,) = (data for name, data in cfmkit.export(spec, format="inp").items() if name.endswith("as-beams.inp"))
+    read = blocks(deck)
     links = [numbers(lines)[0] for head, lines in read if head == "*ELEMENT, TYPE=B32, ELSET=LINKS"]
     assert len(links) == 2
     made = {word for head, _ in read for word in re.findall(r"(?:^\*ELEMENT.*ELSET|^\*NODE.*NSET)=([\w-]+)", head)}
@@ -220,12 +214,12 @@ analysis: {travel: 10 deg, points: 11, fidelity: solid, solid: {poses: 5, error:
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 def test_calculix_finds_the_force_of_the_beams(made, tmp_path):
     """Its beams become bricks with rigid ends: within 1 % of the engine's stretching and shearing beams."""
-    spec, _ = made
-    for network in family(spec.family).elastic.beams(spec):
+    spec, files = made
+    for name, network in zip(("leaf", "spring"), family(spec.family).elastic.beams(spec), strict=True):
         end = float(network.drive.points[-1])
         drive = Displacement(network.drive.node, network.drive.direction, np.linspace(0.0, end, 9)[1:])
         own = float(trace(network.network, drive, Control(branch="primary")).effort[-1])
-        assert force_at_the_end(tmp_path, beam_deck("title", network, 4)) == pytest.approx(own, rel=0.01)
+        assert force_at_the_end(tmp_path, files[f"vcfm-{name}-as-beams.inp"]) == pytest.approx(own, rel=0.01)
 
 
 def test_what_has_no_elastic_part_has_no_deck():

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 import cfmkit
-from cfmkit.runs.specfile import read_spec
 from cfmkit.specs.yamlio.base_file import base_files
 
 CAM = (Path(__file__).parents[2] / "configs" / "cam.yaml").read_text()
@@ -115,12 +114,6 @@ def test_a_base_that_cannot_be_read_as_yaml_is_named(folder):
 def test_a_text_has_no_base():
     with pytest.raises(cfmkit.SpecError, match="this text is in no file"):
         cfmkit.loads("base: cam.yaml\n")
-
-
-def test_the_place_of_what_the_base_says_is_where_the_base_is_named(folder):
-    document = read_spec(str(written(folder, "name: mine\nbase: cam.yaml\n")))
-    assert document.place("requirements.0") == (2, 7)
-    assert document.place("name") == (1, 7)
 
 
 def test_a_batch_computes_again_when_the_base_has_changed(folder):

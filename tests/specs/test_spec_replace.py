@@ -13,7 +13,7 @@ from cfmkit.api import load
 from cfmkit.specs.yamlio.path_notation import with_value
 
 if TYPE_CHECKING:
-    from cfmkit.specs.spec import Spec
+    from cfmkit import Spec
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 FILES = sorted([*CONFIGS.glob("*.yaml"), *CONFIGS.glob("studies/*.yaml")])
@@ -25,6 +25,12 @@ SWITCHES = [
     ("requirements", ()),
     ("mechanism.width", "11 mm"),
 ]
+
+
+def test_a_number_that_replaces_an_angle_is_an_angle() -> None:
+    """As errors of parts do, which are numbers in SI."""
+    spec = load(CONFIGS / "slider_crank_li2019.yaml").replace({"analysis.window": ("2 deg", "10 deg")})
+    assert spec.replace({"analysis.window.0": 0.1}).analysis.window[0].dimension == "angle"
 
 
 def replaced_whole(spec: Spec, path: str, value: Any) -> Spec | None:

@@ -7,11 +7,9 @@ import pytest
 from cam_support import design_exactly
 
 import cfmkit
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import SpecError
-from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.metrics import check, evaluate
-from cfmkit.numerics.monotone_interpolation import ThroughPoints
 from cfmkit.specs.target_curve import Target
 
 CAM = """
@@ -50,30 +48,6 @@ def cam(target, roller="2 mm", friction=0, mechanism="", design="", more=""):
 def designed(*args, **kwargs):
     """Return the designed cam's specification, before its digits are those of the process."""
     return design_exactly(cam(*args, **kwargs))
-
-
-@pytest.mark.parametrize("smooth", [True, False])
-def test_integral_and_slope_are_those_of_the_function(smooth):
-    curve = ThroughPoints((0.0, 1.0, 2.5, 3.0, 4.0), (1.0, 1.0, 2.0, 0.5, 0.7), smooth)
-    x = np.linspace(-0.5, 4.5, 301)
-    x = x[np.abs(x[:, None] - np.array(curve.places)).min(axis=1) > 2e-5]
-    h = 1e-5
-    assert np.allclose((curve.integral(x + h) - curve.integral(x - h)) / (2 * h), curve.evaluate(x), atol=1e-9)
-    inside = x[(x > 0) & (x < 4)]
-    assert np.allclose(
-        (curve.evaluate(inside + h) - curve.evaluate(inside - h)) / (2 * h), curve.slope(inside), atol=1e-6
-    )
-    assert curve.evaluate(np.array(curve.places)) == pytest.approx(curve.values)
-
-
-def test_a_smooth_curve_rounds_steps_and_does_not_overshoot():
-    curve = ThroughPoints((0.0, 1.0, 1.2, 3.0), (1.0, 1.0, 2.0, 2.0))
-    values = curve.evaluate(np.linspace(0.0, 3.0, 1001))
-    assert values.min() == 1.0
-    assert values.max() == 2.0
-    assert (np.diff(values) >= 0).all()
-    assert curve.slope(1.0) == 0.0
-    assert curve.extremes(0.0, 3.0) == (1.0, 2.0)
 
 
 @pytest.mark.parametrize(
@@ -149,7 +123,7 @@ def test_a_cam_follows_its_curve_to_1e_9(target):
 
 
 def test_work_on_the_slider_is_the_energy_of_the_springs():
-    assembly = assemble(designed(STEP_UP))
+    assembly = cfmkit.analyze(designed(STEP_UP)).state.assembly
     law, stiffness = assembly.profile.path.law, assembly.loads.stiffness
     x = np.linspace(law.rest_half_width, assembly.profile.end, 7)
     stored = 0.5 * stiffness * (2.0 * (x - law.rest_half_width)) ** 2
@@ -235,7 +209,7 @@ def test_page_and_notebook_lead_with_the_deviation_from_a_curve_and_from_none_wh
     file = tmp_path / "rising.yaml"
     file.write_text(cfmkit.dumps(designed(RISING, friction=0.002)), encoding="utf-8")
     for name, there in ((str(file), True), ("configs/cam.yaml", False)):
-        assert main(["analyze", name, "--no-plots", "-o", str(tmp_path / "out")]) == 0
+        assert run_command(["analyze", name, "--no-plots", "-o", str(tmp_path / "out")]) == 0
         assert ("deviation from curve" in capsys.readouterr().out) == there
         assert ("deviation from curve" in cfmkit.analyze(name)._repr_html_()) == there
 

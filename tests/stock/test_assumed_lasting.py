@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.stock import MATERIALS_BY_NAME
 from cfmkit.stock.assumed_lasting import ASSUMED_DATA, steel
 from cfmkit.stock.material_and_part_spec import MaterialSpec
@@ -70,7 +70,7 @@ def test_what_is_assumed_is_not_written_into_a_specification():
 
 
 def test_an_analysis_reports_the_force_after_a_hold_and_that_its_creep_is_assumed(tmp_path, capsys):
-    assert main(["analyze", str(CONFIGS / "make_pom_strip.yaml"), "--no-plots", "-v", "-o", str(tmp_path)]) == 0
+    assert run_command(["analyze", str(CONFIGS / "make_pom_strip.yaml"), "--no-plots", "-v", "-o", str(tmp_path)]) == 0
     assert "durability" in (page := capsys.readouterr().out)
     assert "Hostaform C 9021" in page
     metrics = json.loads((tmp_path / "metrics.json").read_text())["metrics"]
@@ -79,8 +79,8 @@ def test_an_analysis_reports_the_force_after_a_hold_and_that_its_creep_is_assume
 
 
 def test_the_page_says_what_is_assumed(capsys):
-    assert main(["show", "materials", "--json"]) == 0
+    assert run_command(["show", "materials", "--json"]) == 0
     shown = capsys.readouterr().out
     assert "Hostaform C 9021" in shown
-    assert main(["show", "steel-304"]) == 0
+    assert run_command(["show", "steel-304"]) == 0
     assert "assumed S-N" in capsys.readouterr().out

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import pytest
 from cam_support import analyze, cam, design
@@ -11,7 +10,6 @@ from pydantic import ValidationError
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.families.slider_crank.springs.bought_springs import _why_not as why_not
 from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 from cfmkit.stock.springs.spec import CatalogueSpring
 
@@ -215,17 +213,3 @@ def test_a_wire_bears_its_share_of_the_rate_that_is_stated(tmp_path):
     three = (*given.mechanism.springs.bought, {**WITH_WIRE, "count": 2})
     shared = given.replace({"mechanism.springs.bought": three, "mechanism.springs.pivot": 3 * 1.09 * wound.rate})
     assert cfmkit.analyze(shared).values["wire_stress_max"].value == pytest.approx(most, rel=1e-9)
-
-
-def test_a_spring_that_does_not_last_its_reversals_is_not_chosen():
-    """Its life in a design is that between both ends of its motion, as in the analysis."""
-    offer = {"name": "T", "kind": "torsion", "wire": "0.8 mm", "coil": "4.8 mm", "turns": 5, "fatigue": FATIGUE}
-    offer = CatalogueSpring.model_validate(offer | {"max_angle": "120 deg"}).offer
-    wanted = SimpleNamespace(spring_room=None, spring_safety=None, spring_life=1000.0)
-    turned = math.radians(55.0)
-    assert why_not(offer, (0.0, turned), wanted) is None
-    share, reported = why_not(offer, (-turned, turned), wanted)
-    wound = HelicalSpring("torsion", 0.8e-3, 4.8e-3, 5.0)
-    cycles = 0.5 * (wound.stress(wound.rate * turned) / 2000e6) ** -10.0  # a load that reverses has no mean
-    assert share == pytest.approx(1 - cycles / 1000, rel=1e-3)
-    assert "cycles" in reported

@@ -14,12 +14,10 @@ import cfmkit
 from cfmkit import Run
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
-from cfmkit.families.slider_crank.spec import SliderCrankSpec
-from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.stock.springs.helical_spring_formulas import SEAT_FACTORS, HelicalSpring, buckling_deflection
 from cfmkit.stock.springs.made_to_measure import PIN_SHARE, extension_spring, stiffest, torsion_spring
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE, generic
-from cfmkit.stock.springs.spec import CatalogueSpring, offers
+from cfmkit.stock.springs.spec import CatalogueSpring, DataSource, offers
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireOutOfRange
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -356,7 +354,7 @@ CRANK = {
 def test_a_compression_spring_at_the_slider_buckles_too():
     analysis = {"drive": "force", "travel": ("0 mm", "35 mm")}
     data = {"family": "slider-crank", "name": "x", "mechanism": CRANK, "analysis": analysis}
-    spec = SliderCrankSpec.model_validate(data)
+    spec = family("slider-crank").spec_type.model_validate(data)
     (one,) = [one for one in cfmkit.analyze(spec).warnings if one.name == "spring_buckles"]
     assert one.cures == ("mechanism.springs.bought.0.guide_rod=4.95 mm",)
     cured = spec.replace({"mechanism.springs.bought.0.guide_rod": 4.95e-3})

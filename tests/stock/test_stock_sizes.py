@@ -1,17 +1,14 @@
 """Sizes that are sold, and dimensions with the digits that a process can hold."""
 
-import math
 import re
 
 import pytest
 
 import cfmkit
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import SpecError
 from cfmkit.metrics import check
-from cfmkit.stock.processes import PROCESSES_BY_NAME
 from cfmkit.stock.stock_series import ALL_SERIES, BALL_BEARINGS, SOCKET_SCREWS, bearings_of, screw_through, series_of
-from cfmkit.studies.stock_and_digits import decimals_of
 
 
 @pytest.mark.parametrize("series", ALL_SERIES, ids=lambda one: f"{one.kind}-{one.system}-{'-'.join(one.materials)}")
@@ -41,7 +38,7 @@ def test_bearings_and_screws_have_room_for_what_is_in_them():
 )
 def test_a_size_that_is_not_sold_is_refused_in_one_line_with_the_nearest(capsys, name, changes, path, nearest):
     options = [part for change in changes for part in ("--set", f"mechanism.{change}")]
-    assert main(["check", f"configs/{name}.yaml", *options]) == 3
+    assert run_command(["check", f"configs/{name}.yaml", *options]) == 3
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert f"mechanism.{path}: no " in line
     assert nearest in line
@@ -109,11 +106,3 @@ def test_rounding_costs_no_requirement_that_was_met():
     made = cfmkit.design(tight)
     found = cfmkit.analyze(made.spec)
     assert [one.ok for one in check(found.spec.part_requirements, found)] == [True, True]
-
-
-def test_the_last_digit_is_at_most_a_tenth_of_the_deviation_of_the_process():
-    for process in PROCESSES_BY_NAME.values():
-        unit = 10.0 ** -decimals_of(process) * 1e-3
-        deviation = min(process.thickness, process.position)
-        assert unit <= 0.1 * deviation * (1 + 1e-9)
-        assert unit > 0.01 * deviation or math.isclose(unit, 0.01 * deviation)

@@ -15,7 +15,6 @@ from store_support import INFO, enter_and_leave, listing, one_line, run
 
 from cfmkit.errors import FolderInUse, OutputError
 from cfmkit.store import RunFolder, lock, run_folder, safe_disk_changes
-from cfmkit.studies.journal import Journal
 
 # ---- the lock
 
@@ -310,11 +309,6 @@ def test_a_system_that_opens_no_folders_and_has_no_pread_writes_a_run(tmp_path, 
     run(tmp_path, a_csv=b"1", figures__x_png=b"2")
     run(tmp_path, a_csv=b"3")
     assert listing(tmp_path) == ["a.csv", "manifest.json"]
-    with Journal(tmp_path / "journal") as journal:
-        journal.add("0" * 32, [1, 2])
-        assert journal.read("0" * 32) == [1, 2]
-    with Journal(tmp_path / "journal") as journal:
-        assert journal.find("0" * 32) == [1, 2]
 
 
 def test_no_process_is_asked_by_a_signal_whether_it_lives_where_that_would_reach_it(monkeypatch):

@@ -6,17 +6,16 @@ import re
 from functools import cache
 
 import pytest
-from suggest_support import request
+from suggest_support import proposal_of, request
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
-from cfmkit.specs.yamlio import dump
-from cfmkit.stock.stock_series import series_of
+from cfmkit.stock import series_of
 from cfmkit.studies.parts.assumed_errors import accuracy_of
 from cfmkit.studies.stock_and_digits import decimals_of, lengths_and_angles
 from cfmkit.studies.suggest.digits_of_proposal import round_to_process
-from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, judge_proposal, make_proposal, numbers_of
+from cfmkit.studies.suggest.proposal_making_and_judging import judge_proposal, numbers_of
 from cfmkit.studies.suggest.search import offer_of
 
 STEEL = {"material": "steel-s235", "safety": "1.5"}
@@ -38,7 +37,7 @@ def propose_first(case):
     asked = request(**REQUESTS[case])
     candidates = offer_of(family(name), asked, Run()).candidates
     chosen = (candidate for candidate in candidates if candidate.variant.endswith(variant))
-    made = (make_proposal(ProposalJob(name, candidate, asked, 0)) for candidate in chosen)
+    made = (proposal_of(name, candidate, asked) for candidate in chosen)
     return asked, next(proposal for proposal in made if proposal.passes)
 
 
@@ -104,17 +103,17 @@ def test_a_tapered_strip_keeps_its_force_when_its_thicknesses_are_rounded():
 def test_a_window_is_as_long_as_a_travel_that_has_more_digits_than_the_process_holds():
     asked = request(travel="2.00004 mm")
     candidate = offer_of(family("vcfm"), asked, Run()).candidates[0]
-    proposal = make_proposal(ProposalJob("vcfm", candidate, asked, 0))
+    proposal = proposal_of("vcfm", candidate, asked)
     low, high = (1e3 * float(end) for end in cfmkit.loads(proposal.text).analysis.window)
     assert high - low == pytest.approx(2.001, abs=1e-9)
     again = judge_proposal("vcfm", "2 Vs", proposal.spec, asked)  # what is rounded stays as it is
-    assert dump(again.spec) == proposal.text.replace(proposal.spec.name, again.spec.name)
+    assert cfmkit.dumps(again.spec) == proposal.text.replace(proposal.spec.name, again.spec.name)
 
 
 def test_leaves_that_are_thinner_than_any_process_makes_are_named():
     asked = request(force="12 mN", travel="100 um", envelope="[12 mm, 9 mm, 0.5 mm]", material="titanium-6al-4v")
     candidate = offer_of(family("vcfm"), asked, Run()).candidates[0]
-    notes = make_proposal(ProposalJob("vcfm", candidate, asked, 0)).notes
+    notes = proposal_of("vcfm", candidate, asked).notes
     (note,) = [note for note in notes if note.startswith("leaves of ")]
     assert note.endswith("mm are thinner than 0.2 mm, the least assumed of wire-edm: state --process")
     thick = propose_first("vcfm")[1]

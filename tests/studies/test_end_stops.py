@@ -9,6 +9,7 @@ from given_points import GivenPoints
 
 import cfmkit
 from cfmkit.errors import SpecError
+from cfmkit.families import family
 from cfmkit.results import Status
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study
@@ -111,9 +112,7 @@ def test_the_window_that_is_not_stated_ends_at_a_stop():
 
 
 def test_parts_with_a_stop_are_the_same_in_a_study_as_alone():
-    from cfmkit.families.vcfm.model import solve_rows
-
-    assert not list(solve_rows([vcfm({"gap": GAP})] * 2))  # left to their own analyses
+    assert not list(family("vcfm").rows([vcfm({"gap": GAP})] * 2))  # left to their own analyses
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,9 @@ import pytest
 
 import cfmkit
 from cfmkit import Run
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.runs.run import run_analysis, run_design
 from cfmkit.specs.units import TravelShare
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.parts import drawn_yields
@@ -38,22 +37,6 @@ def with_yield(spec, least):
     return spec.replace({"requirements": (*spec.requirements, {"metric": "yield", "min": least})})
 
 
-def test_the_yield_is_that_of_the_tolerance_study_of_the_design():
-    found = run_design(cam(samples=120), Run(3))
-    design = found.design.spec
-    study = cfmkit.sensitivity(design, method="tolerance", parameters=TOLERANCES, samples=120, seed=3)
-    assert 0.05 < found.metrics["yield"].value < 0.95
-    assert found.metrics["yield"].value == study.summary["yield"]["value"]
-    assert found.supplement.data["yield"]["clopper_pearson"] == study.summary["yield"]["clopper_pearson"]
-
-
-def test_a_requirement_on_the_yield_decides_the_exit_code_and_keeps_its_place():
-    missed = run_design(with_yield(cam(samples=60), "99 %"), Run())
-    assert [one.metric for one in missed.requirements][-1] == "yield"
-    assert int(missed.exit_code) == 5
-    assert int(run_design(with_yield(cam(samples=60), "5 %"), Run()).exit_code) == 0
-
-
 def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says_so():
     """A cam cut for 240 mm ends a few micrometres earlier with a larger roller: half the parts had no value, unsaid."""
     tolerances = {"mechanism.roller_radius": {"normal": "0.05 mm"}}
@@ -69,13 +52,6 @@ def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says
     of_each = design.replace({"requirements": tuple(shares), "analysis.window": None})
     found = yields_of(replace(cfmkit.analyze(of_each), spec=of_each), None, Run())
     assert (found.lacking, found.after.good) == ((0, ""), 40)
-
-
-def test_an_analysis_does_not_judge_a_yield():
-    spec = with_yield(cam(), "99 %")
-    found = run_analysis(spec, Run())
-    assert len(found.requirements) == len(spec.requirements) - 1
-    assert int(found.exit_code) == 0
 
 
 def test_an_error_of_all_springs_is_common_and_a_trim_takes_it_away():
@@ -97,7 +73,7 @@ def test_a_trim_without_a_window_is_to_the_mean_force_over_that_of_a_requirement
     built = {"mechanism.roller_radius": "8 mm", "analysis.window": None, "analysis.travel": "236 mm"}
     scatter = {"mechanism.roller_radius": {"normal": "0.1 mm"}}
     spec = cam(tolerances=scatter, samples=30).replace({**built, "analysis.points": 31, "requirements": (limits,)})
-    spec = run_design(spec, Run()).design.spec
+    spec = cfmkit.design(spec).spec
     result = cfmkit.analyze(spec)
     made = Parts.of_design(spec, spec.design, 0)
     judged = analyze_parts(made, made.draw(), result, Run())
@@ -149,7 +125,7 @@ def test_bad_input_is_said_with_its_place(changes, reported):
 def test_a_tolerance_on_what_the_design_lacks_ends_with_3(tmp_path, capsys):
     text = cfmkit.dumps(cam(tolerances={"mechanism.springs.stiffness.*": {"normal": "1 %"}}, samples=20))
     (tmp_path / "cam.yaml").write_text(text)
-    assert main(["design", str(tmp_path / "cam.yaml"), "-o", str(tmp_path / "out"), "--no-plots", "--json"]) == 3
+    assert run_command(["design", str(tmp_path / "cam.yaml"), "-o", str(tmp_path / "out"), "--no-plots", "--json"]) == 3
     assert "design.tolerances" in json.loads(capsys.readouterr().out)["errors"][0]["path"]
 
 
@@ -214,21 +190,6 @@ analysis: {travel: 3 mm, points: 11}
 design: {rescale: {force: 2 N}, process: wire-edm}
 requirements: [{metric: force_max, max: 3 N}]
 """
-
-
-def test_a_yield_of_a_part_that_errs_nowhere_is_refused_and_never_met():
-    """Nothing is assumed of tapered beams between held nodes: a requirement on their yield was left out, exit 0."""
-    spec = cfmkit.loads(TAPERED)
-    asked = {"requirements": (*spec.requirements, {"metric": "yield", "min": "95 %"})}
-    for changes, path in ((asked, "requirements.1.metric"), ({"design.yield": "95 %"}, "design.yield")):
-        with pytest.raises(SpecError) as error:
-            cfmkit.loads(cfmkit.dumps(spec.replace(changes)))
-        assert [(one.path, "err by its process" in one.message) for one in error.value.problems] == [(path, True)]
-    found = run_design(spec.replace({**asked, "design.yield": "95 %"}), Run())
-    assert [(one.metric, one.ok, one.value) for one in found.requirements][1] == ("yield", False, None)
-    assert "err by its process" in found.requirements[1].sentence
-    assert int(found.exit_code) == 5
-    assert "err by its process" in dict(found.design.notes)["margins"]
 
 
 def test_parts_without_common_errors_are_analysed_themselves():

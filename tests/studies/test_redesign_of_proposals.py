@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
+from suggest_support import proposal_of, request_of
 
 import cfmkit
+from cfmkit import Run
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
-from cfmkit.runs.suggest_api import read_request
-from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, make_proposal, spec_of
+from cfmkit.studies.suggest.proposal_making_and_judging import spec_of
 from cfmkit.studies.suggest.search import offer_of
 
 REQUESTS = {
@@ -25,9 +25,9 @@ ELASTIC = "vcfm", "beam", "slider-crank"
 def first_proposal(key):
     """Return the specification of the first candidate that meets a request by the model of its design."""
     name = "slider-crank" if key == "turned" else key
-    asked = read_request(None, REQUESTS[key] | {"safety": "1.2"}).request()
+    asked = request_of(REQUESTS[key] | {"safety": "1.2"})
     for candidate in offer_of(family(name), asked, Run()).candidates:
-        proposal = make_proposal(ProposalJob(name, candidate, asked, 0))
+        proposal = proposal_of(name, candidate, asked)
         if proposal.passes:
             return spec_of(name, proposal.text)
     raise AssertionError(f"no candidate of {name} meets the request")

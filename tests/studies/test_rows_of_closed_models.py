@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from given_points import GivenPoints
+from study_rows import assert_rows_equal_runs
 
 import cfmkit
-from cfmkit.families import family
-from cfmkit.families.rows import Variants
-from cfmkit.metrics import split_name
+from cfmkit.families import Variants, family
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.variable_paths import FIXED_BLOCKS, CannotVary, leaf
@@ -97,18 +96,7 @@ def test_rows_have_the_requirements_that_runs_of_their_own_have(stem):
     numbers, draw = numbers_that_vary(spec), np.random.default_rng(39)
     chosen = draw.choice(sorted(numbers), min(3, len(numbers)), replace=False).tolist()
     plan = GivenPoints({path: numbers[path] * draw.uniform(0.99, 1.01, 5) for path in chosen})
-    study = Study(spec, plan.paths, own_metrics(spec))
-    together = evaluate_rows(study, plan, 0, len(plan))
-    largest = np.nanmax(np.abs(np.nan_to_num(together.values)), axis=0)
-    for k in range(len(plan)):
-        alone = study.evaluate(plan.point(k))
-        assert together.status(k) == (alone.status, alone.message)
-        if alone.values:
-            own = np.array([np.nan if value is None else value for value in alone.values])
-            np.testing.assert_array_equal(np.isnan(own), np.isnan(together.values[k]))
-            wrong = np.abs(together.values[k] - own) > 1e-12 * largest
-            assert not wrong.any(), [split_name(study.names[m]) for m in np.flatnonzero(wrong)]
-            assert tuple(together.met[k].tolist()) == alone.met
+    assert_rows_equal_runs(Study(spec, plan.paths, own_metrics(spec)), plan)
 
 
 @pytest.mark.parametrize("stem", ["cam_catalogue", "slider_crank_bought", "vcfm_ding2022"])
@@ -122,6 +110,20 @@ def test_mechanisms_with_bands_of_their_own_are_solved_together(stem):
     strokes = evaluate_rows(study, plan, 0, 3).values[:, 0]
     assert strokes.tolist() == pytest.approx([study.evaluate((band,)).values[0] for band in bands], rel=1e-12)
     assert (np.diff(strokes) > 0).any()
+
+
+def test_rows_know_the_usable_stroke_of_one_branch_alone():
+    needed = {"metric": "usable_stroke[load]", "min": "30 mm"}
+    changes = {"mechanism.rolling_friction": 0.02, "analysis.band": 0.08, "requirements": [needed]}
+    spec = cfmkit.load("configs/cam.yaml").replace(changes)
+    names = ("usable_stroke[load]", "usable_stroke[unload]", "usable_stroke")
+    study = Study(spec, ("mechanism.springs.stiffness",), metrics_of(spec, names, cfmkit.analyze(spec).curve))
+    plan = GivenPoints({"mechanism.springs.stiffness": 690.0 * np.linspace(0.95, 1.05, 9)})
+    together, alone = evaluate_rows(study, plan, 0, 9), [study.evaluate(plan.point(k)) for k in range(9)]
+    np.testing.assert_allclose(together.values, np.array([one.values for one in alone]), rtol=1e-12)
+    assert together.met.tolist() == [list(one.met) for one in alone]
+    assert set(together.met.ravel().tolist()) == {True, False}
+    assert (together.values[:, 0] > together.values[:, 2]).any()
 
 
 def study_variant(study, plan):
@@ -142,9 +144,14 @@ def test_rows_follow_a_curve_as_runs_of_their_own_do(stem, window, last):
     plan = GivenPoints({"analysis.window.1": np.array(last)})
     study = Study(spec, plan.paths, metrics)
     assert are_solved_together(study, plan)
-    together = evaluate_rows(study, plan, 0, 3)
-    for k in range(3):
-        alone = [np.nan if value is None else value for value in study.evaluate(plan.point(k)).values]
-        np.testing.assert_allclose(together.values[k], alone, rtol=1e-12, atol=1e-12, equal_nan=True)
+    together = assert_rows_equal_runs(study, plan)
     known = np.isfinite(together.values[:, names.index("deviation_from_curve")])
     assert known.tolist() == [True, True, not np.isfinite(spec.target_curve.extent[1])]
+
+
+def test_a_row_without_any_equilibrium_has_no_value_and_no_warning_of_numpy():
+    """16 mm of preload close the leaves all over the travel."""
+    vary = {"analysis.preloads.0": ["0 mm", "16 mm"]}
+    table = cfmkit.sweep("configs/vcfm_u_shape.yaml", vary=vary, metrics=["band_range_1pct", "force_mean"]).table
+    assert table["status"] == ("complete", "no_equilibrium")
+    assert np.isfinite(table["band_range_1pct"]).tolist() == [True, False]

@@ -14,12 +14,10 @@ import cfmkit
 from cfmkit import families
 from cfmkit.errors import ExitCode, SpecError, UsageError
 from cfmkit.families import family
-from cfmkit.plots.sensitivity import figures, short
-from cfmkit.plots.style import INCHES_PER_MM, png
 from cfmkit.results import Status
-from cfmkit.specs.sensitivity_methods import METHOD_NAMES
 from cfmkit.studies.engine import ROW_MISSING, run
 from cfmkit.studies.parts.share import Share
+from cfmkit.studies.sensitivity import METHOD_NAMES
 from cfmkit.studies.sensitivity.evaluation import Evaluator
 from cfmkit.studies.sensitivity.output import as_json, by_interval, exit_code, message, outputs, yield_ok
 from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
@@ -57,30 +55,6 @@ def test_a_method_evaluates_as_many_points_as_it_says(method):
     with pytest.raises(UsageError, match="--max-points"):
         prepare(spec(method), most=found.evaluator.count - 1)
     prepare(spec(method), most=found.evaluator.count)
-
-
-@pytest.mark.parametrize("method", METHOD_NAMES)
-@pytest.mark.parametrize("parameters", [PARAMETERS, BROKEN], ids=["complete", "with failures"])
-def test_pictures_are_drawn_whatever_failed_and_their_bytes_repeat(method, parameters):
-    found = study(method, parameters=parameters)
-    drawn = figures(found)
-    assert len(drawn) >= len(found.setup.study.metrics)
-    for name, draw in drawn.items():
-        picture = png(draw())
-        assert picture == png(draw()), name
-        assert len(picture) > 5000
-
-
-@pytest.mark.parametrize("method", METHOD_NAMES)
-def test_labels_of_axes_stay_clear_of_the_edges_of_the_picture(method):
-    for name, draw in figures(study(method)).items():
-        figure = draw()
-        figure.canvas.draw()
-        room = 4.0 * INCHES_PER_MM * figure.dpi
-        for axes in figure.axes:
-            box = axes.xaxis.label.get_window_extent()
-            assert room <= box.x0, name
-            assert box.x1 <= (axes.bbox.x1 if name == "yield_gain" else figure.bbox.x1 - room), name
 
 
 @pytest.mark.parametrize("method", ["oat", "morris", "sobol", "tolerance"])
@@ -269,18 +243,6 @@ def test_a_new_block_changes_no_other_result():
     setup = prepare(spec())
     other = prepare(spec(samples=8))
     assert setup.study.identity == other.study.identity
-
-
-@pytest.mark.parametrize(
-    ("path", "name"),
-    [
-        ("mechanism.brace_length", "brace length"),
-        ("mechanism.springs.stiffness.0, mechanism.springs.stiffness.1", "springs stiffness (2)"),
-        ("mechanism.a, mechanism.b", "a, b"),
-    ],
-)
-def test_names_on_pictures_are_short(path, name):
-    assert short(path) == name
 
 
 def test_blocks_are_numbered_on_when_more_are_drawn():

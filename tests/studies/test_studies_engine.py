@@ -1,6 +1,7 @@
 """A study point by point: failures become rows, rows are reused by content, executors agree."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,9 +9,7 @@ from journal_support import damage_a_record
 
 import cfmkit
 from cfmkit.errors import OutputError, UsageError
-from cfmkit.families import family
-from cfmkit.families.cam.cams_in_rows import solve_rows
-from cfmkit.families.rows import FindingRule, Variants
+from cfmkit.families import FindingRule, Variants, family
 from cfmkit.results import Finding, Status
 from cfmkit.store import origin
 from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
@@ -228,7 +227,7 @@ def test_the_warnings_of_rows_are_theirs_and_those_of_single_analyses(monkeypatc
     def rows(variants):
         friction = variants.values["mechanism.profile.friction"]
         some = np.flatnonzero(friction < 0.0025)
-        for indices, solved in solve_rows(Variants(SPEC, {}, lambda _k: SPEC, len(some))):
+        for indices, solved in record.rows(Variants(SPEC, {}, lambda _k: SPEC, len(some))):
             own = friction[some[indices]]
             rules = (
                 FindingRule("high_pressure_angle", lambda _solution, own=own: own > 0.0015, str),
@@ -410,3 +409,15 @@ def test_small_blocks_are_computed_together_and_noted_one_by_one(tmp_path):
     with Journal(tmp_path / "journal") as journal:
         assert run(more, noting, journal).reused == 3584
     assert jobs == [(3584, 3590)]
+
+
+def test_a_study_knows_a_data_file_by_its_content(tmp_path):
+    (tmp_path / "synthetic").mkdir()
+    (tmp_path / "cam.yaml").write_bytes(Path("configs/cam_as_built.yaml").read_bytes())
+    points = Path("configs/synthetic/cam_flanks.csv").read_text()
+
+    def key(points):
+        (tmp_path / "synthetic/cam_flanks.csv").write_text(points)
+        return Study(cfmkit.load(tmp_path / "cam.yaml"), ("mechanism.rolling_friction",), ()).key((0.002,))
+
+    assert key(points) == key(points) != key(points[::-1].replace("1", "2", 1)[::-1])

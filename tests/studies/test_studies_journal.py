@@ -1,5 +1,7 @@
 """The journal: what was acknowledged stays, what is damaged is reported and done again."""
 
+import os
+import signal
 import subprocess
 import sys
 
@@ -8,7 +10,6 @@ import pytest
 from journal_support import damage_a_record
 
 from cfmkit.errors import OutputError
-from cfmkit.store import lock
 from cfmkit.studies.journal import Journal
 
 
@@ -178,7 +179,7 @@ KILLED = (
 @pytest.mark.parametrize("locks", ["locks", "no locks"])
 def test_what_was_acknowledged_survives_a_kill(path, locks, monkeypatch):
     if locks == "no locks":  # of the file system; the database then runs without any
-        monkeypatch.setenv(lock.NO_LOCK, "1")
+        monkeypatch.setenv("CFMKIT_NO_LOCK", "1")
     assert subprocess.run([sys.executable, "-c", KILLED, str(path)]).returncode == -9
     with Journal(path) as journal:
         assert [journal.find(key(n)) for n in range(100)] == list(range(100))
@@ -223,3 +224,13 @@ def test_what_another_study_left_is_dropped_and_gives_its_room_back(path):
     assert path.stat().st_size < large / 5
     with Journal(path) as journal:
         assert (len(journal), journal.find(key(9)), journal.find(key(10))) == (10, {"v": [3.0]}, None)
+
+
+def test_a_journal_is_kept_where_folders_cannot_be_opened(path, monkeypatch):
+    """As on Windows."""
+    for name in ("O_DIRECTORY", "O_NOFOLLOW", "pread", "pwrite"):
+        monkeypatch.delattr(os, name)
+    monkeypatch.delattr(signal, "pthread_sigmask")
+    filled(path, 1)
+    with Journal(path) as journal:
+        assert journal.find(key(0)) == journal.read(key(0)) is not None

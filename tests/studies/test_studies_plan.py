@@ -51,6 +51,18 @@ def test_a_value_of_a_list_in_the_spec_varies_by_its_index():
     assert changed.mechanism.springs.stiffness[3] == spec.mechanism.springs.stiffness[3]
 
 
+@pytest.mark.parametrize(("unit", "dimension"), [("N/mm", "stiffness"), ("N*mm/rad", "rotational_stiffness")])
+def test_a_value_of_several_dimensions_knows_which_one_it_has(unit, dimension):
+    for values, drawn in (
+        (f"[1 {unit}, 2 {unit}]", False),
+        (f"1 {unit}:2 {unit}:2", False),
+        (f"1 {unit}:2 {unit}", True),
+    ):
+        asked = read(f"analysis.target.stiffness={values}", drawn=drawn)
+        plan = sample_axes(asked, Draw("lhs", 2)) if drawn else grid(asked)
+        assert plan.point(1)[0].dimension == dimension
+
+
 def test_the_first_variable_of_a_grid_varies_slowest():
     plan = grid(read(f"{RADIUS}=[1mm,2mm]", "analysis.points=[11,21,31]"))
     assert [plan.point(k) for k in range(6)] == [

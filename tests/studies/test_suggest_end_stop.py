@@ -8,22 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from suggest_support import POM, request
+from suggest_support import POM, block, proposal_of, request
 
 import cfmkit
-from cfmkit.documents.suggestion_document import document_of
+from cfmkit import Run
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.end_stops_spec import BEFORE_STOP
-from cfmkit.families.hardware import PIN_STRENGTH
-from cfmkit.families.run_control import Run
-from cfmkit.families.suggestion_request import STOP_MARGIN_SHARE
-from cfmkit.runs.part_on_paper import how_to_fasten, list_stops
-from cfmkit.runs.suggest_api import read_request
-from cfmkit.runs.suggestion_record import as_json, exit_code
 from cfmkit.studies.suggest.end_stop_of_proposal import NO_END_STOP
-from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, make_proposal
-from cfmkit.studies.suggest.search import Suggestions, offer_of
+from cfmkit.studies.suggest.search import offer_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -35,7 +27,7 @@ REQUESTS = {"beam": {}, "vcfm": {}, "slider-crank": STRIP, "cam": CAM}
 @cache
 def propose_first(name):
     asked = request(overload="60 N", **REQUESTS[name])
-    return asked, make_proposal(ProposalJob(name, offer_of(family(name), asked, Run()).candidates[0], asked, 0))
+    return asked, proposal_of(name, offer_of(family(name), asked, Run()).candidates[0], asked)
 
 
 @pytest.fixture(scope="module", params=list(REQUESTS))
@@ -58,9 +50,11 @@ def test_the_file_of_a_proposal_has_a_stop_behind_its_travel_and_meets_the_reque
     assert all(outcome.ok for outcome in result.requirements)
     begin, end = (float(place) for place in spec.analysis.window)
     assert end - begin == pytest.approx(asked.travel, rel=1e-5)
-    assert end_of(spec) == pytest.approx(end + STOP_MARGIN_SHARE * asked.travel, rel=1e-12)
+    assert end_of(spec) == pytest.approx(end + 0.03 * asked.travel, rel=1e-12)
     # box and stress are those at the stop
-    assert result.curve.motion.max() == pytest.approx(end_of(spec), abs=1.01 * BEFORE_STOP)
+    assert result.curve.motion.max() == pytest.approx(
+        end_of(spec), abs=1.01e-6
+    )  # at the stop itself the drive is blocked
 
 
 def test_the_stop_carries_what_the_overload_has_above_the_own_force(proposal):
@@ -109,12 +103,8 @@ def test_springs_at_pins_and_stages_in_series_are_not_offered_for_an_overload():
     assert layered.replace({"mechanism.copies.layers": 1}).end_stop_changes(0.01)
 
 
-def test_the_page_says_what_the_stop_carries(proposal):
-    asked, made = proposal
-    keys = POM | REQUESTS[made.family] | {"overload": "60 N"}
-    record = as_json(Suggestions(asked, (), (), (), unjudged=(made,)), read_request(None, keys))
-    notes = document_of(record, exit_code(Suggestions(asked, (), (), (), unjudged=(made,)))).notes
-    assert any(note.text == made.notes[0] and note.text.startswith("end stop, rigid") for note in notes)
+def test_a_note_says_what_the_stop_carries(proposal):
+    assert proposal[1].notes[0].startswith("end stop, rigid")
 
 
 @pytest.mark.parametrize(
@@ -128,7 +118,7 @@ def test_the_page_says_what_the_stop_carries(proposal):
 )
 def test_an_overload_that_makes_no_sense_is_refused_in_one_line(keys, words):
     with pytest.raises(SpecError) as caught:
-        read_request(None, POM | keys)
+        block(POM | keys)
     (problem,) = caught.value.problems
     assert words in str(problem)
 
@@ -136,7 +126,7 @@ def test_an_overload_that_makes_no_sense_is_refused_in_one_line(keys, words):
 def test_an_overload_goes_with_a_force_only():
     keys = {"torque": "1 N*m", "angle": "20 deg", "envelope": "[80 mm, 60 mm]", "overload": "60 N"}
     with pytest.raises(SpecError, match="goes with 'force' only"):
-        read_request(None, keys)
+        block(keys)
 
 
 def test_a_stop_up_to_which_the_travel_goes_is_no_near_contact():
@@ -149,14 +139,4 @@ def test_the_pin_that_is_named_for_a_stop_bears_it_in_bending_by_hand(proposal):
     number, pin = re.search(r"carries (\S+) N of 60 N: a steel pin of (\S+) mm", made.notes[0]).groups()
     moment = float(number) * 0.5 * made.numbers["depth"]
     stress = 32.0 * moment / (np.pi * (1e-3 * float(pin)) ** 3)
-    assert stress <= PIN_STRENGTH / max(asked.safety, 1.5)
-
-
-def test_the_drawing_says_where_the_stop_stands_and_that_there_are_no_holes(proposal):
-    spec = cfmkit.loads(proposal[1].text)
-    words = f"{1e3 * end_of(spec):.6g} mm along the motion from the unloaded pose; not drawn"
-    assert any(line.endswith(words) for line in list_stops(spec))
-    assert list_stops(spec.replace({"mechanism.stops": None if spec.family == "cam" else {}})) == ()
-    assert bool(how_to_fasten(spec)) == (spec.family != "cam")
-    if spec.family != "cam":
-        assert how_to_fasten(spec.replace({"mechanism.part.screws": "M3"})) == ()
+    assert stress <= 235e6 / max(asked.safety, 1.5)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import pytest
-from suggest_support import propose
+from suggest_support import proposal_of, propose, request_of
 
 import cfmkit
 from cfmkit.families import family
-from cfmkit.families.beam.proposals import kept_shapes
-from cfmkit.runs.suggest_api import read_request
-from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, judge_proposal, make_proposal
+from cfmkit.studies.suggest.proposal_making_and_judging import judge_proposal
 
 ABS = "{youngs_modulus: 1800 MPa, poisson_ratio: 0.35, yield_strength: 42.5 MPa}"
 
 
 def offered(name, **keys):
-    asked = read_request(None, {"safety": "1", **keys}).request()
+    asked = request_of({"safety": "1", **keys})
     return asked, propose(name, asked).candidates
 
 
@@ -54,7 +52,7 @@ def test_strips_that_are_probably_too_wide_come_after_those_that_are_not():
 
 def test_a_cam_whose_shafts_are_too_thick_for_its_rollers_is_no_proposal():
     spec = cfmkit.load("configs/cam.yaml").replace({"mechanism.roller_radius": "2 mm"})
-    asked = read_request(None, {"force": "50 N", "travel": "230 mm", "envelope": "[500 mm, 700 mm]"}).request()
+    asked = request_of({"force": "50 N", "travel": "230 mm", "envelope": "[500 mm, 700 mm]"})
     proposal = judge_proposal("cam", "small rollers", spec, asked)
     assert "stress" in proposal.fails
     assert any(text.startswith("shafts of the rollers: ") for text in proposal.missed)
@@ -66,23 +64,17 @@ def test_a_shape_is_offered_with_its_own_thickness_too():
     keys = {"force": "0.4 N", "travel": "5.94 mm", "ripple": "1.8 %", "envelope": "[67.7 mm, 19.95 mm, 10.1 mm]"}
     asked, candidates = offered("beam", **keys, material=material)
     arches = [one for one in candidates if one.variant == "shape arch"]
-    missed = [make_proposal(ProposalJob("beam", one, asked, 0)).missed for one in arches]
+    missed = [proposal_of("beam", one, asked).missed for one in arches]
     assert () in missed
     thickest = max(arches, key=lambda one: one.spec.mechanism.thickness)
     assert any("needs" in text for text in missed[arches.index(thickest)])
-
-
-def test_no_stored_shape_touches_itself():
-    for kept in kept_shapes():
-        result = cfmkit.analyze(kept.spec.replace({"analysis.fidelity": "reissner", "analysis.points": 11}))
-        assert "beams_touch" not in {one.name for one in result.warnings}, kept.name
 
 
 def test_a_cam_for_a_large_force_has_a_plate_pins_and_springs_that_fit():
     """500 N over 250 mm: with a plate for 4.5 times the force on each roller, whatever its path, there was none."""
     keys = {"force": "500 N", "travel": "250 mm", "ripple": "4 %", "envelope": "[600 mm, 900 mm, 200 mm]"}
     asked, candidates = offered("cam", **keys, material="steel-s235", safety="1.5")
-    made = [make_proposal(ProposalJob("cam", one, asked, 0)) for one in candidates if one.springs == "custom"]
+    made = [proposal_of("cam", one, asked) for one in candidates if one.springs == "custom"]
     assert any(one.good for one in made), [one.missed for one in made]
     factors = [one.numbers["safety_factor"] for one in made if one.text]
     assert all(1.5 <= factor < 1.8 for factor in factors), factors
@@ -91,16 +83,26 @@ def test_a_cam_for_a_large_force_has_a_plate_pins_and_springs_that_fit():
 def test_the_pins_of_a_cam_with_friction_bear_its_braces():
     keys = {"force": "120 N", "travel": "60 mm", "ripple": "3 %", "envelope": "[250 mm, 350 mm, 80 mm]"}
     asked, candidates = offered("cam", **keys, hysteresis="6 %", material="steel-s235", safety="1.5")
-    made = [make_proposal(ProposalJob("cam", one, asked, 0)) for one in candidates[:6]]
+    made = [proposal_of("cam", one, asked) for one in candidates[:6]]
     assert any(one.good for one in made)
     assert not any("slider pin" in text for one in made for text in one.missed)
+
+
+def test_closed_forms_of_a_small_cam_count_the_friction_of_its_pins():
+    """Without it the loss of a cycle was half of the true one, and 5 of 8 small cams of POM missed 3 %."""
+    keys = {"force": "10 N", "travel": "30 mm", "ripple": "10 %", "envelope": "[120 mm, 120 mm, 30 mm]"}
+    asked, candidates = offered("cam", **keys, hysteresis="3 %", material="pom", safety="1.5")
+    made = [proposal_of("cam", candidate, asked) for candidate in candidates[:8]]
+    missed = [proposal.variant for proposal in made if any("hysteresis" in text for text in proposal.missed)]
+    assert len(made) == 8
+    assert len(missed) <= 2, missed
 
 
 def test_catalogue_springs_get_a_plate_that_bears_their_rollers():
     """Over all of the travel; on a sharp corner no plate is thick enough."""
     keys = {"force": "5 N", "travel": "40 mm", "ripple": "3 %", "envelope": "[130 mm, 170 mm, 36 mm]"}
     asked, candidates = offered("cam", **keys, springs="catalogue", material="steel-s235", safety="1.5")
-    made = [make_proposal(ProposalJob("cam", one, asked, 0)) for one in candidates if one.springs == "catalogue"]
+    made = [proposal_of("cam", one, asked) for one in candidates if one.springs == "catalogue"]
     assert any(one.good for one in made)
     missed = [text for one in made for text in one.missed if text.startswith("safety factor")]
     assert all("unbounded" in text for text in missed)
@@ -129,9 +131,7 @@ def test_a_thin_screw_that_bears_its_share_is_no_fault():
 def test_catalogue_springs_are_proposed_at_the_pins_of_a_linkage():
     keys = {"force": "5 N", "travel": "40 mm", "ripple": "3 %", "envelope": "[120 mm, 160 mm, 25 mm]"}
     asked, candidates = offered("slider-crank", **keys, material="steel-s235", safety="1.5")
-    made = [
-        make_proposal(ProposalJob("slider-crank", one, asked, 0)) for one in candidates if one.springs == "catalogue"
-    ]
+    made = [proposal_of("slider-crank", one, asked) for one in candidates if one.springs == "catalogue"]
     good = [one for one in made if one.good]
     assert good, [one.missed or one.message for one in made]
     for one in good:

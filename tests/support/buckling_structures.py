@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 UP, DOWN = np.pi / 2, -np.pi / 2
 LEAF_LENGTH, LEAF_RISE = 35e-3, 35e-3 * np.sin(np.radians(8))
 STRIP = el.Section(2e9, 8e-3, 1e-3)
+ALONG = el.slider_support(0.0, rotates=True)
 STIFF_STRIP = el.Section(2e9, 8e-3, 1e-3, axial=False)
 
 
@@ -32,6 +33,22 @@ def leaves(
         strip = el.Section(1477e6, 6e-3, thickness * factor, **section)
         beams[f"b{k}"] = el.Beam(f"w{k}", "d", strip, end_offset=(0.0, -down))
     return el.Network(nodes, beams)
+
+
+def ding_leaf(thickness: float = 1e-3) -> el.Network:
+    """Return the V-beam of Ding, Li and Li (2022), pressed down at d it buckles twice."""
+    length, angle = 35e-3, np.radians(7)
+    nodes = {
+        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "d": el.Node(length * np.cos(angle), length * np.sin(angle), el.slider_support(UP)),
+    }
+    return el.Network(nodes, {"v": el.Beam("wall", "d", el.Section(1477e6, 6e-3, thickness))})
+
+
+def column(section: el.Section, clamped: bool) -> el.Network:
+    """Return a column of 0.1 m whose far end b is guided along it; else it is pinned at both ends."""
+    start, end = (el.CLAMPED_SUPPORT, el.slider_support(0.0)) if clamped else (el.PINNED_SUPPORT, ALONG)
+    return el.Network({"a": el.Node(0, 0, start), "b": el.Node(0.1, 0, end)}, {"x": el.Beam("a", "b", section)})
 
 
 def half_arch(rise: float, thickness: float) -> el.Network:

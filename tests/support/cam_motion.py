@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from cam_support import cam
 
-from cfmkit.families.cam.dynamics.inverse import MotionResponse, respond, statics
-from cfmkit.families.cam.dynamics.machine_from_spec import build
+from cfmkit.families.cam.dynamics import MotionResponse, build, respond, statics
 
 if TYPE_CHECKING:
-    from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.families.cam import CamSpec
 
 PRINTED_INERTIAS = {"masses__brace_inertia": 2.57e-4, "masses__roller_inertia": 4.61e-6}
 """Of the paper's section 4 [kg m^2]."""

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.elastica import Control, Displacement, trace
+import cfmkit.elastica as el
+
+DOWN = -np.pi / 2
+EXACT = el.Control(tolerance=1e-9)
+TIP_LOAD = (el.PointLoad("tip", 0.0, -1.0),)
+SECTION = el.Section(1.0, 12.0, 1.0, axial=False, shear=False)  # EI = 1
+HALF = 0.005  # half the thickness of the next one: radii of references are those of the centre line
+THIN = el.Section(1.2e7, 1.0, 2 * HALF, axial=False, shear=False)  # EI = 1
 
 
 def at_drive(path, drive):
@@ -32,7 +39,7 @@ def assert_work_is_energy(net, node, begin, end):
     """Check that the work of a drive downwards between two places, without an event, is the change of the energy."""
     shares, weights = np.polynomial.legendre.leggauss(12)
     drives = np.concatenate([[begin], begin + (end - begin) * (shares + 1) / 2, [end]])
-    path = trace(net, Displacement(node, -np.pi / 2, drives), Control(tolerance=1e-9))
+    path = el.trace(net, el.Displacement(node, DOWN, drives), EXACT)
     efforts, energy = path.effort[path.at_requested], path.energy[path.at_requested]
     work = 0.5 * (end - begin) * (weights @ efforts[1:-1])
     assert work == pytest.approx(energy[-1] - energy[0], rel=1e-10)
@@ -47,3 +54,10 @@ def shoot(start, force, length, curvature=0.0):
         return [cos, sin, curvature + state[3], force[0] * sin - force[1] * cos]
 
     return solve_ivp(slopes, (0, length), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+
+
+def residual_slopes(equations, free, drive, step=1e-6):
+    """Return the derivatives of the residual by the unknowns, as central differences, (n, n)."""
+    sides = [[equations.linearise(free + way * step * unit, drive).residual for way in (1, -1)]
+             for unit in np.eye(len(free))]  # fmt: skip
+    return np.array([after - before for after, before in sides]).T / (2 * step)

@@ -21,14 +21,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.model.beam_fits import beam_end_at
-from cfmkit.elastica.model.drive import Loading
-from cfmkit.elastica.results import beam_states
+from cfmkit.elastica import Loading
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.results.path import EquilibriumPath as Path
+    from cfmkit.elastica import Path
 
 _STEP = 1e-30
 """Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
@@ -40,8 +38,6 @@ steps are cut to 0.3 rad, so that forty reach 12 rad: nearly two revolutions."""
 _CONVERGED = 1e-9
 """Largest last step, in lengths and radians: a step of 1e-5 is followed by one of 1e-9 there, so the next one, which is
 not taken, would be at rounding."""
-
-N_PLACES = 33  # of an element of the functional, between which a first guess is interpolated
 
 _GAUSS = np.polynomial.legendre.leggauss(8)
 
@@ -144,8 +140,8 @@ class _Elements:
         """Return the first degree of freedom of the node that moves a beam's end, and the arm between them."""
         beam = self.network.beams[name]
         master = self.network.master_of((beam.start, beam.end)[side])
-        (x, y), node = beam_end_at(self.network, name, side), self.network.nodes[master]
-        return self.first[master], np.array([x - node.x, y - node.y], dtype=float)
+        own, node = self.network.nodes[(beam.start, beam.end)[side]], self.network.nodes[master]
+        return self.first[master], np.add((own.x - node.x, own.y - node.y), (beam.start_offset, beam.end_offset)[side])
 
     def _sections(self, places: list[tuple[int, float, float]]) -> None:
         """Set reference chords, rigidities at mid-length and thicknesses at the ends of the elements."""
@@ -278,19 +274,15 @@ class _Elements:
         u = np.zeros(self.size)
         for name, first in self.first.items():
             u[first : first + 3] = path.motion(name)[index]
-        names, at, share = list(self.network.beams), path.take(np.array([index])).at, np.linspace(0.0, 1.0, N_PLACES)
+        names, first = list(self.network.beams), 3 * len(self.first)
         moved = {}
         for number in {beam for beam, _ in self.inner}:
-            name, cuts = names[number], path.mesh.elements.cuts
-            own = beam_states.elements_of(path.mesh, name)
-            now = beam_states.states(self.network, at, name, share)
-            rest = beam_states.unloaded_places(self.network, at, name, share)
-            known = np.concatenate([cuts[k, 0] + (cuts[k, 1] - cuts[k, 0]) * share for k in own])
-            moved[number] = known, (now.x[0] - rest[:, 0], now.y[0] - rest[:, 1], now.turn[0])
-        first = 3 * len(self.first)
+            name = names[number]
+            moved[number] = path.places(name), (*path.line_motion(name)[index].T, path.states(name).turn[index])
         for k, (beam, t) in enumerate(self.inner):
             places, columns = moved[beam]
-            u[first + 3 * k : first + 3 * k + 3] = [np.interp(t, places, column) for column in columns]
+            arc = float(np.real(self.fits[names[beam]].arc(t)))
+            u[first + 3 * k : first + 3 * k + 3] = [np.interp(arc, places, column) for column in columns]
         return u
 
     def _stress(self, u: FloatArray) -> float:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.experiment.reading import Recording
+from cfmkit import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

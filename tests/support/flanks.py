@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from cam_support import cam
 
-from cfmkit.families.cam.geometry.designed_and_built_flanks import DesignFlank
-from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.numerics.rigid_point_registration import turn_points
-
-if TYPE_CHECKING:
-    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
+from cfmkit.families.cam import assemble
+from cfmkit.families.cam.geometry import DesignFlank
 
 MOVE = np.radians(0.3), np.array([1.5e-3, -0.8e-3])
 """The rigid motion of the reference note's case; its inverse is -0.3 deg, (-1.49579067, 0.80784298) mm."""
 
 
-def profile() -> CamProfile:
+def profile() -> Any:
     return assemble(cam()).profile
 
 
@@ -56,5 +52,6 @@ def measured(errors: Errors | None = None, move=MOVE) -> list[np.ndarray]:
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(at.points, axis=0).T))])
         error = errors.offset + errors.waviness * np.sin(2 * np.pi * along / errors.length + number)
         points = at.points + error[:, None] * at.normals + errors.noise * rng.normal(size=at.points.shape)
-        found.append(turn_points(points, *move))
+        turned = (points @ (1, 1j)) * np.exp(1j * move[0])
+        found.append(np.stack([turned.real, turned.imag], axis=1) + move[1])
     return found

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
+from cfmkit.families.slider_crank import Linkage
+from cfmkit.families.slider_crank.printed import (
     FLEXURE_BEAMS,
     STRIP_BEAM,
+    Chain,
     Elasticity,
     Flexure,
     Strip,

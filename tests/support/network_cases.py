@@ -12,11 +12,9 @@ from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from functional_paths import beam_stress
 
 import cfmkit.elastica as elastica
-from cfmkit.elastica.model.shapes import Bent
-from cfmkit.elastica.vibration import NetworkMasses, frequencies
+from cfmkit.elastica import NetworkMasses, frequencies
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -26,12 +24,7 @@ DENSITY = 1000.0  # [kg/m3] of every beam, where frequencies are taken
 N_FREQUENCIES = 3
 MAX_POINTS = 12
 """Points of a path of which values are kept: of more, evenly picked ones, the last among them."""
-MODEL = (
-    "Beam", "Control", "CosineArch", "Displacement", "LineLoad", "LineSpring", "Link", "Loading", "Network", "Node",
-    "PointLoad", "Polyline", "Polynomial", "Rotation", "Section", "SlideSpring", "Spline", "Support", "Taper",
-    "TorsionSpring",
-)  # fmt: skip
-TYPES = {name: getattr(elastica, name) for name in MODEL} | {"Bent": Bent}
+TYPES = {name: getattr(elastica, name) for name in elastica.__all__}
 
 
 def to_json(value: Any) -> Any:
@@ -100,8 +93,8 @@ def observe(path: elastica.Path) -> dict[str, Any]:
         if not network.is_moved_by_link(name):
             seen["motion"][name] = path.motion(name)[at].tolist()
             seen["reaction"][name] = path.reaction(name)[at].tolist()
-    for name in network.beams:
-        seen["stress"][name] = beam_stress(path, name)[0][at].tolist()
+    for name, stress in zip(network.beams, path.beam_stresses()[0], strict=True):
+        seen["stress"][name] = stress[at].tolist()
     loads = (*network.loads, *path.load_case.loads)
     if path.unstable[at[-1]] == 0 and not any(getattr(load, "follows", False) for load in loads):
         masses = NetworkMasses(dict.fromkeys(network.beams, DENSITY))

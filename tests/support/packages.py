@@ -6,7 +6,7 @@ import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from cfmkit.families import entry_point_plugins
+from cfmkit.families import forget_installed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pytest
 
 RECORD = (
-    "from dataclasses import replace\nfrom spare_family import FAMILY as SPARE\n"
+    "from dataclasses import replace\nfrom spare_family import FAMILY_RECORD as SPARE\n"
     "from cfmkit.families.base import DesignMethod, ResultNames, Pictures\n"
 )
 
@@ -42,9 +42,8 @@ def empty_site(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Give an empty folder on the path of modules; what is installed there is forgotten afterwards."""
     folder.mkdir()
     monkeypatch.syspath_prepend(str(folder))
-    entry_point_plugins._import_record.cache_clear()
-    entry_point_plugins._offers_on.cache_clear()
+    forget_installed()
     yield folder
     for path in folder.glob("*.py"):
         sys.modules.pop(path.stem, None)
-    entry_point_plugins._import_record.cache_clear()
+    forget_installed()

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from io import BytesIO
+
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.plots.style import axes_mm, new_figure
+from cfmkit.plots import axes_mm, new_figure
 from cfmkit.results import Result, Status
-from cfmkit.specs.spec import Requirement, Spec
+from cfmkit.specs import Requirement, Spec
 
 
 def axes():
     return axes_mm(new_figure(), (17, 12, 138, 80))
+
+
+def picture(figure):
+    """Return a figure as the bytes of a PNG."""
+    file = BytesIO()
+    figure.savefig(file, format="png", metadata={"Software": None})
+    return file.getvalue()
 
 
 def loop_curve(kind="force", gap=0.02):

@@ -7,9 +7,8 @@ import os
 import sys
 import tempfile
 import tomllib
+from importlib.metadata import entry_points
 from pathlib import Path
-
-from cfmkit.families import entry_point_plugins
 
 GROUP = "cfmkit.families"
 PLUGINS = sorted(path.parent for path in (Path(__file__).parents[2] / "plugins").glob("*/pyproject.toml"))
@@ -18,7 +17,7 @@ CONFIGS = [path for plugin in PLUGINS for path in sorted((plugin / "configs").gl
 
 def register() -> None:
     """Put the packages that are not installed on the path, here and in child processes, with their entry points."""
-    known = {one.package for one in entry_point_plugins.offers()}
+    known = {point.dist.name for point in entry_points(group=GROUP) if point.dist is not None}
     missing = [plugin for plugin in PLUGINS if _project(plugin)["name"] not in known]
     if not missing:
         return

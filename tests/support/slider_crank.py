@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import cfmkit
-from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.unit_springs import curves_along_crank, curves_along_slider
+from cfmkit.families.slider_crank import Linkage, curves_along_crank, curves_along_slider
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 DEG = math.pi / 180

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.numerics.continuation.problem import PathEquilibrium
+from cfmkit.numerics.continuation import PathEquilibrium
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.families.base import Family
+from cfmkit.families import Family
 from cfmkit.results import Result, Status
-from cfmkit.specs.spec import Analysis, Model, Spec
+from cfmkit.specs import Analysis, Model, Spec
 from cfmkit.specs.units import Stiffness  # noqa: TC001  pydantic reads the annotation
 
 if TYPE_CHECKING:
@@ -39,4 +39,4 @@ def analyze(spec: SpareSpec, run: Run) -> Result:
     return Result(spec, Status.COMPLETE, "", curves=(curve,))
 
 
-FAMILY = Family("spare", "a spring", SpareSpec, {"only": analyze})
+FAMILY_RECORD = Family("spare", "a spring", SpareSpec, {"only": analyze})

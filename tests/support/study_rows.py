@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from given_points import GivenPoints
+from scipy.stats import qmc
 
 import cfmkit
-from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.point_evaluation import Study
-from cfmkit.studies.variants_in_rows import evaluate_rows
+from cfmkit.studies import Study, evaluate_rows, metrics_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,6 +24,19 @@ def study_of(spec: Any, values: Mapping[str, Any], names: tuple[str, ...] = ()) 
     """Return a study over given values (path -> one a point), by default with every metric that a sweep notes."""
     plan = GivenPoints(values)
     return Study(spec, plan.paths, metrics_of(spec, names, cfmkit.analyze(spec).curves[0])), plan
+
+
+def draw_points(spec: Any, ranges: Mapping[str, Any], count: int) -> dict[str, Any]:
+    """Return points of a Sobol sequence within ranges ``"low:high"``, or among listed values: path -> one a point."""
+    shares = qmc.Sobol(len(ranges), seed=0).random(count).T
+    drawn = {}
+    for (path, stated), share in zip(ranges.items(), shares, strict=True):
+        if isinstance(stated, str):
+            low, high = (spec.replace({path: end}).get_value(path) for end in stated.split(":"))
+            drawn[path] = low + (high - low) * share
+        else:
+            drawn[path] = [stated[int(place)] for place in share * len(stated)]
+    return drawn
 
 
 def vary_numbers(spec: Any, draw: np.random.Generator, count: int, spread: float) -> dict[str, Any]:

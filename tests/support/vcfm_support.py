@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import cfmkit
-from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
+from cfmkit.families.vcfm.leaves import LeafStrip
 
 if TYPE_CHECKING:
     from cfmkit.results import Result

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import UsageError
 from cfmkit.tables import Table, TableColumn, read_csv
 from cfmkit.tables.parquet_writing import parquet
@@ -51,7 +51,7 @@ def test_parquet_holds_what_the_csv_holds(tmp_path):
     pyarrow = pytest.importorskip("pyarrow.parquet", reason="needs the extra 'table'")
     out = tmp_path / "out"
     command = ["sweep", "configs/cam.yaml", "--vary", "mechanism.roller_radius=8 mm:16 mm:3", "--no-plots"]
-    assert main([*command, "--table", "csv,parquet", "-j", "1", "-o", str(out), "-q"]) == 0
+    assert run_command([*command, "--table", "csv,parquet", "-j", "1", "-o", str(out), "-q"]) == 0
     table = pyarrow.read_table(out / "results.parquet")
     expected = read_csv((out / "results.csv").read_bytes())
     assert tuple(table.column_names) == expected.headers
@@ -76,7 +76,7 @@ def test_an_unknown_format_or_a_missing_package_is_told_first(tmp_path, monkeypa
         "-o",
         str(tmp_path / "out"),
     ]
-    assert main([*command, "--table", "xlsx"]) == 2
+    assert run_command([*command, "--table", "xlsx"]) == 2
     assert "there are csv, parquet" in capsys.readouterr().err
     for name in ("pyarrow", "pandas", "xarray"):
         monkeypatch.setitem(sys.modules, name, None)  # as where it is not installed

@@ -15,7 +15,7 @@ from cfmkit.families import family
 from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.results import Status
-from cfmkit.stock.springs.offer_type_and_generic_series import generic
+from cfmkit.stock.springs import generic
 
 CONFIG = Path(__file__).parents[2] / "configs" / "vcfm_bought_springs.yaml"
 

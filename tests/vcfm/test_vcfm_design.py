@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pkgutil import resolve_name
+
 import numpy as np
 import pytest
 import yaml
@@ -10,10 +12,10 @@ from vcfm_support import CONFIGS, MM, TABLE_I
 import cfmkit
 from cfmkit import Run, api
 from cfmkit.families import family
-from cfmkit.families.base import function_named
-from cfmkit.families.suggestion_request import Request
 from cfmkit.families.vcfm import proposals
+from cfmkit.families.vcfm.design import closed_form, fit_widths
 from cfmkit.results import Status
+from cfmkit.runs import read_request
 
 
 def designed(*changes, stem="vcfm_pla"):
@@ -21,8 +23,9 @@ def designed(*changes, stem="vcfm_pla"):
 
 
 LIMITS = {
-    "design.stroke=5.8 mm": ("stroke_unreachable", "design.stroke"),
-    "design.min_thickness=1.2 mm": ("too_thin", "design.stroke"),
+    # change: finding, key whose nearest feasible value is stated, other keys that the message names
+    "design.stroke=5.8 mm": ("stroke_unreachable", "design.stroke", "design.rise"),
+    "design.min_thickness=1.2 mm": ("too_thin", "design.stroke", "design.min_thickness"),
     "design.max_span=50 mm": ("envelope", "design.max_span"),
     "design.max_width=8 mm": ("envelope", "design.max_width"),
     "design.leaf_length=25 mm": ("overstressed", "design.leaf_length"),
@@ -32,14 +35,21 @@ LIMITS = {
 
 @pytest.mark.parametrize("change", LIMITS)
 def test_a_limit_is_named_and_the_nearest_feasible_value_works(change):
-    name, path = LIMITS[change]
+    name, path, *others = LIMITS[change]
     more = ("design.min_thickness=0.5 mm",) if name == "stroke_unreachable" else ()
     found = designed(change, *more)
     assert found.status is Status.INFEASIBLE
     assert found.warnings[0].name == name
+    assert all(f"'{key}'" in found.message for key in others or [path])
     assert set(found.nearest_feasible) == {path}
     cured = designed(change, *more, f"{path}={found.nearest_feasible[path]}")
     assert cured.status is Status.COMPLETE, cured.message
+
+
+def test_leaves_that_no_stroke_makes_thick_enough_are_told_the_rise_too():
+    message = designed("design.min_thickness=2 mm").message
+    assert "'design.min_thickness'" in message
+    assert "'design.rise'" in message
 
 
 BARE = {
@@ -150,13 +160,38 @@ def test_a_preload_without_what_it_is_to_give_is_refused(tmp_path):
 
 @pytest.mark.parametrize("structure", ["cosine arches", "hybrid leaves", "folded spring"])
 def test_a_proposal_with_another_structure_is_adjusted_by_preloads_of_its_own_spring(structure):
-    request = Request("force", 10.0, 9.9, 10.1, False, 2e-3, 0.05, (0.2, 0.2), adjustable=(8.0, 12.0))
+    stated = {"force": "10 N", "travel": "2 mm", "ripple": "5 %", "envelope": "[200 mm, 200 mm]"}
+    request = read_request(None, stated | {"adjustable": "[8 N, 12 N]"}).request()
     words = proposals.STRUCTURE_BLOCKS[structure][1].variant
     candidates = proposals.propose(request, Run()).candidates
     chosen = next(one for one in candidates if one.variant.startswith(words))
     made = family("vcfm").design.make(chosen.spec.replace({"design.refine": False}), Run()).spec
-    finished = function_named(chosen.finish)(made, request)
+    finished = resolve_name(chosen.finish)(made, request)
     found = cfmkit.analyze(finished)
     change = next(one.values for one in found.tables["adjustability"]().columns if one.name == "force_change")
     assert list(change) == pytest.approx([0.0, 2.0, -2.0], abs=0.025)
     assert "overstressed" not in [one.name for one in found.warnings]
+
+
+DESIGNS = {
+    # changes: closed form (Q, t2, L2, theta2 in deg, b2, L1, b1), then b2 and b1 after the fit
+    "vcfm_pla": ([], (4.22283, 1.00999, 30.22753, 8.1113, 3.59771, 27.052, 10.3268), (3.59411, 10.4295)),
+    "vcfm_aluminium": ([], (3.6276, 0.4135, 26.836, None, None, 21.474, None), (9.638, 21.174)),
+}
+
+
+@pytest.mark.parametrize("stem", DESIGNS)
+def test_worked_designs_by_closed_forms_and_one_exact_pass(stem):
+    _, closed, fitted = DESIGNS[stem]
+    spec = cfmkit.load(CONFIGS / f"{stem}.yaml")
+    sizes = closed_form(spec, spec.design)
+    leaf, spring_leaf = sizes.leaf, sizes.spring_leaf
+    mm = [leaf.thickness, leaf.length, leaf.width, spring_leaf.length, spring_leaf.width]
+    t2, l2, b2, l1, b1 = (value / MM for value in mm)
+    found = (leaf.slenderness, t2, l2, np.degrees(leaf.angle), b2, l1, b1)
+    digits = (5e-5, 5e-5, 5e-4, 5e-5, 5e-5, 5e-4, 5e-4)
+    for value, wanted, digit in zip(found, closed, digits, strict=True):
+        assert wanted is None or value == pytest.approx(wanted, abs=1.1 * digit)
+    after, (stress, _) = fit_widths(spec, spec.design, sizes)
+    assert (after.leaf.width / MM, after.spring_leaf.width / MM) == pytest.approx(fitted, rel=2e-4)
+    assert stress == pytest.approx(spec.mechanism.allowable_stress, rel=2e-3)

@@ -10,14 +10,14 @@ from vcfm_support import CONFIGS, MM, analyzed, message, names, table_i
 
 import cfmkit
 from cfmkit import api
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import SpecError
-from cfmkit.families.findings import mpa
 from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.exact_model import ExactSampler
 from cfmkit.families.vcfm.findings import EXACT_FORM, VCFM_FINDINGS, finding
 from cfmkit.families.vcfm.model import solve_rows
 from cfmkit.results import Status
+from cfmkit.specs.units import format_short
 
 FLAT = "mechanism.positive.width=8.509 mm"
 """With K_p = K_n."""
@@ -102,7 +102,7 @@ def test_a_stress_that_is_too_high_between_two_points_is_found(model, points):
         one = cfmkit.analyze(spec)
         assert ("overstressed" in names(one)) is found
         if found:
-            assert f"reaches {mpa(top)}" in message(one, "overstressed")
+            assert f"reaches {format_short(top, 'stress')}" in message(one, "overstressed")
         if model == "analytic":
             ((_, rows),) = solve_rows([spec, spec])
             assert ("overstressed" in rows.findings()) is found
@@ -117,7 +117,7 @@ def test_a_safety_factor_below_one_is_a_finding_or_explained(tmp_path, capsys):
         assert ("overstressed" in names(found)) is reported
         swept = cfmkit.sweep(spec, vary={"mechanism.bistable.width": spec.mechanism.bistable.width * np.ones(1)})
         assert ("overstressed" in (swept.table["warnings"][0] or "")) is reported
-    main(["analyze", str(CONFIGS / "vcfm_pla.yaml"), "--no-plots", "-o", str(tmp_path / "out")])
+    run_command(["analyze", str(CONFIGS / "vcfm_pla.yaml"), "--no-plots", "-o", str(tmp_path / "out")])
     assert "(stress overestimated by up to" in " ".join(capsys.readouterr().out.split())
 
 
@@ -282,24 +282,6 @@ def test_thin_leaves_do_not_return_by_the_force_at_rest():
     few = analyzed(*thin, "analysis.points=61", "mechanism.positive.width=1e-9 mm")
     assert few.values["least_force"].value < 0
     assert "stays there until it is pulled back" in message(few, "bistable")
-
-
-REFUSED = {
-    "design.stroke=5.8 mm": ("'design.stroke'", "'design.rise'"),
-    "design.min_thickness=1.2 mm": ("'design.min_thickness'",),
-    "design.min_thickness=2 mm": ("'design.min_thickness'", "'design.rise'"),
-    "design.leaf_length=25 mm": ("'design.leaf_length'",),
-    "design.max_span=50 mm": ("'design.max_span'",),
-    "design.max_width=8 mm": ("'design.max_width'",),
-    "mechanism.bistable.half_beams=8": ("'design.leaf_length'",),
-    "mechanism.bistable.guided=false": ("'mechanism.bistable.guided",),
-}
-
-
-@pytest.mark.parametrize("change", REFUSED)
-def test_a_refused_design_names_the_key_that_blocks_it(change):
-    reported = designed(change).message
-    assert all(key in reported for key in REFUSED[change])
 
 
 def test_stress_is_that_of_the_worst_preload():
@@ -497,6 +479,7 @@ def test_what_is_proposed_meets_the_limits_that_come_next_too():
 def test_a_design_for_a_shuttle_that_can_turn_is_refused():
     found = designed("mechanism.bistable.guided=false")
     assert found.warnings[0].name == "asymmetric_buckling"
+    assert "'mechanism.bistable.guided" in found.message
     assert found.nearest_feasible == {"mechanism.bistable.guided": "true"}
 
 
@@ -562,8 +545,8 @@ def test_a_preload_of_a_thousand_kilometres_is_refused_with_its_place(tmp_path, 
     """The exact model would follow the leaves all the way back."""
     spec = str(CONFIGS / "vcfm_hybrid.yaml")
     changes = ["--set", "analysis.preloads=[0 mm, 1e9 mm]", "--fidelity", "exact"]
-    assert main(["check", spec, "--set", "analysis.preloads=[0 mm, 3500 mm]"]) == 0
-    assert main(["analyze", spec, *changes, "-o", str(tmp_path / "out"), "--no-plots"]) == 3
+    assert run_command(["check", spec, "--set", "analysis.preloads=[0 mm, 3500 mm]"]) == 0
+    assert run_command(["analyze", spec, *changes, "-o", str(tmp_path / "out"), "--no-plots"]) == 3
     reported = capsys.readouterr().err
     assert "analysis.preloads" in reported
     assert "at most 3500 mm" in reported

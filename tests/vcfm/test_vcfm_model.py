@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from functional_paths import beam_stress
-from study_rows import assert_rows_equal_runs
+from study_rows import assert_rows_equal_runs, draw_points, study_of
 from vcfm_support import CONFIGS, MM, analyzed, leaf, table_i
 
 import cfmkit
@@ -30,15 +29,8 @@ from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
 from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES, spread
 from cfmkit.metrics import evaluate
-from cfmkit.metrics.longest_interval_in_band import _levels, _reach, flat_window
-from cfmkit.metrics.metrics_of_rows import metric_of_branches
 from cfmkit.results import Status
-from cfmkit.specs.units import window_places
-from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.plan import Draw, sample_axes
-from cfmkit.studies.point_evaluation import Study
-from cfmkit.studies.variants_in_rows import are_solved_together
-from cfmkit.studies.varied_axes import axes, collect_variations
+from cfmkit.studies import are_solved_together
 
 # --- preloads together, and lines together ---------------------------------------------------------------------
 
@@ -142,36 +134,6 @@ def test_a_diamond_without_angle_is_a_parallel_guide():
     assert Diamond(flat).stiffness == pytest.approx(12 * flat.bending / 25.0**3, rel=6e-3)
 
 
-# --- windows ---------------------------------------------------------------------------------------------------
-
-
-def test_the_samples_within_the_band_behind_each_one_are_what_trying_all_gives():
-    curves = np.random.default_rng(3).normal(size=(30, 40)).cumsum(axis=1) * 0.1 + 5
-    curves[4, 10] = -1.0
-    for curve, found in zip(curves, _reach(_levels(curves), 0.05), strict=True):
-        for start, reach in enumerate(found.tolist()):
-            parts = [curve[start : end + 1] for end in range(start + 1, len(curve))]
-            fits = [part.min() > 0 and np.ptp(part) <= 0.05 * part.max() for part in parts]
-            assert reach == [*fits, False].index(False)
-
-
-def test_the_longest_interval_is_that_of_all_that_are_tried():
-    places, fine = np.linspace(0.0, 1.0, 40), np.linspace(0.0, 1.0, 20 * 39 + 1)
-    curves = np.random.default_rng(3).normal(size=(30, 40)).cumsum(axis=1) * 0.1 + 5
-    curves[4, 10], curves[5, 20] = -1.0, np.nan
-
-    def force_at(where):
-        return np.stack([np.interp(one, places, curve) for one, curve in zip(where, curves, strict=True)])
-
-    for curve, start, end in zip(curves, *flat_window(places, curves, 0.05, force_at), strict=True):
-        force, best = np.nan_to_num(np.interp(fine, places, curve), nan=-1.0), 0
-        for i in range(len(fine)):
-            top, bottom = np.maximum.accumulate(force[i:]), np.minimum.accumulate(force[i:])
-            fits = (bottom > 0) & (top - bottom <= 0.05 * top)
-            best = max(best, [*fits.tolist(), False].index(False) - 1)
-        assert -1e-9 <= end - start - fine[best] <= 2 * fine[1]
-
-
 @pytest.mark.parametrize("model", ["analytic", "exact"])
 @pytest.mark.parametrize(
     "changes",
@@ -256,8 +218,7 @@ def test_rows_have_the_numbers_and_warnings_of_their_points(model, window, prelo
         "mechanism.material={youngs_modulus: 1477 MPa, yield_strength: 30 MPa}", "analysis.flatness=5 %",
         preloads=preloads,
     )  # fmt: skip
-    plan = sample_axes(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 64))
-    study = Study(spec, plan.paths, metrics_of(spec, names))
+    study, plan = study_of(spec, draw_points(spec, ranges, 64), names)
     assert are_solved_together(study, plan)
     rows = assert_rows_equal_runs(study, plan, step=4)
     if ranges is WIDE:
@@ -382,7 +343,7 @@ def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, sle
     force, stress, _, buckled = found.evaluate(path.drive[here])
     peak = np.abs(path.effort[path.drive < rise]).max()
     assert force == pytest.approx(path.effort[here], abs=1e-6 * peak)
-    assert stress == pytest.approx(beam_stress(path, "leaf")[0][here], rel=1e-3, abs=2e-4 * stress.max())
+    assert stress == pytest.approx(path.beam_stresses()[0][0][here], rel=1e-3, abs=2e-4 * stress.max())
     assert buckled.tolist() == [found.edges[1] < place < found.buckled_range[1] for place in path.drive[here]]
 
 
@@ -444,6 +405,22 @@ class ForceAndStress(LeafLaw):
 
     def stress(self, travel):
         return TrussLeaf(self.strip).stress(travel)
+
+
+@dataclass(frozen=True)
+class BarInColumns(ForceAndStress):
+    """The same for leaves in columns."""
+
+    one_by_one = False
+
+
+def test_what_a_law_leaves_out_follows_from_its_force_for_leaves_in_columns():
+    leaves = [LEAF, replace(LEAF, thickness=2e-3), replace(LEAF, angle=0.1)]
+    columns = stack_laws([BarInColumns(leaf) for leaf in leaves])
+    for name in ("negative_stiffness", "first_stiffness", "balance"):
+        alone = [getattr(ForceAndStress(leaf), name) for leaf in leaves]
+        assert np.ravel(getattr(columns, name)).tolist() == pytest.approx(alone, rel=1e-12), name
+        assert np.shape(getattr(columns, name)) == (3, 1), name
 
 
 def test_a_law_of_force_and_stress_has_all_that_is_asked_of_a_leaf():
@@ -607,12 +584,9 @@ def test_rows_take_windows_that_are_shares_of_the_travel():
             "requirements": [],
         }
     )
-    variants = [spec.replace({"mechanism.bistable.width": width}) for width in (6e-3, 7e-3)]
-    ((_, found),) = solve_rows(variants)
-    low, high = np.array([window_places(spec.analysis.window, (0.0, spec.travel)) for spec in variants]).T
-    mean = metric_of_branches("force_mean", {"load": found.branches["load"].restrict_to_window((low, high))})["load"]
-    expected = [evaluate(cfmkit.analyze(one), ["force_mean"])["force_mean"].value for one in variants]
-    assert mean.tolist() == pytest.approx(expected, rel=1e-12)
+    study, plan = study_of(spec, {"mechanism.bistable.width": (6e-3, 7e-3)}, ("force_mean",))
+    assert are_solved_together(study, plan)
+    assert_rows_equal_runs(study, plan)
 
 
 def test_the_room_of_a_mechanism_begins_where_a_preload_pushes_it_to_and_has_walls_as_thick_as_stated():

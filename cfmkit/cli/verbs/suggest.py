@@ -131,7 +131,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
                 found, block, working, not options.no_plots, deadlines, command
             ):
                 folder.write(name, content)
-        code = suggestion_record.exit_code(found)
+        code = found.exit_code
         manifest = folder.commit(
             {
                 "command": "suggest", "arguments": list(terminal.arguments), "seed": options.seed,

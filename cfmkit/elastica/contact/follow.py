@@ -118,7 +118,7 @@ def _follow(
             if chosen is None:
                 return
             step = options.first_step * options.span
-            walk = replace(outcome.walk, targets=targets[: turns[1]], number=turns[0], step=step)
+            walk = outcome.walk._replace(targets=targets[: turns[1]], number=turns[0], step=step)
             part, previous, turns = chosen.piece, chosen.at, turns[1:]
             items, count = _go_on(part, walk, chosen.at, sense), 0
             continue
@@ -157,7 +157,7 @@ def _follow(
             if reached is None:
                 break
             yield Point(part.grow(reached), walk.number, walk.branch)
-            walk = replace(walk, number=walk.number + 1)
+            walk = walk._replace(number=walk.number + 1)
         items, previous = (
             iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense),
             at,
@@ -259,14 +259,14 @@ def _follow_part(
             sense = 1.0 if step >= previous.drive else -1.0
             place = found.at.drive
             yield from (event for event in waiting if (place - event.drive) * sense > 0)
-            walk = replace(walk, step=abs(step - previous.drive))
+            walk = walk._replace(step=abs(step - previous.drive))
             tied = SAME_PLACE * walk.options.span
             beside = abs(place - previous.drive) <= tied and found.piece is None
             if found.piece is not None and found.piece.whole.mesh is not mesh:
                 yield Remeshed(found.piece.whole)
             if not walk.done and abs(walk.targets[walk.number] - place) <= tied and not beside:
                 yield Point(found.at, walk.number, walk.branch)
-                walk = replace(walk, number=walk.number + 1)
+                walk = walk._replace(number=walk.number + 1)
             elif not beside:
                 yield Point(found.at, -1, walk.branch)
             return walk, found, sense
@@ -289,7 +289,7 @@ def _pass_point(walk: Walk, point: Point | None) -> Walk:
     if point is None:
         return walk
     number = point.target + 1 if point.target >= 0 else walk.number
-    return replace(walk, number=number, branch=point.branch)
+    return walk._replace(number=number, branch=point.branch)
 
 
 def _enter(

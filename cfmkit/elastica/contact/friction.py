@@ -25,8 +25,10 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 AT_LIMIT = 1e-7  # share of the friction by which the tangential force may miss its limit where slip may begin
-UNDECIDED = 1e-6  # share of the largest rate below which a rate does not say how a condition goes on: a step does
-TRIAL = 1e-4  # of the range: that step
+UNDECIDED_RATE_RTOL = (
+    1e-6  # share of the largest rate below which a rate does not say how a condition goes on: a step does
+)
+TRIAL_STEP_FRACTION = 1e-4  # of the range: that step
 RIGID_RATE = 1e9  # motion or force per drive beyond which the contacts leave no way to move
 MAX_TOGETHER = 5  # contacts whose states are chosen together: three to this power are tried
 
@@ -103,9 +105,9 @@ def _continuations(piece: PieceOfPath, at: PathEquilibrium, number: int, turns: 
 def _goes_on(piece: PieceOfPath, at: PathEquilibrium, sense: float, changed: int | None) -> bool:
     """Return True if no force, no gap and no way of slip of a contact at its limit goes the wrong way."""
     rates = list(_margin_rates(piece, at, sense, changed))
-    if any(rate < -UNDECIDED for rate in rates):
+    if any(rate < -UNDECIDED_RATE_RTOL for rate in rates):
         return False
-    return all(rate > UNDECIDED for rate in rates) or _steps_on(piece, at, sense)
+    return all(rate > UNDECIDED_RATE_RTOL for rate in rates) or _steps_on(piece, at, sense)
 
 
 def _margin_rates(piece: PieceOfPath, at: PathEquilibrium, sense: float, changed: int | None) -> Iterator[float]:
@@ -129,7 +131,7 @@ def _margin_rates(piece: PieceOfPath, at: PathEquilibrium, sense: float, changed
 
 def _steps_on(piece: PieceOfPath, at: PathEquilibrium, sense: float) -> bool:
     """Return True if all conditions are met a small step further on."""
-    start, step = piece.shrink(at), sense * TRIAL * piece.options.span
+    start, step = piece.shrink(at), sense * TRIAL_STEP_FRACTION * piece.options.span
     new = piece.own.solve(start.x + step * start.rate, start.drive + step)
     if new is None:
         return False

@@ -14,7 +14,7 @@ from cfmkit.elastica.mechanics.compiled_module import (
     COUNT_FIELDS,
     MAX_DEGREE,
     N_LAW,
-    load_compiled,
+    find_module,
     make_row,
     numbered_row,
     shape_row,
@@ -31,6 +31,7 @@ from cfmkit.elastica.mechanics.contact_arrays import (
 from cfmkit.elastica.mechanics.discretise import BeamElements
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
+    N_POWERS,
     ComparedStates,
     LinearEquations,
     LineTables,
@@ -73,7 +74,7 @@ class CompiledEquations(NumpyEquations):
         free = mesh.free[mesh.free < mesh.numbering.size] if _has_more_unknowns(mesh) else mesh.free
         numbered, fixed = numbered_row(mesh.numbering, free.tobytes())
         row = make_row(arrays, self._counts(arrays), numbered)
-        vars(self).update(arrays=fixed | arrays, row=row, code=load_compiled())
+        vars(self).update(arrays=fixed | arrays, row=row, code=find_module())
 
     def _counts(self, arrays: Mapping[str, Any]) -> dict[str, int]:
         """Return the counts of a `Model` that depend on more than topology."""
@@ -231,9 +232,10 @@ class CompiledEquations(NumpyEquations):
     def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
         """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""
         mesh, bundle = self.mesh, self.mesh.fits.bundle
-        if _has_more_unknowns(mesh) or bundle.others or self.follows or degree > MAX_DEGREE or mesh.elements.line.any():
+        special = _has_more_unknowns(mesh) or bundle.others or self.follows or degree > MAX_DEGREE
+        if special or np.count_nonzero(mesh.elements.line):
             return None
-        laws = angle_laws(bundle.coefficients, mesh)
+        laws = angle_laws(bundle.coefficients[mesh.fits.number], mesh)
         return compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
 
     def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
@@ -250,12 +252,14 @@ class CompiledEquations(NumpyEquations):
         before = plan.before
         previous_row = NO_NUMBERS if before is None else np.concatenate([before.x, before.rate, [before.drive]])
         start_row = np.concatenate([start.x, start.rate, [start.drive]])
-        code = self.code.march(self.row, plan_row, start_row, previous_row, goals, rows, stored)
+        any_vector = NO_NUMBERS if plan.any_vector is None else plan.any_vector
+        code = self.code.march(self.row, plan_row, start_row, previous_row, goals, rows, stored, any_vector)
         rows = rows[: stored[0]].copy()
         drive, effort, told, target = rows[:, 2 * n :].T
         unstable, at_targets = told.astype(np.int64), target.astype(np.int64)
         x, rate, step = rows[:, :n], rows[:, n : 2 * n], float(plan_row[0])
-        march = NaturalMarch(x, drive, rate, unstable, effort, at_targets, step, plan.branch, MarchCode(code))
+        ends = tuple(plan_row[-2:].tolist())
+        march = NaturalMarch(x, drive, rate, unstable, effort, at_targets, step, plan.branch, MarchCode(code), ends)
         return self._cut_at_stability_change(march, start.unstable) if self.follows else march
 
     def _cut_at_stability_change(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
@@ -288,9 +292,9 @@ def compare_rows(
     """Return how states of designs differ from equilibria of a higher degree."""
     ends, outcomes = np.empty((*z.shape[:-1], mesh.numbering.n_ends)), np.empty((*z.shape[:-1], N_COMPARED))
     drives = np.ascontiguousarray(drive, float)
-    if not load_compiled().compare(rows, shape_row(degree)[0], laws, z, drives, ends, outcomes, tolerance):
+    if not find_module().compare(rows, shape_row(degree)[0], laws, z, drives, ends, outcomes, tolerance):
         raise MemoryError
-    code, *numbers = np.moveaxis(outcomes, -1, 0)
+    code, *numbers = outcomes.transpose(-1, *range(outcomes.ndim - 1))
     return ComparedStates._make((code == 0, *numbers, ends))
 
 
@@ -298,7 +302,7 @@ def plan_row_of(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
     """Return a `Plan` of march.h."""
     on_branch = plan.branch is not None
     numbers = plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, on_branch, start
-    return np.array(numbers, float)
+    return np.array((*numbers, N_POWERS, 0.0, 0.0), float)
 
 
 def model_arrays(of: NumpyEquations) -> dict[str, Any]:

@@ -37,7 +37,7 @@ class CompiledBatch:
         rule, bending = basis(mesh.degree), tables["weight"] * tables["rigidity"]
         bend = (bending[..., 0] / rule.weights[0])[..., None] * (rule.weights @ slope_products(mesh.degree))
         arrays = tables | designs.places | {"bend": bend}  # what is the same along an element, but for the weights
-        self.laws = angle_laws(designs.coefficients, mesh)
+        self.laws = angle_laws(designs.fits[0].bundle.coefficients, mesh)
         self._kept = {name: np.ascontiguousarray(array, float) for name, array in arrays.items()}
         self.rows = np.tile(template.row, (self.count, 1))
         for name, array in self._kept.items():

@@ -38,7 +38,8 @@ N_SIDE_COLUMNS, N_LAW = 13, 3
 
 
 @cache
-def _module() -> Any:
+def find_module() -> Any:
+    """Return the compiled module, None if it was not built, or for another version."""
     try:
         from cfmkit.elastica.mechanics import _march  # type: ignore[attr-defined]
     except ImportError:
@@ -49,7 +50,7 @@ def _module() -> Any:
 
 def load_compiled() -> Any:
     """Return the compiled module, None if it was not built, or for another version, or `WITHOUT_C_VARIABLE` is set."""
-    return None if WITHOUT_C_VARIABLE in os.environ else _module()
+    return None if WITHOUT_C_VARIABLE in os.environ else find_module()
 
 
 def make_row(arrays: dict[str, Any], counts: dict[str, int], like: Any = None) -> Any:
@@ -57,7 +58,7 @@ def make_row(arrays: dict[str, Any], counts: dict[str, int], like: Any = None) -
     row = np.zeros(len(COUNT_FIELDS) + len(ADDRESS_FIELDS), np.int64) if like is None else like.copy()
     for name, count in counts.items():
         row[COUNT_FIELDS.index(name)] = count
-    _module().place(row, len(COUNT_FIELDS), tuple(map(arrays.get, ADDRESS_FIELDS)))
+    find_module().place(row, len(COUNT_FIELDS), tuple(map(arrays.get, ADDRESS_FIELDS)))
     return row
 
 

@@ -164,8 +164,8 @@ def effort_slopes(
     for k, pair in enumerate(_changed_terms(designs)):
         for own in pair:
             total[:, k] += _term_slopes(own, at, motions)
-    if designs.base is not None:
-        total += _held_forces(at, motions) @ (np.imag(designs.base) / COMPLEX_STEP).T
+    if designs.held_slopes is not None:
+        total += _held_forces(at, motions) @ designs.held_slopes.T
     return np.asarray(total * mesh.scales.moment / mesh.scales.drive)
 
 
@@ -236,8 +236,8 @@ def unknown_slopes(at: Equilibria, designs: NetworkDesigns, forces: FloatArray) 
     mesh, chosen = at.mesh, at.mesh.free
     own = equations(mesh)
     found = np.zeros((len(at.z), designs.count, mesh.size))
-    if designs.base is not None:
-        found += np.imag(designs.base) / COMPLEX_STEP
+    if designs.held_slopes is not None:
+        found += designs.held_slopes
     for k, (z, drive) in enumerate(zip(at.z, at.drive.tolist(), strict=True)):
         found[k][:, chosen] = own.resolve(z[chosen], drive, -forces[k][:, chosen])[0]
     if not np.isfinite(found).all():
@@ -252,9 +252,8 @@ def force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
     """
     mesh, unknowns = at.mesh, at.mesh.elements.unknowns
     moved: Any = at.z
-    stepped, held = dual_arrays(designs), None
-    if designs.base is not None:
-        held = np.imag(designs.base) / COMPLEX_STEP
+    stepped, held = dual_arrays(designs), designs.held_slopes
+    if held is not None:
         moved = DualArray(at.z, held[:, None])
     found = np.zeros((len(at.z), designs.count, mesh.size))
     together = max(1, MAX_TOGETHER // (designs.count * mesh.elements.angle.size))
@@ -291,7 +290,7 @@ def _dual(owner: Any, stepped: dict[str, Any]) -> dict[str, Any]:
 
 def _moved_terms(at: Equilibria, designs: NetworkDesigns) -> list[list[Acting]]:
     """Return the springs, loads and contacts of each design with a complex step; all where held unknowns have one."""
-    if designs.base is None or not _acting(at.mesh):
+    if designs.held_slopes is None or not _acting(at.mesh):
         return _changed_terms(designs)
     each = (design_of(designs, d) for d in range(designs.count))
     return [[(network, attached) for attached in _acting(network)] for network in each]

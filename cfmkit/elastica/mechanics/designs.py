@@ -1,74 +1,197 @@
-"""Many networks of one topology as arrays with a leading axis: designs of a batch, or complex steps of variables.
+"""Numbers of networks of one topology as arrays with a leading axis: of one, of a batch, of complex steps of variables.
 
-Most networks have plain beams only (`cfmkit.elastica.model.plain_beams_at_once`: a polynomial angle, one thickness),
-and their designs differ in places of nodes, offsets, shapes and sections. Those are set up together, as arrays; others
-one by one.
+Networks differ in places of nodes, offsets, shapes, sections, supports, springs and loads. Beams that are plain
+(`cfmkit.elastica.model.plain_beams_at_once`: a polynomial angle, one thickness) are set up together.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
-from cfmkit.elastica.mechanics.element_tables import plain_tables
-from cfmkit.elastica.model.plain_beams_at_once import (
-    check_fits,
-    chords,
-    coefficients_of,
-    fit_to_ends,
-    is_plain,
-    rigidities_of,
-)
+from cfmkit.elastica.mechanics.element_tables import element_tables
+from cfmkit.elastica.model.beam_fits import BeamFits, fit_networks
+from cfmkit.elastica.model.driven_node import FRAME_OF_DRIVE, DrivenNode, find_driven_node
+from cfmkit.elastica.model.network import LineLoad, PointLoad
+from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.numbering import Numbering
+    from cfmkit.elastica.mechanics.units import MechanicsUnits
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
 
-TABLE_NAMES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap")
-NO_OFFSET = (0.0, 0.0)
+    Loaded = tuple[Network, Drive]
+
 CURLING_TABLES = ("rest", "curl", "hindrance")  # of wide strips
+
+
+class NetworkArrays(NamedTuple):
+    """Arrays of d networks: `tables` are those of `BeamElements`, `places` origin, arm and frame of `Attachments`."""
+
+    tables: dict[str, Any]  # (d, e, ...)
+    places: dict[str, Any]  # (d, k, 2)
+    held: list[dict[int, Any]]  # (d): values of unknowns by their numbers
 
 
 @dataclass(frozen=True, eq=False)
 class NetworkDesigns:
-    """Arrays of d networks of one topology; real, or with a complex step each.
-
-    `tables` are those of `Elements`, `places` origin, arm and frame of `Attachments`, all with the designs as first
-    axis; an array that no design changes is left out.
-    """
+    """Arrays of d networks of one topology; real, or with a complex step each."""
 
     template: Discretisation
-    count: int
-    tables: dict[str, Any]  # (d, e, ...)
+    networks: tuple[Loaded, ...]
+    fits: list[BeamFits]
+    tables: dict[str, Any]  # (d, e, ...), as of `NetworkArrays`
     places: dict[str, Any]  # (d, k, 2)
-    base: Any  # (d, size), None if no design changes it
-    each: tuple[Discretisation, ...]  # where they were set up one by one; else empty
-    networks: tuple[tuple[Network, Drive], ...]
-    coefficients: Any = None  # (d, b, n) of the angles of the beams, where they were set up together
+    held: list[dict[int, Any]]  # as of `NetworkArrays`
+
+    @property
+    def count(self) -> int:
+        """Number of networks."""
+        return len(self.networks)
+
+    @cached_property
+    def held_slopes(self) -> FloatArray | None:
+        """Derivatives of all unknowns where they are held, (d, size), by complex steps; None if none has any."""
+        if all(own is self.held[0] for own in self.held):
+            return None
+        steps = np.imag(join_held(self.held, self.template.size)) / COMPLEX_STEP
+        return steps if steps.any() else None
 
 
 def set_up(
     template: Discretisation,  # of one of them, or of the network that they differ from
-    origin: tuple[Network, Drive],  # (Network, Drive): what the template was made of
-    networks: Sequence[tuple[Network, Drive]],  # they may hold complex steps
-    # how one is set up by itself; as the template was, with one piece a beam, unless given
-    make: Callable[[Network, Drive], Discretisation] | None = None,
+    origin: Loaded,  # what the template was made of
+    networks: Sequence[Loaded],  # they may hold complex steps
 ) -> NetworkDesigns:
-    """Return the arrays of networks of one topology."""
-    pairs = tuple(networks)
-    if _all_plain(template, origin, pairs):
-        return _plain(template, origin, pairs)
-    alone = make or (lambda net, drive: discretise(net, drive, template.degree, scales=template.scales))
-    each = tuple(alone(*pair) for pair in pairs)
-    names = (*TABLE_NAMES, *(CURLING_TABLES if template.elements.curl is not None else ()))
-    stack = {name: np.array([getattr(one.elements, name) for one in each]) for name in names}
-    places = {name: np.array([getattr(one.attachments, name) for one in each]) for name in ("origin", "arm", "frame")}
-    return NetworkDesigns(template, len(pairs), stack, places, np.array([one.base for one in each]), each, pairs)
+    """Return the arrays of networks of one topology, with the elements of a template."""
+    pairs, e, driven = tuple(networks), template.elements, find_driven_node(*origin)
+    fits = fit_networks([network for network, _ in pairs])
+    tables, places, held = fill_arrays(template.numbering, template.scales, e.cuts, pairs, fits, driven)
+    if np.any(template.floored):
+        tables["axial"] = tables["axial"] + template.floor[:, None]
+    return NetworkDesigns(template, pairs, fits, tables, places, held)
+
+
+def fill_arrays(
+    numbering: Numbering,
+    scales: MechanicsUnits,
+    cuts: FloatArray,  # (e, 2)
+    pairs: Sequence[Loaded],
+    fits: Sequence[BeamFits],  # of their beams
+    driven: DrivenNode | None,  # of all of them
+) -> NetworkArrays:
+    """Return what is different in networks of one topology."""
+    n, length, bundle, numbers = numbering, scales.length, fits[0].bundle, [own.number for own in fits]
+    tables = element_tables(fits, scales, n.topology.degree, n.row, cuts)
+    spots = bundle.spots[numbers]
+    masters = spots[:, n.master]
+    places = {"origin": masters / length, "arm": (spots[:, n.node] - masters) / length}
+    if bundle.offsets is not None:
+        offsets = bundle.offsets[numbers] / length
+        places["arm"] = places["arm"].astype(np.result_type(places["arm"], offsets))
+        places["arm"][:, n.beam_ends] += offsets
+    if n.inside.size:
+        _place_inside(n, tables, places)
+    frames, held = _hold_bodies(n, pairs, driven, length)
+    places["frame"] = np.array(frames)
+    tables["line"], tables["gap"] = _line_loads(n, scales, pairs), np.zeros((len(pairs), len(n.row), 2))
+    raw = [beam.closure == "raw" for beam in pairs[0][0].beams.values()]
+    if any(raw):
+        tables["gap"] = _gaps(n, tables, places, np.array(raw)[n.row] & (cuts[:, 1] == 1.0))
+    return NetworkArrays(tables, places, held)
+
+
+def _chords(tables: dict[str, Any]) -> Any:
+    """Return the vectors between the ends of elements at rest, (d, e, 2)."""
+    return np.stack([(tables["weight"] * turn(tables["angle"])).sum(axis=-1) for turn in (np.cos, np.sin)], axis=-1)
+
+
+def _place_inside(n: Numbering, tables: dict[str, Any], places: dict[str, Any]) -> None:
+    """Let attachments inside beams, which are bodies of their own, lie where the elements before them end."""
+    ahead, arm, origin = _chords(tables), places["arm"], places["origin"]
+    places["origin"] = origin = origin.astype(np.result_type(origin, arm, ahead))
+    for beam, first in enumerate(n.beam_ends[:, 0]):
+        own = np.flatnonzero(n.row == beam)[:-1]
+        start = (origin[:, first] + arm[:, first])[:, None]
+        origin[:, n.ends[own, 1]] = start + np.cumsum(ahead[:, own], axis=1)
+
+
+@lru_cache(maxsize=128)
+def frame_of(n: Numbering, *angles: Any) -> Any:
+    """Return cosine and sine of the angles of bodies at rest, (k, 2), by the directions of the nodes' supports."""
+    angle = np.array(angles)[n.master] + 0.0
+    angle[n.inside] = 0.0
+    both = np.empty((*angle.shape, 2), angle.dtype)
+    both[:, 0], both[:, 1] = np.cos(angle), np.sin(angle)
+    return both
+
+
+def _line_loads(n: Numbering, scales: MechanicsUnits, pairs: Sequence[Loaded]) -> Any:
+    """Return the line loads of every element, constant and growing with the drive, (d, e, 2, 2)."""
+    if not any(isinstance(load, LineLoad) for on in pairs[0] for load in on.loads):
+        return np.zeros((len(pairs), len(n.row), 2, 2))
+    lines = [(d, grows, load) for d, pair in enumerate(pairs) for grows, on in enumerate(pair) for load in on.loads]
+    given = [(d, grows, load) for d, grows, load in lines if isinstance(load, LineLoad)]
+    kinds = {type(value) for _, _, load in given for value in (load.wx, load.wy)}
+    total = np.zeros((len(pairs), len(n.row), 2, 2), np.result_type(float, *kinds))
+    for d, grows, load in given:
+        own = n.row == list(pairs[d][0].beams).index(load.beam)
+        values = np.array([load.wx, load.wy]) * (scales.length / scales.force)
+        total[d, own, grows] += values * scales.drive if grows else values
+    return total
+
+
+def _gaps(n: Numbering, tables: dict[str, Any], places: dict[str, Any], last: Any) -> Any:
+    """Return by how much the last elements of beams that are forced into place miss their nodes, (d, e, 2)."""
+    place = places["origin"] + places["arm"]
+    span = place[:, n.ends[:, 1]] - place[:, n.ends[:, 0]]
+    return np.where(last[:, None], span - _chords(tables), 0.0)
+
+
+def _hold_bodies(
+    n: Numbering, pairs: Sequence[Loaded], driven: DrivenNode | None, length: float
+) -> tuple[list[Any], list[dict[int, Any]]]:
+    """Return the frames of the attachments, and the unknowns that supports and the drive hold, and where, of each.
+
+    What networks have in common is found once.
+    """
+    turned = driven.node if driven is not None and driven.motion == FRAME_OF_DRIVE else None
+    frames, values, before = list[Any](), list[dict[int, Any]](), None
+    for network, drive in pairs:
+        nodes = network.nodes
+        own = [nodes[name].support for name in nodes], drive.direction if turned else 0.0  # type: ignore[union-attr]
+        if own != before:
+            frame = frame_of(n, *(own[1] if name == turned else nodes[name].support.direction for name in nodes))
+            held, before = dict[int, Any](), own
+            for name, (along, across, rotation) in n.bodies.items():
+                support = nodes[name].support
+                if support.along:
+                    held[along] = support.displacement[0] / length
+                if support.across:
+                    held[across] = support.displacement[1] / length
+                if support.rotation:
+                    held[rotation] = support.displacement[2]
+            if driven is not None:
+                held[n.bodies[driven.node][driven.motion % FRAME_OF_DRIVE]] = 0.0
+        frames.append(frame)
+        values.append(held)
+    return frames, values
+
+
+def join_held(held: list[dict[int, Any]], size: int) -> Any:
+    """Return the values of held unknowns of d networks, (d, size); zero where nothing is held."""
+    values = np.array([list(own.values()) for own in held]).reshape(len(held), -1)
+    base = np.zeros((len(held), size), np.result_type(float, values.dtype))
+    base[:, list(held[0])] = values
+    return base
 
 
 def make_up(network: Network) -> Any:
@@ -84,98 +207,17 @@ def make_up(network: Network) -> Any:
     return nodes, beams, network.links, acting, [type(contact) for contact in network.contacts]
 
 
-def _all_plain(template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]) -> bool:
-    """Return True if all networks have plain beams and differ in nothing but nodes, beams and sections.
-
-    Joints and links are those of one topology: they are not compared.
-    """
-    network, drive = origin
-    return not template.elements.gap.any() and all(
-        all(is_plain(beam) and beam.closure != "raw" for beam in net.beams.values())
-        and net.springs == network.springs
-        and net.loads == network.loads
-        and own.loads == drive.loads
-        and net.contacts == network.contacts
-        for net, own in (origin, *pairs)
-    )
-
-
-def _plain(
-    template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]
-) -> NetworkDesigns:
-    scales, e = template.scales, template.elements
-    n = template.numbering
-    names, node, master, ends, inside = list(n.topology.nodes), n.node, n.master, n.beam_ends, n.inside
-    spots = np.array([[(net.nodes[name].x, net.nodes[name].y) for name in names] for net, _ in pairs]) / scales.length
-    beams = [list(net.beams.values()) for net, _ in pairs]
-    every = [beam for each in beams for beam in each]
-    shape = len(beams), len(beams[0])
-    arm = spots[:, node] - spots[:, master]
-    if any(b.start_offset != NO_OFFSET or b.end_offset != NO_OFFSET for b in every):
-        offsets = np.array([(b.start_offset, b.end_offset) for b in every]).reshape(*shape, 2, 2)
-        arm = arm.astype(np.result_type(arm, offsets))
-        arm[:, ends] += offsets / scales.length
-    place = spots[:, master]
-    reach = (place + arm)[:, ends[:, 1]] - (place + arm)[:, ends[:, 0]]
-    coefficients = coefficients_of(every).reshape(*shape, -1)
-    drawn = chords(coefficients)
-    check_fits(every, np.hypot(reach[..., 0].real, reach[..., 1].real), np.hypot(*map(np.real, drawn)))
-    rotation, length = fit_to_ends(*drawn, reach)
-    turned = coefficients + rotation[..., None] * (np.arange(coefficients.shape[-1]) == 0)
-    rigidities = rigidities_of(every).reshape(3, *shape)
-    tables = plain_tables(turned, length * scales.length, rigidities, scales, template.degree, n.row, e.cuts)
-    if np.any(template.floored):
-        tables["axial"] = tables["axial"] + template.floor[:, None]
-    if inside.size:  # bodies between the elements of a beam
-        steps = [(tables["weight"] * turn(tables["angle"])).sum(axis=-1) for turn in (np.cos, np.sin)]
-        ahead = np.stack(steps, axis=-1)
-        for k in np.flatnonzero(e.cuts[:, 1] < 1.0):
-            place[:, e.ends[k, 1]] = (place + arm)[:, e.ends[k, 0]] + ahead[:, k]
-    frames, base = _supports(template, origin, pairs, [names[k] for k in master])
-    if frames is not None:
-        frames[:, inside] = template.attachments.frame[inside]
-    places = {"origin": place, "arm": arm} | ({} if frames is None else {"frame": frames})
-    return NetworkDesigns(template, len(pairs), tables, places, base, (), tuple(pairs), turned)
-
-
-def _supports(
-    template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]], masters: list[str]
-) -> tuple[Any, Any]:
-    """Return the frames of attachments (d, k, 2) and values of held unknowns (d, size); None if no design has others.
-
-    A node that is driven, but held nowhere, has the frame of the drive.
-    """
-    names, base = list(dict.fromkeys(masters)), None
-    known = [origin[0].nodes[name].support for name in names]
-    drives = {getattr(drive, "direction", None) for _, drive in (origin, *pairs)}
-    supports = [[net.nodes[name].support for name in names] for net, _ in pairs]
-    if len(drives) == 1 and all(own == known for own in supports):
-        return None, None
-    angle = np.empty((len(pairs), len(names)), complex)
-    base = np.zeros((len(pairs), template.size), complex)
-    at = {name: template.attachments.frame[masters.index(name)] for name in names}
-    for d, ((_, drive), own) in enumerate(zip(pairs, supports, strict=True)):
-        for k, (name, support) in enumerate(zip(names, own, strict=True)):
-            angle[d, k] = support.direction
-            driven = getattr(drive, "node", None) == name and hasattr(drive, "direction")
-            if driven and not np.allclose(at[name], (np.cos(support.direction), np.sin(support.direction))):
-                angle[d, k] = drive.direction  # type: ignore[union-attr]
-            flags = support.along, support.across, support.rotation
-            for flag, unknown, value in zip(flags, template.bodies[name], support.displacement, strict=True):
-                if flag and template.rate[unknown] == 0.0:
-                    base[d, unknown] = value / (1.0 if unknown == template.bodies[name][2] else template.scales.length)
-    turn = angle[:, [names.index(name) for name in masters]]
-    frames = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    real = not (frames.imag.any() or base.imag.any())
-    return (frames.real, base.real) if real else (frames, base)
-
-
 def design_of(designs: NetworkDesigns, number: int) -> Discretisation:
     """Return the arrays of one design as a `Discretisation`."""
-    if designs.each:
-        return designs.each[number]
-    template = designs.template
-    elements = template.elements._replace(**{name: table[number] for name, table in designs.tables.items()})
-    attachments = template.attachments._replace(**{name: place[number] for name, place in designs.places.items()})
-    base = template.base if designs.base is None else designs.base[number]
-    return replace(template, elements=elements, attachments=attachments, base=base)
+    template, (network, drive) = designs.template, designs.networks[number]
+    loads = [load for load in (*network.loads, *drive.loads) if isinstance(load, PointLoad)]
+    return replace(
+        template,
+        elements=template.elements._replace(**{name: table[number] for name, table in designs.tables.items()}),
+        attachments=template.attachments._replace(**{name: at[number] for name, at in designs.places.items()}),
+        springs=tuple(at._replace(item=item) for at, item in zip(template.springs, network.springs, strict=True)),
+        loads=tuple(at._replace(item=item) for at, item in zip(template.loads, loads, strict=True)),
+        contacts=tuple(at._replace(item=network.contacts[at.number]) for at in template.contacts),
+        base=join_held([designs.held[number]], template.size)[0],
+        fits=designs.fits[number],
+    )

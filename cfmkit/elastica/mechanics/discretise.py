@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
+from cfmkit.elastica.mechanics.designs import fill_arrays, join_held
 from cfmkit.elastica.mechanics.element_cuts import (
     TAUT_RATIO,
     MovingCuts,
@@ -26,14 +27,13 @@ from cfmkit.elastica.mechanics.element_cuts import (
     join_cut_laws,
     turns_little,
 )
-from cfmkit.elastica.mechanics.element_tables import element_tables
 from cfmkit.elastica.mechanics.numbering import Numbering, Topology, find_free, number
 from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.contact import BeamSide, Stop
 from cfmkit.elastica.model.drive import Displacement, Loading
-from cfmkit.elastica.model.driven_node import find_driven_node
-from cfmkit.elastica.model.network import LineLoad, PointLoad, TorsionSpring, apart, spring_ends
+from cfmkit.elastica.model.driven_node import FRAME_OF_DRIVE, find_driven_node
+from cfmkit.elastica.model.network import PointLoad, TorsionSpring, apart, spring_ends
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.errors import InputError
 
@@ -49,7 +49,6 @@ FLOOR_UNDER_MOTION = 3e-12
 """1/EA [L^2/EI] of a straight beam that does not stretch: at rest nothing else determines the force along it."""
 FLOOR_UNDER_LOADS = 1e-3 * FLOOR_UNDER_MOTION
 """The same where loads drive: they reach 1e3 times the force that a motion causes before it is noticed."""
-FRAME_OF_DRIVE = 3  # frame of a node that is held nowhere in `driven`: that of the drive, along whose x it moves
 
 
 class BeamElements(NamedTuple):
@@ -152,14 +151,6 @@ class Discretisation:
         return np.asarray(np.where(self.floored, self.axial[:, 0], 0.0))
 
     @property
-    def cuts(self) -> dict[str, list[float]]:
-        """Parameters between which the elements of each beam lie, ascending."""
-        cuts = {name: [0.0] for name in self.fits}
-        for name, (_, end) in zip(self.elements.beam, self.elements.cuts.tolist(), strict=True):
-            cuts[name].append(end)
-        return cuts
-
-    @property
     def n_motions(self) -> int:
         """Number of unknowns that are motions; forces come behind them."""
         return self.numbering.n_motions
@@ -174,8 +165,6 @@ def discretise(
     tension: Mapping[str, float] | None = None,  # beams under a large tension N to their L sqrt(N/EI)
     scales: MechanicsUnits | None = None,  # units; found from the beams unless given
     fits: BeamFits | None = None,  # those of the same network, if it was set up before
-    # parameters between which the elements of each beam lie; found from degree, pieces and tension unless given
-    cuts: Mapping[str, list[float]] | None = None,
     # places at which sides of beams may touch obstacles; of one beam in ascending order
     flanks: Sequence[FlankPlace] = (),
 ) -> Discretisation:
@@ -185,7 +174,7 @@ def discretise(
     pinned to an arm.
     """
     fits = fits or BeamFits(network)
-    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build(cuts, tuple(flanks))
+    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build(tuple(flanks))
 
 
 class _ArrayBuilder:
@@ -199,19 +188,15 @@ class _ArrayBuilder:
         self.fits, self.bundle = fits, fits.bundle
         self.scales = scales or self._scales()
         self.driven = find_driven_node(network, drive)
-        along = self.driven is not None and self.driven[1] == FRAME_OF_DRIVE
-        self.turned = {drive.node: drive.direction} if along else {}  # type: ignore[union-attr]
 
-    def build(
-        self, given_cuts: Mapping[str, list[float]] | None, flanks: tuple[FlankPlace, ...] = ()
-    ) -> Discretisation:
+    def build(self, flanks: tuple[FlankPlace, ...]) -> Discretisation:
         """Return the arrays."""
         beams = self.network.beams
         touched: dict[str, list[float]] = {}
         for flank in flanks:
             touched.setdefault(self.network.contacts[flank.number].beam, []).append(flank.parameter)  # type: ignore[union-attr]
         laws = {name: find_moving_cuts(beams[name], self.fits[name], places) for name, places in touched.items()}
-        cuts = given_cuts or {
+        cuts = {
             name: laws[name].evaluate(touched[name]) if name in laws else self._cuts(name, beam)
             for name, beam in beams.items()
         }
@@ -229,10 +214,15 @@ class _ArrayBuilder:
             Attached(load, places, grows) for (load, grows), places in zip(point_loads, at_loads, strict=True)
         )
         places = np.array([pair for own in cuts.values() for pair in itertools.pairwise(own)])
-        tables = element_tables(self.fits, self.scales, self.degree, numbering.row, places)
-        attachments = self._attachments(numbering, tables)
-        floors = np.array([self._floor(name, beam) for name, beam in beams.items()])
-        elements, size = self._elements(places, tables, numbering, attachments, floors[numbering.row]), numbering.size
+        arrays = fill_arrays(numbering, self.scales, places, [(self.network, self.drive)], [self.fits], self.driven)
+        attachments = Attachments(numbering.places, **{name: at[0] for name, at in arrays.places.items()})
+        floors = np.array([self._floor(name, beam) for name, beam in beams.items()])[numbering.row]
+        tables = {name: table[0] for name, table in arrays.tables.items()}
+        if np.count_nonzero(floors):
+            tables["axial"] = tables["axial"] + floors[:, None]
+        names = tuple(map(list(beams).__getitem__, numbering.row.tolist()))
+        elements = BeamElements(**tables, ends=numbering.ends, unknowns=numbering.unknowns, beam=names, cuts=places)
+        size = numbering.size
         contacts = tuple(
             ContactAt(item, place, size + k, contact_number)
             for k, ((contact_number, item), place) in enumerate(zip(touching, numbering.touching, strict=True))
@@ -241,7 +231,7 @@ class _ArrayBuilder:
         contacts, n_friction = _number_friction(contacts, behind)
         contacts += self._flank_contacts(flanks, elements, size + len(contacts))
         acting = [*springs, *loads, *(Attached(contact.item, (contact.place,)) for contact in contacts)]
-        free, base, rate = self._constraints(numbering, attachments, acting)
+        free, base, rate = self._constraints(numbering, attachments, acting, arrays.held[0])
         if contacts:
             sides = [contact for contact in contacts if contact.slide >= 0]
             more = (
@@ -255,7 +245,7 @@ class _ArrayBuilder:
             base, rate = (np.append(values, np.zeros(len(more))) for values in (base, rate))
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
-            numbering, self.fits, (floors > 0)[numbering.row], self.pieces, self.tension, contacts,
+            numbering, self.fits, floors > 0, self.pieces, self.tension, contacts,
             join_cut_laws(laws, elements.beam, _sides(contacts))
             if flanks
             else None,
@@ -283,10 +273,10 @@ class _ArrayBuilder:
     # -- bodies and attachments ------------------------------------------------------------------------------------
     def _scales(self) -> MechanicsUnits:
         lengths = [np.real(self.fits[name].length) for name in (self.bundle.names[k] for k in self.bundle.others)]
-        lengths += np.real(self.bundle.length).tolist() if self.bundle.plain else []
+        lengths += self.bundle.length[self.fits.number].real.tolist() if self.bundle.plain else []
         length = float(sum(lengths) / len(lengths))
         if self.bundle.plain[:1] == [0]:
-            rigidity = float(np.real(self.bundle.rigidities[0][0]))
+            rigidity = float(self.bundle.rigidities[0, self.fits.number, 0].real)
         else:
             section = next(iter(self.network.beams.values())).section
             rigidity = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
@@ -321,32 +311,6 @@ class _ArrayBuilder:
                     f"{carrier!r} is pinned to a rigid arm: it cannot carry offsets or rigid links of its own"
                 )
 
-    def _attachments(self, numbering: Numbering, tables: Mapping[str, Any]) -> Attachments:
-        """Return where springs, loads and ends of elements act; those inside beams are bodies of their own."""
-        nodes, beams, length = self.network.nodes, self.network.beams.values(), self.scales.length
-        spots = np.array([(node.x, node.y) for node in nodes.values()])
-        origin = spots[numbering.master] / length
-        arm = (spots[numbering.node] - spots[numbering.master]) / length
-        if any(any(b.start_offset) or any(b.end_offset) for b in beams):
-            offsets = np.array([(b.start_offset, b.end_offset) for b in beams]) / length
-            arm = arm.astype(np.result_type(arm, offsets))
-            arm[numbering.beam_ends] += offsets
-        if numbering.inside.size:
-            chords = [(tables["weight"] * turn(tables["angle"])).sum(axis=1) for turn in (np.cos, np.sin)]
-            ahead = np.stack(chords, axis=1)
-            origin = origin.astype(np.result_type(origin, arm, ahead))
-            for number_of_beam, first in enumerate(numbering.beam_ends[:, 0]):
-                own = np.flatnonzero(numbering.row == number_of_beam)[:-1]
-                origin[numbering.ends[own, 1]] = origin[first] + arm[first] + np.cumsum(ahead[own], axis=0)
-        angles = [self.turned.get(name, node.support.direction) for name, node in nodes.items()]
-        if not any(angles):
-            frame = np.zeros(arm.shape)
-            frame[:, 0] = 1.0
-            return Attachments(numbering.places, arm, origin, frame)
-        angle = np.array(angles)[numbering.master]
-        angle[numbering.inside] = 0.0
-        return Attachments(numbering.places, arm, origin, _direction(angle))
-
     # -- elements --------------------------------------------------------------------------------------------------
     def _cuts(self, name: str, beam: Beam) -> list[float]:
         """Return the parameters between which the elements of a beam lie."""
@@ -362,64 +326,15 @@ class _ArrayBuilder:
         floor = FLOOR_UNDER_LOADS if isinstance(self.drive, Loading) else FLOOR_UNDER_MOTION
         return float(floor * self.scales.force * self.scales.length**2 / rigidity)
 
-    def _elements(
-        self, cuts: FloatArray, tables: dict[str, Any], numbering: Numbering, attachments: Attachments, floors: Any
-    ) -> BeamElements:  # fmt: skip
-        """Return the elements."""
-        if floors.any():
-            tables = tables | {"axial": tables["axial"] + floors[:, None]}
-        names = list(self.network.beams)
-        beams = tuple(names[k] for k in numbering.row.tolist())
-        elements = BeamElements(
-            **tables, line=self._line_loads(beams), gap=np.zeros((len(beams), 2)), ends=numbering.ends,
-            unknowns=numbering.unknowns, beam=beams, cuts=cuts,
-        )  # fmt: skip
-        raw = [self.network.beams[name].closure == "raw" for name in beams]
-        return elements._replace(gap=self._gaps(elements, attachments, raw)) if any(raw) else elements
-
-    def _line_loads(self, beams: tuple[str, ...]) -> Any:
-        """Return the line loads of every element: constant and growing with the drive."""
-        given = [(k, load) for k, loads in enumerate((self.network.loads, self.drive.loads)) for load in loads]
-        lines = [(k, load) for k, load in given if isinstance(load, LineLoad)]
-        if not lines:
-            return np.zeros((len(beams), 2, 2))
-        kind = np.result_type(float, *(value for _, load in lines for value in (load.wx, load.wy)))
-        total = np.zeros((len(beams), 2, 2), kind)
-        unit = self.scales.length / self.scales.force
-        for grows, load in lines:
-            own = [name == load.beam for name in beams]
-            total[own, grows] += np.array([load.wx, load.wy]) * unit * (self.scales.drive if grows else 1.0)
-        return total
-
-    def _gaps(self, elements: BeamElements, attachments: Attachments, raw: list[bool]) -> Any:
-        """Return by how much the last element of each beam that is forced into place misses its node."""
-        place = attachments.origin + attachments.arm
-        span = place[elements.ends[:, 1]] - place[elements.ends[:, 0]]
-        reach = [(elements.weight * turn(elements.angle)).sum(axis=1) for turn in (np.cos, np.sin)]
-        last = np.array(raw) & (elements.cuts[:, 1] == 1.0)
-        return np.where(last[:, None], span - np.stack(reach, axis=1), 0.0)
-
     # -- what is held ----------------------------------------------------------------------------------------------
     def _constraints(
-        self, numbering: Numbering, attachments: Attachments, acting: list[Attached]
+        self, numbering: Numbering, attachments: Attachments, acting: list[Attached], held: dict[int, Any]
     ) -> tuple[Any, Any, Any]:
         """Return the free unknowns, the values of held ones and their change with the drive."""
-        rate, held = np.zeros(numbering.size), dict[int, Any]()
-        for name, body in numbering.bodies.items():
-            support = self.network.nodes[name].support
-            flags = support.along, support.across, support.rotation
-            for flag, unknown, value in zip(flags, body, support.displacement, strict=True):
-                if flag:
-                    held[unknown] = value / (1.0 if unknown == body[2] else self.scales.length)
+        base, rate = join_held([held], numbering.size)[0], np.zeros(numbering.size)
         if self.driven is not None:
-            node, local, sense = self.driven
-            unknown = numbering.bodies[node][local % FRAME_OF_DRIVE]
-            rate[unknown], held[unknown] = sense, 0.0
-        base = np.zeros(numbering.size)
-        if any(held.values()):
-            base = base.astype(np.result_type(float, *{type(value) for value in held.values()}))
-            base[list(held)] = list(held.values())
-        arms = (attachments.arm != 0).any(axis=1).tobytes()
+            rate[numbering.bodies[self.driven.node][self.driven.motion % FRAME_OF_DRIVE]] = self.driven.sense
+        arms = ((attachments.arm[:, 0] != 0) | (attachments.arm[:, 1] != 0)).tobytes()
         acts = tuple((attached.places, *_acts_on(attached.item)) for attached in acting)
         return find_free(numbering, tuple(held), arms, acts), base, rate
 
@@ -440,13 +355,6 @@ def _sides(contacts: tuple[ContactAt, ...]) -> list[tuple[str, int]]:
     """Return beam and unknown place of each contact of a side."""
     sides: Any = [contact for contact in contacts if contact.slide >= 0]
     return [(contact.item.beam, contact.slide) for contact in sides]
-
-
-def _direction(angle: Any) -> Any:
-    """Return cosine and sine in a last axis."""
-    both = np.empty((*angle.shape, 2), np.result_type(angle, float))
-    both[..., 0], both[..., 1] = np.cos(angle), np.sin(angle)
-    return both
 
 
 def _acts_on(item: Any) -> tuple[bool, bool]:

@@ -85,7 +85,7 @@ def join_cut_laws(laws: Mapping[str, CutLaw], beams: tuple[str, ...], sides: Seq
 def is_straight(beam: Beam, fits: BeamFits, name: str) -> bool:
     """Return True if a beam is straight before it is loaded."""
     if isinstance(beam.shape, Polynomial):
-        return not any(np.real(coefficient) for coefficient in beam.shape.coefficients[1:])
+        return not any(coefficient.real for coefficient in beam.shape.coefficients[1:])
     fitted = fits[name]
     angle = np.real(fitted.angle(np.linspace(0, 1, 9), 0.5)) + np.zeros(9)
     return len(fitted.course.breaks) == 2 and not np.ptp(angle) > 0
@@ -93,7 +93,7 @@ def is_straight(beam: Beam, fits: BeamFits, name: str) -> bool:
 
 def turns_little(beam: Beam) -> bool:
     """Return True if the angle of an unloaded beam is a polynomial that cannot turn by more than an element may."""
-    return isinstance(beam.shape, Polynomial) and sum(abs(c) for c in beam.shape.coefficients[1:]) <= MAX_TURN
+    return isinstance(beam.shape, Polynomial) and sum(map(abs, beam.shape.coefficients[1:])) <= MAX_TURN
 
 
 def _refine_ends(cuts: list[float], tautness: float) -> list[float]:

@@ -16,7 +16,7 @@ from cfmkit.elastica.mechanics.polynomials import N_EXTRA_POINTS, basis, integra
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.units import MechanicsUnits
@@ -28,7 +28,7 @@ SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
 
 
 def element_tables(
-    fits: BeamFits,  # the beams of a network
+    fits: Sequence[BeamFits],  # the beams of d networks
     scales: MechanicsUnits,  # units of the tables
     degree: int,  # of the rotation on an element
     # row, cuts: (e,), (e, 2): number of each element's beam, ascending, and the parameters of its shape between which
@@ -36,32 +36,29 @@ def element_tables(
     row: Any,
     cuts: FloatArray,
 ) -> dict[str, Any]:
-    """Return the tables of the elements between cuts of the beams, one beam after the other."""
-    beams, bundle = fits.network.beams, fits.bundle
+    """Return the tables of the elements between cuts of the beams, one beam after the other: (d, e, q) or (d, e)."""
+    beams, bundle, numbers = fits[0].network.beams, fits[0].bundle, [own.number for own in fits]
+    if not bundle.others:
+        return plain_tables(*bundle.rows(numbers), scales, degree, row, cuts)
     wide = any(beam.section.wide for beam in beams.values())
     plain, together, first = [] if wide else bundle.plain, dict[str, Any](), 0
     if plain:
-        rows = np.isin(row, plain) if bundle.others else slice(None)
-        number = np.searchsorted(plain, row[rows]) if bundle.others else row
-        shapes = bundle.coefficients, bundle.length, bundle.rigidities
-        if not bundle.others and bundle.coefficients.dtype == bundle.rigidities.dtype == float and load_compiled():
-            return _compile_tables(*shapes, scales, degree, row, cuts)
-        together = plain_tables(*shapes, scales, degree, number, cuts[rows])
-        if not bundle.others:
-            return together
+        rows = np.isin(row, plain)
+        together = plain_tables(*bundle.rows(numbers), scales, degree, np.searchsorted(plain, row[rows]), cuts[rows])
     parts: list[dict[str, Any]] = []
-    for k, (name, beam) in enumerate(beams.items()):
+    for k, name in enumerate(beams):
         between = cuts[row == k]
         if k in plain:
-            parts.append({column: values[first : first + len(between)] for column, values in together.items()})
+            parts.append({column: values[:, first : first + len(between)] for column, values in together.items()})
             first += len(between)
         else:
-            parts += _smooth_tables(beam, fits[name], scales, degree, between.tolist(), wide)
-    return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
+            each = [_smooth_tables(own.network.beams[name], own[name], scales, degree, between, wide) for own in fits]
+            parts.append({column: np.array([tables[column] for tables in each]) for column in each[0]})
+    return {column: np.concatenate([part[column] for part in parts], axis=1) for column in parts[0]}
 
 
 def plain_tables(
-    # coefficients, length, rigidities: (..., b, m), (..., b), (3, ..., b): as of `Bundle`, [rad], [m], [N m2], [1/N]
+    # coefficients, length, rigidities: (d, b, m), (d, b), (3, d, b): as of `Bundle`, [rad], [m], [N m2], [1/N]
     coefficients: Any,
     length: Any,
     rigidities: Any,
@@ -72,7 +69,12 @@ def plain_tables(
     row: Any,
     cuts: FloatArray,
 ) -> dict[str, Any]:
-    """Return the tables of elements of plain beams, of one network or of d: (e, q) or (d, e, q) each."""
+    """Return the tables of elements of plain beams of d networks, (d, e, q) each; of one by compiled code."""
+    if len(length) == 1 and coefficients.dtype == rigidities.dtype == float and (compiled := load_compiled()):
+        table, lengths = np.empty((6, 1, len(row), degree + N_EXTRA_POINTS)), np.empty((1, len(row)))
+        given = (np.ascontiguousarray(values, float) for values in (cuts, coefficients, length, rigidities))
+        compiled.tables(shape_row(degree)[0], row, *given, table, lengths, scales.length, scales.force)
+        return {**dict(zip(TABLES_AT_POINTS, table, strict=True)), "length": lengths}
     rule, force, width = basis(degree), scales.force, cuts[:, 1:] - cuts[:, :1]
     t, own, angle = cuts[:, :1] + width * rule.places, coefficients[..., row, :], 0.0
     for k in reversed(range(own.shape[-1])):
@@ -90,25 +92,16 @@ def plain_tables(
     }
 
 
-def _compile_tables(
-    coefficients: FloatArray, length: FloatArray, rigidities: FloatArray, scales: MechanicsUnits, degree: int, row: Any,
-    cuts: FloatArray,
-) -> dict[str, Any]:  # fmt: skip
-    """Return the same of one network with real numbers in compiled code, (e, q) each."""
-    shapes, tables, lengths = shape_row(degree)[0], np.empty((6, len(row), degree + N_EXTRA_POINTS)), np.empty(len(row))
-    given = (np.ascontiguousarray(values, float) for values in (cuts, coefficients, length, rigidities))
-    load_compiled().tables(shapes, row, *given, tables, lengths, scales.length, scales.force)
-    return {**dict(zip(TABLES_AT_POINTS, tables, strict=True)), "length": lengths}
-
-
 def _smooth_tables(
-    beam: Beam, fitted: Fit, scales: MechanicsUnits, degree: int, cuts: list[list[float]], wide: bool
-) -> Iterator[dict[str, Any]]:
-    """Yield the tables of the elements in each smooth part of a beam."""
+    beam: Beam, fitted: Fit, scales: MechanicsUnits, degree: int, cuts: FloatArray, wide: bool
+) -> dict[str, Any]:
+    """Return the tables of the elements of a beam, those of one smooth part after the other."""
+    parts, middle = list[dict[str, Any]](), 0.5 * (cuts[:, 0] + cuts[:, 1])
     for begin, end in itertools.pairwise(smooth_marks(beam, fitted)):
-        own = np.array([pair for pair in cuts if begin <= 0.5 * sum(pair) < end])
+        own = cuts[(begin <= middle) & (middle < end)]
         if len(own):  # else the marks are at one place but for rounding
-            yield smooth_tables(beam, fitted, scales, degree, own, 0.5 * (begin + end), wide)
+            parts.append(smooth_tables(beam, fitted, scales, degree, own, 0.5 * (begin + end), wide))
+    return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
 
 
 def smooth_tables(

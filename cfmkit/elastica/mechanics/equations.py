@@ -37,6 +37,7 @@ FORCE_CHANGE = 8.0  # of a section force in one step, in EI/L^2 of its element, 
 LAND_FROM = 1.3  # steps to a target from which on it is hit by one
 SHORTEST_STEP = 1e-13  # share of the range
 N_PREDICTING = 3  # states whose polynomial predicts the next
+N_POWERS = 3  # by which the flexibility of the softest mode is found
 MAX_REJECTED = 7  # two for each rejected step, one less for each accepted one
 
 
@@ -108,6 +109,7 @@ class MarchPlan:
     tolerance: float = 1e-10
     branch: PathBranch | None = None  # then it is checked that every state leads back: a branch may end
     room: int = 2000  # states
+    any_vector: FloatArray | None = None  # then flexibilities at both ends are wanted, found from this one (compiled)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +117,7 @@ class NaturalMarch(MarchedSteps):
     """Equilibria that were reached, and why the march ended; efforts are gradients by what the way moves."""
 
     code: MarchCode
+    flexibilities: tuple[float, float] = (0.0, 0.0)  # of the softest modes at both ends, if they are known
 
     @property
     def stuck(self) -> bool:
@@ -323,8 +326,8 @@ class NumpyEquations:
 def force_units(mesh: Discretisation) -> FloatArray:
     """Return the unit of each free unknown that is a force, EI/L^2 of its element or 1; infinite for motions."""
     e = mesh.elements
-    length = np.real(e.length).reshape(-1, len(e.beam))[0]  # those of the first of several states
-    rigidity = np.real(e.rigidity * e.weight).reshape(-1, *e.weight.shape[-2:])[0]
+    length = e.length.real.reshape(-1, len(e.beam))[0]  # those of the first of several states
+    rigidity = (e.rigidity * e.weight).real.reshape(-1, *e.weight.shape[-2:])[0]
     bending = rigidity.sum(axis=1) * length
     unit = np.full(mesh.size, np.inf)
     unit[e.unknowns[:, -2:]] = (bending / length**2)[:, None]

@@ -83,8 +83,14 @@ static void store(Int n, double *row, const double *x, const double *rate, doubl
     row[2 * n + 3] = target;
 }
 
+static double flexibility(const Model *m, const double *x, double way, const Plan *plan, const double *any, double *vector) {
+    memcpy(vector, any, (size_t)m->free * sizeof(double));
+    return soften(m, x, way, (Int)plan->powers, vector);
+}
+
+/* `any` is a vector with a share of every mode, from which the softest one is found; NULL if it is not asked for. */
 int march(const Model *m, Plan *plan, double *x, double *rate, double *way, const double *before, const double *targets,
-          Int count, double *rows, Int room, Int *stored) {
+          Int count, double *rows, Int room, Int *stored, const double *any) {
     const Int n = m->free, wide = 2 * n + 4;
     const size_t bytes = (size_t)n * sizeof(double);
     const Goal goal = {NULL, 0.0, NULL, plan->tolerance, 1};
@@ -108,6 +114,7 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
         plan->unstable = (double)found.unstable;
         if (count && targets[0] == *way) store(n, rows + wide * kept++, x, rate, *way, &found, (double)passed++);
     }
+    if (any) plan->first_flexibility = flexibility(m, x, *way, plan, any, scratch);
     while (passed < count && kept < room) {
         const double left = targets[passed] - *way, sense = left > 0.0 ? 1.0 : -1.0;
         const int lands = fabs(left) <= LAND_FROM * plan->step;
@@ -151,6 +158,7 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
         if (rejected > 7 || plan->step < SHORTEST_STEP * plan->range) { code = STEPS_FAIL; break; }
     }
     if (code == DONE && passed < count) code = FULL;
+    if (any && code == DONE) plan->last_flexibility = flexibility(m, x, *way, plan, any, scratch);
 end:
     stored[0] = kept;
     stored[1] = passed;
@@ -171,7 +179,7 @@ int march_many(const Model *models, Int designs, const Plan *plan, const double 
         double way = 0.0, *x = calloc((size_t)(2 * m->free), sizeof(double)), *rows = malloc((size_t)(room * wide) * sizeof(double));
         for (Int k = 0; k < count; k++) efforts[d * count + k] = NAN;
         if (!x || !rows) { free(x); free(rows); return 0; }
-        codes[d] = march(m, &own, x, x + m->free, &way, NULL, targets, count, rows, room, stored);
+        codes[d] = march(m, &own, x, x + m->free, &way, NULL, targets, count, rows, room, stored, NULL);
         for (Int k = 0; k < stored[0]; k++) {
             const double *row = rows + k * wide, target = row[wide - 1];
             if (target < 0.0) continue;

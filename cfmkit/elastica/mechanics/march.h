@@ -169,10 +169,11 @@ int compare(const Model *models, Int designs, const Model *shapes, const double 
 /* Of a march: numbers of 8 bytes, too. */
 typedef struct {
     double step, range, largest_turn, largest_force, tolerance, unstable, on_branch, start;
+    double powers, first_flexibility, last_flexibility; /* of the softest mode at both ends, by so many powers; 0: not asked */
 } Plan;
 
 int march(const Model *m, Plan *plan, double *x, double *rate, double *way, const double *before, const double *targets,
-          Int count, double *rows, Int room, Int *stored);
+          Int count, double *rows, Int room, Int *stored, const double *any);
 int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts,
                Int room, Int *codes, const Int *chosen, Int some, double *states);
 

@@ -61,9 +61,9 @@ FUNCTION(compare, 7, 1, compare(m, a->count[0] / N_FIELDS, a->at[1], a->at[2], a
 /* shapes, row, cuts, coefficients, length, rigidities, tables, lengths; units of length, force */
 FUNCTION(tables, 8, 2, beam_tables(m, a->count[1], a->at[1], a->at[2], a->at[3], a->count[3] / a->count[4], a->at[4], a->at[5],
                                    a->count[4], a->number[0], a->number[1], a->at[6], a->at[7]))
-/* model, plan, x with rate and way, before, targets, rows, stored -> code */
-FUNCTION(march, 7, 0, march(m, a->at[1], a->at[2], (double *)a->at[2] + m->free, (double *)a->at[2] + 2 * m->free, a->at[3], a->at[4],
-                            a->count[4], a->at[5], a->count[5] / (2 * m->free + 4), a->at[6]))
+/* model, plan, x with rate and way, before, targets, rows, stored, any vector -> code */
+FUNCTION(march, 8, 0, march(m, a->at[1], a->at[2], (double *)a->at[2] + m->free, (double *)a->at[2] + 2 * m->free, a->at[3], a->at[4],
+                            a->count[4], a->at[5], a->count[5] / (2 * m->free + 4), a->at[6], a->at[7]))
 /* models, plan, targets, efforts, codes, chosen, states; room -> whether there was memory */
 FUNCTION(march_many, 7, 1, march_many(m, a->count[4], a->at[1], a->at[2], a->count[2], a->at[3], (Int)a->number[0], a->at[4], a->at[5],
                                       a->count[5], a->at[6]))

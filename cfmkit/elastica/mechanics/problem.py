@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.compiled import CompiledEquations
-from cfmkit.elastica.mechanics.equations import MarchPlan
+from cfmkit.elastica.mechanics.equations import N_POWERS, MarchCode, MarchPlan, NaturalMarch
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import slopes_at_end
 from cfmkit.elastica.model.network import PointLoad
@@ -30,8 +30,8 @@ SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier
 N_SPARE_STATES = 50  # states of a march besides two for each requested value, until it is looked at again
 ROOM_IN_CONTACT, ROOM_IN_NUMPY = 40, 8
 """States of a march with closed contacts, behind which it is seen whether one begins or ends; fewer where they cost."""
-FIRST_POWERS, N_POWERS, STIFF_SHARE = 8, 3, 1e-2
-"""Powers by which the softest mode is estimated, and its flexibility as a share of a critical one's that is none."""
+FIRST_POWERS, STIFF_SHARE = 8, 1e-2
+"""Powers by which the softest mode is estimated first, and its flexibility as a share of a critical one's."""
 MODE_MIX_SHARE = 0.1  # of any vector, that is added to a mode which may have no share of the one looked for
 NO_MOTION = 1e-3  # share of a mode's largest part below which the nodes do not move
 
@@ -88,13 +88,32 @@ class NetworkProblem:
         each = zip(found.free, drives, found.rate, found.unstable.tolist(), found.effort.tolist(), strict=True)
         return [PathEquilibrium(*values) if well else None for values, well in zip(each, found.converged, strict=True)]
 
+    def march_whole(self, walk: Walk, stiffnesses: tuple[float, float]) -> MarchedSteps | None:
+        """Return the whole way from its start, None if something may happen: `march` begins with the steps taken.
+
+        Nothing does if all is stable, and no eigenvalue at either end as small as a stiffness by far.
+        """
+        if not isinstance(self.equations, CompiledEquations) or self.follows or self.mesh.fits.network.contacts:
+            return None
+        march = self._march(walk, self._any_vector)
+        ends = zip(march.flexibilities, stiffnesses, strict=True)
+        if march.code is MarchCode.DONE and all(0 < abs(soft) * stiffness < STIFF_SHARE for soft, stiffness in ends):
+            return march
+        vars(self)["_begun"] = walk.here, march
+        return None
+
     def march(self, walk: Walk) -> MarchedSteps:
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
+        begun: tuple[PathEquilibrium | None, Any] = vars(self).pop("_begun", (None, None))
+        taken: NaturalMarch | None = begun[1] if begun[0] is walk.here and walk.before is None else None
+        return taken or self._march(walk)
+
+    def _march(self, walk: Walk, any_vector: FloatArray | None = None) -> NaturalMarch:
         left = walk.targets[walk.number :]
         plan = MarchPlan(
             walk.step, walk.options.span, walk.before, walk.options.largest_motion, self.next_correction,
             branch=walk.branch,
-            room=self._room_in_contact if self.mesh.contacts else 2 * len(left) + N_SPARE_STATES,
+            room=self._room_in_contact if self.mesh.contacts else 2 * len(left) + N_SPARE_STATES, any_vector=any_vector,
         )  # fmt: skip
         marched = self.equations.march(walk.here, left, plan)
         marched.target[marched.target >= 0] += walk.number

@@ -21,7 +21,8 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     if degree == mesh.degree:
         return mesh
     e = mesh.elements
-    tables = element_tables(mesh.fits, mesh.scales, degree, mesh.numbering.row, e.cuts)
+    many = element_tables([mesh.fits], mesh.scales, degree, mesh.numbering.row, e.cuts)
+    tables = {name: table[0] for name, table in many.items()}
     if np.any(mesh.floored):
         tables["axial"] = tables["axial"] + mesh.floor[:, None]
     coarse = mesh.numbering

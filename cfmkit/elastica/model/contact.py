@@ -209,19 +209,19 @@ class ObstacleEdge(ShortRepr):
         return found
 
 
-def line(through: Sequence[float], direction: float) -> ObstacleEdge:
+def line_edge(through: Sequence[float], direction: float) -> ObstacleEdge:
     """Return a straight line through a point [m], along a direction [rad]; the free side is to its left."""
     along = np.array([[math.cos(direction), math.sin(direction)]])
     return _outline([np.asarray(through, float)], along, [0.0], [])
 
 
-def circle(centre: Sequence[float], radius: float, hole: bool = False) -> ObstacleEdge:
+def circle_edge(centre: Sequence[float], radius: float, hole: bool = False) -> ObstacleEdge:
     """Return a disc, free outside, or a hole, free inside [m]."""
     arc = (np.asarray(centre, float), radius, 0.0, math.tau, -1.0 if hole else 1.0)
     return _outline([], [], [], [arc], closed=True)
 
 
-def polyline(points: Sequence[Sequence[float]], fillet: float, closed: bool = False) -> ObstacleEdge:
+def polyline_edge(points: Sequence[Sequence[float]], fillet: float, closed: bool = False) -> ObstacleEdge:
     """Return straight sides through points [m] with rounded corners; the free side is to the left.
 
     Raises ValueError if two points are the same, the line turns back on itself, or the fillet is too large for a side.
@@ -257,7 +257,7 @@ def polyline(points: Sequence[Sequence[float]], fillet: float, closed: bool = Fa
     return _outline(ring[:-1] + along * cut[:, :1], along, np.maximum(left, 0.0), arcs, closed)
 
 
-def arc(centre: Sequence[float], radius: float, start: float, end: float) -> ObstacleEdge:
+def arc_edge(centre: Sequence[float], radius: float, start: float, end: float) -> ObstacleEdge:
     """Return a part of the edge of a disc [m], between two angles [rad], that goes on straight at both ends.
 
     The free side is outside of the disc.

@@ -6,7 +6,7 @@ A drive that cannot be applied, because its node is held or moved by a link, is 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,14 +18,23 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
 
+FRAME_OF_DRIVE = 3  # number of the motion of a node in the frame of its drive
 
-def find_driven_node(network: Network, drive: Drive) -> tuple[str, int, float] | None:
-    """Return node, number of its motion and sign of what a drive moves; None if the drive prescribes loads.
 
-    The number is 0 or 1 for the motion along or across the direction of the node's support, and 2 for its rotation. It
-    is 3 if the support holds neither of the first two: its frame is then turned so that its x axis is along the drive.
-    The sign is 1 or -1: a drive may lead against the direction that the support leaves free. Directions may be complex
-    (derivatives are taken by complex steps); their real parts decide.
+class DrivenNode(NamedTuple):
+    """A node and its motion that a drive prescribes."""
+
+    node: str
+    # 0 or 1 for the motion along or across the direction of the node's support, 2 for its rotation; `FRAME_OF_DRIVE` if
+    # the support holds neither of the first two: its frame is then turned so that its x axis is along the drive
+    motion: int
+    sense: float  # 1 or -1: a drive may lead against the direction that the support leaves free
+
+
+def find_driven_node(network: Network, drive: Drive) -> DrivenNode | None:
+    """Return what a drive moves; None if the drive prescribes loads.
+
+    Directions may be complex (derivatives are taken by complex steps); their real parts decide.
 
     Raises InputError if the node is moved by a link, or held where it is to move.
     """
@@ -38,15 +47,15 @@ def find_driven_node(network: Network, drive: Drive) -> tuple[str, int, float] |
     if isinstance(drive, Rotation):
         if support.rotation:
             raise InputError(f"node {drive.node!r} cannot be turned: its rotation is held")
-        return drive.node, 2, 1.0
+        return DrivenNode(drive.node, 2, 1.0)
     if not support.along and not support.across:
-        return drive.node, 3, 1.0
+        return DrivenNode(drive.node, FRAME_OF_DRIVE, 1.0)
     for held, other, offset, turn in (
         (support.along, support.across, 0, 0.0),
         (support.across, support.along, 1, np.pi / 2),
     ):
         if not held and other and same_direction(drive.direction, support.direction + turn):
             along = math.cos(drive.direction.real - support.direction.real - turn)
-            return drive.node, offset, math.copysign(1.0, along)
+            return DrivenNode(drive.node, offset, math.copysign(1.0, along))
     direction = np.degrees(np.real(drive.direction))
     raise InputError(f"node {drive.node!r} cannot be moved along {direction:.6g} deg: it is held")

@@ -6,7 +6,7 @@ network or of several of one topology. The others are fitted one by one (`cfmkit
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,97 +24,103 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.section import Section
 
 
+NO_OFFSETS = ((0.0, 0.0), (0.0, 0.0))
+SHORTEST_CHORD = 1e-9  # of a shape of length 1 that can be fitted
 MAX_BEAM_TURN = 16.0  # turn [rad] up to which GAUSS integrates sine and cosine of the angle to about 1e-12
 
 
 class Bundle:
-    """The beams of a network between given ends.
+    """The beams of d networks of one make-up between their ends."""
 
-    Attributes
-    ----------
-    plain : list of int
-        Beams with a polynomial angle and one thickness; `others` has the rest.
-    coefficients : (plain, m) array
-        Of the angle, rotation of the fit included in the first.
-    length : (plain,) array
-        Arc length as used [m].
-    rigidities : (3, plain) array
-        Of bending, and the compliances of stretching and shearing, as `Section.rigidities` has them.
-    """
+    def __init__(self, networks: Sequence[Network]) -> None:
+        """Fit the plain beams."""
+        rows = [list(network.beams.values()) for network in networks]
+        self.names, number = list(networks[0].beams), {name: k for k, name in enumerate(networks[0].nodes)}
+        # places of all nodes (d, nodes, 2) [m]
+        self.spots = np.array([[(node.x, node.y) for node in network.nodes.values()] for network in networks])
+        places = self.spots[:, [(number[beam.start], number[beam.end]) for beam in rows[0]]]
+        offsets = [(beam.start_offset, beam.end_offset) for row in rows for beam in row]
+        # offsets of both ends of all beams, (d, beams, 2, 2) [m]; None if there are none
+        self.offsets = np.reshape(offsets, places.shape) if any(own != NO_OFFSETS for own in offsets) else None
+        if self.offsets is not None:
+            places = places + self.offsets
+        # beams with a polynomial angle and one thickness; `others` has the rest
+        self.plain = [k for k, same in enumerate(zip(*rows, strict=True)) if all(map(is_plain, same))]
+        self.others = [] if len(self.plain) == len(self.names) else sorted({*range(len(self.names))} - {*self.plain})
+        if self.plain:
+            reach = places[:, :, 1] - places[:, :, 0]
+            self._fit_plain(
+                [row[k] for row in rows for k in self.plain], reach[:, self.plain] if self.others else reach
+            )
 
-    def __init__(self, network: Network, ends: Any) -> None:
-        """Fit the plain beams; `ends` (b, 2, 2) [m] has the places of their ends."""
-        self.names, self.beams = list(network.beams), list(network.beams.values())
-        plain = [k for k, beam in enumerate(self.beams) if is_plain(beam)]
-        self.plain = plain
-        self.others = [] if len(plain) == len(self.beams) else [k for k in range(len(self.beams)) if k not in plain]
-        if plain:
-            self._fit_plain(ends if not self.others else ends[plain])
+    def _fit_plain(self, beams: list[Beam], reach: Any) -> None:
+        shape, self.beams = reach.shape[:2], beams
+        c = coefficients_of(beams).reshape(*shape, -1) + 0.0
+        dx, dy, (cx, cy) = reach[..., 0], reach[..., 1], chords(c)
+        far, own = dx * dx + dy * dy, cx * cx + cy * cy
+        check_fits(beams, far, own)
+        self.drawn = dx, dy, cx, cy, far, own
+        rotation, self.length = direction(dx * cx + dy * cy, dy * cx - dx * cy), np.sqrt(far / own)
+        self.raw = [beam.closure == "raw" for beam in beams]
+        if any(self.raw):
+            raw = np.reshape(self.raw, shape)
+            rotation, self.length = np.where(raw, 0.0, rotation), np.where(raw, self.nominal, self.length)
+        # of the angle (d, plain, m), the rotation of the fit included in the first; arc `length` as used (d, plain) [m]
+        self.coefficients, self.rotation = c if c.dtype == rotation.dtype else c + 0j, rotation
+        self.coefficients[..., 0] += rotation
+        # (3, d, plain): of bending, and the compliances of stretching and shearing, as `Section.rigidities` has them
+        self.rigidities = rigidities_of(beams).reshape(3, *shape)
 
-    def _fit_plain(self, ends: Any) -> None:
-        beams = [self.beams[k] for k in self.plain]
-        c = coefficients_of(beams) + 0.0
-        reach = ends[:, 1] - ends[:, 0]
-        distance = np.sqrt(reach[:, 0] * reach[:, 0] + reach[:, 1] * reach[:, 1])
-        cx, cy = chords(c)
-        own = np.sqrt(cx * cx + cy * cy)
-        check_fits(beams, distance, own)
-        nominal = [beam.shape.length for beam in beams]  # type: ignore[union-attr]
-        first = distance
-        if any(nominal):
-            first = np.array([d if one is None else one for d, one in zip(distance, nominal, strict=True)])
-        self.reach, self.drawn = reach, (first, cx, cy)
-        rotation, self.length = fit_to_ends(cx, cy, reach)
-        self.scale = distance / (own * first)
-        closures = [beam.closure for beam in beams]
-        if "raw" in closures:
-            raw = np.array([closure == "raw" for closure in closures])
-            rotation, self.scale = np.where(raw, 0.0, rotation), np.where(raw, 1.0, self.scale)
-            self.length = np.where(raw, first, self.length)
-        self.rotation = rotation
-        self.coefficients = c if c.dtype == rotation.dtype else c + 0j
-        self.coefficients[:, 0] += rotation
-        self.rigidities = rigidities_of(beams)
+    def rows(self, chosen: list[int]) -> tuple[Any, Any, Any]:
+        """Return coefficients, length and rigidities of some of the networks."""
+        if len(chosen) == len(self.length):
+            return self.coefficients, self.length, self.rigidities
+        return self.coefficients[chosen], self.length[chosen], self.rigidities[:, chosen]
 
-    @property
-    def gap(self) -> Any:
-        """Distances between the far ends of the shapes as given and their nodes, (plain,) [m]."""
-        first, cx, cy = self.drawn
-        return np.hypot(np.real(self.reach[:, 0] - first * cx), np.real(self.reach[:, 1] - first * cy))
+    @cached_property
+    def nominal(self) -> Any:
+        """Lengths of the shapes as given, (d, plain) [m]: the distance of the ends where they have none."""
+        distance = np.sqrt(self.drawn[4])
+        lengths: Any = [beam.shape.length for beam in self.beams]  # type: ignore[union-attr]
+        given = [far if length is None else length for far, length in zip(distance.flat, lengths, strict=True)]
+        return np.reshape(given, distance.shape)
 
-    def fit_of(self, name: str) -> Fit | None:
-        """Return the fit of a plain beam, None of another."""
-        number = self.names.index(name)
-        if number not in self.plain:
+    def fit_of(self, number: int, name: str) -> Fit | None:
+        """Return the fit of a plain beam of one of the networks, None of another."""
+        beam = self.names.index(name)
+        if beam not in self.plain:
             return None
-        k = self.plain.index(number)
-        shape: Any = self.beams[number].shape
-        chord = self.length[k] / self.scale[k]
-        return Fit(self.rotation[k], self.scale[k], float(self.gap[k]), self.length[k], shape.course(chord))
+        at = number, self.plain.index(beam)
+        flat, length, first = number * len(self.plain) + at[1], self.length[at], self.nominal[at]
+        dx, dy, cx, cy, far, own = (drawn[at] for drawn in self.drawn)
+        scale = 1.0 if self.raw[flat] else np.sqrt(far) / (np.sqrt(own) * first)
+        gap = float(np.hypot(np.real(dx - first * cx), np.real(dy - first * cy)))
+        course = self.beams[flat].shape.course(length / scale)
+        return Fit(self.rotation[at], scale, gap, length, course)
 
 
 def check_fits(
     beams: Sequence[Beam],  # plain ones
-    # distance, own: (b,) in all: between the ends of each [m], and between those of its shape, over its length [1]
-    distance: Any,
+    # far, own: (b,) in all: squares of the distance of the ends of each [m], and of those of its shape, over its length
+    far: Any,
     own: Any,
 ) -> None:
     """Refuse beams without length, and shapes that return to their start.
 
     Raises InputError if one cannot be fitted.
     """
-    if distance.real.min() > 0 and own.real.min() > 1e-9:
+    if np.count_nonzero((far.real > 0) & (own.real > SHORTEST_CHORD**2)) == far.size:
         return
-    for beam, far, reach in zip(beams, np.real(distance).ravel(), np.real(own).ravel(), strict=True):
-        if not far > 0:
+    for beam, distance, chord in zip(beams, far.real.flat, own.real.flat, strict=True):
+        if not distance > 0:
             raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
-        if not reach > 1e-9:
+        if not chord > SHORTEST_CHORD**2:
             raise InputError(f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted")
 
 
 def is_plain(beam: Beam) -> bool:
     """Return True if a beam has a polynomial angle, no coil of many turns, one thickness, and is no wide strip."""
-    return not beam.section.wide and has_polynomial_angle(beam)
+    return has_polynomial_angle(beam) and not beam.section.wide
 
 
 def has_polynomial_angle(beam: Beam) -> bool:
@@ -135,26 +141,19 @@ def coefficients_of(beams: Sequence[Beam]) -> Any:
 
 
 def chords(coefficients: Any) -> tuple[Any, Any]:
-    """Return the chords of shapes of length 1 with coefficients (..., b, m), x and y (..., b) each.
+    """Return the chords of shapes of length 1 with coefficients (d, b, m), x and y (d, b) each.
 
-    Networks with complex steps, (d, b, m), are one but for these.
+    Networks with complex steps are one but for these.
     """
     power, weights = powers(coefficients.shape[-1]), BEAM_QUADRATURE[1]
     if not np.iscomplexobj(coefficients):
         angle = coefficients @ power
         return np.cos(angle) @ weights, np.sin(angle) @ weights
-    angle = (coefficients if coefficients.ndim == 2 else coefficients[0]).real @ power
+    angle = coefficients[0].real @ power
     cos, sin = weights * np.cos(angle), weights * np.sin(angle)
     steps = 1j * coefficients.imag
     x, y = ((steps * (moment @ power.T)).sum(axis=-1) for moment in (sin, cos))
     return cos.sum(axis=-1) - x, sin.sum(axis=-1) + y
-
-
-def fit_to_ends(cx: Any, cy: Any, reach: Any) -> tuple[Any, Any]:
-    """Return rotations and lengths of shapes with chords that fit their ends, `reach` (..., b, 2) apart."""
-    dx, dy = reach[..., 0], reach[..., 1]
-    rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
-    return rotation, np.sqrt((dx * dx + dy * dy) / (cx * cx + cy * cy))
 
 
 def rigidities_of(beams: Sequence[Beam]) -> Any:

@@ -188,7 +188,7 @@ def _rest_of_designs(
 ) -> _BeamAtRest:
     """Return beams at fractions of elements before any load with their derivatives, dual where they have some."""
     template, names = designs.template, [designs.template.elements.beam[element] for element in elements]
-    if designs.each:
+    if template.fits.bundle.others:
         template_beam = _rest(template.fits.network, template, elements, places)
         beams = [_rest(net, design_of(designs, d), elements, places) for d, (net, _) in enumerate(designs.networks)]
         return _BeamAtRest(

@@ -13,8 +13,9 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
+from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.similar_arrays import discretise_alike
+from cfmkit.elastica.mechanics.similar_arrays import make_inextensible
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.path import PathStatus
 from cfmkit.errors import InputError
@@ -51,7 +52,9 @@ def solve_near_known_path(
     EquilibriumPath
         The points found, on the elements of the known path. LOST, with the first place, if any is missing.
     """
-    arrays, known = discretise_alike(path.mesh, network, drive), path.at_requested
+    known, mesh = path.at_requested, path.mesh
+    arrays = discretise(network, drive, mesh.degree, mesh.pieces, mesh.tension, mesh.scales)
+    arrays = make_inextensible(arrays, np.flatnonzero(arrays.floored & ~mesh.floored))
     if not np.array_equal(arrays.free, path.mesh.free) or len(known) != len(drive.points):
         raise InputError("neighbouring equilibria need networks of the same kind and as many points as were reached")
     own, moves = equations(arrays), arrays.free < arrays.n_motions

@@ -105,7 +105,7 @@ def find_start(mesh: Discretisation, control: Control, remesh: Remesh | None = N
         at = correct(problem, at.x, 0.0) or at._replace(drive=0.0, rate=np.zeros_like(at.x), effort=np.nan)
     problem, at = _remove_floors(problem, at)
     if not ramps:  # at rest nothing bears anything: forces that Newton's method leaves there are rounding
-        at = at._replace(x=np.zeros_like(at.x), effort=0.0)
+        at = at._replace(x=np.zeros(len(at.x)), effort=0.0)
     return DriveStart(problem, at, tuple(events), branch, first, None)
 
 
@@ -121,9 +121,10 @@ def _ramps(mesh: Discretisation) -> Iterator[tuple[str, tuple[Change, bool]]]:
     """
     springs = [spring.item for spring in mesh.springs]
     tight = any(getattr(item, name, None) for item in springs for name in FREE_LENGTH_KEYS)
-    if tight or mesh.elements.gap.any():
+    if tight or np.count_nonzero(mesh.elements.gap):
         yield "prestress", (_remove_loads, True)
-    if any(not load.grows for load in mesh.loads) or mesh.elements.line[:, 0].any() or mesh.base.any():
+    fixed = any(not load.grows for load in mesh.loads) or np.count_nonzero(mesh.base)
+    if fixed or np.count_nonzero(mesh.elements.line[:, 0]):
         yield "constant loads", (_loads_as_drive, False)
 
 
@@ -157,9 +158,9 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
     Left in, nearly rigid networks of thin straight beams have errors of 1e-5 and more.
     """
     mesh = problem.mesh
-    elements = np.flatnonzero(mesh.floored)
-    if not elements.size:
+    if not np.count_nonzero(mesh.floored):
         return problem, at
+    elements = np.flatnonzero(mesh.floored)
     slot = np.full(mesh.size, -1)
     slot[mesh.free] = np.arange(len(mesh.free))
     rows = slot[mesh.elements.unknowns[elements, -2:]]
@@ -188,7 +189,7 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
 
 def is_stretched(mesh: Discretisation, z: np.ndarray) -> bool:
     """Return True if a beam that does not stretch was stretched through its floor at any of k states, (k, size)."""
-    if not len(z) or not mesh.floored.any():
+    if not len(z) or not np.count_nonzero(mesh.floored):
         return False
     elements = np.flatnonzero(mesh.floored)
     force = np.abs(z[:, mesh.elements.unknowns[elements][:, -2:]]).max(axis=(0, 2))

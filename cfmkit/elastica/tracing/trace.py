@@ -153,8 +153,8 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             best, attempt = attempt, None
             continue
         attempt = _with_error(attempt)
-        raised = resolution.degree < MAX_DEGREE and _can_be_raised(attempt)  # which corrects all its points
-        if tolerance < attempt.path.error < NEAR_ERROR_FACTOR * tolerance and not raised:
+        near = tolerance < attempt.path.error < NEAR_ERROR_FACTOR * tolerance
+        if near and not (resolution.degree < MAX_DEGREE and _can_be_raised(attempt)):  # which corrects all its points
             attempt = _with_error(attempt._replace(path=polish(path)))
         path = attempt.path
         if best is None or not path.error > max(best.path.error, tolerance):
@@ -347,7 +347,7 @@ def trace_on(
         points.pop()
     status, message = _explain(start, ending, unit)
     columns = PointColumns.from_points(points)
-    _settle_events(columns, events, SAME_PLACE * _range(drive) / unit)
+    _settle_events(columns, events, drive, unit)
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _path(network, drive, _states(start, meshes, columns), columns, told, status, message)
     if changes:
@@ -401,7 +401,8 @@ def _path(
         status=status, message=message, events=events, error=float("inf"),
         accurate=read_only(np.ones(len(points.drive)), np.bool_),
     )  # fmt: skip
-    if not isinstance(drive, Loading) and np.isfinite(points.effort).all():  # the solver has them already
+    # the solver has them already
+    if not (isinstance(drive, Loading) or np.count_nonzero(~np.isfinite(points.effort))):
         vars(path)["effort"] = read_only(points.effort * (states.mesh.scales.moment / states.mesh.scales.drive))
     return path
 
@@ -410,20 +411,19 @@ def _tell(event: PathEvent, unit: float) -> Event:
     return Event(event.kind, event.drive * unit, event.before, event.after)
 
 
-def _settle_events(points: PointColumns, events: list[PathEvent], near: float) -> None:
+def _settle_events(points: PointColumns, events: list[PathEvent], drive: Drive, unit: float) -> None:
     """Let points at a bifurcation be as stable as the path is on the better side of it.
 
-    There, as `near` as that in the drive, the number of unstable directions is rounding.
+    There the number of unstable directions is rounding.
     """
     for event in reversed(events):  # of several the first counts
         if event.kind == "bifurcation":
+            near = SAME_PLACE * _range(drive) / unit
             points.unstable[np.abs(points.drive - event.drive) <= near] = min(event.before, event.after)
 
 
 def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
     names = {branch: _name_branch(branch, unit) for branch in set(branches)}
-    if len(names) == 1:
-        return read_only(np.full(len(branches), names[branches[0]]), np.str_)
     return read_only([names[branch] for branch in branches], np.str_)
 
 

@@ -20,10 +20,9 @@ from cfmkit.families.beam.model import kind_of, solve
 from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, target_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as OF_SURFACES
-from cfmkit.families.end_stops import DEFINITIONS as OF_CONTACTS
+from cfmkit.families.end_stops import CONTACT_QUANTITIES
 from cfmkit.families.rows import ScalarQuantity, SeveralSolutions, SolvedRows, each_quantity, each_rule, or_nan
 from cfmkit.metrics import split_name
-from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
 ROWS_TOGETHER = 64  # mechanisms that are looked at together: their unknowns at 200 points take 20 MB
 ROW_COLUMNS = {name: each_quantity(quantity) for name, quantity in SCALAR_QUANTITIES.items()} | {
     split_name(name)[0]: ScalarQuantity[SeveralSolutions[Solution]](*about, lambda _: np.nan)
-    for name, about in (OF_SURFACES | OF_CONTACTS).items()
+    for name, about in (OF_SURFACES | CONTACT_QUANTITIES).items()
 }
 """What studies may ask of rows; mechanisms that follow a surface, or that may touch something, are none."""
 
@@ -56,23 +55,23 @@ class BeamRows:
 
     @cached_property
     def _laws(self) -> list[BetweenPoints]:
-        return [law for one in self.each if (law := one.model_between_points) is not None]
+        return [law for solution in self.each if (law := solution.model_between_points) is not None]
 
     @cached_property
     def branches(self) -> Mapping[str, CurveRows]:
         """The curve of each mechanism."""
         each, paths = self.each, PathsOfDesigns(self._laws)
         paths.solve_knots()
-        pose = np.array([or_nan(one.spec.analysis.reference) for one in each])
-        allowable = np.array([or_nan(one.assembly.allowable_stress) for one in each])
+        pose = np.array([or_nan(solution.spec.analysis.reference) for solution in each])
+        allowable = np.array([or_nan(solution.assembly.allowable_stress) for solution in each])
         curves = CurveRows(
             _samples(each),
             lambda: _pad_rows([law.places for law in self._laws]),
             paths.effort,
-            np.array([or_nan(one.effort_error) for one in each]),
-            np.array([or_nan(target_of(one)) for one in each]),
-            MeasuringFrame.band,
-            (np.array([one.motion[0] for one in each]), np.array([one.motion[-1] for one in each])),
+            np.array([or_nan(solution.effort_error) for solution in each]),
+            np.array([or_nan(target_of(solution)) for solution in each]),
+            np.array([solution.spec.analysis.band for solution in each]),
+            (np.array([solution.motion[0] for solution in each]), np.array([solution.motion[-1] for solution in each])),
             self._part_efforts,
             StressRows(tuple, self._stress_at, allowable, paths.largest_stress),
             kind_of(each[0]),
@@ -83,10 +82,12 @@ class BeamRows:
         return {"load": curves}
 
     def _stress_at(self, places: FloatArray, rows: Any) -> FloatArray:
-        return np.array([self._laws[row].stress("", own) for row, own in zip(rows, places, strict=True)])
+        return np.array([self._laws[row].stress("", row_places) for row, row_places in zip(rows, places, strict=True)])
 
     def _part_efforts(self, places: FloatArray) -> FloatArray:
-        return np.array([one.part_efforts("", own) for one, own in zip(self.each, places, strict=True)])
+        return np.array(
+            [solution.part_efforts("", row_places) for solution, row_places in zip(self.each, places, strict=True)]
+        )
 
 
 def _pad_rows(rows: Sequence[FloatArray], behind: float | None = None) -> FloatArray:
@@ -96,14 +97,16 @@ def _pad_rows(rows: Sequence[FloatArray], behind: float | None = None) -> FloatA
 
 
 def _samples(each: Sequence[Solution]) -> RowSamples:
-    count = np.array([len(one.motion) for one in each])
-    return RowSamples(_pad_rows([one.motion for one in each]), _pad_rows([one.effort for one in each]), count)
+    count = np.array([len(solution.motion) for solution in each])
+    return RowSamples(
+        _pad_rows([solution.motion for solution in each]), _pad_rows([solution.effort for solution in each]), count
+    )
 
 
 @one_blas_thread
 def _solutions(specs: Sequence[BeamSpec], indices: range) -> dict[int, Solution]:
     """Return the solutions of those of some mechanisms whose paths go straight on, by their index."""
-    found: dict[int, Solution] = {}
+    solutions: dict[int, Solution] = {}
     for index in indices:
         try:
             if not _may_go_straight_on(specs[index]):
@@ -114,8 +117,8 @@ def _solutions(specs: Sequence[BeamSpec], indices: range) -> dict[int, Solution]
         path, law = solution.path, solution.model_between_points
         quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
         if quiet and law is not None and solution.accurate.all():
-            found[index] = solution
-    return found
+            solutions[index] = solution
+    return solutions
 
 
 def _may_go_straight_on(spec: BeamSpec) -> bool:

@@ -145,15 +145,15 @@ class AlongMotion:
     def stress_reaches(self, level: float) -> float | None:
         """Return where the largest stress first reaches a level, by the model between the points [m or rad]."""
         assert self.solution.model_between_points is not None
-        found = self.solution.model_between_points.stress_reaches(level, self.sense)
-        return None if found is None else self.sense * found
+        place = self.solution.model_between_points.stress_reaches(level, self.sense)
+        return None if place is None else self.sense * place
 
     # -- the range that ends at d [Lan, sec. 2]; NaN where a value does not exist ------------------------------------
     @cached_property
     def force_at_end(self) -> float:
         """Force F_d at the end of the window [N]; NaN if the curve turns back, ends before it or has unknown forces."""
-        known = len(self.motion) and self.reaches_end and np.isfinite(self.effort).all()
-        return value_at(*self.knots, self.end) if known else np.nan
+        is_complete = len(self.motion) and self.reaches_end and np.isfinite(self.effort).all()
+        return value_at(*self.knots, self.end) if is_complete else np.nan
 
     @cached_property
     def start(self) -> float:
@@ -190,8 +190,8 @@ class AlongMotion:
         if np.isnan(self.force_at_end) or allowable is None:
             return np.nan
         if self.solution.model_between_points is not None:
-            found = self.stress_reaches(allowable)
-            return np.nan if found is None else found
+            limit = self.stress_reaches(allowable)
+            return np.nan if limit is None else limit
         reached = [crossing(self.motion, value, allowable) for value, _ in self.solution.stresses.values()]
         return min((place for place in reached if place is not None), default=np.nan)
 
@@ -226,13 +226,13 @@ class AlongMotion:
             return np.nan, np.nan
         return self._refine_extreme(first_extreme(*self.knots, -1, after=self.peak[0], corners=self.corners))
 
-    def _refine_extreme(self, found: tuple[float, float] | None) -> tuple[float, float]:
+    def _refine_extreme(self, extreme: tuple[float, float] | None) -> tuple[float, float]:
         """Return an extreme, refined by equilibria solved around it if the model allows it; NaN for None."""
-        if found is None:
+        if extreme is None:
             return np.nan, np.nan
-        if self.corners is None or found[0] in self.corners:
-            return found
-        place, value = found
+        if self.corners is None or extreme[0] in self.corners:
+            return extreme
+        place, value = extreme
         clear = np.concatenate([self.motion[[0, -1]], self.corners])
         step = min(float(np.abs(np.diff(self.motion)).max()), float(np.abs(clear - place).min()) / EXTREME_STENCIL[-1])
         for _ in range(2):
@@ -243,7 +243,7 @@ class AlongMotion:
             turns = np.roots(rates[::-1])
             real = turns.real[np.isreal(turns)]
             if not len(real) or np.abs(real).min() > EXTREME_STENCIL[-1]:
-                return found
+                return extreme
             at = float(real[np.abs(real).argmin()])
             place, value = place + step * at, float(np.polynomial.polynomial.polyval(at, powers))
         return place, value
@@ -267,7 +267,7 @@ def find_strict_start(x: FloatArray, force: FloatArray, end: float, band: float 
     top, bottom = float(tops[last + 1]), float(bottoms[last + 1])
 
     def is_inside_band(place: float) -> bool:
-        here = value_at(x, force, place)
-        return max(top, here) - min(bottom, here) <= band * max(top, here)
+        force_there = value_at(x, force, place)
+        return max(top, force_there) - min(bottom, force_there) <= band * max(top, force_there)
 
     return bisect(is_inside_band, float(places[last]), float(places[last + 1]))

@@ -17,10 +17,10 @@ from cfmkit.elastica.model.contact import (
     NodeOnObstacle,
     ObstacleEdge,
     Stop,
-    arc,
-    circle,
-    line,
-    polyline,
+    arc_edge,
+    circle_edge,
+    line_edge,
+    polyline_edge,
 )
 from cfmkit.specs.spec import Model, PositiveLength
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, format_short
@@ -88,9 +88,9 @@ class RotationStop(StopBase):
     )
 
 
-def _kind_of_stop(given: Any) -> str:
+def _kind_of_stop(tree: Any) -> str:
     """Return which kind of stop is meant: one with a direction, unless a rotation is named."""
-    turns = "rotation" in given if isinstance(given, Mapping) else isinstance(given, RotationStop)
+    turns = "rotation" in tree if isinstance(tree, Mapping) else isinstance(tree, RotationStop)
     return "rotation" if turns else "motion"
 
 
@@ -133,7 +133,7 @@ class LineObstacle(ObstacleBase):
 
     def outline(self) -> ObstacleEdge:
         """Return its edge."""
-        return line(self.through, self.direction)
+        return line_edge(self.through, self.direction)
 
 
 class DiscObstacle(ObstacleBase):
@@ -145,7 +145,7 @@ class DiscObstacle(ObstacleBase):
 
     def outline(self) -> ObstacleEdge:
         """Return its edge."""
-        return circle(self.centre, self.radius)
+        return circle_edge(self.centre, self.radius)
 
 
 class HoleObstacle(ObstacleBase):
@@ -157,7 +157,7 @@ class HoleObstacle(ObstacleBase):
 
     def outline(self) -> ObstacleEdge:
         """Return its edge."""
-        return circle(self.centre, self.radius, hole=True)
+        return circle_edge(self.centre, self.radius, hole=True)
 
 
 class PolylineObstacle(ObstacleBase):
@@ -182,7 +182,7 @@ class PolylineObstacle(ObstacleBase):
 
     def outline(self) -> ObstacleEdge:
         """Return its edge."""
-        return polyline(self.points, self.fillet or 0.0, self.closed)
+        return polyline_edge(self.points, self.fillet or 0.0, self.closed)
 
 
 _FROM_FIELD: Any = {"from": (Angle, Field(description="direction from the middle to one end of the arc"))}
@@ -211,7 +211,7 @@ class ArcObstacle(_BeginsAnywhere):
 
     def outline(self) -> ObstacleEdge:
         """Return its edge."""
-        return arc(self.centre, self.radius, *self.ends)
+        return arc_edge(self.centre, self.radius, *self.ends)
 
 
 ObstacleSpec = Annotated[
@@ -298,15 +298,15 @@ def list_names(names: Iterable[str]) -> str:
 
 def contacts_of(mechanism: Mechanism) -> tuple[Contact, ...]:
     """Return all one-sided contacts of a mechanism: of stops first, then of obstacles, then between parts."""
-    found = [contact for name, stop in mechanism.stops.items() for contact in stop.contacts(name)]
+    contacts = [contact for name, stop in mechanism.stops.items() for contact in stop.contacts(name)]
     for name, obstacle in mechanism.obstacles.items():
         outline = obstacle.outline()
         for node, radius in pads_of(mechanism, obstacle).items():
             stiffness = obstacle.stiffness or math.inf
-            found.append(NodeOnObstacle(name, node, outline, radius, stiffness, obstacle.friction))
-        found.extend(BeamOnObstacle(name, beam, outline) for beam in sides_of(mechanism, obstacle))
-    found.extend(contact for pair in mechanism.contacts for contact in pair.contacts(mechanism))
-    return tuple(found)
+            contacts.append(NodeOnObstacle(name, node, outline, radius, stiffness, obstacle.friction))
+        contacts.extend(BeamOnObstacle(name, beam, outline) for beam in sides_of(mechanism, obstacle))
+    contacts.extend(contact for pair in mechanism.contacts for contact in pair.contacts(mechanism))
+    return tuple(contacts)
 
 
 def rubs(mechanism: Mechanism) -> bool:
@@ -346,21 +346,25 @@ def pads_of(mechanism: Mechanism, obstacle: ObstacleBase) -> Mapping[str, float]
 def free_ends(mechanism: Mechanism) -> dict[str, float]:
     """Return the nodes at which one beam ends freely, with half its thickness there [m]."""
     linked = {name for link in mechanism.links for name in (link.master, link.node)}
-    thickness, found = mechanism.of_beams("thickness"), dict[str, float]()
+    thickness, radii = mechanism.of_beams("thickness"), dict[str, float]()
     for node, spec in mechanism.nodes.items():
         ends = [(name, end) for name, beam in mechanism.beams.items() for end in ("start", "end")
                 if getattr(beam, end) == node]  # fmt: skip
         if spec.support == "free" and node not in linked and len(ends) == 1:
             ((name, end),) = ends
-            given = thickness[name]
-            there = given[0 if end == "start" else -1][1] if isinstance(given, tuple) else given
-            found[node] = 0.5 * there
-    return found
+            thickness_given = thickness[name]
+            tip_thickness = (
+                thickness_given[0 if end == "start" else -1][1]
+                if isinstance(thickness_given, tuple)
+                else thickness_given
+            )
+            radii[node] = 0.5 * tip_thickness
+    return radii
 
 
 def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
     """Yield what is wrong with the contacts of a mechanism whose names of nodes are right."""
-    size = max(math.dist(one.at, other.at) for one in mechanism.nodes.values() for other in mechanism.nodes.values())
+    size = max(math.dist(a.at, b.at) for a in mechanism.nodes.values() for b in mechanism.nodes.values())
     for name, obstacle in mechanism.obstacles.items():
         place = ("obstacles", name, obstacle.kind)
         yield from _side_faults(mechanism, obstacle, place)

@@ -19,7 +19,7 @@ from cfmkit.families.beam.constant_force_range_and_extremes import window_of
 from cfmkit.families.beam.contact_spec import MAX_OVERLAP_SHARE, column_names, friction_columns, pads_of, sides_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
-from cfmkit.families.end_stops import DEFINITIONS, LARGEST_FORCE
+from cfmkit.families.end_stops import CONTACT_QUANTITIES, LARGEST_FORCE
 from cfmkit.families.end_stops_spec import BEFORE_STOP
 from cfmkit.numerics.quadrature import clenshaw_curtis
 from cfmkit.results import Quantity
@@ -80,11 +80,11 @@ def groups(contacts: tuple[Contact, ...]) -> dict[tuple[str, str], list[int]]:
 
     Those between the same parts of the mechanism have one name.
     """
-    found: dict[tuple[str, str], list[int]] = {}
+    numbers_by_pad: dict[tuple[str, str], list[int]] = {}
     for number, contact in enumerate(contacts):
         key = contact.name, "" if isinstance(contact, NodeOnBeam | BeamOnBeam) else toucher(contact)
-        found.setdefault(key, []).append(number)
-    return found
+        numbers_by_pad.setdefault(key, []).append(number)
+    return numbers_by_pad
 
 
 def toucher(contact: Contact) -> str:
@@ -120,15 +120,19 @@ def numbers_of(contacts: tuple[Contact, ...], name: str) -> list[int]:
 
 def named_force(path: Path, name: str) -> FloatArray:
     """Return the force of a stop, or of all pads on an obstacle, at every point of a path, (n,)."""
-    found = [numbers for (own, _), numbers in groups(path.network.contacts).items() if own == name]
-    return np.asarray(sum(signed_force(path, numbers) for numbers in found))
+    groups_of_contact = [
+        numbers for (contact_name, _), numbers in groups(path.network.contacts).items() if contact_name == name
+    ]
+    return np.asarray(sum(signed_force(path, numbers) for numbers in groups_of_contact))
 
 
 def contact_columns(solution: Solution) -> LazyColumns:
     """Return the force of each stop and each pad at every point of the curve, and what happens there; when read."""
-    known = LazyMapping(("all",), lambda _: _columns(solution))
+    columns = LazyMapping(("all",), lambda _: _columns(solution))
     names = _column_names(solution) if solution.path.network.contacts else []
-    return {name: partial(lambda own: known["all"][own], name) for name in [*names, *(["event"] if names else [])]}
+    return {
+        name: partial(lambda column: columns["all"][column], name) for name in [*names, *(["event"] if names else [])]
+    }
 
 
 def _column_names(solution: Solution) -> list[str]:
@@ -181,7 +185,9 @@ def _columns(solution: Solution) -> dict[str, Column]:
             total = np.sum([sign * force for sign, (force, _) in zip(signs, rubbing, strict=True)], axis=0)
             columns[tangential] = Column(total[keep], "force")
             said = [np.asarray(states)[keep] for _, states in rubbing]
-            columns[state] = Column(np.array(["".join(each) for each in zip(*said, strict=True)], np.str_), "text")
+            columns[state] = Column(
+                np.array(["".join(marks_of_pose) for marks_of_pose in zip(*said, strict=True)], np.str_), "text"
+            )
         place_columns = _place_columns(contact, column)
         if place_columns:
             places = _place_values(path, numbers)[keep]
@@ -211,18 +217,18 @@ def contact_values(solution: Solution) -> Mapping[str, Quantity]:
     def compute(name: str) -> Quantity:
         plain, _, contact = name.partition("[")
         if plain == "first_contact":
-            return Quantity(_first_contact(solution), *DEFINITIONS[name])
+            return Quantity(_first_contact(solution), *CONTACT_QUANTITIES[name])
         if plain == "contact_force_max":
-            top = largest(solution, lambda there: np.array([there.contact_force(number) for number in pushing]), window)
+            top = largest(solution, lambda poses: np.array([poses.contact_force(number) for number in pushing]), window)
             return Quantity(top, "force", LARGEST_FORCE)
         if plain == "contact_force":
             mean = _mean(solution, contact.removesuffix("]"), window)
             reason = "" if mean is not None else "the window is not on the curve, or the curve turns back"
-            return Quantity(mean, *DEFINITIONS["contact_force[contact]"], reason=reason)
+            return Quantity(mean, *CONTACT_QUANTITIES["contact_force[contact]"], reason=reason)
         top, bottom = force_extremes(solution, contact.removesuffix("]"), window)
         ripple = (top - bottom) / top if top is not None and bottom is not None and top > 0 else None
         reason = "" if ripple is not None else "there is no contact in the window"
-        return Quantity(ripple, *DEFINITIONS["contact_force_ripple[contact]"], reason=reason)
+        return Quantity(ripple, *CONTACT_QUANTITIES["contact_force_ripple[contact]"], reason=reason)
 
     return LazyMapping(names, compute)
 
@@ -234,9 +240,9 @@ def _first_contact(solution: Solution) -> float | None:
     if solution.spec.mechanism.drive.turns or not contacts:
         return None
     if first is not None:
-        there = path.take(path.changes_contact)
-        motion = replace(solution, path=there, keep=np.arange(len(there)), ends=()).motion
-        return float(motion[int(np.abs(there.drive - first.drive).argmin())])
+        path_at_changes = path.take(path.changes_contact)
+        motion = replace(solution, path=path_at_changes, keep=np.arange(len(path_at_changes)), ends=()).motion
+        return float(motion[int(np.abs(path_at_changes.drive - first.drive).argmin())])
     closed = any(path.contact_force(number)[0] > 0 for number in range(len(contacts)))
     return float(solution.motion[0]) if closed else None
 
@@ -279,7 +285,9 @@ def contact_sentences(solution: Solution, say: Callable[[float], str]) -> Iterat
     path = solution.path
     if not path.network.contacts or not len(solution.keep):
         return
-    resting = [describe(one) for number, one in enumerate(path.network.contacts) if path.contact_force(number)[0] > 0]
+    resting = [
+        describe(contact) for number, contact in enumerate(path.network.contacts) if path.contact_force(number)[0] > 0
+    ]
     before = [f"closed before the drive moves: {', '.join(resting)}"] if resting else []
     yield from change_sentences(solution, say, before)
     rubbing = [number for number, contact in enumerate(path.network.contacts) if contact.friction]
@@ -402,21 +410,21 @@ def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator
     for name, obstacle in mechanism.obstacles.items():
         outline = obstacle.outline()
         pads, sides = pads_of(mechanism, obstacle), sides_of(mechanism, obstacle)
-        for beam, own in path.network.beams.items():
+        for beam, network_beam in path.network.beams.items():
             if beam in sides:
                 continue
-            found = states(path.network, path.take(keep).at, beam, np.linspace(0.0, 1.0, N_SIDE))
-            places = np.stack([found.x, found.y], axis=-1)
-            depth = 0.5 * thickest_of(own.section) - outline.distance(places).value
-            slack = MAX_PENETRATION_SHARE * thickest_of(own.section)
+            side = states(path.network, path.take(keep).at, beam, np.linspace(0.0, 1.0, N_SIDE))
+            places = np.stack([side.x, side.y], axis=-1)
+            depth = 0.5 * thickest_of(network_beam.section) - outline.distance(places).value
+            slack = MAX_PENETRATION_SHARE * thickest_of(network_beam.section)
             # an elastic obstacle yields at its pads, and the beam with them
-            yields = max((float(-path.contact_gap(k).min()) for k, one in enumerate(path.network.contacts)
-                          if isinstance(one, NodeOnObstacle) and one.name == name and one.node in pads),
+            yields = max((float(-path.contact_gap(k).min()) for k, contact in enumerate(path.network.contacts)
+                          if isinstance(contact, NodeOnObstacle) and contact.name == name and contact.node in pads),
                          default=0.0)  # fmt: skip
             deep = depth > slack + max(yields, 0.0)
             if deep.any():
                 first = int(deep.any(axis=1).argmax())
-                place = float(np.broadcast_to(found.place, depth.shape)[first, depth[first].argmax()])
+                place = float(np.broadcast_to(side.place, depth.shape)[first, depth[first].argmax()])
                 yield (
                     "side_in_obstacle",
                     f"the side of beam {beam!r} passes through {name!r} from {say(float(path.drive[keep[first]]))} on, "

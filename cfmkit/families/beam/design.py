@@ -60,7 +60,7 @@ def rescale(
     """Return the specification with the changes made and the force wanted reached, or why it cannot be."""
     wanted = wanted.model_copy(update={"free": wanted.choose_dimension(sheet_of(spec.mechanism.part))})
     changed = changed_spec(spec, wanted)
-    found = _validity(spec, wanted)
+    validity = _validity(spec, wanted)
     for _ in range(MAX_ROUNDS):
         before = changed
         if wanted.to_allowable_stress:
@@ -87,7 +87,7 @@ def rescale(
         changed = again
         if changed == before or not wanted.to_allowable_stress:
             break
-    return Design(changed, Status.COMPLETE, _report_changes(spec, changed), warnings=(*found, *_stress(changed)))
+    return Design(changed, Status.COMPLETE, _report_changes(spec, changed), warnings=(*validity, *_stress(changed)))
 
 
 def _force(spec: BeamSpec) -> float | None:
@@ -120,8 +120,8 @@ def _exponent(before: float, after: float, factor: float, expected: float) -> fl
     """Return how the force went with what was scaled: wide beams, stretch and shear bend the law a little."""
     if not after / before > 0 or factor == 1.0:
         return expected
-    found = math.log(after / before) / math.log(factor)
-    return found if 0.5 < found / expected < 2.0 else expected
+    exponent = math.log(after / before) / math.log(factor)
+    return exponent if 0.5 < exponent / expected < 2.0 else expected
 
 
 def changed_spec(spec: BeamSpec, wanted: Rescale) -> BeamSpec:
@@ -200,7 +200,7 @@ def _resize(spec: BeamSpec, factor: float) -> BeamSpec:
         update={
             "mechanism": mechanism.model_copy(update=update),
             "analysis": analysis,
-            "requirements": tuple(_lengths(one, ("over",), factor) for one in spec.requirements),
+            "requirements": tuple(_lengths(requirement, ("over",), factor) for requirement in spec.requirements),
         }
     )
 
@@ -222,7 +222,7 @@ def _lengths(block: Any, names: tuple[str, ...], factor: float) -> Any:
 
 def _point(value: Any, factor: float) -> Any:
     if isinstance(value, tuple):
-        return tuple(_point(one, factor) for one in value)
+        return tuple(_point(item, factor) for item in value)
     if isinstance(value, TravelShare):  # of the travel, which is scaled itself
         return value
     return Place(value * factor, value.dimension) if isinstance(value, Place) else value * factor
@@ -342,7 +342,7 @@ def _report_changes(old: BeamSpec, new: BeamSpec) -> str:
         after = now[name]
         if abs(after / before - 1) > FORCE_RTOL:
             changes.append(f"{name} {format_short(before, 'length')} -> {format_short(after, 'length')}")
-    before, after = (_modulus(one.mechanism) for one in (old, new))
+    before, after = (_modulus(part.mechanism) for part in (old, new))
     if before != after:
         changes.append(f"E {format_short(before, 'stress')} -> {format_short(after, 'stress')}")
     return "rescaled: " + ", ".join(changes) if changes else "nothing to change"

@@ -56,9 +56,9 @@ def draw_contacts(
 
 def _hatch(outline: ObstacleEdge, line: FloatArray, length: float) -> FloatArray:
     """Return strokes from a part of an outline into the solid, with gaps between them, (n, 2) [m]."""
-    way = np.append(0.0, np.hypot(*np.diff(line, axis=0).T).cumsum())
-    shares = np.arange(0.5 * length, way[-1], length)
-    begin = np.column_stack([np.interp(shares, way, line[:, k]) for k in (0, 1)])
+    arc_length = np.append(0.0, np.hypot(*np.diff(line, axis=0).T).cumsum())
+    shares = np.arange(0.5 * length, arc_length[-1], length)
+    begin = np.column_stack([np.interp(shares, arc_length, line[:, k]) for k in (0, 1)])
     free = outline.distance(begin).normal
     end = begin - 0.7 * length * (free + np.column_stack([-free[:, 1], free[:, 0]]))
     return np.stack([begin, end, np.full_like(begin, np.nan)], axis=1).reshape(-1, 2)

@@ -171,9 +171,9 @@ def _peak(solution: Solution, ax: Axes, index: int) -> Label:
     """Mark where the stress is largest, on the unbent beam: there a reader finds the place on the part."""
     name, share = str(solution.stress_at[0][index]), float(solution.stress_at[1][index])
     path = solution.path
-    found = np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(found, axis=0).T))])
-    x, y = (float(np.interp(share * way[-1], way, found[:, k])) for k in (0, 1))
+    centre_line = np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
+    arc_length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(centre_line, axis=0).T))])
+    x, y = (float(np.interp(share * arc_length[-1], arc_length, centre_line[:, k])) for k in (0, 1))
     ax.plot(
         *parts.mm((x, y)), marker="o", markersize=8, markerfacecolor="none", color=TROUBLE_RED, zorder=5, gid="peak"
     )
@@ -182,11 +182,11 @@ def _peak(solution: Solution, ax: Axes, index: int) -> Label:
 
 def _names(solution: Solution) -> list[Label]:
     """Return the names of the beams as cut."""
-    path, found = solution.path, []
+    path, labels = solution.path, []
     for name in list(path.network.beams)[: 2 * MOST_BEAMS]:
         points = np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
-        found.append(parts.part_name(name, points[len(points) // 4 : 3 * len(points) // 4], (0.3, 1.0), TEXT_INK))
-    return found
+        labels.append(parts.part_name(name, points[len(points) // 4 : 3 * len(points) // 4], (0.3, 1.0), TEXT_INK))
+    return labels
 
 
 def _box(shown: Sequence[PosedBody]) -> parts.Box:
@@ -201,8 +201,8 @@ def _supports(solution: Solution, ax: Axes) -> None:
         if not (support.along or support.across or support.rotation) and name != solution.assembly.driven:
             continue
         color = LINE_VERMILLION if name == solution.assembly.driven else TEXT_INK
-        here = np.array([[float(np.real(node.x)), float(np.real(node.y))]])
-        for at in [here] if axis is None else [here, mirror_points(here, *axis)]:
+        place = np.array([[float(np.real(node.x)), float(np.real(node.y))]])
+        for at in [place] if axis is None else [place, mirror_points(place, *axis)]:
             ax.plot(
                 *parts.mm(at[0]), marker="s" if support.rotation else "o", markersize=4.5, color=color, zorder=4,
                 markerfacecolor=color if support.along or color != TEXT_INK else "white", linestyle="",
@@ -223,8 +223,8 @@ def reactions(result: Result) -> Figure:
     across = {name: (force[:, 1] * c - force[:, 0] * s) * (-1 if turned else 1) for name, force in forces.items()}
     size = max(float(np.nanmax(np.abs(force[:, :2]))) for force in forces.values())
     along, across = ({name: zero_rounding(row, size) for name, row in rows.items()} for rows in (along, across))
-    one = ", one copy" if solution.assembly.parallel > 1 else ""
-    heading = Heading.from_result(result, f"force of each beam on its last node{one}{_left_out(forces)}")
+    per_copy = ", one copy" if solution.assembly.parallel > 1 else ""
+    heading = Heading.from_result(result, f"force of each beam on its last node{per_copy}{_left_out(forces)}")
     diagrams = [
         Diagram(solution.motion, _motion(result), Scale(names[0], "force"), _series(along)),
         Diagram(solution.motion, _motion(result), Scale(names[1], "force"), _series(across)),
@@ -242,7 +242,7 @@ def _series(values: dict[str, FloatArray]) -> list[Series]:
     size = {name: float(np.nanmax(np.abs(value))) for name, value in values.items()}
     lines: dict[str, tuple[str, FloatArray]] = {}
     for name in sorted(size, key=lambda name: -size[name])[:MOST_BEAMS]:
-        same = next((key for key, (_, other) in lines.items() if _alike(values[name], other)), None)
+        same = next((key for key, (_, drawn_values) in lines.items() if _alike(values[name], drawn_values)), None)
         names = name if same is None else f"{lines[same][0]}, {name}"
         lines[same or name] = (names, values[name])
     chosen = sorted(lines, key=list(values).index)
@@ -257,9 +257,9 @@ def _series(values: dict[str, FloatArray]) -> list[Series]:
     ]
 
 
-def _alike(one: FloatArray, other: FloatArray) -> bool:
-    largest = float(np.nanmax(np.abs(one)))
-    return bool(np.nanmax(np.abs(one - other)) <= LINE_RTOL * largest)
+def _alike(first: FloatArray, second: FloatArray) -> bool:
+    largest = float(np.nanmax(np.abs(first)))
+    return bool(np.nanmax(np.abs(first - second)) <= LINE_RTOL * largest)
 
 
 def stress(result: Result) -> Figure:
@@ -292,7 +292,9 @@ def frequencies(result: Result) -> Figure:
                 )
     most = f"; the lowest {MOST_MODES}" if solution.spec.analysis.modes > MOST_MODES else ""
     heading = Heading.from_result(result, f"natural frequencies about each pose, drive held and free{most}")
-    values = np.concatenate([one.values[np.isfinite(one.values)] for one in series] or [np.ones(1)])
+    values = np.concatenate(
+        [diagram_series.values[np.isfinite(diagram_series.values)] for diagram_series in series] or [np.ones(1)]
+    )
     wide = bool(values.min() > 0 and values.max() > MAX_LINEAR_FREQUENCY_RATIO * values.min())
     scale = Scale("frequency", "frequency", zero=not wide, log=wide)
     return diagram_figure(heading, [Diagram(solution.motion, _motion(result), scale, series)])
@@ -300,21 +302,21 @@ def frequencies(result: Result) -> Figure:
 
 def surface(result: Result) -> Figure:
     """Return the contact along the surface: its height, and the forces at the tip [Lan, Fig. 14]."""
-    found = follow_surface(result.state)
-    if found is None:
+    contact = follow_surface(result.state)
+    if contact is None:
         raise ValueError("there is no surface")
-    way = Scale("along the surface", "length")
+    scale = Scale("along the surface", "length")
     low, high = (result.values[name].value for name in ("tip_force_min", "tip_force_max"))
     limits = [*limits_on(result, "tip_force_min"), *limits_on(result, "tip_force_max")]
     if low is not None and high is not None:
         limits += [Limit(value, value_text(value, "force")) for value in (low, high)]
     diagrams = [
-        Diagram(found.place, way, Scale("height", "length"), [Series(found.height, "surface", TEXT_GREY)]),
+        Diagram(contact.place, scale, Scale("height", "length"), [Series(contact.height, "surface", TEXT_GREY)]),
         Diagram(
-            found.place,
-            way,
+            contact.place,
+            scale,
             Scale("tip force", "force", zero=False),
-            [Series(found.force, "", LINE_COLOURS[0])],
+            [Series(contact.force, "", LINE_COLOURS[0])],
             limits,
         ),
     ]
@@ -348,33 +350,35 @@ _LENGTH_RTOL = 1e-9  # of the size: parts shorter than this are not there
 
 def centre_line(path: Path, beam: str, point: int) -> FloatArray:
     """Return the centre line of a beam at a point of the path, (n, 2) [m]."""
-    found = states(path.network, path.take(np.array([point])).at, beam, np.linspace(0.0, 1.0, _N_ELEMENT_PLACES))
-    line = np.stack([found.x[0], found.y[0]], axis=-1)
-    return np.asarray(line[np.append(True, np.diff(found.place) > 0)])
+    line_states = states(path.network, path.take(np.array([point])).at, beam, np.linspace(0.0, 1.0, _N_ELEMENT_PLACES))
+    line = np.stack([line_states.x[0], line_states.y[0]], axis=-1)
+    return np.asarray(line[np.append(True, np.diff(line_states.place) > 0)])
 
 
 def rigid_parts(path: Path, point: int | None) -> list[FloatArray]:
     """Return links and the arms beside nodes as lines (2, 2) [m], at a point of the path or before any load."""
     network = path.network
-    found = [np.array([place(path, one.master, point), place(path, one.node, point)]) for one in network.links]
+    parts_of_links = [
+        np.array([place(path, link.master, point), place(path, link.node, point)]) for link in network.links
+    ]
     for beam in network.beams.values():
         for node, arm in ((beam.start, beam.start_offset), (beam.end, beam.end_offset)):
             at = place(path, node, point)
             angle = 0.0 if point is None else float(path.motion(node)[point, 2])
             turned = complex(*map(float, np.real(arm))) * np.exp(1j * angle)
-            found.append(np.array([at, at + np.array([turned.real, turned.imag])]))
-    return [line for line in found if np.hypot(*(line[1] - line[0])) > _LENGTH_RTOL * path.mesh.scales.length]
+            parts_of_links.append(np.array([at, at + np.array([turned.real, turned.imag])]))
+    return [line for line in parts_of_links if np.hypot(*(line[1] - line[0])) > _LENGTH_RTOL * path.mesh.scales.length]
 
 
 def spring_lines(path: Path) -> list[FloatArray]:
     """Return the springs between two places as lines (2, 2) [m], before any load."""
-    found = []
+    lines = []
     for spring in path.network.springs:
         if isinstance(spring, LineSpring):
             ground = np.array([float(np.real(x)) for x in spring.ground])
-            other = ground if spring.end is None else place(path, spring.end, None)
-            found.append(np.array([place(path, spring.start, None), other]))
-    return found
+            far_end = ground if spring.end is None else place(path, spring.end, None)
+            lines.append(np.array([place(path, spring.start, None), far_end]))
+    return lines
 
 
 def place(path: Path, node: str, point: int | None) -> FloatArray:

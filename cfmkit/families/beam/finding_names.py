@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cfmkit.families.end_stops import FINDINGS as OF_STOPS
+from cfmkit.families.end_stops import STOP_FINDINGS
 from cfmkit.families.findings import Finder
 
 BEAM_FINDINGS = {
@@ -39,7 +39,7 @@ BEAM_FINDINGS = {
     "sharp_corners": "without fillets the stress in inside corners has no value: it grows as the mesh gets finer",
     "mesh_coarse": "the force or the largest stress of the solid is not known as closely as requested",
     "feature_small": "a beam is thinner than can be made",
-    **OF_STOPS,
+    **STOP_FINDINGS,
     "contact_spreads_between_beams": "two parts begin to lie on each other along a length: the curve ends there",
     "friction_not_unique": "friction leaves several states at a change of contact: the first of them was taken",
     "stability_of_sliding": "a pad slides against friction: whether what slides is stable is not known",

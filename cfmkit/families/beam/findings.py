@@ -69,7 +69,11 @@ def _find_moved_nodes(solution: Solution) -> dict[str, float]:
         name: float(np.hypot(*(np.real([network.nodes[name].x, network.nodes[name].y]) - node.at)))
         for name, node in nodes.items()
     }
-    return {name: way for name, way in ways.items() if way > LENGTH_RTOL * solution.path.mesh.scales.length}
+    return {
+        name: displacement
+        for name, displacement in ways.items()
+        if displacement > LENGTH_RTOL * solution.path.mesh.scales.length
+    }
 
 
 def _moved_guides(solution: Solution) -> list[str]:
@@ -78,7 +82,10 @@ def _moved_guides(solution: Solution) -> list[str]:
 
 
 def _moved_nodes(solution: Solution) -> Sentence:
-    reported = (f"{name} by {format_short(way, 'length')}" for name, way in _find_moved_nodes(solution).items())
+    reported = (
+        f"{name} by {format_short(displacement, 'length')}"
+        for name, displacement in _find_moved_nodes(solution).items()
+    )
     return (f"nodes were moved to where the beams end: {', '.join(reported)}",)
 
 
@@ -86,11 +93,11 @@ def _misfits(solution: Solution) -> dict[str, Fit]:
     """Return the fits of the beams that miss their nodes."""
     beams = solution.path.network.beams
     return {
-        name: one
-        for name, one in solution.path.fits.items()
+        name: fit
+        for name, fit in solution.path.fits.items()
         if name in solution.spec.mechanism.beams
         and getattr(beams[name].shape, "length", None)
-        and one.gap > LENGTH_RTOL * float(np.real(one.length))
+        and fit.gap > LENGTH_RTOL * float(np.real(fit.length))
     }
 
 
@@ -105,7 +112,7 @@ def _is_adjusted(solution: Solution) -> bool:
 
 def _forced_beams(solution: Solution) -> Sentence:
     """Return the cost of forcing beams into place, in words."""
-    gaps = ", ".join(f"{name} by {format_short(one.gap, 'length')}" for name, one in _misfits(solution).items())
+    gaps = ", ".join(f"{name} by {format_short(fit.gap, 'length')}" for name, fit in _misfits(solution).items())
     return (
         f"beams miss their nodes ({gaps}) and are forced into place: at rest the drive carries "
         f"{format_short(float(solution.effort[0]), _effort(solution))} and the stress is "
@@ -117,9 +124,9 @@ def _forced_beams(solution: Solution) -> Sentence:
 def _fitted_beams(solution: Solution) -> Sentence:
     """Return the fit of each beam, in words."""
     reported = ", ".join(
-        f"{name} {format_short(float(np.real(one.rotation)), 'angle')} and x {float(np.real(one.scale)):.5f} "
-        f"(it missed by {format_short(one.gap, 'length')})"
-        for name, one in _misfits(solution).items()
+        f"{name} {format_short(float(np.real(fit.rotation)), 'angle')} and x {float(np.real(fit.scale)):.5f} "
+        f"(it missed by {format_short(fit.gap, 'length')})"
+        for name, fit in _misfits(solution).items()
     )
     return (f"beams were turned and scaled to fit between their nodes: {reported}",)
 
@@ -138,10 +145,10 @@ def _events(name: str, kind: str) -> FindingRule[Solution]:
         return [drive_text(solution.assembly, event.drive) for event in solution.path.events if event.kind == kind]
 
     def sentence(solution: Solution) -> Sentence:
-        found = places(solution)
-        more = f" and {len(found) - 6} more" if len(found) > 6 else ""
+        events = places(solution)
+        more = f" and {len(events) - 6} more" if len(events) > 6 else ""
         tail = _describe_bifurcation(solution) if kind == "bifurcation" else ""
-        return (f"{kind}{'s' if len(found) > 1 else ''} at {', '.join(found[:6])}{more}{tail}",)
+        return (f"{kind}{'s' if len(events) > 1 else ''} at {', '.join(events[:6])}{more}{tail}",)
 
     return FindingRule(name, lambda solution: bool(places(solution)), sentence)
 
@@ -184,8 +191,8 @@ def _misses_flutter(solution: Solution) -> bool:
 
 
 def _flutters(solution: Solution) -> bool:
-    known = solution.frequencies if solution.follows and len(solution.keep) else None
-    return known is not None and bool(known.flutters.any())
+    frequencies = solution.frequencies if solution.follows and len(solution.keep) else None
+    return frequencies is not None and bool(frequencies.flutters.any())
 
 
 def _growing_oscillations(solution: Solution) -> Sentence:
@@ -215,8 +222,8 @@ def _bent_beams(solution: Solution) -> Sentence:
 
 
 def _beams_of_known_strength(solution: Solution) -> list[str]:
-    known = known_allowable_stresses(solution.spec)
-    return [name for name in solution.path.network.beams if name.split(".")[0] in known]
+    strengths = known_allowable_stresses(solution.spec)
+    return [name for name in solution.path.network.beams if name.split(".")[0] in strengths]
 
 
 def _least_allowable_stress(solution: Solution) -> float:
@@ -282,8 +289,8 @@ def _hindered_share(solution: Solution) -> tuple[float, str]:
     """Return by what share of their energy beams that are solved as narrow ones are too soft, and where."""
     if not _has_curve(solution) or solution.spec.mechanism.wide_beams:
         return 0.0, ""
-    found = solution.curling
-    share, beam = found.share[solution.keep], found.beam[solution.keep]
+    curling = solution.curling
+    share, beam = curling.share[solution.keep], curling.beam[solution.keep]
     worst = int(share.argmax())
     place = format_short(float(solution.motion[worst]), solution.motion_dimension)
     return float(share[worst]), f"at {place}, most of it in beam {beam[worst]}"
@@ -307,10 +314,10 @@ def _touching_beams(solution: Solution) -> Sentence:
     still, moving = solution.gaps
     assert moving is not None
     when = "before any load" if still is not None and still.size <= 0 else "during the travel"
-    if frozenset((moving.one, moving.other)) in pairs_in_contact(solution.path.network):
-        return (f"beams {moving.one} and {moving.other} overlap {when}, beside their contact that is stated",)
-    remedy = "" if moving.other.endswith("'") else "; state it in 'mechanism.contacts'"
-    return (f"beams {moving.one} and {moving.other} touch {when}: contact is not modelled{remedy}",)
+    if frozenset((moving.first, moving.second)) in pairs_in_contact(solution.path.network):
+        return (f"beams {moving.first} and {moving.second} overlap {when}, beside their contact that is stated",)
+    remedy = "" if moving.second.endswith("'") else "; state it in 'mechanism.contacts'"
+    return (f"beams {moving.first} and {moving.second} touch {when}: contact is not modelled{remedy}",)
 
 
 def _least_gap(solution: Solution) -> float:
@@ -328,8 +335,8 @@ def _small_gap(solution: Solution) -> Sentence:
     gap = solution.gaps[0]
     assert gap is not None
     return (
-        f"the gap between beams {gap.one} and {gap.other} is {format_short(gap.size, 'length')}: smaller than can be "
-        f"cut ({format_short(_least_gap(solution), 'length')})",
+        f"the gap between beams {gap.first} and {gap.second} is {format_short(gap.size, 'length')}: smaller than can "
+        f"be cut ({format_short(_least_gap(solution), 'length')})",
     )
 
 
@@ -347,7 +354,9 @@ def _thin_beam(name: str) -> FindingRule[Solution]:
         thin, made = (format_short(size, "length") for size in (thickness(solution), least(solution)))
         return (f"beam {name} is {thin} thick: less than can be made ({made})",)
 
-    return FindingRule("feature_small", lambda one: thickness(one) < least(one) * (1 - LENGTH_RTOL), sentence)
+    return FindingRule(
+        "feature_small", lambda solution: thickness(solution) < least(solution) * (1 - LENGTH_RTOL), sentence
+    )
 
 
 # --- table ----------------------------------------------------------------------------------------------------------

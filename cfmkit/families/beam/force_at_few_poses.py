@@ -59,15 +59,15 @@ def _find_slopes(assembly: Assembly, path: Path, at: NDArray[np.int64], paths: S
     spec, copies = assembly.spec, assembly.spec.mechanism.copies
     if spec.mechanism.closure == "chain" or (copies is not None and copies.layers > 1):
         return {}
-    known = [name for name in paths if _SMOOTH_KEYS.fullmatch(name) and isinstance(spec.get_value(name), float)]
-    if not known:
+    smooth_keys = [name for name in paths if _SMOOTH_KEYS.fullmatch(name) and isinstance(spec.get_value(name), float)]
+    if not smooth_keys:
         return {}
 
     def build(x: Any) -> Network:
-        return assemble(_replace_values(spec, dict(zip(known, x, strict=True)))).network
+        return assemble(_replace_values(spec, dict(zip(smooth_keys, x, strict=True)))).network
 
     try:
-        slopes = gradient(path, build, np.array([spec.get_value(one) for one in known]), at)
+        slopes = gradient(path, build, np.array([spec.get_value(key) for key in smooth_keys]), at)
         axial = spec.stress == "total"
         by_stress = []
         for name in path.network.beams:
@@ -79,7 +79,9 @@ def _find_slopes(assembly: Assembly, path: Path, at: NDArray[np.int64], paths: S
         by_effort = assembly.effort_unit * slopes.effort
     except (CfmError, np.linalg.LinAlgError):
         return {}
-    return {name: Sampled({"load": by_effort[:, k]}, np.array(by_stress)[:, :, k]) for k, name in enumerate(known)}
+    return {
+        name: Sampled({"load": by_effort[:, k]}, np.array(by_stress)[:, :, k]) for k, name in enumerate(smooth_keys)
+    }
 
 
 def _follow_path(spec: BeamSpec, places: FloatArray) -> tuple[Assembly, Path, NDArray[np.int64]] | None:
@@ -109,7 +111,7 @@ def _replace_values(block: Any, values: Mapping[str, Any]) -> Any:
         return inside[""] if "" in inside else _replace_values(now, inside)
 
     if isinstance(block, tuple):
-        return tuple(item(one, below[str(k)]) if str(k) in below else one for k, one in enumerate(block))
+        return tuple(item(child, below[str(k)]) if str(k) in below else child for k, child in enumerate(block))
     if isinstance(block, dict):
-        return {name: item(one, below[name]) if name in below else one for name, one in block.items()}
+        return {name: item(child, below[name]) if name in below else child for name, child in block.items()}
     return block.model_copy(update={name: item(getattr(block, name), inside) for name, inside in below.items()})

@@ -58,11 +58,11 @@ def largest(
     for number in range(N_EXTREME_ROUNDS):
         wanted = wanted[np.abs(wanted[:, None] - x).min(axis=1) > PLACE_RTOL * np.abs(x).max()]
         if len(wanted):
-            there = ask(wanted)
-            known = np.flatnonzero(there.accurate)
-            places = np.searchsorted(x, wanted[known])
-            x = np.insert(x, places, wanted[known])
-            rows = np.insert(rows, places, observe(there)[:, known], axis=1)
+            poses = ask(wanted)
+            solved = np.flatnonzero(poses.accurate)
+            places = np.searchsorted(x, wanted[solved])
+            x = np.insert(x, places, wanted[solved])
+            rows = np.insert(rows, places, observe(poses)[:, solved], axis=1)
         reached = x if winding is None else winding.states(_ways(winding, x))[0]
         top = _top(rows, _find_in_window(reached, window))
         if top is None:
@@ -101,17 +101,17 @@ def _find_in_window(motion: FloatArray, window: tuple[float, float]) -> FloatArr
 
 def _top(rows: FloatArray, kept: FloatArray) -> float | None:
     """Return the largest value of some columns, None without any."""
-    found = rows[:, kept]
-    known = found[np.isfinite(found)]
-    return float(known.max()) + 0.0 if len(known) else None  # not -0
+    values = rows[:, kept]
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) + 0.0 if len(finite) else None  # not -0
 
 
 def _higher(x: FloatArray, row: FloatArray, bound: float) -> FloatArray:
     """Return where the cubics between values have extremes above a bound."""
     size = np.abs(row)
     finite = np.sort(size[np.isfinite(size)])
-    known = size <= MAX_MEDIAN_RATIO * finite[len(finite) // 2]  # np.median would load numpy.ma
-    known[1:] &= np.diff(x) > 0.0  # a straight column does not move under a load
-    x, row = x[known], row[known]
-    found = inner_extremes(x, row)
-    return found[values_at(x, row, found) > bound] if len(found) else found
+    regular = size <= MAX_MEDIAN_RATIO * finite[len(finite) // 2]  # np.median would load numpy.ma
+    regular[1:] &= np.diff(x) > 0.0  # a straight column does not move under a load
+    x, row = x[regular], row[regular]
+    places = inner_extremes(x, row)
+    return places[values_at(x, row, places) > bound] if len(places) else places

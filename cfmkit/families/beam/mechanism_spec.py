@@ -78,9 +78,9 @@ def faults(mechanism: Mechanism) -> Iterator[Fault]:
 def _unknown(mechanism: Mechanism) -> Iterator[Fault]:
     """Yield names of nodes and beams that do not exist."""
     for place, kind, name in references(mechanism):
-        known: Mapping[str, object] = getattr(mechanism, f"{kind}s")
-        if name not in known:
-            yield place, f"there is no {kind} {name!r}; {kind}s are {list_names(known)}"
+        items: Mapping[str, object] = getattr(mechanism, f"{kind}s")
+        if name not in items:
+            yield place, f"there is no {kind} {name!r}; {kind}s are {list_names(items)}"
     for number, contact in enumerate(mechanism.contacts):
         if (fault := contact.find_fault(mechanism)) is not None:
             yield ("contacts", number, fault[0]), fault[1]
@@ -142,10 +142,10 @@ def _link_faults(mechanism: Mechanism) -> Iterator[Fault]:
 
 def _chain(leads: Mapping[str, str], node: str) -> list[str]:
     """Return a node and all that lead it."""
-    found = [node]
-    while found[-1] in leads:
-        found.append(leads[found[-1]])
-    return found
+    chain = [node]
+    while chain[-1] in leads:
+        chain.append(leads[chain[-1]])
+    return chain
 
 
 def _loose_nodes(mechanism: Mechanism) -> Iterator[Fault]:
@@ -171,20 +171,20 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
     if isinstance(drive, LoadsDrive) and not any(load.acts for load in drive.loads):
         yield ("drive", "loads", "loads"), "every load is zero: nothing drives the mechanism"
     if along and across:
-        way = f"'guided' with 'direction: {format_short(drive.direction, 'angle')}'"
-        yield at, f"{drive.node!r} cannot move: its support is {node.support!r}; {way} or 'free' lets it"
+        remedy = f"'guided' with 'direction: {format_short(drive.direction, 'angle')}'"
+        yield at, f"{drive.node!r} cannot move: its support is {node.support!r}; {remedy} or 'free' lets it"
     elif across and not parallel(drive.direction, node.direction or 0.0):
-        way, own = format_short(drive.direction, "angle"), format_short(node.direction or 0.0, "angle")
+        drive_angle, guide_angle = format_short(drive.direction, "angle"), format_short(node.direction or 0.0, "angle")
         yield (
             ("drive", drive.kind, "direction"),
-            f"{drive.node!r} slides along {own} only ('mechanism.nodes.{drive.node}.direction'), not along {way}: make "
-            "both directions equal, or its support 'free'",
+            f"{drive.node!r} slides along {guide_angle} only ('mechanism.nodes.{drive.node}.direction'), not along "
+            f"{drive_angle}: make both directions equal, or its support 'free'",
         )
 
 
-def parallel(one: float, other: float) -> bool:
+def parallel(angle: float, reference: float) -> bool:
     """Return True if two directions [rad] are parallel, in either sense."""
-    return abs(math.sin(one - other)) < _SAME_DIRECTION
+    return abs(math.sin(angle - reference)) < _SAME_DIRECTION
 
 
 def _copy_faults(mechanism: Mechanism) -> Iterator[Fault]:
@@ -281,8 +281,11 @@ class Mechanism(RoundedCorners, Model):
     @property
     def thinnest(self) -> float:
         """Smallest thickness of all beams [m]."""
-        given = self.of_beams("thickness").values()
-        return min(one if isinstance(one, float) else min(value for _, value in one) for one in given)
+        thicknesses = self.of_beams("thickness").values()
+        return min(
+            thickness if isinstance(thickness, float) else min(value for _, value in thickness)
+            for thickness in thicknesses
+        )
 
     @model_validator(mode="after")
     def _names_match(self) -> Self:

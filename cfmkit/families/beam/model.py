@@ -156,12 +156,12 @@ def _refuse_torn_beams(assembly: Assembly) -> None:
     if abs(spec.extent) <= most * _way_to_support(network, drive.node, straight):
         return
     lengths = {name: fit.length for name, fit in BeamFits(network).items()}
-    way = _way_to_support(network, drive.node, lengths)
-    if abs(spec.extent) > most * way:
+    length = _way_to_support(network, drive.node, lengths)
+    if abs(spec.extent) > most * length:
         raise InputError(
             f"analysis.travel of {format_short(spec.extent, 'length')} would stretch beams to more than twice their "
-            f"length: from {drive.node!r} to a node that is held they are {format_short(way, 'length')} long; "
-            f"a travel of at most {format_short(most * way, 'length')} is possible"
+            f"length: from {drive.node!r} to a node that is held they are {format_short(length, 'length')} long; "
+            f"a travel of at most {format_short(most * length, 'length')} is possible"
         )
 
 
@@ -169,7 +169,7 @@ def _way_to_support(network: Network, node: str, lengths: Mapping[str, float]) -
     """Return the length of beams and links from a node to the nearest one that is held in place [m]; else infinity."""
     moved = {name: math.hypot(*at.support.displacement[:2]) for name, at in network.nodes.items()}
     ways = ways_to_supports(network, node, lengths)
-    return min((way + moved[name] for name, way in ways.items()), default=math.inf)
+    return min((length + moved[name] for name, length in ways.items()), default=math.inf)
 
 
 def _keep_points(assembly: Assembly, path: Path) -> tuple[Any, Any]:
@@ -204,7 +204,7 @@ def _curve(solution: Solution) -> Curve:
     columns = _columns(solution)
     if solution.back is None:
         return _curve_of(solution, columns, solution.stable)
-    return join_branches(*(_curve_of(way, _columns(way), way.stable) for way in (solution, solution.back)))
+    return join_branches(*(_curve_of(branch, _columns(branch), branch.stable) for branch in (solution, solution.back)))
 
 
 def _columns(solution: Solution) -> LazyColumns:
@@ -245,8 +245,10 @@ def _ends(solution: Solution) -> Curve | None:
     """Return the points at which windows end between those of the curve, with their stress; None without any."""
     if not len(solution.ends):
         return None
-    there = replace(solution, keep=solution.ends)
-    return _curve_of(there, {"max_stress": lambda: Column(there.stress, "stress")}, np.array(there.accurate))
+    ends_only = replace(solution, keep=solution.ends)
+    return _curve_of(
+        ends_only, {"max_stress": lambda: Column(ends_only.stress, "stress")}, np.array(ends_only.accurate)
+    )
 
 
 def _frequencies(solution: Solution) -> LazyColumns:
@@ -295,8 +297,8 @@ def _points_of_events(path: Path) -> Iterator[int]:
     marked, number = np.flatnonzero(path.changes_contact), 0
     event: ContactEvent
     for event in path.contact_events:
-        near = SAME_PLACE * float(np.ptp(path.drive))
-        while number < len(marked) - 1 and abs(path.drive[marked[number]] - event.drive) > near:
+        same_place = SAME_PLACE * float(np.ptp(path.drive))
+        while number < len(marked) - 1 and abs(path.drive[marked[number]] - event.drive) > same_place:
             number += 1
         yield int(marked[number])
 
@@ -305,8 +307,8 @@ def join_branches(load: Curve, unload: Curve) -> Curve:
     """Return one curve of both branches, in the order in which the mechanism goes through them."""
 
     def column(name: str) -> Column:
-        there, back = load.extra[name], unload.extra[name]
-        return Column(np.concatenate([there.values, back.values]), there.dimension)
+        loading, unloading = load.extra[name], unload.extra[name]
+        return Column(np.concatenate([loading.values, unloading.values]), loading.dimension)
 
     return Curve(
         np.concatenate([load.motion, unload.motion]),
@@ -320,12 +322,14 @@ def join_branches(load: Curve, unload: Curve) -> Curve:
 
 def equilibria_of_both_branches(solution: Solution) -> BothBranches | None:
     """Return the equilibria between the points of both branches; None unless both cover the same motion."""
-    there = solution.model_between_points
-    back = None if solution.back is None else solution.back.model_between_points
-    if there is None or back is None:
+    loading = solution.model_between_points
+    unloading = None if solution.back is None else solution.back.model_between_points
+    if loading is None or unloading is None:
         return None
-    first, second = (np.array([way.own_points[0], way.own_points[-1]]) for way in (there, back))
-    return BothBranches({"load": there, "unload": back}) if np.allclose(first, second, rtol=0, atol=1e-12) else None
+    first, second = (np.array([branch.own_points[0], branch.own_points[-1]]) for branch in (loading, unloading))
+    return (
+        BothBranches({"load": loading, "unload": unloading}) if np.allclose(first, second, rtol=0, atol=1e-12) else None
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,12 +341,12 @@ class BothBranches:
     @property
     def places(self) -> FloatArray:
         """The points of both branches, and extremes between them, increasing [m or rad]."""
-        return np.unique(np.concatenate([way.places for way in self.ways.values()]))
+        return np.unique(np.concatenate([branch.places for branch in self.ways.values()]))
 
     @property
     def peaks(self) -> FloatArray:
         """Places of extremes of the effort between two points, and of corners, (m,) [m or rad]."""
-        return np.unique(np.concatenate([way.peaks for way in self.ways.values()]))
+        return np.unique(np.concatenate([branch.peaks for branch in self.ways.values()]))
 
     def effort(self, branch: str, places: FloatArray, /) -> FloatArray:
         """Return the effort of a branch at places of any shape [N or N m]."""

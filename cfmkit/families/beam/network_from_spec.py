@@ -108,11 +108,11 @@ class Assembly(ShortRepr):
             case LoadsDrive():
                 return engine.Loading((*(load.build() for load in drive.loads), *self.growing(spec.extent)), points)
             case MomentDrive():
-                own = engine.PointLoad(self.driven, moment=1.0)
+                drive_load = engine.PointLoad(self.driven, moment=1.0)
             case ForceDrive():
                 x, y = math.cos(self.direction), math.sin(self.direction)
-                own = engine.PointLoad(self.driven, x, y, follows=drive.follows)
-        return engine.Loading((own, *self.growing(spec.extent / self.parallel)), points / self.parallel)
+                drive_load = engine.PointLoad(self.driven, x, y, follows=drive.follows)
+        return engine.Loading((drive_load, *self.growing(spec.extent / self.parallel)), points / self.parallel)
 
     @property
     def effort_unit(self) -> float:
@@ -124,9 +124,9 @@ class Assembly(ShortRepr):
         """Return what the parts weigh; None if a density is not known."""
         mechanism = self.spec.mechanism
         # stages in series have the names of the first, with a number behind a dot
-        own = mechanism.of_beams("material")
-        materials = {name: own[name.split(".")[0]] for name in self.network.beams}
-        density = {name: one.density for name, one in materials.items() if one.density is not None}
+        stated_materials = mechanism.of_beams("material")
+        materials = {name: stated_materials[name.split(".")[0]] for name in self.network.beams}
+        density = {name: material.density for name, material in materials.items() if material.density is not None}
         if len(density) < len(materials):
             return None
         from cfmkit.elastica.vibration import NetworkMasses
@@ -192,20 +192,20 @@ def mirror_axis(assembly: Assembly) -> tuple[complex, float] | None:
 
 def is_on_axis(assembly: Assembly, node: str) -> bool:
     """Return True if a node is on the mirror axis, by the thickness of the beams that meet there."""
-    found, axis = assembly.network.nodes[node], mirror_axis(assembly)
+    place, axis = assembly.network.nodes[node], mirror_axis(assembly)
     if axis is None:
         return False
-    away = ((complex(found.x, found.y) - axis[0]) / np.exp(1j * axis[1])).imag
+    away = ((complex(place.x, place.y) - axis[0]) / np.exp(1j * axis[1])).imag
     beams = assembly.network.beams.values()
-    near = [beam for beam in beams if node in (beam.start, beam.end)] or beams
-    return bool(abs(away) < _ON_AXIS * max(thickest_of(beam.section) for beam in near))
+    joined_beams = [beam for beam in beams if node in (beam.start, beam.end)] or beams
+    return bool(abs(away) < _ON_AXIS * max(thickest_of(beam.section) for beam in joined_beams))
 
 
 def constant_load(assembly: Assembly, node: str) -> FloatArray:
     """Return the constant point loads on a node (3,): force x, y [N], moment [N m]."""
     loads = [load for load in assembly.network.loads if isinstance(load, engine.PointLoad) and load.node == node]
-    each = np.array([(load.fx, load.fy, load.moment) for load in loads], dtype=float).reshape(-1, 3)
-    return np.asarray(each.sum(axis=0))
+    components = np.array([(load.fx, load.fy, load.moment) for load in loads], dtype=float).reshape(-1, 3)
+    return np.asarray(components.sum(axis=0))
 
 
 def moving_nodes(assembly: Assembly) -> set[str]:
@@ -216,14 +216,16 @@ def moving_nodes(assembly: Assembly) -> set[str]:
 
 def allowable_stress(spec: BeamSpec) -> float | None:
     """Return yield strength over safety factor [Pa], of the weakest beam; None if that of a beam is not known."""
-    known = known_allowable_stresses(spec)
-    return min(known.values()) if len(known) == len(spec.mechanism.beams) else None
+    strengths = known_allowable_stresses(spec)
+    return min(strengths.values()) if len(strengths) == len(spec.mechanism.beams) else None
 
 
 def known_allowable_stresses(spec: BeamSpec) -> dict[str, float]:
     """Return yield strength over safety factor of the beams whose strength is known, by name [Pa]."""
     mechanism = spec.mechanism
-    limits = {name: one.allowable(mechanism.safety_factor) for name, one in mechanism.of_beams("material").items()}
+    limits = {
+        name: material.allowable(mechanism.safety_factor) for name, material in mechanism.of_beams("material").items()
+    }
     return {name: limit for name, limit in limits.items() if limit is not None}
 
 
@@ -280,10 +282,10 @@ def is_between_held_places(mechanism: Mechanism, beam: MemberSpec) -> bool:
     return held and beam.shape.is_straight and not (beam.start_offset or beam.end_offset)
 
 
-def _thickness(given: Thickness) -> float | engine.Taper:
-    if isinstance(given, tuple):
-        return engine.Taper(np.array([place for place, _ in given]), np.array([value for _, value in given]))
-    return given
+def _thickness(thickness: Thickness) -> float | engine.Taper:
+    if isinstance(thickness, tuple):
+        return engine.Taper(np.array([place for place, _ in thickness]), np.array([value for _, value in thickness]))
+    return thickness
 
 
 def resolve(spec: BeamSpec) -> BeamSpec:
@@ -321,8 +323,8 @@ def _own_chord(network: Network, beam: Beam) -> complex:
     reach = complex(end.x - start.x, end.y - start.y) + complex(*beam.end_offset) - complex(*beam.start_offset)
     if getattr(beam.shape, "length", None) is None:
         return reach
-    found = fit(beam, (reach.real, reach.imag))
-    return reach * cmath.exp(-1j * float(np.real(found.rotation))) / float(np.real(found.scale))
+    fit_of_shape = fit(beam, (reach.real, reach.imag))
+    return reach * cmath.exp(-1j * float(np.real(fit_of_shape.rotation))) / float(np.real(fit_of_shape.scale))
 
 
 _PITCH_MARGIN = 1.15  # of the pitch that is chosen, for what joins the stages

@@ -65,13 +65,13 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
         [area for hole in solid.holes for area in hole.to_polygons(fine / OUTLINE_TOLERANCE)],
     )
     sections = check_outline(contours, tuple(_specified_pieces(beams, pieces, thinnest)), thinnest, fillet, holes)
-    contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
+    contours += tuple(circle(hole.at, 0.5 * hole.diameter, "cut", hole=True) for hole in part.holes)
     paths = [Contour((line,), "path") for line in lines]
     moving = moving_nodes(assembly)
     places = held_places(assembly, beams, tolerance)
     marks = [mark(shape, place.node in moving) for place in places for shape in place.shapes]
     marks += [mark(shape, False) for shape in frame]
-    tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
+    tables = tuple(_table(f"beam-{name}", strips) for name, strips in beams.items())
     legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
     contours, bare = add_fixing_holes(contours, marks, part.screws)
     notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
@@ -94,10 +94,10 @@ def _specified_pieces(
     beams: dict[str, list[BeamStrip]], pieces: Sequence[OutlinePiece], size: float
 ) -> Iterator[SpecifiedPiece]:
     """Yield the pieces that a part is united from, the first of which are the strips of beams, with their sections."""
-    strips_of = [(name, strip) for name, found in beams.items() for strip in found]
+    strips_of = [(name, strip) for name, strips in beams.items() for strip in strips]
     for number, piece in enumerate(pieces):
-        own = (strips_of[number][1].section(strips_of[number][0]),) if number < len(strips_of) else ()
-        yield SpecifiedPiece(piece.to_polygons(size), own)
+        sections = (strips_of[number][1].section(strips_of[number][0]),) if number < len(strips_of) else ()
+        yield SpecifiedPiece(piece.to_polygons(size), sections)
 
 
 def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
@@ -128,12 +128,12 @@ def _distances(words: str, start: Any, end: Any, along: tuple[Literal["x", "y"],
 def _facts(assembly: Assembly, fillet: float) -> Iterator[tuple[str, str]]:
     """Yield what the part is made of, and how thick its beams are."""
     mechanism = assembly.spec.mechanism
-    materials = {name: one.words for name, one in mechanism.of_beams("material").items()}
+    materials = {name: material.words for name, material in mechanism.of_beams("material").items()}
     yield "material", _by_beam(materials) if len({*materials.values()}) > 1 else next(iter(materials.values()))
     yield "fillets", format_short(fillet, "length") if fillet else "none"
     thick = {}
-    for name, given in mechanism.of_beams("thickness").items():
-        ends = [given] if isinstance(given, float) else [value for _, value in given]
+    for name, thickness in mechanism.of_beams("thickness").items():
+        ends = [thickness] if isinstance(thickness, float) else [value for _, value in thickness]
         thick[name] = " ... ".join(dict.fromkeys(format_short(value, "length") for value in (min(ends), max(ends))))
     yield "thickness", _by_beam(thick)
 
@@ -150,30 +150,30 @@ def _sheet(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Sheet:
     """Return the mechanism's width, and where beams have another one."""
     mechanism, axis = assembly.spec.mechanism, mirror_axis(assembly)
     widths = mechanism.of_beams("width")
-    own = [
+    regions = [
         Region(strip.polygon, width)
-        for name, found in beams.items()
+        for name, strips in beams.items()
         for width in {widths[name.split(".")[0]]} - {mechanism.width}
-        for strip in found
+        for strip in strips
     ]
     if axis is not None:
-        own += [Region(mirror_points(one.polygon, *axis), one.thickness) for one in own]
-    return Sheet(mechanism.width, tuple(own))
+        regions += [Region(mirror_points(region.polygon, *axis), region.thickness) for region in regions]
+    return Sheet(mechanism.width, tuple(regions))
 
 
 def _line(strip: BeamStrip) -> Smooth:
     return Smooth(strip.points, np.column_stack([np.cos(strip.angle), np.sin(strip.angle)]))
 
 
-def _table(name: str, found: list[BeamStrip]) -> Curve2D:
+def _table(name: str, strips: list[BeamStrip]) -> Curve2D:
     """Return the exact points of a beam: centre line, angle, thickness, both edges."""
-    points = np.concatenate([strip.points for strip in found])
-    left, right = (np.concatenate([strip.sides[k] for strip in found]) for k in (0, 1))
+    points = np.concatenate([strip.points for strip in strips])
+    left, right = (np.concatenate([strip.sides[k] for strip in strips]) for k in (0, 1))
     columns = {
         "x": (points[:, 0], "length"),
         "y": (points[:, 1], "length"),
-        "angle": (np.concatenate([strip.angle for strip in found]), "angle"),
-        "thickness": (np.concatenate([strip.thickness for strip in found]), "length"),
+        "angle": (np.concatenate([strip.angle for strip in strips]), "angle"),
+        "thickness": (np.concatenate([strip.thickness for strip in strips]), "length"),
         "left_x": (left[:, 0], "length"),
         "left_y": (left[:, 1], "length"),
         "right_x": (right[:, 0], "length"),
@@ -193,27 +193,29 @@ def joined_unasked(
     fillet: float,  # its inside corners [m]
 ) -> Iterator[Finding]:
     """Yield a warning that names what the outline joins although the network has it apart."""
-    strips = [_draw_strip(assembly, name, found) for name, found in beams.items()]
+    strips = [_draw_strip(assembly, name, strips_of_beam) for name, strips_of_beam in beams.items()]
     blocks = [*blocks]
     if (axis := mirror_axis(assembly)) is not None:
         strips += [
             DrawnStrip(
-                f"{one.name}'", mirror_points(one.points, *axis), one.thickness,
-                (_image(assembly, one.ends[0]), _image(assembly, one.ends[1])),
+                f"{strip.name}'", mirror_points(strip.points, *axis), strip.thickness,
+                (_image(assembly, strip.ends[0]), _image(assembly, strip.ends[1])),
             )
-            for one in strips
+            for strip in strips
         ]  # fmt: skip
         blocks += [
             DrawnBlock(
-                f"{one.name}'", tuple(_image(assembly, node) for node in one.nodes), mirror_points(one.shape, *axis)
+                f"{block.name}'",
+                tuple(_image(assembly, node) for node in block.nodes),
+                mirror_points(block.shape, *axis),
             )
-            for one in blocks
-            if not any(node.endswith("'") for node in one.nodes)  # bars between the halves are their own image
+            for block in blocks
+            if not any(node.endswith("'") for node in block.nodes)  # bars between the halves are their own image
         ]
     joins = joined_away_from_nodes(strips, blocks, _nodes_and_bodies(assembly), contours, fillet)
     if joins:
         more = f" and {len(joins) - MAX_NAMED_PAIRS} more" if len(joins) > MAX_NAMED_PAIRS else ""
-        pairs = ", ".join(_phrase(one) for one in joins[:MAX_NAMED_PAIRS])
+        pairs = ", ".join(_phrase(join) for join in joins[:MAX_NAMED_PAIRS])
         yield finding(
             "joined_away_from_nodes",
             f"drawn as one piece although the mechanism has them apart: {pairs}{more}; the part is stiffer than its "
@@ -236,16 +238,16 @@ def pins_drawn_solid(spec: BeamSpec) -> Iterator[Finding]:
 
 
 def _phrase(join: Join) -> str:
-    at = ", ".join(format_short(one, "length") for one in np.round(join.at, 9).tolist())
-    pair = f"{join.one} with itself" if join.one == join.other else f"{join.one} and {join.other}"
+    at = ", ".join(format_short(place, "length") for place in np.round(join.at, 9).tolist())
+    pair = f"{join.first} with itself" if join.first == join.second else f"{join.first} and {join.second}"
     filled = f", where fillets fill the gap of {format_short(join.gap, 'length')}" if join.gap > 0 else ""
     return f"{pair} at ({at}){filled}"
 
 
-def _draw_strip(assembly: Assembly, name: str, found: Sequence[BeamStrip]) -> DrawnStrip:
+def _draw_strip(assembly: Assembly, name: str, beam_strips: Sequence[BeamStrip]) -> DrawnStrip:
     beam = assembly.network.beams[name]
-    points = np.concatenate([strip.points for strip in found])
-    return DrawnStrip(name, points, np.concatenate([strip.thickness for strip in found]), (beam.start, beam.end))
+    points = np.concatenate([strip.points for strip in beam_strips])
+    return DrawnStrip(name, points, np.concatenate([strip.thickness for strip in beam_strips]), (beam.start, beam.end))
 
 
 def _image(assembly: Assembly, node: str) -> str:
@@ -260,7 +262,7 @@ def _nodes_and_bodies(assembly: Assembly) -> NodesAndBodies:
     held = {name for name, node in network.nodes.items() if _stands(assembly, name) and name not in moving}
     pairs = [(link.master, link.node) for link in network.links] + list(combinations(sorted(held), 2))
     if axis is not None:
-        pairs += [(_image(assembly, one), _image(assembly, other)) for one, other in pairs]
+        pairs += [(_image(assembly, first), _image(assembly, second)) for first, second in pairs]
         pairs += [(name, _image(assembly, name)) for name in sorted(held | moving)]
         places |= {_image(assembly, name): mirror_points(at[None], *axis)[0] for name, at in places.items()}
     return NodesAndBodies(places, _bodies(pairs))
@@ -274,7 +276,7 @@ def _stands(assembly: Assembly, node: str) -> bool:
 def _bodies(pairs: Sequence[tuple[str, str]]) -> dict[str, str]:
     """Return the body of each node of some pairs that move as one."""
     body: dict[str, str] = {}
-    for one, other in pairs:
-        kept, gone = body.setdefault(one, one), body.setdefault(other, other)
-        body = {node: kept if own == gone else own for node, own in body.items()}
+    for first, second in pairs:
+        kept, gone = body.setdefault(first, first), body.setdefault(second, second)
+        body = {node: kept if representative == gone else representative for node, representative in body.items()}
     return body

@@ -186,8 +186,8 @@ def _swept(assembly: Assembly, places: Sequence[HeldPlace]) -> Any:
     solid = spec.analysis.fidelity == "solid"
     solution = solve(spec.replace({"analysis.fidelity": "inextensible"}) if solid else spec)
     rest = list(itertools.chain.from_iterable(strips_of(assembly).values()))
-    half = 0.5 * max(float(one.thickness.max()) for one in rest)
-    lines = with_image(assembly, [PosedBody.line("beam", "free", one.points, half) for one in rest])
+    half = 0.5 * max(float(strip.thickness.max()) for strip in rest)
+    lines = with_image(assembly, [PosedBody.line("beam", "free", strip.points, half) for strip in rest])
     poses = bodies(solution, choose_points(solution, N_SWEPT), places)
     moving = (body if body.closed else replace(body, half_thickness=half) for body in poses if body.role != "held")
     return swept([*lines, *moving])
@@ -204,8 +204,8 @@ def part_over_motion(result: Result) -> PosedPart | None:
     if hasattr(result.state, "fine"):
         from cfmkit.families.beam.model import analyze
 
-        given: Any = result.spec
-        result = analyze(given.replace({"analysis.fidelity": "reissner", "requirements": ()}), Run())
+        as_specified: Any = result.spec
+        result = analyze(as_specified.replace({"analysis.fidelity": "reissner", "requirements": ()}), Run())
     if result.state is None:
         return None
     solution: Solution = result.state
@@ -269,7 +269,9 @@ def _moved_bodies(assembly: Assembly, path: Path, place: HeldPlace, at: Sequence
 
 def made_strips(assembly: Assembly) -> list[PosedBody]:
     """Return the smooth pieces of all unloaded beams."""
-    made = [PosedBody.polygon("strip", "free", one.polygon) for found in strips_of(assembly).values() for one in found]
+    made = [
+        PosedBody.polygon("strip", "free", strip.polygon) for strips in strips_of(assembly).values() for strip in strips
+    ]
     return with_image(assembly, made)
 
 
@@ -278,8 +280,8 @@ def with_image(assembly: Assembly, described: Sequence[PosedBody]) -> list[Posed
     axis = mirror_axis(assembly)
     if axis is None:
         return list(described)
-    images = [mirror_points(one.core.reshape(-1, 2), *axis).reshape(one.core.shape) for one in described]
-    return [*described, *(replace(one, core=image) for one, image in zip(described, images, strict=True))]
+    images = [mirror_points(element.core.reshape(-1, 2), *axis).reshape(element.core.shape) for element in described]
+    return [*described, *(replace(element, core=image) for element, image in zip(described, images, strict=True))]
 
 
 def choose_points(solution: Solution, count: int) -> NDArray[Any]:

@@ -48,13 +48,13 @@ def _find_pulled(path: Path, last: int) -> Iterator[str]:
     for name, beam in path.network.beams.items():
         line = path.shape(name, last)
         chord = line[-1] - line[0]
-        way, length = float(np.hypot(*chord)), float(np.real(path.fits[name].length))
-        if way < _STRAIGHT_LENGTH_SHARE * length:
+        distance_of_ends, length = float(np.hypot(*chord)), float(np.real(path.fits[name].length))
+        if distance_of_ends < _STRAIGHT_LENGTH_SHARE * length:
             continue
-        pull = float(path.end_force(name, 1)[last, :2] @ chord) / way
+        pull = float(path.end_force(name, 1)[last, :2] @ chord) / distance_of_ends
         stiffness = float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0]))
         if pull * length**2 > _TAUT_RATIO * stiffness:
-            yield f"{name}: {_describe_beam(way, length)}"
+            yield f"{name}: {_describe_beam(distance_of_ends, length)}"
 
 
 def _in_line(path: Path, last: int) -> Iterator[str]:
@@ -72,15 +72,15 @@ def _in_line(path: Path, last: int) -> Iterator[str]:
             yield f"{name} to {drive.node}: {_describe_beam(now, length)}"
 
 
-def _describe_beam(way: float, length: float) -> str:
-    return f"{format_short(way, 'length')} of {format_short(length, 'length')}"
+def _describe_beam(distance_of_ends: float, length: float) -> str:
+    return f"{format_short(distance_of_ends, 'length')} of {format_short(length, 'length')}"
 
 
-def _apart(path: Path, one: str, other: str, point: int) -> float:
+def _apart(path: Path, first: str, second: str, point: int) -> float:
     """Return how far two nodes are apart at a point of a path [m]."""
     places = [
         np.array([node.x, node.y]) + path.motion(name)[point, :2]
-        for name, node in ((name, path.network.nodes[name]) for name in (one, other))
+        for name, node in ((name, path.network.nodes[name]) for name in (first, second))
     ]
     return math.hypot(*(places[1] - places[0]))
 
@@ -95,16 +95,16 @@ def ways_to_supports(
     ways += [(link.master, link.node, distance(network, link.master, link.node)) for link in network.links]
     reached = {node: 0.0}
     for _ in network.nodes:
-        for one, other, length in (*ways, *((b, a, length) for a, b, length in ways)):
-            if one in reached and reached[one] + length < reached.get(other, math.inf):
-                reached[other] = reached[one] + length
+        for near_node, far_node, length in (*ways, *((b, a, length) for a, b, length in ways)):
+            if near_node in reached and reached[near_node] + length < reached.get(far_node, math.inf):
+                reached[far_node] = reached[near_node] + length
     supports = {name: at.support for name, at in network.nodes.items()}
-    return {name: way for name, way in reached.items() if supports[name].along and supports[name].across}
+    return {name: length for name, length in reached.items() if supports[name].along and supports[name].across}
 
 
-def distance(network: Network, one: str, other: str) -> float:
+def distance(network: Network, first_node: str, second_node: str) -> float:
     """Return how far two nodes are apart before any load [m]."""
-    first, second = network.nodes[one], network.nodes[other]
+    first, second = network.nodes[first_node], network.nodes[second_node]
     return math.hypot(second.x - first.x, second.y - first.y)
 
 
@@ -122,8 +122,8 @@ def drive_text(assembly: Assembly, value: float) -> str:
 
 def in_units(assembly: Assembly, text: str) -> str:
     """Return a sentence of the engine with units."""
-    text = _LENGTH_PATTERN.sub(lambda found: format_short(float(found[1]), "length"), text)
-    return _PLACE_PATTERN.sub(lambda found: f"{found[1]} {drive_text(assembly, float(found[2]))}", text)
+    text = _LENGTH_PATTERN.sub(lambda match: format_short(float(match[1]), "length"), text)
+    return _PLACE_PATTERN.sub(lambda match: f"{match[1]} {drive_text(assembly, float(match[2]))}", text)
 
 
 EXTENSIBLE_OPTION = "analysis.fidelity=extensible"
@@ -215,7 +215,7 @@ def _find_along_drive(spec: BeamSpec) -> Iterator[str]:
     if direction is None:
         return
     for name, beam in mechanism.beams.items():
-        way = np.subtract(mechanism.nodes[beam.end].at, mechanism.nodes[beam.start].at)
-        across = abs(way @ (-np.sin(direction), np.cos(direction)))
-        if beam.shape.is_straight and across <= _PARALLEL_RTOL * np.hypot(*way):
+        chord = np.subtract(mechanism.nodes[beam.end].at, mechanism.nodes[beam.start].at)
+        across = abs(chord @ (-np.sin(direction), np.cos(direction)))
+        if beam.shape.is_straight and across <= _PARALLEL_RTOL * np.hypot(*chord):
             yield name

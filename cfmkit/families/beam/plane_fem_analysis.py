@@ -263,8 +263,10 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     material, width = (next(iter(spec.mechanism.of_beams(key).values())) for key in ("material", "width"))
     law = MATERIAL_LAWS[material.law](material.modulus, material.poisson)
     places = [
-        HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams, _load(assembly, one))
-        for one in regions(spec)
+        HeldOrDriven(
+            region.name, region.shapes, region.at, *_motions(assembly, region), region.seams, _load(assembly, region)
+        )
+        for region in regions(spec)
     ]
     thinnest = _thinnest(assembly)
     rings = rings_of(cut, thinnest)
@@ -316,7 +318,7 @@ def _stops(spec: BeamSpec) -> list[float]:
 
 def _ends_of_windows(spec: BeamSpec, end: float) -> list[float]:
     """Return where every window starts and ends on a travel [m or rad]."""
-    windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
+    windows = [spec.analysis.window, *(requirement.over for requirement in spec.requirements)]
     return [place for window in windows if window is not None for place in window_places(window, (0.0, end))]
 
 
@@ -337,16 +339,16 @@ def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArr
             driven[:2] = np.cos(direction), np.sin(direction)
     c, s = np.cos(direction), np.sin(direction)
     ways = ((along, (c, s, 0.0)), (across, (-s, c, 0.0)), (turn, (0.0, 0.0, 1.0)))
-    return driven, np.array([way for held, way in ways if not held]).reshape(-1, 3).T
+    return driven, np.array([direction for held, direction in ways if not held]).reshape(-1, 3).T
 
 
 def _load(assembly: Assembly, place: HeldPlace) -> FloatArray:
     """Return the constant load on a region (3,): force [N] and moment [N m]; on the mirror axis of both halves."""
-    own, axis = constant_load(assembly, place.node), mirror_axis(assembly)
+    load, axis = constant_load(assembly, place.node), mirror_axis(assembly)
     if axis is None:
-        return own
-    image = np.array([*mirror_points(own[None, :2], 0j, axis[1])[0], -own[2]])
-    return own + image if is_on_axis(assembly, place.node) else own if place.name == place.node else image
+        return load
+    image = np.array([*mirror_points(load[None, :2], 0j, axis[1])[0], -load[2]])
+    return load + image if is_on_axis(assembly, place.node) else load if place.name == place.node else image
 
 
 def _explain_ending(solution: SolidSolution) -> str:
@@ -444,14 +446,14 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     for point in solution.solved.critical_points:
         at = format_short(point.travel, "angle" if _turns(spec) else "length")
         load = format_short(solution.copies * point.effort, "torque" if _turns(spec) else "force")
-        known = "" if math.isnan(point.error) else f" (both within {100 * point.error:.2g} %)"
-        yield finding("bifurcation", f"the part leaves its path at {at} and {load}{known} for a stable branch")
+        accuracy = "" if math.isnan(point.error) else f" (both within {100 * point.error:.2g} %)"
+        yield finding("bifurcation", f"the part leaves its path at {at} and {load}{accuracy} for a stable branch")
     if reported := _sharp(spec):
         yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
     yield from drawing(spec).warnings
-    thinnest, one = _thinnest(solution.assembly), next(iter(solution.assembly.network.beams.values())).section
+    thinnest, section = _thinnest(solution.assembly), next(iter(solution.assembly.network.beams.values())).section
     wide = spec.mechanism.wide_beams
-    yield from findings_of_mesh(finding, solution.error, [(one.width, thinnest)], one.poisson_ratio, wide)
+    yield from findings_of_mesh(finding, solution.error, [(section.width, thinnest)], section.poisson_ratio, wide)
     allowable = solution.assembly.allowable_stress
     if allowable is not None and solution.worst is not None and solution.worst[0] > allowable:
         from cfmkit.solid.boundary_and_element_sizes import place_text

@@ -99,8 +99,8 @@ def _follow_shape(name: str) -> Kept:
 def _in_two_layers(kept: Kept) -> Kept:
     """Return two of a shape in series: twice the travel at the same force and stress."""
     spec = kept.spec.replace({"mechanism.copies.layers": 2})
-    one, both = (float(box(as_made(assemble(stacked)))[1, 1]) for stacked in (kept.spec, spec))
-    space = replace(kept.envelope, along=kept.envelope.along + both - one)
+    single_height, double_height = (float(box(as_made(assemble(stacked)))[1, 1]) for stacked in (kept.spec, spec))
+    space = replace(kept.envelope, along=kept.envelope.along + double_height - single_height)
     return replace(kept, name=f"{kept.name} in two layers", spec=spec, motion=2.0 * kept.motion, envelope=space)
 
 
@@ -113,7 +113,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
         return FamilyOffer(reason="the stored shapes are driven by a displacement: they give a force, no torque")
     if request.adjustable is not None:
         return FamilyOffer(reason="the force of a network of beams cannot be adjusted")
-    found: list[Candidate] = []
+    candidates: list[Candidate] = []
     missed: list[tuple[float, str]] = []
     for kept in kept_shapes():
         sides = request.envelope[0] / kept.envelope.across, request.envelope[1] / kept.envelope.along
@@ -123,17 +123,23 @@ def propose(request: Request, run: Run) -> FamilyOffer:
                 candidate = _rescale_shape(request, kept, share * largest, dict(block), ratio)
                 if not isinstance(candidate, Candidate):
                     missed.append(candidate)
-                elif not found or candidate.spec != found[-1].spec:
-                    found.append(candidate)
-    if found:
-        return FamilyOffer(tuple(_vary_by_turns(found)[:MAX_PROPOSALS]))
-    return FamilyOffer(reason=min(missed, key=lambda one: one[0])[1])
+                elif not candidates or candidate.spec != candidates[-1].spec:
+                    candidates.append(candidate)
+    if candidates:
+        return FamilyOffer(tuple(_vary_by_turns(candidates)[:MAX_PROPOSALS]))
+    return FamilyOffer(reason=min(missed, key=lambda miss: miss[0])[1])
 
 
-def _vary_by_turns(found: list[Candidate]) -> list[Candidate]:
+def _vary_by_turns(candidates: list[Candidate]) -> list[Candidate]:
     """Return candidates of all shapes by turns, that of the most promising one first."""
-    kinds = list(dict.fromkeys(one.variant for one in found))
-    rows = [sorted((one for one in found if one.variant == kind), key=lambda one: one.promise) for kind in kinds]
+    kinds = list(dict.fromkeys(candidate.variant for candidate in candidates))
+    rows = [
+        sorted(
+            (candidate for candidate in candidates if candidate.variant == kind),
+            key=lambda candidate: candidate.promise,
+        )
+        for kind in kinds
+    ]
     rows.sort(key=lambda row: row[0].promise)
     longest = max(map(len, rows))
     return [row[k] for k in range(longest) for row in rows if k < len(row)]
@@ -183,9 +189,9 @@ def _size_section(
     thickest: float,
 ) -> Candidate | tuple[float, str]:
     """Return the shape with its thickness from the stress and its width from the force."""
-    material, own = MaterialSpec.model_validate(block), kept.spec.mechanism
-    stiffer = material.modulus / own.material.modulus
-    thin = float(own.thickness) if isinstance(own.thickness, float) else 0.0
+    material, mechanism = MaterialSpec.model_validate(block), kept.spec.mechanism
+    stiffer = material.modulus / mechanism.material.modulus
+    thin = float(mechanism.thickness) if isinstance(mechanism.thickness, float) else 0.0
     stress, force = curve
     strength = material.allowable(1.0)
     if strength is None or not force > 0.0:
@@ -214,9 +220,9 @@ def _size_section(
     promise += layers - 1.0  # one layer is easier to make than two
     promise += WIDE_LAST * is_too_wide(request, wide, thicker * thin, strain)
     variant = name_variant(f"shape {kept.name}", request, block)
-    here = "cfmkit.families.beam.proposals"
+    module = "cfmkit.families.beam.proposals"
     free = "mechanism.thickness", "mechanism.width"
-    return Candidate(variant, spec, False, f"{here}:finish", promise, free, f"{here}:correct")
+    return Candidate(variant, spec, False, f"{module}:finish", promise, free, f"{module}:correct")
 
 
 def _width(request: Request, kept: Kept, size: float, stiffer: float, thicker: float, force: float) -> float:
@@ -271,19 +277,19 @@ def _refit(spec: BeamSpec, request: Request, model: Callable[[BeamSpec, Run], Re
     longer = 1.12 * float(spec.analysis.travel or 0.0)
     free = {"analysis.travel": longer, "analysis.window": None, "requirements": (), "sensitivity": None}
     result = model(spec.replace(free), Run())
-    found = flattest(result, request.travel)
-    if found is None:
+    window = flattest(result, request.travel)
+    if window is None:
         return None, 1.0
     curve, allowed = result.curve, request.strength_used * (spec.mechanism.material.allowable(1.0) or np.inf)
-    mean = float(np.interp(np.linspace(*found, 101), curve.motion, curve.effort).mean())
+    mean = float(np.interp(np.linspace(*window, 101), curve.motion, curve.effort).mean())
     stress = np.maximum.accumulate(curve.extra["max_stress"].values)
-    thinner = min(1.0, 0.99 * allowed / float(np.interp(found[1], curve.motion, stress)))
+    thinner = min(1.0, 0.99 * allowed / float(np.interp(window[1], curve.motion, stress)))
     thickness = float(spec.mechanism.thickness) * thinner  # type: ignore[arg-type]
     changes = {
         "mechanism.thickness": thickness,
         "mechanism.width": spec.mechanism.width * request.target / (mean * thinner**3),
-        "analysis.travel": Place(found[1], "length"),
-        "analysis.window": tuple(Place(end, "length") for end in found),
+        "analysis.travel": Place(window[1], "length"),
+        "analysis.window": tuple(Place(end, "length") for end in window),
         "requirements": (),
     }
     return spec.replace(changes), thinner

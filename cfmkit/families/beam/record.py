@@ -23,7 +23,7 @@ with deferred_imports():
     from cfmkit.families.beam.proposals import propose
     from cfmkit.families.beam.redesign_variables_and_process_errors import errors, free
 
-FAMILY = Family(
+FAMILY_RECORD = Family(
     name="beam",
     summary="a planar network of slender beams in large deflection",
     spec_type=BeamSpec,

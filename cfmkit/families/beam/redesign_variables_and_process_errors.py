@@ -18,9 +18,9 @@ _MAX_COEFFICIENT_TURN = 0.4
 """How far a coefficient of a shape may turn from the design [rad]: farther off it is another shape."""
 
 
-def free(given: BeamSpec, designed: BeamSpec) -> dict[str, tuple[float, float]]:
+def free(spec: BeamSpec, designed: BeamSpec) -> dict[str, tuple[float, float]]:
     """Return places of nodes and coefficients of shapes that were searched, or width or thickness that was rescaled."""
-    design = given.design
+    design = spec.design
     if design is None:
         return {}
     if design.optimise is not None:
@@ -66,12 +66,12 @@ def _of_shapes(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tupl
 
 def errors(spec: BeamSpec) -> dict[str, str]:
     """Return which values a process errs in, and whether in thickness or in position: thicknesses and free nodes."""
-    found = {
+    errors = {
         path: "thickness"
         for path in _stated_paths(spec.mechanism, "thickness")
         if isinstance(spec.get_value(path), float)
     }
     for name, node in spec.mechanism.nodes.items():
         if node.support == "free":
-            found |= {f"mechanism.nodes.{name}.at.{axis}": "position" for axis in (0, 1)}
-    return found
+            errors |= {f"mechanism.nodes.{name}.at.{axis}": "position" for axis in (0, 1)}
+    return errors

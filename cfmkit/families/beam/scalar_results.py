@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.families.beam.constant_force_range_and_extremes import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
-from cfmkit.families.end_stops import DEFINITIONS as OF_CONTACTS
+from cfmkit.families.end_stops import CONTACT_QUANTITIES
 from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
 from cfmkit.families.rows import ScalarQuantity, or_nan
 from cfmkit.numerics.cubic_interpolation import value_at
@@ -58,8 +58,8 @@ def _gap(solution: Solution, which: int) -> float:
 
 def _largest_misfit(solution: Solution, misfit: Callable[[Fit], float]) -> float:
     """Return the largest of some misfit between a beam with a length of its own and its nodes."""
-    own = [name for name, beam in solution.path.network.beams.items() if getattr(beam.shape, "length", None)]
-    return max((misfit(solution.path.fits[name]) for name in own), default=0.0)
+    with_length = [name for name, beam in solution.path.network.beams.items() if getattr(beam.shape, "length", None)]
+    return max((misfit(solution.path.fits[name]) for name in with_length), default=0.0)
 
 
 def _least_slenderness(solution: Solution) -> float:
@@ -104,7 +104,7 @@ def _event(kind: str, dimension: str) -> Callable[[Solution], float]:
         if _turns(solution) or solution.spec.mechanism.drive.is_displacement != (dimension == "length"):
             return math.nan
         unit = solution.assembly.effort_unit if dimension == "force" else 1
-        return next((unit * one.drive for one in solution.path.events if one.kind == kind), math.nan)
+        return next((unit * event.drive for event in solution.path.events if event.kind == kind), math.nan)
 
     return function
 
@@ -160,8 +160,8 @@ def _passes_pole(solution: Solution, direction: float, window: tuple[float, floa
     x, y, _ = path.motion(node).T
     along = np.cos(direction) * x + np.sin(direction) * y
     inside = (along >= window[0]) & (along <= window[1])
-    found = poles(path, node, solution.assembly.direction)
-    return bool((found & inside[1:] & inside[:-1]).any())
+    at_poles = poles(path, node, solution.assembly.direction)
+    return bool((at_poles & inside[1:] & inside[:-1]).any())
 
 
 BIFURCATION_OFFSETS = np.array([-1e-5, -1e-6, 1e-6, 1e-5])
@@ -178,10 +178,10 @@ def _has_pole(solution: Solution, observe: Callable[[Path], FloatArray], window:
         return False
     for place in (event.drive for event in solution.path.events if event.kind == "bifurcation"):
         if window[0] <= place <= window[1]:
-            far, near, later, farther = np.abs(
+            far_before, before, after, far_after = np.abs(
                 observe(law.solve_at(place + BIFURCATION_OFFSETS * float(np.ptp(solution.motion))))[0]
             )
-            if near > 5.0 * far or later > 5.0 * farther:
+            if before > 5.0 * far_before or after > 5.0 * far_after:
                 return True
     return False
 
@@ -191,12 +191,12 @@ def _has_pole(solution: Solution, observe: Callable[[Path], FloatArray], window:
 
 def natural(solution: Solution) -> dict[str, FloatArray]:
     """Return the natural frequencies at every point with the drive "held" and "free", (n, modes) [Hz]; else nan."""
-    found = solution.frequencies
-    if found is None:
+    frequencies = solution.frequencies
+    if frequencies is None:
         return {}
     by_motion = solution.spec.mechanism.drive.by_motion
-    held = found.held if not by_motion else np.where(solution.stable[:, None], found.held, np.nan)
-    free = np.where(solution.stable[:, None], found.free, np.nan)
+    held = frequencies.held if not by_motion else np.where(solution.stable[:, None], frequencies.held, np.nan)
+    free = np.where(solution.stable[:, None], frequencies.free, np.nan)
     return {"held": np.where(solution.accurate[:, None], held, np.nan), "free": free}
 
 
@@ -204,10 +204,10 @@ def _lowest_frequency(hold: str) -> Callable[[Solution], float]:
     """Return what reads the lowest natural frequency in the window; none where there is a pose without."""
 
     def function(solution: Solution) -> float:
-        found = natural(solution) if solution.spec.analysis.modes else {}
-        if hold not in found:
+        frequencies = natural(solution) if solution.spec.analysis.modes else {}
+        if hold not in frequencies:
             return math.nan
-        first = found[hold][find_in_window(solution, *window_of(solution)), 0]
+        first = frequencies[hold][find_in_window(solution, *window_of(solution)), 0]
         return float(first.min()) if len(first) and np.isfinite(first).all() else math.nan
 
     return function
@@ -374,7 +374,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     ),
 }
 """Every scalar result of the family, in the order in which they are shown."""
-SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()} | OF_CONTACTS
+SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()} | CONTACT_QUANTITIES
 """Name -> dimension and definition."""
 EXTREME_METRICS = ("peak_displacement", "peak_force", "valley_displacement", "valley_force")
 RANGE_METRICS = tuple(SCALAR_QUANTITIES)[: tuple(SCALAR_QUANTITIES).index("allowable_stress")]

@@ -145,7 +145,7 @@ class _ThroughPoints(Shape):
     def find_faults(self, reach: float) -> Iterator[tuple[str, str]]:
         """Yield that neighbours, or the ends, are at one place, if they are."""
         points: tuple[Point, ...] = self.points  # type: ignore[attr-defined]
-        if any(one == other for one, other in itertools.pairwise(points)):
+        if any(point == following for point, following in itertools.pairwise(points)):
             yield "points", "two neighbouring points are the same"
         elif points[0] == points[-1]:
             yield "points", CLOSED_SHAPE_MESSAGE

@@ -57,17 +57,21 @@ class SolidNodes:
             for place in self.solved.part.places
             if place.name in self.assembly.network.nodes and place.name != name
         ]
-        if any(is_on_axis(self.assembly, other) for other in others):
+        if any(is_on_axis(self.assembly, neighbour) for neighbour in others):
             return lambda travel: np.full((len(travel), 3), np.nan)
         load = constant_load(self.assembly, name)
-        return lambda travel: -np.sum([self._transfer_reaction(name, other, travel) for other in others], axis=0) - load
+        return lambda travel: (
+            -np.sum([self._transfer_reaction(name, neighbour, travel) for neighbour in others], axis=0) - load
+        )
 
-    def _transfer_reaction(self, name: str, other: str, travel: FloatArray) -> FloatArray:
+    def _transfer_reaction(self, name: str, neighbour: str, travel: FloatArray) -> FloatArray:
         """Return the reaction at another node with its moment about this one, (n, 3)."""
-        found = self.reaction(other)(travel) + constant_load(self.assembly, other)
-        here, there = ((self._place(node) + self.motion(node)(travel)[:, :2]).T for node in (name, other))
-        arm = there - here
-        return np.asarray(found + np.outer(arm[0] * found[:, 1] - arm[1] * found[:, 0], [0.0, 0.0, 1.0]))
+        reaction = self.reaction(neighbour)(travel) + constant_load(self.assembly, neighbour)
+        place, neighbour_place = (
+            (self._place(node) + self.motion(node)(travel)[:, :2]).T for node in (name, neighbour)
+        )
+        arm = neighbour_place - place
+        return np.asarray(reaction + np.outer(arm[0] * reaction[:, 1] - arm[1] * reaction[:, 0], [0.0, 0.0, 1.0]))
 
     def _place(self, name: str) -> FloatArray:
         about = self.assembly.network.nodes[name]
@@ -96,11 +100,11 @@ def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float
     spec = assembly.spec
     beams, nodes = _name_polygons(assembly)
     rows = []
-    for one in stressed_fillets(solved, spec.mechanism.fillet):
-        joined = one.arc.find_touched(beams)
-        node = min(nodes, key=lambda name: float(np.hypot(*(nodes[name] - one.arc.middle))))
-        if (found := one.largest(*window)) is not None:
-            rows.append(FilletRow(f"{node}: {', '.join(joined)}" if joined else node, one.arc, *found))
+    for fillet in stressed_fillets(solved, spec.mechanism.fillet):
+        joined = fillet.arc.find_touched(beams)
+        node = min(nodes, key=lambda name: float(np.hypot(*(nodes[name] - fillet.arc.middle))))
+        if (largest := fillet.largest(*window)) is not None:
+            rows.append(FilletRow(f"{node}: {', '.join(joined)}" if joined else node, fillet.arc, *largest))
     travel = np.array([row.motion for row in rows])
     drive: Any = assembly.drive()  # through a displacement or a rotation: a solid has no other
     paths = partial(both_images, assembly.network, lambda points: replace(drive, points=points))
@@ -118,7 +122,7 @@ def _name_polygons(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dic
     network, axis = assembly.network, mirror_axis(assembly)
     exact = EDGE_TOLERANCE * min(beam.section.thinnest for beam in network.beams.values())
     halves = both_halves(assembly, strips_of(assembly, exact / POINT_TOLERANCE_FACTOR))
-    beams = {name: [polygon for strip in found for polygon in strip.polygons] for name, found in halves.items()}
+    beams = {name: [polygon for strip in strips for polygon in strip.polygons] for name, strips in halves.items()}
     nodes = {name: np.array([node.x, node.y]) for name, node in network.nodes.items()}
     if axis is not None:
         others = {name: mirror_points(place[None], *axis)[0] for name, place in nodes.items()}

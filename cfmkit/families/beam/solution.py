@@ -137,20 +137,20 @@ class Solution(ShortRepr):
 
     def _part_efforts_at(self, places: FloatArray) -> FloatArray:
         assert self.model_between_points is not None
-        found, near = self._solved_part_efforts(places), AT_CORNER * float(np.ptp(self.motion))
+        efforts, corner_width = self._solved_part_efforts(places), AT_CORNER * float(np.ptp(self.motion))
         for corner, *sides in self.model_between_points.beside_corners[:, [1, 0, 2]].tolist():
-            here = np.abs(places - corner) <= near
-            if here.any():  # the path has two directions: along one it may be unbounded, along the other it goes on
+            at_corner = np.abs(places - corner) <= corner_width
+            if at_corner.any():  # there are two directions: along one it may be unbounded, along the other it goes on
                 steps = np.array([side - corner for side in sides if side != corner])
-                one, two = (self._solved_part_efforts(corner + count * steps) for count in (1, 2))
-                found[here] = (2 * one - two)[np.where(np.isfinite(one), one, np.inf).argmin()]
-        return found
+                first, second = (self._solved_part_efforts(corner + count * steps) for count in (1, 2))
+                efforts[at_corner] = (2 * first - second)[np.where(np.isfinite(first), first, np.inf).argmin()]
+        return efforts
 
     def _solved_part_efforts(self, places: FloatArray) -> FloatArray:
         assert self.model_between_points is not None
-        there = self.model_between_points.solve_at(places)
-        alone = replace(self, path=there, keep=np.arange(len(there)), ends=())
-        return np.where(there.accurate, alone.largest_member_efforts, np.nan)
+        path = self.model_between_points.solve_at(places)
+        alone = replace(self, path=path, keep=np.arange(len(path)), ends=())
+        return np.where(path.accurate, alone.largest_member_efforts, np.nan)
 
     @cached_property
     def largest_member_efforts(self) -> FloatArray:
@@ -197,8 +197,8 @@ class Solution(ShortRepr):
 
         Under loads that turn with their node all motions decide where masses are known, else the path's count.
         """
-        found = self.frequencies if self.follows else None
-        stable = self.path.stable[self.keep] if found is None else ~(found.flutters | found.diverges)
+        frequencies = self.frequencies if self.follows else None
+        stable = self.path.stable[self.keep] if frequencies is None else ~(frequencies.flutters | frequencies.diverges)
         return read_only(stable, np.bool_)
 
     @cached_property
@@ -227,17 +227,17 @@ class Solution(ShortRepr):
             return read_only(np.full(len(self.keep), np.nan))
         from cfmkit.elastica.results.cross_stiffness import cross_stiffness
 
-        found = cross_stiffness(self.path, self.assembly.driven, self.assembly.direction, self.keep)
-        known = self.accurate & np.isfinite(found)
-        return read_only(np.where(known, self.assembly.parallel * found, np.nan))
+        stiffness = cross_stiffness(self.path, self.assembly.driven, self.assembly.direction, self.keep)
+        is_known = self.accurate & np.isfinite(stiffness)
+        return read_only(np.where(is_known, self.assembly.parallel * stiffness, np.nan))
 
     @cached_property
     def gaps(self) -> tuple[BeamGap | None, BeamGap | None]:
         """The smallest gap between two beams before any load, and of some places of the curve [m]."""
         poses = sorted(set(np.linspace(0, len(self.keep) - 1, _N_POSES).astype(int).tolist()))
-        found = [self._gap(int(self.keep[pose])) for pose in poses]
-        moving = min((gap for gap in found if gap is not None), default=None)
-        return found[0], moving
+        gaps_of_poses = [self._gap(int(self.keep[pose])) for pose in poses]
+        moving = min((gap for gap in gaps_of_poses if gap is not None), default=None)
+        return gaps_of_poses[0], moving
 
     def _gap(self, point: int) -> BeamGap | None:
         network = self.path.network

@@ -257,8 +257,8 @@ class BeamSpec(Spec):
     @property
     def out_of_plane_widths(self) -> Mapping[str, float | None]:
         """Of all beams, and of those that have their own; None if one has none."""
-        own = {f"beams.{name}.width": one.width for name, one in self.mechanism.beams.items()}
-        return {"width": self.mechanism.width} | own
+        widths = {f"beams.{name}.width": beam.width for name, beam in self.mechanism.beams.items()}
+        return {"width": self.mechanism.width} | widths
 
     @model_validator(mode="after")
     def _can_be_rescaled(self) -> Self:
@@ -273,10 +273,12 @@ class BeamSpec(Spec):
     @model_validator(mode="after")
     def _can_be_optimised(self) -> Self:
         if self.design is not None and self.design.optimise is not None:
-            found = [*optimise_faults(self.design.optimise, self.mechanism)]
+            faults_of_request = [*optimise_faults(self.design.optimise, self.mechanism)]
             if self.mechanism.loads and not self.analysis.loads_first:
-                found.append(((), "shapes are searched with constant loads applied first: drop analysis.loads_first"))
-            refuse("BeamSpec", {("design", "optimise", *place): message for place, message in found})
+                faults_of_request.append(
+                    ((), "shapes are searched with constant loads applied first: drop analysis.loads_first")
+                )
+            refuse("BeamSpec", {("design", "optimise", *place): message for place, message in faults_of_request})
         return self
 
     @model_validator(mode="after")
@@ -297,13 +299,12 @@ class BeamSpec(Spec):
     @model_validator(mode="after")
     def _is_a_part_where_it_is_solid(self) -> Self:
         verified = self.design is not None and self.design.verify == "solid"
-        found = list(_solid_faults(self)) if self.analysis.fidelity == "solid" or verified else []
+        unsupported = list(_solid_faults(self)) if self.analysis.fidelity == "solid" or verified else []
         place = ("design", "verify") if verified else ("analysis", "fidelity")
         # no word in quotes: long lists between two would be shortened like a long quotation
-        message = (
-            f"the model solid has limits: {'; '.join(found)}; leave these keys out, or use the beam model: reissner"
-        )
-        refuse("BeamSpec", {place: message} if found else {})
+        limits = "; ".join(unsupported)
+        message = f"the model solid has limits: {limits}; leave these keys out, or use the beam model: reissner"
+        refuse("BeamSpec", {place: message} if unsupported else {})
         return self
 
     @property
@@ -371,8 +372,8 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
     for group in ("nodes", "reactions"):
         for number, name in enumerate(getattr(outputs, group)):
             if name not in mechanism.nodes:
-                known = ", ".join(repr(node) for node in list(mechanism.nodes)[:20])
-                yield (group, number), f"there is no node {name!r}; nodes: {known}"
+                node_names = ", ".join(repr(node) for node in list(mechanism.nodes)[:20])
+                yield (group, number), f"there is no node {name!r}; nodes: {node_names}"
             elif group == "reactions" and name in moved:
                 yield (group, number), f"a link moves {name!r}: what is held is its master, {moved[name]!r}"
             elif group == "reactions" and not (mechanism.nodes[name].support != "free" or name == mechanism.drive.node):
@@ -444,8 +445,8 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
         ("mechanism.beams", _several(spec, "material"), "all beams must be of one material"),
         ("mechanism.beams", _several(spec, "width"), "all beams must have one width"),
     )
-    for key, given, reason in things:
-        if given:
+    for key, value, reason in things:
+        if value:
             yield f"{key} is not supported: {reason}"
 
 
@@ -470,10 +471,10 @@ def _no_density(spec: BeamSpec) -> str:
     return f"natural frequencies need a density: give {', '.join(listed[:5])}, such as 1410 kg/m^3" if listed else ""
 
 
-def _has_strength(spec: BeamSpec, other: BeamMaterial | None) -> bool:
+def _has_strength(spec: BeamSpec, material: BeamMaterial | None) -> bool:
     """Return True if the allowable stress is known of all beams, or of another material if there is one."""
-    of = [other] if other else spec.mechanism.of_beams("material").values()
-    return all(one.allowable(spec.mechanism.safety_factor) is not None for one in of)
+    of = [material] if material else spec.mechanism.of_beams("material").values()
+    return all(material.allowable(spec.mechanism.safety_factor) is not None for material in of)
 
 
 def _rescale_faults(spec: BeamSpec) -> Iterator[str]:

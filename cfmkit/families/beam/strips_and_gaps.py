@@ -59,9 +59,9 @@ class BeamStrip:
         bend, opens = 0.5 * (self.thickness * self.curvature)[:, None], 0.5 * self.slope[:, None]
         left, right = self.sides
         ways = ((1.0 - bend) * along + opens * aside, (1.0 + bend) * along - opens * aside)
-        one, other = (way / np.hypot(*way.T)[:, None] for way in ways)
+        left_edge, right_edge = (tangent / np.hypot(*tangent.T)[:, None] for tangent in ways)
         start, end = ((tuple(right[k].tolist()), tuple(left[k].tolist())) for k in (0, -1))
-        return Smooth(right, other), Line(*end), Smooth(left[::-1], -one[::-1]), Line(*start[::-1])
+        return Smooth(right, right_edge), Line(*end), Smooth(left[::-1], -left_edge[::-1]), Line(*start[::-1])
 
     @property
     def straight(self) -> bool:
@@ -135,7 +135,7 @@ def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: floa
     start = network.nodes[beam.start]
     at = np.array([start.x + beam.start_offset[0], start.y + beam.start_offset[1]])
     cuts = {*fit.course.breaks.tolist(), *(fit.parameter(float(place)) for place in beam.section.stations)}
-    found = []
+    pieces = []
     for low, high in itertools.pairwise(sorted(cuts)):
         count = max(4, int(np.ceil(STEP_LIMITS * (high - low))))
         piece = _piece(beam, fit, at, np.linspace(low, high, count + 1))
@@ -148,9 +148,9 @@ def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: floa
                 f"{name!r}, {size} long, is too large to be drawn to the tolerance: {MOST_STEPS} points do not follow "
                 "its edges that closely; draw it with a coarser --tolerance"
             )
-        found.append(piece)
+        pieces.append(piece)
         at = piece.points[-1]
-    return found
+    return pieces
 
 
 def _piece(beam: Beam, fit: Fit, at: FloatArray, t: FloatArray) -> BeamStrip:
@@ -160,13 +160,13 @@ def _piece(beam: Beam, fit: Fit, at: FloatArray, t: FloatArray) -> BeamStrip:
     speed, angle = np.real(fit.speed(nodes, inside)), np.real(fit.angle(nodes, inside))
     step = half * np.stack([speed * np.cos(angle), speed * np.sin(angle)]) @ _GAUSS_WEIGHTS
     points = at + np.concatenate([np.zeros((1, 2)), np.cumsum(step.T, axis=0)])
-    place = t if fit.course.uniform else np.array([float(np.real(fit.arc(float(one)))) for one in t])
+    place = t if fit.course.uniform else np.array([float(np.real(fit.arc(float(parameter)))) for parameter in t])
     middle = float(place[len(place) // 2])
     thickness = np.real(beam.section.thickness_at(place, middle)) + np.zeros(len(t))
     turn = np.imag(fit.angle(t + 1j * COMPLEX_STEP, inside)) / COMPLEX_STEP / np.real(fit.speed(t, inside))
     slope = np.full(len(t), (thickness[-1] - thickness[0]) / ((place[-1] - place[0]) * float(np.real(fit.length))))
     angle = np.real(fit.angle(t, inside))
-    return BeamStrip(*(read_only(one) for one in (points, angle, thickness, turn + np.zeros(len(t)), slope)))
+    return BeamStrip(*(read_only(column) for column in (points, angle, thickness, turn + np.zeros(len(t)), slope)))
 
 
 def mirror_points(points: FloatArray, at: complex, direction: float) -> FloatArray:
@@ -181,8 +181,8 @@ class BeamGap:
     """A distance between the surfaces of two beams [m], negative where they overlap, and which they are."""
 
     size: float
-    one: str
-    other: str
+    first: str
+    second: str
 
 
 def smallest_gap(
@@ -202,11 +202,11 @@ def smallest_gap(
     for k in np.argsort(bounds).tolist():
         if best is not None and bounds[k] > best.size:
             break
-        found = _gap(lines, halves, *pairs[k])
+        gap = _gap(lines, halves, *pairs[k])
         may_close = frozenset(pairs[k]) in may_touch
-        if found is not None and may_close and found.size > -MAX_OVERLAP_SHARE * min(halves[name] for name in pairs[k]):
+        if gap is not None and may_close and gap.size > -MAX_OVERLAP_SHARE * min(halves[name] for name in pairs[k]):
             continue
-        best = found if best is None or (found is not None and found < best) else best
+        best = gap if best is None or (gap is not None and gap < best) else best
     return best
 
 
@@ -217,28 +217,31 @@ def _bounds(
     number = {name: k for k, name in enumerate(lines)}
     low, high = (np.array([end(line, axis=0) for line in lines.values()]).reshape(-1, 2) for end in (np.min, np.max))
     half = np.array([halves[name.rstrip("'")] for name in lines])
-    one, other = np.array([(number[a], number[b]) for a, b in pairs], dtype=np.int64).reshape(-1, 2).T
-    apart = np.maximum(np.maximum(low[other] - high[one], low[one] - high[other]), 0.0)
-    return np.asarray(np.hypot(*apart.T) - half[one] - half[other])
+    first, second = np.array([(number[a], number[b]) for a, b in pairs], dtype=np.int64).reshape(-1, 2).T
+    apart = np.maximum(np.maximum(low[second] - high[first], low[first] - high[second]), 0.0)
+    return np.asarray(np.hypot(*apart.T) - half[first] - half[second])
 
 
 def _pairs(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
     """Yield every two beams of which one at least is described and not mirrored."""
-    return ((one, other) for one, other in itertools.combinations(lines, 2) if not one.endswith("'"))
+    return ((first, second) for first, second in itertools.combinations(lines, 2) if not first.endswith("'"))
 
 
-def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], one: str, other: str) -> BeamGap | None:
+def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], first: str, second: str) -> BeamGap | None:
     """Return the gap of two beams; None if nothing is left of one beside their common ends."""
-    a, b, half = lines[one], lines[other], halves[other.rstrip("'")]
+    a, b, half = lines[first], lines[second], halves[second.rstrip("'")]
     for i, j in itertools.product((0, -1), repeat=2):
-        if np.hypot(*(lines[one][i] - lines[other][j])) < END_DISTANCE_RATIO * (halves[one] + half):
-            a, b = _away(a, i, 2 * COMMON_END_THICKNESSES * halves[one]), _away(b, j, 2 * COMMON_END_THICKNESSES * half)
+        if np.hypot(*(lines[first][i] - lines[second][j])) < END_DISTANCE_RATIO * (halves[first] + half):
+            a, b = (
+                _away(a, i, 2 * COMMON_END_THICKNESSES * halves[first]),
+                _away(b, j, 2 * COMMON_END_THICKNESSES * half),
+            )
     if len(a) < 2 or len(b) < 2:
         return None
     import shapely
 
     distance = float(shapely.distance(shapely.LineString(a), shapely.LineString(b)))
-    return BeamGap(distance - halves[one] - half, one, other)
+    return BeamGap(distance - halves[first] - half, first, second)
 
 
 def _away(line: FloatArray, end: int, length: float) -> FloatArray:
@@ -246,9 +249,9 @@ def _away(line: FloatArray, end: int, length: float) -> FloatArray:
     if not len(line):
         return line
     ordered = line if end == 0 else line[::-1]
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ordered, axis=0).T))])
-    if way[-1] <= length:
+    arc_length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ordered, axis=0).T))])
+    if arc_length[-1] <= length:
         return ordered[:0]
-    first = [np.interp(length, way, column) for column in ordered.T]
-    kept = np.vstack([first, ordered[way > length]])
+    first = [np.interp(length, arc_length, column) for column in ordered.T]
+    kept = np.vstack([first, ordered[arc_length > length]])
     return kept if end == 0 else kept[::-1]

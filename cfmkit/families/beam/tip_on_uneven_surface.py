@@ -71,28 +71,28 @@ def course_of(surface: Surface) -> SurfaceCourse:
 
     Raises DataError if the file cannot be used.
     """
-    given = surface.profile
-    return _of_file(given) if given.kind == "file" else _of_formula(given)
+    profile = surface.profile
+    return _of_file(profile) if profile.kind == "file" else _of_formula(profile)
 
 
-def _of_formula(given: FormulaProfile) -> SurfaceCourse:
+def _of_formula(profile: FormulaProfile) -> SurfaceCourse:
     from cfmkit.specs.formula_of_x import formula, slope
 
-    height, rise = formula(given.height), slope(given.height)
-    rows = np.linspace(0.0, given.length, given.points)
+    height, rise = formula(profile.height), slope(profile.height)
+    rows = np.linspace(0.0, profile.length, profile.points)
     return SurfaceCourse(lambda x: height(x * 1e3) * 1e-3, lambda x: rise(x * 1e3), rows, np.zeros(0))
 
 
-def _of_file(given: FileProfile) -> SurfaceCourse:
+def _of_file(profile: FileProfile) -> SurfaceCourse:
     from pathlib import Path
 
     from scipy.interpolate import CubicSpline
 
     from cfmkit.tables.measured_outline import read_profile
 
-    x, y = read_profile(getattr(given.file, "path", Path(given.file)))
+    x, y = read_profile(getattr(profile.file, "path", Path(profile.file)))
     rows = np.unique(np.concatenate([x, np.linspace(x[0], x[-1], _N_SURFACE_ROWS)]))
-    if given.between == "smooth":
+    if profile.between == "smooth":
         spline = CubicSpline(x, y)
         least = MAX_HOLE_SHARE * (x[-1] - x[0])
         holes = tuple((low, high) for low, high in holes_between(x, x[0], x[-1]) if high - low > least)
@@ -113,14 +113,14 @@ def largest(function: Callable[[FloatArray], FloatArray], places: FloatArray) ->
     >>> round(largest(lambda x: 1 - (x - 0.3) ** 2, np.linspace(0.0, 1.0, 5)), 12)
     1.0
     """
-    found = -np.inf
+    largest = -np.inf
     for _ in range(_N_ZOOMS):
         values = function(places)
         best = int(np.argmax(values))
-        found = max(found, float(values[best]))
+        largest = max(largest, float(values[best]))
         low, high = places[max(best - 1, 0)], places[min(best + 1, len(places) - 1)]
         places = np.linspace(low, high, _PLACES_PER_ZOOM)
-    return found
+    return largest
 
 
 _N_ZOOMS, _PLACES_PER_ZOOM = 5, 65  # each makes the places 32 times as dense
@@ -256,9 +256,9 @@ def follow_surface(solution: SolvedMechanism) -> SurfaceResult | None:
         first = int(lost[0])
         beyond = float(places[first])
         if first:
-            near = float(places[first - 1])
-            beyond = bisect(lambda place: not tip.follows(np.array([place]))[0], near, beyond)
-            end = float(np.nextafter(beyond, near))
+            last_good = float(places[first - 1])
+            beyond = bisect(lambda place: not tip.follows(np.array([place]))[0], last_good, beyond)
+            end = float(np.nextafter(beyond, last_good))
         ending = tip.ending(beyond)
         rows = np.append(rows[rows < end], end) if first else rows[:0]
     u = tip.displacement(rows)

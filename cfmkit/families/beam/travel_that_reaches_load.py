@@ -29,13 +29,13 @@ def moved_by(spec: BeamSpec, travel: float) -> BeamSpec:
     """Return a mechanism that a load drives with its node moved by that load's motion instead [m or rad]."""
     drive: Any = spec.mechanism.drive
     if drive.turns:
-        given, extent = {"kind": "rotation", "node": drive.node}, f"{travel!r} rad"
+        drive_keys, extent = {"kind": "rotation", "node": drive.node}, f"{travel!r} rad"
     else:
-        given = {"kind": "displacement", "node": drive.node, "direction": drive.direction}
+        drive_keys = {"kind": "displacement", "node": drive.node, "direction": drive.direction}
         extent = f"{travel!r} m"
     return spec.replace(
         {
-            "mechanism.drive": given,
+            "mechanism.drive": drive_keys,
             "analysis.travel": extent,
             "analysis.force": None,
             "analysis.moment": None,
@@ -58,9 +58,9 @@ def moved_far_enough(
 
     guess = _travel_of_beams(assemble(spec))
     moved = moved_by(spec, guess)
-    found = part(moved, assemble(moved))
+    moved_part = part(moved, assemble(moved))
     travel = travel_for(
-        found.create_mesh(),
+        moved_part.create_mesh(),
         load_of_one(spec),
         guess,
         max(spec.analysis.solid.poses, 5),

@@ -30,7 +30,6 @@ from cfmkit.families.rows import (
     agree,
     drop_numbers,
     fails,
-    row_of,
     rows_of,
     stack,
     valid,
@@ -50,9 +49,12 @@ if TYPE_CHECKING:
     Rows = NDArray[np.intp]
     Group = tuple[Rows, SolvedRows[Solution]]
 
-MAX_SAMPLES_AT_ONCE = 125_000
-"""Points that are worked on together: few enough to stay in a processor's cache, 260 curves of 481 points."""
-MIN_SHARED_CAMS = 8  # mechanisms around one cam from which on they are worth a solution of their own
+MAX_SAMPLES_AT_ONCE = 250_000
+"""Points that are worked on together: 520 curves of 481 points. A quarter of them takes twice the time a point."""
+MIN_SHARED_CAMS, MIN_SHARED_UNCHECKED = 8, 400
+"""Mechanisms around one cam from which on they are worth a solution of their own: where each other one is validated,
+and where bounds of its numbers are enough.
+"""
 BESIDE_THE_CAM = re.compile(
     r"mechanism\.(rolling_friction|springs\.(stiffness|count)(\.\d+)?|masses\.(slider|brace|roller)|contact\.width)"
     r"|design\.force"
@@ -67,25 +69,25 @@ def solve_rows(variants: Variants) -> Iterator[Group]:
     plain = _plain_numbers(variants.spec)
     rows = np.flatnonzero(variants.keep_bounds(variants.values.keys() & plain))
     moving = [path for path in variants.values if path not in plain or not BESIDE_THE_CAM.fullmatch(path)]
-    beside = [path for path in variants.values if path not in moving]
-    mixed: list[int] = []
-    for members in _alike([variants.values[path] for path in moving], rows):
-        if len(members) < MIN_SHARED_CAMS:
-            mixed += members.tolist()
-        elif plain >= set(moving):
-            yield from _in_parcels(members, partial(_with_columns, variants, [*moving, *beside], variants.spec))
+    is_checked = plain >= set(moving)
+    as_columns = partial(_with_columns, variants, tuple(variants.values), variants.spec)
+    least = MIN_SHARED_UNCHECKED if is_checked else MIN_SHARED_CAMS
+    shared, rest = _group_shared([variants.values[path] for path in moving], rows, least)
+    for members in shared:
+        if is_checked:
+            yield from _solve_alike(members, as_columns)
         elif (first := dict(valid(variants, members[:1].tolist()))) and not _is_left_out(first[members[0]]):
-            yield from _in_parcels(members, partial(_with_columns, variants, beside, first[members[0]]))
-    rest = np.array(sorted(mixed), dtype=np.intp)
-    if plain >= set(moving):
-        yield from _in_parcels(rest, partial(_with_columns, variants, [*moving, *beside], variants.spec))
+            beside = [path for path in variants.values if path not in moving]
+            yield from _solve_alike(members, partial(_with_columns, variants, beside, first[members[0]]))
+    if is_checked:
+        yield from _solve_alike(rest, as_columns)
         return
     kinds: dict[str, list[int]] = {}
     for row, spec in valid(variants, rest.tolist()):
         if not _is_left_out(spec):
             kinds.setdefault(_kind(spec), []).append(row)
     for alike in kinds.values():
-        yield from _in_parcels(np.array(alike), partial(_stack_specs, variants), partial(_windows, variants))
+        yield from _solve_alike(np.array(alike), partial(_stack_specs, variants), partial(_windows, variants))
 
 
 def _is_left_out(spec: CamSpec) -> bool:
@@ -119,20 +121,19 @@ def _plain_numbers(spec: CamSpec) -> set[str]:
     return found | {f"mechanism.profile.{name}" for name in lengths if getattr(profile, name) is not None}
 
 
-def _alike(columns: list[NDArray[Any]], rows: Rows) -> list[Rows]:
-    """Return the rows in groups that have the same values in all columns, in the order of their first."""
+def _group_shared(columns: list[NDArray[Any]], rows: Rows, least: int) -> tuple[list[Rows], Rows]:
+    """Return groups of many rows with the same values in all columns, in the order of their first, and other rows."""
     if not columns or not len(rows):
-        return [rows] if len(rows) else []
+        return [], rows
     if any(column.dtype == object for column in columns):
-        keys: dict[str, list[int]] = {}
-        for row in rows.tolist():
-            keys.setdefault(repr([column[row] for column in columns]), []).append(row)
-        return [np.array(members) for members in keys.values()]
-    table = np.stack([column[rows].astype(np.float64) for column in columns], axis=1)
-    _, which = np.unique(table, axis=0, return_inverse=True)
-    order = np.argsort(which.ravel(), kind="stable")
-    groups = np.split(rows[order], np.flatnonzero(np.diff(which.ravel()[order])) + 1)
-    return sorted(groups, key=lambda members: int(members[0]))
+        table: Any = [repr([column[row] for column in columns]) for row in rows.tolist()]
+        _, which, count = np.unique(table, return_inverse=True, return_counts=True)
+    else:
+        table = np.stack([column[rows].astype(np.float64) for column in columns], axis=1)
+        _, which, count = np.unique(table, axis=0, return_inverse=True, return_counts=True)
+    which = which.ravel()
+    groups = [rows[which == kind] for kind in np.flatnonzero(count >= least)]
+    return sorted(groups, key=lambda members: int(members[0])), rows[count[which] < least]
 
 
 def _with_columns(variants: Variants, paths: Sequence[str], spec: CamSpec, rows: Rows) -> CamSpec:
@@ -164,20 +165,14 @@ def _kind(spec: CamSpec) -> str:
     return repr((settings, curves, [drop_numbers(block) for block in (spec.mechanism, analysis, spec.design)]))
 
 
-def _in_parcels(
-    members: Rows, spec_of: Callable[[Rows], CamSpec], windows_of: Callable[[Rows], Sequence[Ends]] = lambda _rows: ()
+def _solve_alike(
+    rows: Rows, spec_of: Callable[[Rows], CamSpec], windows_of: Callable[[Rows], Sequence[Ends]] = lambda _rows: ()
 ) -> Iterator[Group]:
-    """Yield mechanisms that are solved together, few at a time."""
-    if len(members):
-        samples = len(members) * spec_of(members[:1]).analysis.points
-        for rows in np.array_split(members, -(-samples // MAX_SAMPLES_AT_ONCE)):
-            yield from _solve_alike(spec_of(rows), rows, windows_of)
-
-
-def _solve_alike(spec: CamSpec, rows: Rows, windows_of: Callable[[Rows], Sequence[Ends]]) -> Iterator[Group]:
-    """Yield mechanisms of one specification with columns; those whose computation takes another way apart."""
+    """Yield mechanisms that are put together at once and solved a few at a time; those of another kind apart."""
+    if not len(rows):
+        return
     try:
-        assembly = assemble(spec)
+        assembly = assemble(spec_of(rows))
         check_first_pose(assembly)
         low, end = reachable_travel(assembly)
         if fails(end <= low) or shortfalls(assembly, end):
@@ -186,19 +181,18 @@ def _solve_alike(spec: CamSpec, rows: Rows, windows_of: Callable[[Rows], Sequenc
         for value in (assembly.spec.mechanism.rolling_friction, loads.roller_weight, loads.sideways[0]):
             agree(np.not_equal(value, 0.0))
         agree(track.corner_end - track.start > low)
-        solution = replace(solve(assembly, len(rows)), windows=windows_of(rows))
     except RowsDiffer as kinds:
-        if kinds.mask.all():
-            for row, index in enumerate(rows.tolist()):
-                yield from _solve_alike(row_of(spec, row), np.array([index]), windows_of)
-        else:
-            for some in (np.flatnonzero(kinds.mask), np.flatnonzero(~kinds.mask)):
-                part = row_of(spec, int(some[0])) if len(some) == 1 else rows_of(spec, some)
-                yield from _solve_alike(part, rows[some], windows_of)
+        parts = rows[:, None] if kinds.mask.all() else (rows[kinds.mask], rows[~kinds.mask])
+        for part in parts:
+            yield from _solve_alike(part, spec_of, windows_of)
         return
     except CfmError:  # whoever analyses it alone says why
         return
-    yield rows, _solve_group(solution, rows)
+    samples = len(rows) * assembly.spec.analysis.points
+    for some in np.array_split(np.arange(len(rows)), -(-samples // MAX_SAMPLES_AT_ONCE)):
+        parcel = replace(rows_of(assembly, some), track=track.of_rows(some)) if len(some) < len(rows) else assembly
+        windows = windows_of(rows[some])
+        yield rows[some], _solve_group(replace(solve(parcel, len(some)), windows=windows), rows[some])
 
 
 def _solve_group(solution: Solution, chosen: Rows) -> SolvedRows[Solution]:

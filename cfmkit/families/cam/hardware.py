@@ -388,11 +388,10 @@ def _drawn_bodies(
     bearing: Bearing | None,
     hooked: tuple[_Hooks, float],  # springs, and the width of the bars that carry them [m]
 ) -> Iterator[PosedBody]:
-    """Yield all parts as the assembly shows them, the lowest first."""
+    """Yield all parts as the assembly shows them, the lowest first (guide and slider are outside of the braces)."""
     (width, pin, shaft), (hooks, bar) = sizes, hooked
     rollers, pins, radius = roller_path(solution), pin_path(solution), solution.assembly.spec.mechanism.roller_radius
     mirror = np.array([-1.0, 1.0])
-    yield from (body for body in standing if body.name == "guide")
     yield PosedBody.polygon("plate", "held", cut_plate(solution)[0].points(OUTLINE_TOLERANCE))
     yield from (body for body in standing if body.name == "screw")
     thick = min(0.35 * width, 0.5 * hooks.outer)
@@ -409,6 +408,7 @@ def _drawn_bodies(
             tall = np.array([[0.0, -0.5], [0.0, 0.5]]) * hooks.height
             yield PosedBody.line("hook bar", "free", (rollers * side)[:, None] + tall, 0.5 * bar)
         yield PosedBody.line("shaft", "free", (rollers * side)[:, None], 0.5 * shaft)
+    yield from (body for body in standing if body.name == "guide")
     corners = radius * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     yield PosedBody.polygon("slider", "driven", pins[:, None] + corners)
     yield PosedBody.line("slider pin", "driven", pins[:, None], 0.5 * pin)

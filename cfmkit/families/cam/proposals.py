@@ -2,8 +2,10 @@
 
 With D = x - x0 the travel is s = D^2/(2A), the springs are stretched by 2D and add up to K = F/(4A) [SS, eq. 1].
 Friction makes F/F0 = 1 +- mu (1 + f^2) A/D with the path's slope f = D/A + tan a; the roller fits the path's start if
-its radius is below 1/(cos^3 a0/A + 1/l). Without friction a roller presses on the cam with (F/2) sqrt(1 + f^2): half of
-the force along the travel, f times as much across it.
+its radius is below 1/(cos^3 a0/A + 1/l). Where hysteresis is limited, pins of radius r_p at the slider and at the
+springs add mu_p r_p (A/(D cos a) + 1)/(l cos a): forces of brace and spring times how far the brace turns.
+Without friction a roller presses on the cam with (F/2) sqrt(1 + f^2): half of the force along the travel, f times as
+much across it.
 
 Reference
 ---------
@@ -45,6 +47,7 @@ SLIDING_FRICTION = 0.1
 required: greased steel; assumed."""
 PIN_SHARE = 0.25
 """Diameter of the slider pin and of the pins that springs hook on, over that of a roller, at least: assumed."""
+USUAL_PIN_SHARE = 0.3  # the same of usual pins, which are rounded up to their series
 PULL_MARGIN, CONTACT_MARGIN = 1.1, 1.1
 """On the pull of a brace, and on the force between roller and cam: friction adds to them."""
 N_PROPORTIONS = 60_000  # proportions that are looked at
@@ -109,19 +112,22 @@ def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
         x = start + stretch
         slope = stretch / constant + x / np.sqrt(brace**2 - x**2)
         loss = ROLLING_FRICTION * (1.0 + slope**2) * constant / stretch
-        ripple = 1.0 - (1.0 + loss.min(axis=0)) / (1.0 + loss.max(axis=0))
-        down = 1.0 - (1.0 - loss.max(axis=0)) / (1.0 - loss.min(axis=0))
     tab = TAB_HEIGHT_RATIO * along
     width = 2.0 * (end + roller)
     height = stroke + rise + roller + np.maximum(roller, tab)
     contact = 0.5 * np.hypot(1.0, slope.max(axis=0))
     shaft = np.cbrt(32.0 * contact * request.target * SHAFT_ARM * request.safety / (np.pi * PIN_STRENGTH))
     plain = np.zeros(brace.size, dtype=bool)
-    if request.hysteresis is not None:  # rollers on plain shafts rub there
-        turning = np.maximum(shaft, THINNEST_SHAFT)
-        plain = ~_turn_on_bearings(turning, roller)
-        share = 1.0 + plain * SLIDING_FRICTION * turning / (2.0 * roller * ROLLING_FRICTION)
-        loss, ripple, down = loss * share, ripple * share, down * share
+    with np.errstate(invalid="ignore", divide="ignore"):
+        if request.hysteresis is not None:  # rollers on plain shafts rub there, pins at the slider and at the springs
+            turning = np.maximum(shaft, THINNEST_SHAFT)
+            plain = ~_turn_on_bearings(turning, roller)
+            loss *= 1.0 + plain * SLIDING_FRICTION * turning / (2.0 * roller * ROLLING_FRICTION)
+            along_travel = np.sqrt(brace**2 - x**2)  # of a brace: l cos a [m]
+            pins = SLIDING_FRICTION * USUAL_PIN_SHARE * roller
+            loss += pins * (constant * brace / (stretch * along_travel) + 1.0) / along_travel
+        ripple = 1.0 - (1.0 + loss.min(axis=0)) / (1.0 + loss.max(axis=0))
+        down = 1.0 - (1.0 - loss.max(axis=0)) / (1.0 - loss.min(axis=0))
     least = np.maximum(ROLLER_MIN, 0.5 * shaft / SHAFT_IN_ROLLER)
     there = (end < 0.97 * brace) & (roller > least) & (roller < 0.99 * radius) & np.isfinite(loss).all(axis=0)
     ripple = np.where(there, np.maximum(ripple, down), np.inf)

@@ -22,7 +22,7 @@ with deferred_imports():
     from cfmkit.families.cam.proposals import propose
     from cfmkit.families.cam.redesign_variables_and_process_errors import errors, free
 
-FAMILY = Family(
+FAMILY_RECORD = Family(
     name="cam",
     summary="two rollers on a cam, pulled together by springs and up by braces",
     spec_type=CamSpec,

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam
-    from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.families.cam.statics import Forces
 
 
@@ -280,28 +279,18 @@ def _corner_peak(solution: Solution) -> FloatArray:
     return np.where(free, extreme_next_to(force, travel, force(travel), len(solution))[0], np.nan)
 
 
-def _springs_in_use(solution: Solution) -> list[SpringInUse]:
-    """Return a spring of each mechanism between its loads, the stiffest of unequal ones; one where all are alike."""
+def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
+    """Yield what a spring's wire bears, where it is known, of each mechanism; of unequal springs the stiffest."""
     springs, ends = solution.mechanism.springs, solution.elongation
-    least, most = (
-        np.ravel(springs.initial_tension * (end >= 0.0) + springs.stiffest * np.maximum(end, 0.0)).tolist()
+    loads = (
+        solution.column(springs.initial_tension * (end >= 0.0) + springs.stiffest * np.maximum(end, 0.0)).tolist()
         for end in (ends.min(axis=-1, keepdims=True), ends.max(axis=-1, keepdims=True))
     )
-    stated = [row_of(springs, row) for row in range(len(solution))]
-    least, most = (np.broadcast_to(one, len(stated)).tolist() for one in (least, most))
-    return [_in_use(*each) for each in zip(stated, least, most, strict=True)]
-
-
-def _in_use(springs: Springs, least: float, largest: float) -> SpringInUse:
-    wire = springs.wound
-    wound = None if wire is None else wire.to_wound("extension")
-    fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
-    return SpringInUse(wound, least, largest, fatigue, springs.life)
-
-
-def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
-    """Yield what the springs' wire bears, where it is known, of each mechanism; of unequal springs the stiffest."""
-    return (wire_quantities([spring]) for spring in _springs_in_use(solution))
+    for row, (least, largest) in enumerate(zip(*loads, strict=True)):
+        wire, life = row_of((springs.wound, springs.life), row)
+        wound = None if wire is None else wire.to_wound("extension")
+        fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
+        yield wire_quantities([SpringInUse(wound, least, largest, fatigue, life)])
 
 
 def _is_in_contact(solution: Solution) -> bool:

@@ -6,7 +6,7 @@ run reports carries the numbers that decide and the cure.
 
 from __future__ import annotations
 
-from cfmkit.families.end_stops import FINDINGS as ON_STOPS
+from cfmkit.families.end_stops import STOP_FINDINGS
 from cfmkit.families.findings import Finder
 
 SLIDER_CRANK_FINDINGS = {
@@ -48,7 +48,7 @@ SLIDER_CRANK_FINDINGS = {
     "wrong_branch": "the chain bends to the side opposite to the requested one: the force differs",
     "unstable": "the equilibrium is unstable even with the slider held: the chain would snap",
     "limit_point": "there is no equilibrium for a further displacement of the slider",
-    **ON_STOPS,
+    **STOP_FINDINGS,
     "self_contact": "the part as a solid touches itself: the curve ends there",
     "not_converged": "a solver did not converge: its last iterate is not reported",
     "branch_begins_late": "the branch against the kink exists only beyond a certain travel",

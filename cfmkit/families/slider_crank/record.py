@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cfmkit.families.base import DesignMethod, ElasticParts, Family, Pictures, ResultNames
 from cfmkit.families.deferred_imports import deferred_imports
-from cfmkit.families.end_stops import OF_STOPS
+from cfmkit.families.end_stops import STOP_QUANTITIES
 from cfmkit.families.slider_crank.findings import SLIDER_CRANK_FINDINGS
 from cfmkit.families.slider_crank.linkage import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS as OF_PARTS
@@ -25,13 +25,13 @@ with deferred_imports():
     from cfmkit.families.slider_crank.redesign_variables_and_process_errors import errors, free
     from cfmkit.families.slider_crank.springs.model import analyze, gradient, solve_rows
 
-FAMILY = Family(
+FAMILY_RECORD = Family(
     name="slider-crank",
     summary="a crank, a coupler and a slider with a spring at each joint: constant torque or force",
     spec_type=SliderCrankSpec,
     models={"prb": analyze, "lumped": analyze_printed, "beam": analyze_printed, "solid": analyze_solid},
     outputs=ResultNames(
-        values=OF_SPRINGS | OF_PARTS | OF_STOPS,
+        values=OF_SPRINGS | OF_PARTS | STOP_QUANTITIES,
         words={"stiffness_class": CLASS_NAMES},
         findings=SLIDER_CRANK_FINDINGS,
         headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),

@@ -201,7 +201,8 @@ class SliderPath:
         travel = np.asarray(travel, dtype=np.float64)
         state, beyond = self.evaluate(travel), self.is_unreachable(travel)
         effort, stiffness = self.efforts(state)
-        effort[:, beyond] = stiffness[:, beyond] = np.nan
+        if beyond.any():  # of several linkages it may be one row for all
+            effort, stiffness = (np.where(beyond, np.nan, curves) for curves in (effort, stiffness))
         angle = self.unloaded + state.turn[0]
         if self.is_mirrored:
             return UnitCurves(math.pi - angle, -state.position, -state.turn, effort, stiffness)
@@ -211,9 +212,8 @@ class SliderPath:
     def unit_forces(self, travel: FloatArray) -> FloatArray:
         """Return the force of a unit spring at each joint: that of `units` without anything else, and faster."""
         travel = np.asarray(travel, dtype=np.float64)
-        found = self.forces(self.evaluate(travel))
-        found[:, self.is_unreachable(travel)] = np.nan
-        return found
+        forces, beyond = self.forces(self.evaluate(travel)), self.is_unreachable(travel)
+        return np.where(beyond, np.nan, forces) if beyond.any() else forces
 
     def is_unreachable(self, travel: FloatArray) -> NDArray[np.bool_]:
         """Return whether the slider cannot get there."""

@@ -14,7 +14,8 @@ import numpy as np
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.curves_in_rows import Characteristics, LeafSamples
 from cfmkit.families.vcfm.interpolated_equilibrium_path import COEFFICIENT_RTOL, trace_leaf
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils, leaf_law, leaf_spring, parts
+from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring, parts
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.interpolated_equilibrium_path import Traced
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.leaves.kinds import SpringChain
-    from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
     from cfmkit.families.vcfm.leaves_spec import Bistable
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Result
@@ -133,7 +133,7 @@ class ExactSampler:
         self.each = about.half_beams * (1.0 if about.guided else 0.5)
         self.pushed = _leaf_path(*leaf, end, spec.analysis.branch)
         self.pulled = _leaf_path(*leaf, -back, None)
-        self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
+        self.coils = None if spec.mechanism.springs is None else Coils.from_springs(spec.mechanism.springs)
         self.problem = problem_of("bistable", (self.pushed, self.pulled), 1.0)
         if self.coils is not None:
             return

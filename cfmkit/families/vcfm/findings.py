@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.end_stops import FINDINGS as ON_STOPS
+from cfmkit.families.end_stops import STOP_FINDINGS
 from cfmkit.families.findings import (
     TOO_SOFT,
     Finder,
@@ -79,7 +79,7 @@ VCFM_FINDINGS = {
     "spring_buckles": "a compression spring is pressed beyond the deflection at which it buckles, without a guide",
     "spring_slack": "bought springs are slack over a part of the travel",
     "no_spring_fits": "no spring of the catalogue fits",
-    **ON_STOPS,
+    **STOP_FINDINGS,
     "stress_unreachable": "no leaf length brings the exact stress below the allowable stress",
 }
 
@@ -235,7 +235,7 @@ def _uneven_force(solution: Solution) -> Sentence:
 
 def _stays(solution: Solution) -> Any:
     """Return which mechanisms do not come back by themselves, (m,): past its peak their force is not above rounding."""
-    least, largest = solution.least[1], np.nanmax(np.abs(solution.nominal.force), axis=1)
+    least, largest = solution.least[1], np.nanmax(np.abs(solution.nominal.force), axis=1, initial=0.0)
     return np.isfinite(least) & ~(least > LIMIT_RTOL * largest)
 
 

@@ -94,7 +94,7 @@ def parts(spec: VcfmSpec) -> LeafLaws:
     mechanism = spec.mechanism
     bistable, leaf = mechanism.bistable, leaf_law(mechanism.bistable, mechanism.material)
     if mechanism.springs is not None:
-        return LeafLaws(leaf, coils(mechanism.springs), bistable.half_beams)
+        return LeafLaws(leaf, Coils.from_springs(mechanism.springs), bistable.half_beams)
     positive = mechanism.flexures
     spring, truss = leaf_spring(positive, mechanism.material), (bistable.kind.truss, positive.kind.truss)
     if spec.analysis.fidelity == "truss" and truss[0] is not None and truss[1] is not None:
@@ -110,8 +110,3 @@ def leaf_law(bistable: Bistable, made_of: MaterialSpec) -> LeafLaw:
 def leaf_spring(positive: Positive, made_of: MaterialSpec) -> LeafSpring:
     """Return the closed form of a spring of leaves, as much of it as is loaded, with its shape."""
     return positive.kind.law(strip_of(positive, made_of), positive, share_of(positive))
-
-
-def coils(springs: BoughtSprings) -> Coils:
-    """Return the law of bought springs, all of them together."""
-    return Coils(springs.count * springs.rate, springs.count * springs.initial_tension)

@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.families.findings import mm, mpa
 from cfmkit.families.no_mechanism import Infeasible, no_design, refusals_answered
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws, coils, room_of_coils
+from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws, room_of_coils
 from cfmkit.families.vcfm.leaf_sizing import (
     FITTED_REGION_SHARE,
     FORCE_RTOL,
@@ -32,6 +32,7 @@ from cfmkit.families.vcfm.leaf_sizing import (
     sized_leaf,
     thickness_for,
 )
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.families.vcfm.leaves.v_beam import MAX_LEAF_ANGLE, VBeam, onset_and_exit
 from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
@@ -174,7 +175,7 @@ def _design_around(
     spec: VcfmSpec, target: VcfmDesign, springs: BoughtSprings, offer: Offer | None
 ) -> LeavesAroundSprings | Miss:
     """Return the leaves around some springs by closed forms, or what the springs miss."""
-    label, law = f"{springs.count} x {springs.name or 'the spring'}", coils(springs)
+    label, law = f"{springs.count} x {springs.name or 'the spring'}", Coils.from_springs(springs)
     left = target.required_force - law.tension
     if left <= 0:
         return Miss(label, law.tension / target.required_force, "their initial tension alone is more than the force")
@@ -265,7 +266,7 @@ def _in_use(spec: VcfmSpec, leaves: LeavesAroundSprings, offer: Offer) -> Iterat
     from cfmkit.families.vcfm.model import LawSampler, rest_of
 
     springs, end = leaves.springs, max(float(leaves.linear[1]), spec.analysis.travel or 0.0)
-    sampler = LawSampler(LeafLaws(VBeam(leaves.leaf), coils(springs), leaves.half_beams))
+    sampler = LawSampler(LeafLaws(VBeam(leaves.leaf), Coils.from_springs(springs), leaves.half_beams))
     stated = "analysis" in spec.model_fields_set and "preloads" in spec.analysis.model_fields_set
     for preload in {*(spec.analysis.preloads if stated else (0.0,)), leaves.target.preload_stroke}:
         rest = rest_of(sampler, preload, np.linspace(0.0, end, 101)) or 0.0

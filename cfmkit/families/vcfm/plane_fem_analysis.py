@@ -32,7 +32,8 @@ from cfmkit.families.fem_results import (
 from cfmkit.families.findings import sharp_inside
 from cfmkit.families.vcfm.exact_model import DOWN_ANGLE, ExactSampler, leaf_network, problem_of, spring_chain
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts, strip_of
+from cfmkit.families.vcfm.leaf_laws_from_spec import parts, strip_of
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import drawing, sharp_corners
 from cfmkit.families.vcfm.part import solved_leaf, solved_spring
@@ -119,7 +120,7 @@ class SolidSampler(ExactSampler):
         """Mesh and follow leaf and spring."""
         about, preloads, back = spec.mechanism.bistable, spec.analysis.preloads, max(back, 0.02 * end)
         self.each = about.half_beams * (1.0 if about.guided else 0.5)
-        self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
+        self.coils = None if spec.mechanism.springs is None else Coils.from_springs(spec.mechanism.springs)
         leaf, *spring = elastic_parts(spec)
         leaves = leaf.solve(lambda part, _: run.progress(0.6 * part, "leaf"))
         self.pushed, self.mesh_error = _path(leaves.solution), leaves.error

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils, spring_room
+from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -66,7 +67,7 @@ def preloads_for(
         return known
     if per_force is None:
         stroke = design.preload_stroke / design.adjustment if design and design.adjustment else 0.0
-        per_force = stroke if bought is None else 1.0 / coils(bought).stiffness
+        per_force = stroke if bought is None else 1.0 / Coils.from_springs(bought).stiffness
     low, high = request.adjustable
     return (0.0, *(one for one in ((high - request.target) * per_force, (low - request.target) * per_force) if one))
 

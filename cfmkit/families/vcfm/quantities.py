@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.end_stops import OF_STOPS
+from cfmkit.families.end_stops import STOP_QUANTITIES
 from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
 from cfmkit.families.findings import newton
 from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values, or_nan, quantity_of_each
@@ -266,9 +266,9 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **{name: quantity_of_each(name, about, _wires) for name, about in WIRE_DEFINITIONS.items()},
 }
 """Every scalar result of the family, in the order in which they are shown."""
-ROW_COLUMNS = columns_of_absent_values(OF_STOPS) | dict(SCALAR_QUANTITIES)
+ROW_COLUMNS = columns_of_absent_values(STOP_QUANTITIES) | dict(SCALAR_QUANTITIES)
 """What studies may ask of rows; a mechanism with stops is solved by itself."""
-SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()} | OF_STOPS
+SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()} | STOP_QUANTITIES
 """Name -> dimension and definition."""
 
 

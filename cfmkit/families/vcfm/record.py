@@ -21,7 +21,7 @@ with deferred_imports():
     from cfmkit.families.vcfm.proposals import propose
     from cfmkit.families.vcfm.redesign_variables_and_process_errors import errors, free
 
-FAMILY = Family(
+FAMILY_RECORD = Family(
     name="vcfm",
     summary="V-beams that snap through beside a diamond spring, adjustable by the spring's preload",
     spec_type=VcfmSpec,

@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.vcfm.curves_in_rows import LeafSamples, Push
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.metrics.longest_interval_in_band import extremes
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.specs.units import window_places
@@ -60,7 +60,7 @@ def target_of(spec: VcfmSpec) -> float | None:
     if design is None or design.force is None or not preload:
         return None if design is None else design.force
     if spec.mechanism.springs is not None:
-        stiffness = coils(spec.mechanism.springs).stiffness
+        stiffness = Coils.from_springs(spec.mechanism.springs).stiffness
     else:
         stiffness = design.required_force / design.height if design.height else 0.0
     target = design.force + stiffness * preload

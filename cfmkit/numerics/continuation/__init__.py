@@ -8,3 +8,17 @@ References
 [Ri] E. Riks, Int. J. Solids Structures 15 (1979) 529: the arc length as the parameter.
 [Ke] H. B. Keller, in: Applications of Bifurcation Theory, Academic Press, 1977, 359: bordered systems, branches.
 """
+
+from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
+from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
+
+__all__ = [
+    "ContinuationProblem",
+    "Options",
+    "PathBranch",
+    "PathEquilibrium",
+    "PathEvent",
+    "PathStop",
+    "Point",
+    "WhyStopped",
+]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,7 +58,7 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
             return None
         yield Point(move.new, -1, walk.branch)
         sense, drive_step = walk.sense, abs(move.new.drive - move.old.drive)
-        walk = replace(passed.move(move.new), step=drive_step)
+        walk = passed.move(move.new)._replace(step=drive_step)
         leads = largest_motion(problem, move.new.rate) * drive_step < STEADY_SHARE * largest_motion(
             problem, move.new.x - move.old.x
         )
@@ -80,7 +79,7 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
 
 
 def _natural(walk: Walk) -> Walk:
-    return replace(walk, rejections=0)
+    return walk._replace(rejections=0)
 
 
 def _pass_targets(walk: Walk, move: ArcMove) -> Generator[Point, None, Walk | None]:
@@ -91,7 +90,7 @@ def _pass_targets(walk: Walk, move: ArcMove) -> Generator[Point, None, Walk | No
         if at is None:
             return None
         yield Point(at, number, walk.branch)
-        walk = replace(walk, number=number + 1)
+        walk = walk._replace(number=number + 1)
     return walk
 
 
@@ -113,7 +112,7 @@ def _end_at_fold(
         goal, turns = float(walk.targets[number]), walk.turns_at(fold.drive)
         beside = find_beside(walk.problem, fold.x, fold.drive, move.old, goal, begin.unstable)
         yield Point(beside, number, walk.branch)
-        walk = replace(walk, number=number + 1)
+        walk = walk._replace(number=number + 1)
         if turns:
             yield _nothing_lost(fold, begin)
             return walk.restart(move.old, abs(move.new.drive - move.old.drive), same_piece=True)
@@ -121,13 +120,13 @@ def _end_at_fold(
         goal = float(walk.targets[walk.number])
         yield Point(fold.near._replace(drive=goal, unstable=begin.unstable), walk.number, walk.branch)
         yield _nothing_lost(fold, begin)
-        walk = replace(walk, number=walk.number + 1)
+        walk = walk._replace(number=walk.number + 1)
         return walk.restart(move.old, abs(move.new.drive - move.old.drive), same_piece=True)
     if joined is None:
         return PathStop(WhyStopped.LOST, fold.drive, "the end of a branch at {place} leads nowhere")
     beyond, event = joined
     yield event
-    walk = replace(walk, branch=None)
+    walk = walk._replace(branch=None)
     if walk.done:
         return walk
     for number in walk.targets_up_to(beyond.drive):
@@ -135,7 +134,7 @@ def _end_at_fold(
         guess = beyond.x + (goal - beyond.drive) * beyond.rate
         at = correct(walk.problem, guess, goal) or PathEquilibrium(guess, goal, beyond.rate, beyond.unstable)
         yield Point(at, number, walk.branch)
-        walk = replace(walk, number=number + 1)
+        walk = walk._replace(number=number + 1)
     yield Point(beyond, -1, walk.branch)
     span = walk.options.span
     return walk.restart(beyond, min(0.02 * span, max(abs(beyond.drive - fold.drive), 1e-3 * span)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,7 +56,7 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located | None = None, after: int
         point: Point | None = None
         for point in _pass_values(walk, run, step, passed_fold):
             yield point
-            walk = replace(walk, number=max(walk.number, point.target + 1))
+            walk = walk._replace(number=max(walk.number, point.target + 1))
         if point is not None and point.target == run[-1]:
             return walk.restart(point.at, walk.step)
         if not limits[0] <= step.new.drive <= limits[1]:
@@ -72,7 +71,7 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located | None = None, after: int
         steady = steady + 1 if leads and not step.folds else 0
         if steady >= STEADY_STEPS and step.new.unstable <= begin.unstable:
             ahead = next(number for number in run if (walk.targets[number] - step.new.drive) * sense > 0)
-            return replace(walk, number=ahead).restart(step.new, change)
+            return walk._replace(number=ahead).restart(step.new, change)
     return PathStop(WhyStopped.LOST, walk.here.drive, "the path was lost along its arc at {place}")
 
 

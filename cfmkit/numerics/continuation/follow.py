@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,13 @@ from cfmkit.numerics.continuation.branch_ends import find_passed_end, primary_sl
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.corners import crosses_bend, mark_corners
 from cfmkit.numerics.continuation.events import locate_loss
-from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
+from cfmkit.numerics.continuation.losses import (
+    CRITICAL_STIFFNESS,
+    look_past,
+    lose_stability,
+    start_critical,
+    start_unstable,
+)
 from cfmkit.numerics.continuation.path import (
     AT_EVENT,
     MarchedSteps,
@@ -63,7 +68,7 @@ def follow(
     ----------
     problem : ContinuationProblem
         The structure. If it has a method `march`, of a `Walk`, to `MarchedSteps`, it takes steps by itself where
-        nothing happens, in compiled code, say.
+        nothing happens, in compiled code, say; if it has `march_whole`, too, all of them where nothing happens at all.
     start : PathEquilibrium
         Where the path begins.
     targets : (k,) array
@@ -98,7 +103,7 @@ def follow_together(
     """Yield what `follow` does, but the points of every march together, and no corners that are rounded."""
     left = options.most_points
     for item in _items(problem, start, targets, options, branch):
-        if isinstance(item, MarchedSteps) and (between := int((item.target < 0).sum())) <= left:
+        if isinstance(item, MarchedSteps) and (between := np.count_nonzero(item.target < 0)) <= left:
             yield item
             left -= between
             continue
@@ -120,6 +125,14 @@ def _items(
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
     step, steepest = options.first_step * options.span, max(0.0, abs(start.stiffness))
     walk = Walk(problem, options, targets, start, step, at_first, trail=(start,), branch=branch, steepest=steepest)
+    march_whole = getattr(problem, "march_whole", None)
+    if march_whole is not None and not walk.done and not start.unstable:
+        marched = march_whole(walk, (CRITICAL_STIFFNESS, NEARLY_CRITICAL))
+        if marched is not None:
+            yield Point(start, at_first - 1, branch)
+            yield marched
+            yield PathStop(WhyStopped.COMPLETE, float(marched.drive[-1]))
+            return
     beyond = None if walk.done or options.branch == "primary" else start_critical(walk)
     if beyond is not None:  # how many directions are unstable there is rounding
         yield Point(start._replace(unstable=beyond.here.unstable), at_first - 1, branch)
@@ -170,7 +183,7 @@ def _look_ahead(walk: Walk) -> Iterator[PathEvent]:
         return
     sense = 1.0 if here.drive >= walk.before.drive else -1.0
     beyond = np.append(walk.targets, here.drive + sense * AT_EVENT * walk.options.span)
-    for item in _walk_on(replace(walk, targets=beyond, rejections=0)):
+    for item in _walk_on(walk._replace(targets=beyond, rejections=0)):
         if isinstance(item, PathEvent) and item.kind == "bifurcation":
             yield item
 
@@ -182,8 +195,8 @@ def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[March
         yield marched
         last = marched.point_at(-2) if len(marched.drive) > 1 else walk.here
         number = walk.number + int((marched.target >= 0).sum())
-        walk = replace(walk, before=last, here=marched.point_at(-1), trail=(*walk.trail, marched), number=number)
-    return replace(walk, step=marched.step, rejections=ARC_AFTER if marched.stuck else 1)
+        walk = walk._replace(before=last, here=marched.point_at(-1), trail=(*walk.trail, marched), number=number)
+    return walk._replace(step=marched.step, rejections=ARC_AFTER if marched.stuck else 1)
 
 
 def _step(walk: Walk) -> Items:
@@ -192,7 +205,7 @@ def _step(walk: Walk) -> Items:
     if _is_locked(walk):
         return PathStop(WhyStopped.LIMIT_POINT, here.drive, LOCKED_MESSAGE)
     if walk.before is not None and (here.drive - walk.before.drive) * sense < 0:  # the drive turns back
-        walk = replace(walk, before=None)
+        walk = walk._replace(before=None)
     target = float(walk.targets[walk.number])
     lands = abs(target - here.drive) <= LANDING_STRETCH * walk.step
     goal = target if lands else here.drive + sense * walk.step
@@ -201,12 +214,12 @@ def _step(walk: Walk) -> Items:
         return _shorten_for_forces(walk, goal, trial.excess)
     if trial.new is None or _skips(walk, trial.new):
         return (yield from _reject(walk, goal))
-    walk = replace(walk, rejections=max(0, walk.rejections - 1))
+    walk = walk._replace(rejections=max(0, walk.rejections - 1))
     if crosses_bend(walk, trial.new):
         return walk.shorten(0.5 * abs(goal - here.drive), penalty=0)
     if trial.new.unstable > here.unstable and walk.options.branch != "primary":
         outcome = yield from lose_stability(walk, trial.new)
-        return outcome if outcome is not None else replace(walk.shorten(0.25 * abs(goal - here.drive)), before=None)
+        return outcome if outcome is not None else walk.shorten(0.25 * abs(goal - here.drive))._replace(before=None)
     return (yield from _accept(walk, trial, goal, lands))
 
 
@@ -242,19 +255,19 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
     elif walk.branch is not None and not walk.options.corner:  # else it is the end of a branch that bends the curve
         end = find_passed_end(walk, new)
         if end == "unsure":
-            return replace(walk.shorten(0.5 * step), before=None)
+            return walk.shorten(0.5 * step)._replace(before=None)
         if end is not None and lands and walk.turns_at(end.drive):
             yield Point(new, walk.number, walk.branch)
             yield PathEvent("bifurcation", end.drive, new.unstable, new.unstable, end.near)
-            return replace(walk, number=walk.number + 1, before=None)
+            return walk._replace(number=walk.number + 1, before=None)
         if end is not None:
             yield end
-            walk = replace(walk, branch=None)
-            walk = replace(walk.move(new, int(lands)), before=None)
+            walk = walk._replace(branch=None)
+            walk = walk.move(new, int(lands))._replace(before=None)
             yield Point(new, walk.number - 1 if lands else -1, walk.branch)
-            return replace(walk, step=_next_step(walk, trial.misfit, step, lands))
+            return walk._replace(step=_next_step(walk, trial.misfit, step, lands))
     yield Point(new, walk.number if lands else -1, walk.branch)
-    return replace(walk.move(new, int(lands)), step=_next_step(walk, trial.misfit, step, lands))
+    return walk.move(new, int(lands))._replace(step=_next_step(walk, trial.misfit, step, lands))
 
 
 def _next_step(walk: Walk, misfit: float, step: float, landed: bool) -> float:
@@ -270,14 +283,14 @@ def _shorten_for_forces(walk: Walk, goal: float, excess: float) -> Walk:
     """
     step = abs(goal - walk.here.drive) * max(FORCE_MARGIN / excess, 1e-4)
     short = step < SHORT_STEP * walk.options.span
-    return replace(walk, step=step, before=None, rejections=walk.rejections + short)
+    return walk._replace(step=step, before=None, rejections=walk.rejections + short)
 
 
 def _reject(walk: Walk, goal: float) -> Items:
     """Go on after a step that failed: behind a bifurcation that is here, by a shorter step, by the arc length."""
     options, here = walk.options, walk.here
     if walk.rejections >= 2 and walk.searched is not here and not options.corner:  # else steps are cut at a bend
-        walk = replace(walk, searched=here)
+        walk = walk._replace(searched=here)
         outcome = yield from look_past(walk, goal)
         if outcome is not None:
             return outcome

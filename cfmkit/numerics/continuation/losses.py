@@ -74,7 +74,7 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
             guess = found.x + (goal - found.drive) / (new.drive - found.drive) * (new.x - found.x)
             at = correct(problem, guess, goal) or PathEquilibrium(guess, goal, new.rate, new.unstable)
             yield Point(at._replace(unstable=new.unstable), number, walk.branch)
-            walk = replace(walk, number=number + 1)
+            walk = walk._replace(number=number + 1)
         return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
     if options.branch == "stop":
         yield from _reach_bifurcation(walk, found, far, slope)
@@ -93,7 +93,7 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
     yield replace(corner, after=after, modes=modes) if corner else event
     walk = yield from _reach_bifurcation(walk, found, far, slope)
     if onto is None and options.through_folds:
-        return replace(walk, options=replace(options, branch="primary")).restart(new, walk.step, same_piece=True)
+        return walk._replace(options=options._replace(branch="primary")).restart(new, walk.step, same_piece=True)
     if onto is None:
         return PathStop(
             WhyStopped.JUMPS, found.drive, "no stable equilibrium near {place}: it jumps to a distant one there"
@@ -164,7 +164,7 @@ def _reach_bifurcation(
         if at is None or at.unstable > unstable or largest_motion(problem, at.x - guess) > ON_PATH:
             at = PathEquilibrium(guess, goal, far.rate, unstable)  # at the singular point itself
         yield Point(at, number, walk.branch)
-        walk = replace(walk, number=number + 1)
+        walk = walk._replace(number=number + 1)
     return walk
 
 
@@ -174,11 +174,11 @@ def _begin_branch(walk: Walk, found: Located, onto: PathEquilibrium, after: int)
     for number in walk.targets_up_to(onto.drive) if not walk.done else ():
         goal = float(walk.targets[number])
         yield Point(find_beside(walk.problem, found.x, found.drive, onto, goal, walk.here.unstable), number, branch)
-        walk = replace(walk, number=number + 1)
+        walk = walk._replace(number=number + 1)
     yield Point(onto, -1, branch)
     modes = after - walk.here.unstable
     walk = walk.restart(onto, 0.5 * abs(onto.drive - found.drive))
-    return replace(walk, branch=branch, modes=modes)
+    return walk._replace(branch=branch, modes=modes)
 
 
 def look_past(walk: Walk, goal: float) -> Items:
@@ -198,7 +198,7 @@ def look_past(walk: Walk, goal: float) -> Items:
                 and (past.unstable > here.unstable or (primary and past.unstable != here.unstable))
                 and largest_motion(problem, past.x - guess) < LOOK_PAST_MISS
             ):
-                return (yield from lose_stability(replace(walk, here=far), past))
+                return (yield from lose_stability(walk._replace(here=far), past))
     return None
 
 
@@ -227,7 +227,7 @@ def start_critical(walk: Walk) -> Walk | None:
             if not walk.targets_up_to(step.new.drive):
                 return walk.restart(step.new, abs(step.new.drive - start.drive))
     relieved = start._replace(rate=primary_slope(problem, start, modes), unstable=start.unstable - int(values[0] < 0))
-    return replace(walk, here=relieved, trail=(relieved,))
+    return walk._replace(here=relieved, trail=(relieved,))
 
 
 def start_unstable(walk: Walk) -> Walk | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -31,8 +31,7 @@ class PathBranch(NamedTuple):
     label: str = ""  # of what is followed, if it is not the drive of the path proper
 
 
-@dataclass(frozen=True)
-class Options:
+class Options(NamedTuple):
     """Settings of the follower."""
 
     span: float  # range of the drive
@@ -161,8 +160,7 @@ class MarchedSteps:
             yield Point(at, target, self.branch)
 
 
-@dataclass(frozen=True, eq=False)
-class Walk:
+class Walk(NamedTuple):
     """State of the follower: the last equilibria of one smooth piece, the next step and value."""
 
     problem: ContinuationProblem
@@ -188,12 +186,15 @@ class Walk:
     def origin(self) -> PathEquilibrium:
         """The first equilibrium of this smooth piece."""
         first = self.trail[0]
-        return first.states[0] if isinstance(first, MarchedSteps) else first
+        return first.point_at(0) if isinstance(first, MarchedSteps) else first
 
     def look_back(self) -> Iterator[PathEquilibrium]:
         """Yield the equilibria of this smooth piece, the last first."""
         for part in reversed(self.trail):
-            yield from reversed(part.states) if isinstance(part, MarchedSteps) else (part,)
+            if isinstance(part, MarchedSteps):
+                yield from map(part.point_at, reversed(range(len(part.drive))))
+            else:
+                yield part
 
     @property
     def done(self) -> bool:
@@ -205,17 +206,17 @@ class Walk:
         trail = (*self.trail, new)
         steepest = max(self.steepest, abs(new.stiffness))
         number = self.number + reached
-        return replace(self, before=self.here, here=new, trail=trail, number=number, steepest=steepest)
+        return self._replace(before=self.here, here=new, trail=trail, number=number, steepest=steepest)
 
     def restart(self, new: PathEquilibrium, step: float, same_piece: bool = False) -> Walk:
         """Return the walk at an equilibrium from which the slope alone predicts."""
         trail = (*self.trail, new) if same_piece else (new,)
-        return replace(self, before=None, here=new, step=step, trail=trail, rejections=0)
+        return self._replace(before=None, here=new, step=step, trail=trail, rejections=0)
 
     def shorten(self, step: float, penalty: int = 2) -> Walk:
         """Return the walk with a shorter step after a rejected one."""
         keep = self.before is not None and step >= 0.25 * abs(self.here.drive - self.before.drive)
-        return replace(self, step=step, before=self.before if keep else None, rejections=self.rejections + penalty)
+        return self._replace(step=step, before=self.before if keep else None, rejections=self.rejections + penalty)
 
     def turns_at(self, drive: float) -> bool:
         """Return True if the drive turns back at the next requested value and that lies at a drive."""

@@ -49,9 +49,9 @@ from cfmkit.specs.units.windows import (
     SHARE_DIMENSION,
     Ends,
     TravelShare,
+    attach_dimension,
     dimension_of_end,
     ends_increase,
-    place_of,
     window_places,
 )
 
@@ -79,6 +79,7 @@ __all__ = [
     "Torque",
     "TravelShare",
     "UnitField",
+    "attach_dimension",
     "border_unit",
     "dimension_of_end",
     "ends_increase",
@@ -86,7 +87,6 @@ __all__ = [
     "format_short",
     "from_border",
     "meant_as_percent",
-    "place_of",
     "quantity",
     "read_number",
     "read_one_of",

@@ -56,12 +56,14 @@ class _WindowEnd(DimensionedField):
         return format_quantity(value, SHARE_DIMENSION, "%") if isinstance(value, TravelShare) else super().write(value)
 
 
-def place_of(value: float, dimension: str) -> Place:
-    """Return a number that knows what it is: a length, an angle, or with the dimension ``ratio`` a share."""
-    return TravelShare(value) if dimension == SHARE_DIMENSION else Place(value, dimension)
+def attach_dimension(value: float, dimension: str) -> DimensionedFloat:
+    """Return a number that knows what it is: a length, an angle, with ``ratio`` a share of the travel, or a force."""
+    if dimension == SHARE_DIMENSION:
+        return TravelShare(value)
+    return (Place if dimension in PLACE_DIMENSIONS else DimensionedFloat)(value, dimension)
 
 
-_END_FIELD = _WindowEnd((*PLACE_DIMENSIONS, SHARE_DIMENSION), place_of)
+_END_FIELD = _WindowEnd((*PLACE_DIMENSIONS, SHARE_DIMENSION), attach_dimension)
 WindowEnd = Annotated[float, _END_FIELD]
 Ends = tuple[WindowEnd, WindowEnd]
 

@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cfmkit.specs.block import Model, keys_of
+from cfmkit.specs.units.fields import DimensionedFloat
 from cfmkit.specs.units.strict_decimal_number import quote
+from cfmkit.specs.units.windows import TravelShare
 
 Path = tuple[str | int, ...]
 
@@ -54,7 +56,7 @@ def with_value(tree: Any, path: Sequence[str], value: Any) -> Any:
     head, rest = path[0], path[1:]
     if isinstance(tree, tuple | list):
         index = _parse_index(head, tree)
-        new = with_value(tree[index], rest, value) if rest else value
+        new = with_value(tree[index], rest, value) if rest else _keep_dimension(tree[index], value)
         return (*tree[:index], new, *tree[index + 1 :])
     if isinstance(tree, Model):
         tree = keys_of(tree)
@@ -64,8 +66,15 @@ def with_value(tree: Any, path: Sequence[str], value: Any) -> Any:
     below = block.get(head)
     if rest and head in SHORT_FOR and isinstance(below, str):
         below = {SHORT_FOR[head]: below}
-    block[head] = with_value(below, rest, value) if rest else value
+    block[head] = with_value(below, rest, value) if rest else _keep_dimension(below, value)
     return block
+
+
+def _keep_dimension(before: Any, value: Any) -> Any:
+    """Return a value; a number in SI that replaces an angle, say, is an angle, too. Of a share it cannot be known."""
+    if isinstance(before, DimensionedFloat) and not isinstance(before, TravelShare) and type(value) is float:
+        return type(before)(value, before.dimension)
+    return value
 
 
 def _parse_index(text: str, items: Sequence[Any]) -> int:

@@ -1,1 +1,12 @@
 """Springs that can be bought: own lists, and a generic series that is computed from wire, coil and turns."""
+
+from cfmkit.lazy_names import lazy_names
+
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "helical_spring_formulas": "HelicalSpring",
+        "offer_type_and_generic_series": "generic",
+        "wire_materials": "WIRES_BY_NAME",
+    },
+)

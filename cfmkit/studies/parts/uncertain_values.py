@@ -36,7 +36,7 @@ class Parameter:
     path: str  # dotted
     dimension: str  # of `cfmkit.specs.units`
     spread: ParameterSpread  # how it is distributed [SI]
-    place: bool = False  # whether it is a place that knows if it is a length or an angle
+    several: bool = False  # whether a value may be of several dimensions: it knows which, as a length or an angle
 
 
 def parameters_of(spec: Spec, block: Sensitivity) -> tuple[Parameter, ...]:
@@ -146,8 +146,7 @@ def _parameter(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> Pa
         raise CannotVary(f"{path!r} does not vary continuously; `cfmkit sweep` goes through its values")
     nominal, dimension = _nominal(spec, found)
     spread = _tolerance(found, stated, nominal) if isinstance(stated, Tolerance) else _range(found, stated, nominal)
-    several = found.quantity is not None and len(found.quantity.dimensions) > 1
-    return Parameter(path, dimension, spread, several)
+    return Parameter(path, dimension, spread, found.has_several_dimensions)
 
 
 def _nominal(spec: Spec, found: Leaf) -> tuple[float, str]:
@@ -230,7 +229,7 @@ def plan_of(parameters: Sequence[Parameter], points: FloatArray) -> Plan:
     """Return points, (n, d), as a plan of the engine."""
     columns = map(np.ascontiguousarray, points.T)
     varied = (
-        Variable(one.path, one.dimension, values, border_values(values, one.dimension), one.place)
+        Variable(one.path, one.dimension, values, border_values(values, one.dimension), one.several)
         for one, values in zip(parameters, columns, strict=True)
     )
     return Plan(tuple(varied), len(points), joint=True)

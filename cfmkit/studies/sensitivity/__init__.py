@@ -6,7 +6,11 @@ method reads the outcome. The statistics work on plain arrays and know no mechan
 means for an index: never "no influence"). Distributions, made parts, shares of good ones and the tolerances that keep a
 yield are those of `cfmkit.studies.parts`.
 
-A method is a module of its name with a record `METHOD` (`method`), listed in `cfmkit.specs.sensitivity_methods`.
-`setup` says what is to be done, `run_sensitivity_method` joins method and engine, `result_types` and `output` say what
-came out.
+A method is a module of its name with a record `SENSITIVITY_METHOD` (`method`), listed in
+`cfmkit.specs.sensitivity_methods`. `setup` says what is to be done, `run_sensitivity_method` joins method and
+engine, `result_types` and `output` say what came out.
 """
+
+from cfmkit.specs.sensitivity_methods import METHOD_NAMES
+
+__all__ = ["METHOD_NAMES"]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.setup import Setup
 
-DEFAULT_YIELD, ESTIMATED = 0.95, 4000
+DEFAULT_YIELD, N_DRAWN_PARTS = 0.95, 4000
 """What `inverse` keeps where `min_yield` says nothing, and the parts of its estimate of first order."""
 
 
@@ -29,7 +29,7 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     """State which tolerances keep the yield, and draw parts within those that are allocated."""
     wanted = setup.block.min_yield or DEFAULT_YIELD
     spreads = [one.spread for one in setup.parameters]
-    errors = setup.parts.draw(ESTIMATED, [setup.seed, 3]) - setup.values
+    errors = setup.parts.draw(N_DRAWN_PARTS, [setup.seed, 3]) - setup.values
     costs = np.array([setup.block.costs.get(path, 1.0) for path in setup.paths])
     answer = allowed_tolerances(setup.parts, setup.nominal.result, errors, costs, wanted)
     found = list(_tolerance_lines(setup, answer))
@@ -51,10 +51,10 @@ def _tolerance_lines(setup: Setup, answer: ToleranceFactors) -> Iterator[IndexLi
             width = float(getattr(answer, name)[k]) * stated_width
             value = reported(float(to_border(width, one.dimension)), "ratio")
             unit = border_unit(one.dimension)
-            yield IndexLine("yield", one.path, f"tolerance_{name}", value, None, None, unit, ESTIMATED)
+            yield IndexLine("yield", one.path, f"tolerance_{name}", value, None, None, unit, N_DRAWN_PARTS)
 
 
-METHOD = Method(
+SENSITIVITY_METHOD = Method(
     run,
     lambda samples, _, __: samples,
     ("tolerance_alone", "tolerance_together", "tolerance_allocated"),

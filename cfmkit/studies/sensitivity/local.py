@@ -165,6 +165,6 @@ def _neighbours(value: float, reach: float) -> tuple[float, float, float]:
     return value, value - reach, value + reach
 
 
-METHOD = Method(
+SENSITIVITY_METHOD = Method(
     run, lambda _, parameters, __: 2 * N_STEP_LEVELS * parameters, (SLOPE_INDEX, "gradient"), {"": "draw_bars"}
 )

@@ -29,5 +29,5 @@ class Method:
 
 def method_named(name: str) -> Method:
     """Return the method of one of the names in `METHOD_NAMES`: that of the module beside this one with that name."""
-    method: Method = import_module(f".{METHOD_NAMES[name].name}", __package__).METHOD
+    method: Method = import_module(f".{METHOD_NAMES[name].name}", __package__).SENSITIVITY_METHOD
     return method

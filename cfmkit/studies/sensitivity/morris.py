@@ -100,6 +100,6 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
 
 
-METHOD = Method(
+SENSITIVITY_METHOD = Method(
     run, lambda samples, parameters, _: samples * (parameters + 1), ("mu_star", "sigma"), {"": "draw_morris"}
 )

@@ -80,4 +80,6 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
 
 
-METHOD = Method(run, lambda samples, parameters, _: samples * parameters, (SWING_INDEX, SLOPE_INDEX), {"": "draw_oat"})
+SENSITIVITY_METHOD = Method(
+    run, lambda samples, parameters, _: samples * parameters, (SWING_INDEX, SLOPE_INDEX), {"": "draw_oat"}
+)

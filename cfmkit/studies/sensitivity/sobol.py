@@ -129,7 +129,7 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     return Findings(setup, evaluator, tuple(found), tuple(on_the_way), points=points, outputs=outputs)
 
 
-METHOD = Method(
+SENSITIVITY_METHOD = Method(
     run,
     lambda samples, parameters, _: samples * (parameters + 2),
     ("total_order", "first_order"),

@@ -66,7 +66,7 @@ def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
     return replace(with_shares(found, met, failed), lines=lines)
 
 
-METHOD = Method(
+SENSITIVITY_METHOD = Method(
     run,
     lambda samples, _, groups: samples * (groups + 1),
     (monte_carlo_yield.YIELD_GAIN, monte_carlo_yield.VARIANCE_DROP),

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING
@@ -29,6 +29,7 @@ from cfmkit.store.content_hashes_and_versions import code_stamp, stable_hash
 from cfmkit.studies.pool import give_up_at
 from cfmkit.studies.serial_and_cluster_executors import Lost, lost_to, surviving
 from cfmkit.studies.suggest.end_stop_of_proposal import NO_END_STOP
+from cfmkit.studies.suggest.outcome_of_search import Answered, Suggestions
 from cfmkit.studies.suggest.proposal_making_and_judging import (
     ENDED_EARLY,
     OUT_OF_TIME,
@@ -39,7 +40,7 @@ from cfmkit.studies.suggest.proposal_making_and_judging import (
 from cfmkit.studies.suggest.relaxed_requests import MAX_NAMED_KEYS, confirm, edges
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
     from typing import Any
 
     from cfmkit.families.base import Family
@@ -80,42 +81,6 @@ class _Times:
         left = max(LAST_SHARE * budget, min(reserve, RESERVE_OF_FEW))
         ends = (max(budget - kept, 0.5 * budget) for kept in (reserve, left))
         return cls(now + ASKING_SHARE * budget, *(now + end for end in ends))
-
-
-@dataclass(frozen=True)
-class Answered:
-    """Candidates of one family: how many it named and how many were made, or why there are none.
-
-    Where no family has a mechanism, `nearest` says with which values of a key it would have one.
-    """
-
-    family: str
-    offer: FamilyOffer
-    made: int = 0
-    nearest: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Suggestions:
-    """Outcome of a request."""
-
-    request: Request
-    # those that do all that is required, judged by the finest model of their family, the best first
-    proposals: tuple[Proposal, ...]
-    near: tuple[Proposal, ...]  # those that miss one request, at most two a family
-    answers: tuple[Answered, ...]  # of every family that was asked
-    # family -> why nothing came of candidates, each reason once
-    failed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    late: bool = False  # whether the time budget ended the search
-    reused: int = 0  # candidates that were found in the journal
-    bugs: tuple[str, ...] = ()  # the traceback of each family or candidate that a bug ended
-    unjudged: tuple[Proposal, ...] = ()  # those that miss nothing of what was judged, but not all was, the best first
-    remote: bool = False  # whether it would not help either to relax one requirement up to `LAST_FACTOR`
-
-    @property
-    def listed(self) -> tuple[Proposal, ...]:
-        """Proposals that have a folder: what meets the request, then what was not judged in full."""
-        return (*self.proposals, *self.unjudged)
 
 
 def suggest(
@@ -189,22 +154,14 @@ def surviving_until(run: Run, deadline: float | None, bugs: list[str]) -> Execut
 
 
 class _Making:
-    """The candidates that were made, in the order in which they were requested.
-
-    Attributes
-    ----------
-    done : list of Proposal
-        What became of them; in a round that the time ended, of some of them.
-    reused : int
-        Those that were found in the journal.
-    """
+    """The candidates that were made, in the order in which they were requested."""
 
     def __init__(self, run: Run, times: _Times, total: int, bugs: list[str]) -> None:
         self._run, self._times, self._total, self._tried, self._bugs = run, times, total, 0, bugs
         self._known: dict[int, Proposal] = {}
         self._jobs: list[ProposalJob] = []
-        self.done: list[Proposal] = []
-        self.reused = 0
+        self.done: list[Proposal] = []  # what became of them; in a round that the time ended, of some of them
+        self.reused = 0  # those that stood in the journal
 
     def late(self) -> bool:
         """Return True if the time is up, of which there is more as long as nothing is found."""

@@ -12,7 +12,7 @@ with deferred_imports():
     from cfmkit_oblique.figures import figures
     from cfmkit_oblique.outline import drawing
 
-FAMILY = Family(
+FAMILY_RECORD = Family(
     name="oblique",
     summary="a slider on a vertical spring between two oblique springs: quasi-zero stiffness",
     spec_type=ObliqueSpec,

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cfmkit
-from cfmkit.families.run_control import Run
+from cfmkit import Run
 from cfmkit.results import Status
 
 CONFIG = Path(__file__).parents[1] / "configs" / "oblique_carrella2007.yaml"

@@ -17,7 +17,14 @@ from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.network_from_spec import assemble, known_allowable_stresses, thickest_of
 from cfmkit.families.beam.shaping.multistart import Explored, explore, rank
 from cfmkit.families.beam.shaping.report import REISSNER_MODEL, Judged, judge_design, notes_of, search_of, starts_table
-from cfmkit.families.beam.shaping.search import VIOLATION_TOL, Found, StartBudget, polish, satisfy_limits, widen
+from cfmkit.families.beam.shaping.search import (
+    VIOLATION_TOL,
+    ShapeCandidate,
+    StartBudget,
+    polish,
+    satisfy_limits,
+    widen,
+)
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScatter, scatter_within_tolerances
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task import BENDING_ONLY, STRESS_MARGIN, Coordinate, Task, TaskLimits
@@ -56,8 +63,8 @@ def optimise_shape(
     spread = NetworkScatter(
         wanted.tolerances.nodes, wanted.tolerances.coefficients, wanted.tolerances.samples, run.seed
     )
-    drawn = scatter_within_tolerances(Variables(task, best.found.order), best.found, spread)
-    held = held_by(task, best.found)
+    drawn = scatter_within_tolerances(Variables(task, best.candidate.order), best.candidate, spread)
+    held = held_by(task, best.candidate)
     return Design(
         best.spec,
         Status.COMPLETE,
@@ -153,9 +160,9 @@ def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
 
 def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Judged | Design:
     """Return the best design that analysis and audit confirm, or why there is none."""
-    candidates = [(candidate, result.audits.get(index)) for index, candidate in rank(task, result.found)]
+    candidates = [(candidate, result.audits.get(index)) for index, candidate in rank(task, result.designs)]
     if not candidates:
-        some = [candidate for candidate in result.found.values() if candidate is not None]
+        some = [candidate for candidate in result.designs.values() if candidate is not None]
         if not some:
             return _nothing(result, plan)
         if plan.late():
@@ -175,7 +182,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Ju
     if task.objective == "range" and candidates[0][0].objective > task.half_band:
         flattest = min((candidate for candidate, _ in candidates), key=lambda candidate: candidate.objective)
         said = (
-            f"no shape of {len(result.found)} starts keeps the force within ± {percent(task.half_band)} over the "
+            f"no shape of {len(result.designs)} starts keeps the force within ± {percent(task.half_band)} over the "
             f"requested window (design.optimise.window); the flattest keeps it within ± {percent(flattest.objective)}"
         )
         nearest = {"design.optimise.half_band": f"at least {percent(1.02 * flattest.objective)}"}
@@ -209,8 +216,8 @@ def _nothing(result: Explored, plan: StartBudget) -> Design:
 
 def _report_search(task: Task, design: Judged, result: Explored) -> str:
     """Return what the search did, in one sentence; force and window in it are those of the analysis."""
-    best, window = design.found, design.window
-    some = [audit_or_design for audit_or_design in result.found.values() if audit_or_design is not None]
+    best, window = design.candidate, design.window
+    some = [audit_or_design for audit_or_design in result.designs.values() if audit_or_design is not None]
     feasible = [audit_or_design for audit_or_design in some if audit_or_design.feasible]
     unsound = len(feasible) - sum(audit_or_design.sound for audit_or_design in result.audits.values())
     refuted = f", the audit rejects {unsound} of them" if unsound else ""
@@ -229,7 +236,7 @@ def _report_search(task: Task, design: Judged, result: Explored) -> str:
     if task.objective == "paper":
         reached = f"F(a)/F(b) - 1 = {best.objective:.3f}"
     return (
-        f"{reached}; {len(feasible)} of {len(result.found)} starts meet all limits{refuted} ({total} "
+        f"{reached}; {len(feasible)} of {len(result.designs)} starts meet all limits{refuted} ({total} "
         f"traces{reused}{left}); the last minimisation {best.ending}"
     )
 
@@ -243,7 +250,7 @@ def _warnings(task: Task, design: Judged, result: Explored) -> tuple[Finding, ..
         out.append(
             finding(
                 "objective_ill_posed",
-                f"F(a)/F(b) - 1 = {design.found.objective:.3f} is bounded by nothing but the limits: a force that "
+                f"F(a)/F(b) - 1 = {design.candidate.objective:.3f} is bounded by nothing but the limits: a force that "
                 "falls from b to a is rewarded; over the window the half band is "
                 + (percent(design.half_band) if design.half_band is not None else "not known"),
                 "design.optimise.objective=ripple",
@@ -268,10 +275,10 @@ class Blocked:
     missed: Mapping[str, str]  # limit -> by how much the best design misses it, and where
     # path below `design.optimise` or `mechanism` -> value for which the other limits could be met
     nearest: Mapping[str, str]
-    freed: Found | None  # a design that meets all limits after all
+    freed: ShapeCandidate | None  # a design that meets all limits after all
 
 
-def find_blocking(task: Task, designs: Iterable[Found], plan: StartBudget) -> Blocked:
+def find_blocking(task: Task, designs: Iterable[ShapeCandidate], plan: StartBudget) -> Blocked:
     """Return what blocks, judged from the designs that miss the limits least."""
     best = sorted(designs, key=lambda candidate: candidate.violation)[:MAX_NEAR_DESIGNS]
     missed = missed_by(task, best[0])
@@ -296,7 +303,7 @@ def find_blocking(task: Task, designs: Iterable[Found], plan: StartBudget) -> Bl
     return Blocked(missed, nearest, None)
 
 
-def _relax_limits(task: Task, candidate: Found, plan: StartBudget, give: tuple[str, ...]) -> Found:
+def _relax_limits(task: Task, candidate: ShapeCandidate, plan: StartBudget, give: tuple[str, ...]) -> ShapeCandidate:
     """Return a design that meets all limits but some, and misses those as little as possible."""
     rest = [
         satisfy_limits(
@@ -306,7 +313,7 @@ def _relax_limits(task: Task, candidate: Found, plan: StartBudget, give: tuple[s
     return satisfy_limits(task, rest[0], task.orders[-1], plan, give, 0.98)
 
 
-def missed_by(task: Task, candidate: Found) -> dict[str, str]:
+def missed_by(task: Task, candidate: ShapeCandidate) -> dict[str, str]:
     """Return the limits that a design misses, each with its worst place and by how much, the worst first."""
     program = Shaping(Variables(task, candidate.order), candidate.start, Flattest())
     view = program.view(candidate.x)
@@ -316,7 +323,7 @@ def missed_by(task: Task, candidate: Found) -> dict[str, str]:
     return {row.name: f"{row.about}: missed by {percent(row.by)}" for row in rows}
 
 
-def held_by(task: Task, candidate: Found, close: float = 2e-3) -> tuple[str, ...]:
+def held_by(task: Task, candidate: ShapeCandidate, close: float = 2e-3) -> tuple[str, ...]:
     """Return the limits and bounds that hold a design, by name and place."""
     variables = Variables(task, candidate.order)
     program = Shaping(variables, candidate.start, Flattest())
@@ -368,12 +375,12 @@ NEAREST_LIMITS: dict[str, Callable[[Task, float], dict[str, str]]] = {
     "envelope": _box("envelope"),
     "deformed_envelope": _box("deformed_envelope"),
     "max_length_ratio": _scale_limit(
-        "max_length_ratio", lambda one, s: 1 / max(1e-3, 1 / (one.length_ratio or 1.0) - s), "at least", "count"
+        "max_length_ratio", lambda limits, s: 1 / max(1e-3, 1 / (limits.length_ratio or 1.0) - s), "at least", "count"
     ),
     "min_slenderness": _scale_limit(
-        "min_slenderness", lambda one, s: (one.slenderness or 0.0) * (1 - s), "at most", "count"
+        "min_slenderness", lambda limits, s: (limits.slenderness or 0.0) * (1 - s), "at most", "count"
     ),
-    "min_radius": _scale_limit("min_radius", lambda one, s: (one.radius or 0.0) * (1 - s), "at most", "length"),
+    "min_radius": _scale_limit("min_radius", lambda limits, s: (limits.radius or 0.0) * (1 - s), "at most", "length"),
     "clearance": _clearance,
     "force": _force,
 }

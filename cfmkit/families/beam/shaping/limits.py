@@ -97,7 +97,7 @@ def _extremes(view: View, name: str, most: dict[str, tuple[float, float]], which
         [np.stack([getattr(line, what)[which] for what in most]) for line in lines.values()],
     )
     values = (np.array(list(most.values()))[:, None, :, None] - top) / unit  # (what, beam, side, pose)
-    is_near = values < view.near
+    is_near = values < view.slopes_below
     share = (weights * np.array([-1.0, 1.0])[:, None, None] / unit)[is_near]
     rows = np.stack([at.index[three[:, k]] for k, at in enumerate(view.response.rows.values())], axis=1)[is_near]
     pose = np.broadcast_to(poses, is_near.shape)[is_near]
@@ -271,7 +271,7 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
     soft, weights = soft_least(ratio.reshape(*ratio.shape[:2], -1), BOUND_SHARPNESS)
 
     def slopes() -> FloatArray:
-        share = np.where((soft - 1.0 < view.near)[..., None] & (weights > _NO_WEIGHT), weights, 0.0)
+        share = np.where((soft - 1.0 < view.slopes_below)[..., None] & (weights > _NO_WEIGHT), weights, 0.0)
         at = p, q, i, j = np.nonzero(share.reshape(ratio.shape))
         pull = share.reshape(ratio.shape)[at] / required[p, i, j]
         push = np.where(is_near[p, i, j], opening * pull * ratio[at], 0.0)
@@ -310,10 +310,13 @@ class _ThinnedBeams:
         lines, shown = view.response.state.lines, view.poses.shown
         kept = [_even(len(line.place)) for line in lines.values()]
         x, y = (
-            np.stack([getattr(line, axis)[shown][:, own] for line, own in zip(lines.values(), kept, strict=True)])
+            np.stack([getattr(line, axis)[shown][:, chosen] for line, chosen in zip(lines.values(), kept, strict=True)])
             for axis in ("x", "y")
         )
-        at = [(rows.place[own], rows.index[own]) for rows, own in zip(view.response.rows.values(), kept, strict=True)]
+        at = [
+            (rows.place[chosen], rows.index[chosen])
+            for rows, chosen in zip(view.response.rows.values(), kept, strict=True)
+        ]
         place, row = (np.stack(column) for column in zip(*at, strict=True))
         return cls(place, row, x, y)
 
@@ -345,16 +348,20 @@ class _Ways:
     def from_beams(cls, view: View, couples: list[Pair], u: FloatArray, v: FloatArray) -> _Ways:
         """Return the ways of pairs between places (n, r) of their first and second beams."""
         first, second = ([view.lengths[pair.beams[side]] for pair in couples] for side in (0, 1))
-        own, other = (np.array([line.length for line in lines])[:, None, None] for lines in (first, second))
+        first_length, second_length = (
+            np.array([line.length for line in lines])[:, None, None] for lines in (first, second)
+        )
         count = max(1, *(len(pair.joints) for pair in couples))
         ends = np.array([[*pair.joints, *[(np.nan, np.nan)] * (count - len(pair.joints))] for pair in couples])
         p, q = abs(u[:, None] - ends[..., :1]), abs(v[:, None] - ends[..., 1:])
-        through = np.nan_to_num(p[..., :, None] * own[..., None] + q[..., None, :] * other[..., None], nan=np.inf)
+        through = np.nan_to_num(
+            p[..., :, None] * first_length[..., None] + q[..., None, :] * second_length[..., None], nan=np.inf
+        )
         joint = through.argmin(axis=1)
         length = np.take_along_axis(through, joint[:, None], axis=1)[:, 0]
         alone = np.array([pair.alone for pair in couples])[:, None, None]
         apart = np.where(alone, abs(u[:, :, None] - v[:, None, :]), np.nan)
-        length = np.where(alone, apart * own, length)
+        length = np.where(alone, apart * first_length, length)
         by_lengths = np.array([line.by_length for line in first]), np.array([line.by_length for line in second])
         return cls(length, (np.nan_to_num(p), np.nan_to_num(q)), joint, apart, by_lengths)
 

@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.designing.run_many_starts import Done, OneStart, Stage, from_record, run_stage
 from cfmkit.families.beam.shaping.search import (
     VIOLATION_TOL,
-    Found,
+    ShapeCandidate,
     StartBudget,
     nearer,
     refine,
@@ -51,7 +51,7 @@ _STAGE_DURATIONS = {
 class Explored:
     """Results of the starts."""
 
-    found: dict[int, Found | None]  # number of the start -> the design, None if nothing could be followed
+    designs: dict[int, ShapeCandidate | None]  # number of the start -> the design, None if nothing could be followed
     reused: int  # starts that were noted by a run before
     missing: int  # starts that led to nothing: the time did not suffice, or a process died
     lost: tuple[str, ...] = ()  # why processes died
@@ -71,21 +71,21 @@ def explore(
     starts, wide = counts
     jobs = _Jobs(task, plan, identity, run)
     begun = jobs.run_stage("starts", partial(search_start, task.started, run.seed, plan=plan), range(starts))
-    found, missing = _found_in(begun), starts - len(begun.records)
+    designs, missing = _found_in(begun), starts - len(begun.records)
     if task.objective == "range":
-        best = dict(list(rank(task, found))[:wide])
-        found |= _found_in(jobs.run_stage("widenings", partial(_widen, task.started, best, plan), best))
+        best = dict(list(rank(task, designs))[:wide])
+        designs |= _found_in(jobs.run_stage("widenings", partial(_widen, task.started, best, plan), best))
         distant = partial(searched_far, task.started, run.seed, plan=plan)
         far = _found_in(jobs.run_stage("starts over a wider window", distant, range(starts)))
         leaders = dict(sorted(_keep_within_limits(far), key=lambda item: item[1].objective)[:_N_LEADERS])
         work = partial(_nearer, task.started, leaders, plan)
         led = _found_in(jobs.run_stage("widenings of the flattest of these", work, leaders))
-        found |= {index: one for index, one in led.items() if _better(task, one, found.get(index))}
+        designs |= {index: design for index, design in led.items() if _better(task, design, designs.get(index))}
     if task.orders != task.started.orders:
-        widest = dict(list(rank(task, found))[:_N_REFINED])
-        found |= _found_in(jobs.run_stage("refinements", partial(_refine, task, widest, plan), widest))
-    audits = {index: audit_design(Variables(task, one.order), one) for index, one in rank(task, found)}
-    return Explored(found, begun.reused, missing, tuple(jobs.lost), audits)
+        widest = dict(list(rank(task, designs))[:_N_REFINED])
+        designs |= _found_in(jobs.run_stage("refinements", partial(_refine, task, widest, plan), widest))
+    audits = {index: audit_design(Variables(task, design.order), design) for index, design in rank(task, designs)}
+    return Explored(designs, begun.reused, missing, tuple(jobs.lost), audits)
 
 
 @dataclass
@@ -98,15 +98,15 @@ class _Jobs:
     run: Run
     lost: list[str] = field(default_factory=list)
 
-    def run_stage(self, what: str, search: Callable[[int], Found | None], numbers: Iterable[int]) -> Done:
+    def run_stage(self, what: str, search: Callable[[int], ShapeCandidate | None], numbers: Iterable[int]) -> Done:
         """Return what the jobs of a stage led to; it is called by what its jobs are."""
         numbers = tuple(numbers)
         stage = Stage(OneStart(search, self.plan.clock), numbers, f"{self.identity} {what}")
         begun, ended = _shares(self.task)[what]
 
         def tell(records: Mapping[int, dict[str, Any]]) -> None:
-            found = [record["found"] for record in records.values() if record["found"]]
-            feasible = sum(one["violation"] <= VIOLATION_TOL for one in found)
+            designs = [record["found"] for record in records.values() if record["found"]]
+            feasible = sum(design["violation"] <= VIOLATION_TOL for design in designs)
             text = f"{len(records)} of {len(numbers)} {what}, {feasible} meet all limits"
             self.run.progress(begun + (ended - begun) * len(records) / max(1, len(numbers)), text)
 
@@ -126,42 +126,42 @@ def _shares(task: Task) -> dict[str, tuple[float, float]]:
     return dict(zip(lasts, pairwise(ends.tolist()), strict=True))
 
 
-def _widen(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
+def _widen(task: Task, designs: dict[int, ShapeCandidate], plan: StartBudget, index: int) -> ShapeCandidate:
     return widen(task, designs[index], plan)
 
 
-def _nearer(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
+def _nearer(task: Task, designs: dict[int, ShapeCandidate], plan: StartBudget, index: int) -> ShapeCandidate:
     return nearer(task, designs[index], plan)
 
 
-def _refine(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
+def _refine(task: Task, designs: dict[int, ShapeCandidate], plan: StartBudget, index: int) -> ShapeCandidate:
     return refine(task, designs[index], plan)
 
 
-def _found_in(stage: Done) -> dict[int, Found | None]:
+def _found_in(stage: Done) -> dict[int, ShapeCandidate | None]:
     """Return the designs of a stage by the number of the start; None if nothing could be followed."""
     records = {index: stage.records[index]["found"] for index in sorted(stage.records)}
-    return {index: from_record(Found, record) if record else None for index, record in records.items()}
+    return {index: from_record(ShapeCandidate, record) if record else None for index, record in records.items()}
 
 
-def _better(task: Task, one: Found | None, other: Found | None) -> bool:
+def _better(task: Task, candidate: ShapeCandidate | None, design: ShapeCandidate | None) -> bool:
     """Return True if one design of a start takes the place of the other."""
-    if one is None or not one.feasible:
+    if candidate is None or not candidate.feasible:
         return False
-    return other is None or not other.feasible or rank_of(task, one) < rank_of(task, other)
+    return design is None or not design.feasible or rank_of(task, candidate) < rank_of(task, design)
 
 
-def rank(task: Task, found: Mapping[int, Found | None]) -> Iterator[tuple[int, Found]]:
+def rank(task: Task, designs: Mapping[int, ShapeCandidate | None]) -> Iterator[tuple[int, ShapeCandidate]]:
     """Yield the designs that meet all limits, the best first."""
-    yield from sorted(_keep_within_limits(found), key=lambda item: rank_of(task, item[1]))
+    yield from sorted(_keep_within_limits(designs), key=lambda item: rank_of(task, item[1]))
 
 
-def _keep_within_limits(found: Mapping[int, Found | None]) -> list[tuple[int, Found]]:
-    return [(index, one) for index, one in found.items() if one is not None and one.feasible]
+def _keep_within_limits(designs: Mapping[int, ShapeCandidate | None]) -> list[tuple[int, ShapeCandidate]]:
+    return [(index, design) for index, design in designs.items() if design is not None and design.feasible]
 
 
-def rank_of(task: Task, one: Found) -> tuple[bool, float, float]:
+def rank_of(task: Task, design: ShapeCandidate) -> tuple[bool, float, float]:
     """Return what orders designs: whether the band is kept and where the window begins, if it counts; the objective."""
     if task.objective != "range":
-        return False, 0.0, one.objective
-    return one.objective > task.half_band, one.start, one.objective
+        return False, 0.0, design.objective
+    return design.objective > task.half_band, design.start, design.objective

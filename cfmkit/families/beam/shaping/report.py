@@ -15,7 +15,7 @@ from cfmkit.designing.reported_values_of_finished_design import measure_metrics
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.beam.contacts import force_extremes
 from cfmkit.families.beam.model import analyze
-from cfmkit.families.beam.shaping.search import COORDINATE_DECIMALS, Found
+from cfmkit.families.beam.shaping.search import COORDINATE_DECIMALS, ShapeCandidate
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audit_design
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.findings import percent
@@ -39,7 +39,7 @@ class Judged:
     """A design with what the analysis of its specification and the audit say about it."""
 
     spec: BeamSpec  # as it is written; its window is the one that the analysis confirms
-    found: Found  # what came out of the search
+    candidate: ShapeCandidate  # what came out of the search
     audit: Audit  # whether it exists as drawn
     half_band: float | None  # of the force that is to be constant, over the window, as the analysis finds it
     faults: tuple[str, ...]  # what analysis and audit hold against it
@@ -55,21 +55,21 @@ class Judged:
 
 
 def judge_design(
-    # spec, task, found: what was given, what was searched for, and what came out
+    # spec, task, design: what was given, what was searched for, and what came out
     spec: BeamSpec,
     task: Task,
-    found: Found,
+    design: ShapeCandidate,
     audit: Audit | None = None,  # of the design, where it is known already
 ) -> Judged:
     """Return a design as its own analysis finds it: the same curve, stress and metrics as of `cfmkit analyze`."""
-    new = write_design(spec, task, found)
+    new = write_design(spec, task, design)
     result = analyze(new, Run())
-    window = _confirmed_window(task, result, _window(spec, task, found), _requested_window(spec)[0])
+    window = _confirmed_window(task, result, _window(spec, task, design), _requested_window(spec)[0])
     new = new.replace({"analysis.window": window})
     band = _half_band(task, result, window)
-    audit = audit or audit_design(Variables(task, found.order), found)
+    audit = audit or audit_design(Variables(task, design.order), design)
     (miss,) = (None,) if task.shape is None else measure_metrics(result, window, "deviation_from_curve")
-    return Judged(new, found, audit, band, tuple(_faults(task, audit, result, window)), miss)
+    return Judged(new, design, audit, band, tuple(_faults(task, audit, result, window)), miss)
 
 
 def _half_band(task: Task, result: Result, window: tuple[float, float]) -> float | None:
@@ -120,11 +120,11 @@ def _faults(task: Task, audit: Audit, result: Result, window: tuple[float, float
         yield f"the stress reaches {format_short(stress, 'stress')}, {format_short(allowed, 'stress')} are allowed"
 
 
-def write_design(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
+def write_design(spec: BeamSpec, task: Task, design: ShapeCandidate) -> BeamSpec:
     """Return the specification with nodes and shapes written out, and the window of the design as its window."""
-    variables = Variables(task, found.order)
-    network = variables.build(found.x)
-    moved = dict.fromkeys(one.node for one in task.coordinates)
+    variables = Variables(task, design.order)
+    network = variables.build(design.x)
+    moved = dict.fromkeys(coordinate.node for coordinate in task.coordinates)
     nodes = {name: (_place(network.nodes[name].x), _place(network.nodes[name].y)) for name in moved}
     changes: dict[str, Any] = {f"mechanism.nodes.{name}.at": at for name, at in nodes.items()}
     for name in task.shaped:
@@ -141,16 +141,16 @@ def write_design(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
             "length": float(np.real(fitted.length)),
         }
         changes[f"mechanism.beams.{name}.shape"] = shape
-    changes["analysis.window"] = _window(spec, task, found)
+    changes["analysis.window"] = _window(spec, task, design)
     if spec.design is not None and spec.design.target is not None:
         changes["design.target"] = spec.design.target.written_out()
     return spec.replace(changes)
 
 
-def _window(spec: BeamSpec, task: Task, found: Found) -> tuple[float, float]:
+def _window(spec: BeamSpec, task: Task, design: ShapeCandidate) -> tuple[float, float]:
     """Return the window of a design [m]: the one requested, or the wider one, from a whole micrometre on."""
     asked, end = _requested_window(spec)
-    start = float(np.ceil(found.start * task.layers * 1e6 - 1e-6)) / 1e6
+    start = float(np.ceil(design.start * task.layers * 1e6 - 1e-6)) / 1e6
     return asked if abs(start - asked) < 1e-6 else start, end
 
 
@@ -198,13 +198,13 @@ SEARCH_DEFINITIONS = {
 
 def search_of(task: Task, design: Judged, drawn: Drawn, result: Explored) -> Mapping[str, Searched]:
     """Return what only the search knows, each number with the model and the window that it is of."""
-    own = design.window
-    asked, whole = (task.layers * task.window[0], own[1]), (0.0, own[1])
+    window = design.window
+    asked, whole = (task.layers * task.window[0], window[1]), (0.0, window[1])
     reported = dict.fromkeys(SEARCH_DEFINITIONS, (task.fidelity, whole))
     reported |= dict.fromkeys(("starts", "starts_within_limits", "starts_sound", "traces"), (task.fidelity, asked))
-    reported |= dict.fromkeys(("tolerance_half_band_median", "tolerance_half_band_p90"), (task.fidelity, own))
+    reported |= dict.fromkeys(("tolerance_half_band_median", "tolerance_half_band_p90"), (task.fidelity, window))
     reported |= {
-        "audit_half_band_reissner": (REISSNER_MODEL, own),
+        "audit_half_band_reissner": (REISSNER_MODEL, window),
         "audit_strict_range_reissner": (REISSNER_MODEL, whole),
     }
     audit = design.audit
@@ -224,11 +224,11 @@ def _reissner(design: Judged) -> dict[str, float | None]:
 
 
 def _counts(result: Explored) -> dict[str, float | None]:
-    some = [one for one in result.found.values() if one is not None]
-    feasible = sum(one.feasible for one in some)
-    traces = sum(one.evaluations for one in some)
-    sound = sum(one.sound for one in result.audits.values())
-    counts = {"starts": len(some), "starts_within_limits": feasible, "starts_sound": sound, "traces": traces}
+    designs = [design for design in result.designs.values() if design is not None]
+    feasible = sum(design.feasible for design in designs)
+    traces = sum(design.evaluations for design in designs)
+    sound = sum(audit.sound for audit in result.audits.values())
+    counts = {"starts": len(designs), "starts_within_limits": feasible, "starts_sound": sound, "traces": traces}
     return {name: float(count) for name, count in counts.items()}
 
 
@@ -268,22 +268,22 @@ def starts_table(task: Task, result: Explored) -> Table:
     """Return one row per start, in order, each with the audit of its design where that meets all limits."""
     from cfmkit.tables import Table, TableColumn
 
-    audits = [result.audits.get(index) for index, one in result.found.items() if one is not None]
-    gaps = [np.nan if one is None or one.gap is None else 1e3 * one.gap for one in audits]
-    rows = [(index, one) for index, one in result.found.items() if one is not None]
+    audits = [result.audits.get(index) for index, design in result.designs.items() if design is not None]
+    gaps = [np.nan if audit is None or audit.gap is None else 1e3 * audit.gap for audit in audits]
+    rows = [(index, design) for index, design in result.designs.items() if design is not None]
     columns = {
-        "window_share": [1 - one.start / task.window[1] for _, one in rows],
-        "objective": [one.objective for _, one in rows],
-        "violation": [max(0.0, one.violation) for _, one in rows],
+        "window_share": [1 - design.start / task.window[1] for _, design in rows],
+        "objective": [design.objective for _, design in rows],
+        "violation": [max(0.0, design.violation) for _, design in rows],
     }
     return Table(
         (
             TableColumn("start", tuple(index for index, _ in rows)),
             *(TableColumn(name, np.array(values, dtype=float), "1") for name, values in columns.items()),
-            TableColumn("sound", tuple(None if one is None else one.sound for one in audits)),
-            TableColumn("crossings", tuple(None if one is None else one.crossings for one in audits)),
+            TableColumn("sound", tuple(None if audit is None else audit.sound for audit in audits)),
+            TableColumn("crossings", tuple(None if audit is None else audit.crossings for audit in audits)),
             TableColumn("gap", np.array(gaps, dtype=float), "mm"),
-            TableColumn("evaluations", tuple(one.evaluations for _, one in rows)),
-            TableColumn("ending", tuple(one.ending for _, one in rows)),
+            TableColumn("evaluations", tuple(design.evaluations for _, design in rows)),
+            TableColumn("ending", tuple(design.ending for _, design in rows)),
         )
     )

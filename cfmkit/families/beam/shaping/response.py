@@ -166,9 +166,9 @@ class Response:
         (_, fractions), beams = self._elements, self.path.mesh.elements.beam
         rows = {}
         for name in self.path.network.beams:
-            own = [k for k, beam in enumerate(beams) if beam == name]
-            among = np.searchsorted(fractions, _fractions(len(own)))
-            index = (np.array(own)[:, None] * len(fractions) + among).ravel()
+            numbers = [k for k, beam in enumerate(beams) if beam == name]
+            among = np.searchsorted(fractions, _fractions(len(numbers)))
+            index = (np.array(numbers)[:, None] * len(fractions) + among).ravel()
             place = self.states.place[index]
             once = np.append(True, np.diff(place) > 0)
             rows[name] = RowsOfBeam(place[once], index[once])
@@ -203,11 +203,11 @@ class Response:
     @cached_property
     def _gradient(self) -> Gradient:
         try:
-            found = gradient(self.path, self.variables.build, self.x)
-            _ = found.unknowns  # with them the efforts are known, too
+            outputs = gradient(self.path, self.variables.build, self.x)
+            _ = outputs.unknowns  # with them the efforts are known, too
         except (CfmError, np.linalg.LinAlgError):
             raise NoAnswer from None
-        return found
+        return outputs
 
     @cached_property
     def force_slopes(self) -> FloatArray:
@@ -258,14 +258,14 @@ def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response 
 class View:
     """Input of the limits: the response at the poses of a window from `start`, with derivatives or without.
 
-    Derivatives are those of rows below `near`. kept: what was computed for either.
+    Derivatives are those of rows below `slopes_below`. kept: what was computed for either.
     """
 
     response: Response
     poses: PosePlan
     start: float
     sloped: bool = False
-    near: float = np.inf
+    slopes_below: float = np.inf
     kept: dict[str, Any] = field(default_factory=dict)
 
     @property

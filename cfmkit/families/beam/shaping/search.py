@@ -56,7 +56,7 @@ _MAX_VIOLATION = (
 _SPRING_HALF_BAND = 0.2  # one with this is a spring, and not looked at further
 _FINER_POSE_COUNTS = (33, 65)  # poses in the window where the first 17 do not show what the force does
 _BAND_RATIO_TOL = 1.01  # a half band at many poses that is within this and the next of that at few
-_NEAR = 1e-4
+_OBJECTIVE_ATOL = 1e-4
 _BAND_WEIGHT = 20.0  # what a half band beyond that counts against the violation of the limits
 
 
@@ -85,7 +85,7 @@ class StartBudget:
 
 
 @dataclass(frozen=True)
-class Found:
+class ShapeCandidate:
     """A design on the way."""
 
     # x, order, (k,): the design variables and the order of their shapes
@@ -110,7 +110,7 @@ def search_start(
     seed: int,
     index: int,
     plan: StartBudget,  # how much is tried
-) -> Found | None:
+) -> ShapeCandidate | None:
     """Return what a start leads to; None if no random network could be followed over the window."""
     first, rng = task.first, np.random.default_rng([seed, index])
     begun = _begin_network(first, rng, plan)
@@ -129,7 +129,7 @@ def search_start(
     return polish(task, design if design.feasible else satisfy_limits(task, design, design.order, plan), plan)
 
 
-def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found | None:
+def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> ShapeCandidate | None:
     """Return the random network of a start flattened in the finest order at once, over a window that begins farther.
 
     It begins halfway between rest and the requested window. What is flat over that seldom is the flattest over the
@@ -148,16 +148,16 @@ def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found 
     return design if hopeless else flatten(task, design, plan)
 
 
-def nearer(task: Task, design: Found, plan: StartBudget) -> Found:
+def nearer(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandidate:
     """Return a design that was flattened over a window that begins farther, flattened and widened as any other."""
     far = evaluate_in_model(task, design)
     flat = far.feasible and far.objective <= task.half_band
     return widen(task, polish(task, far if flat else replace(far, start=task.window[0]), plan), plan)
 
 
-def _begin_network(task: Task, rng: np.random.Generator, plan: StartBudget) -> Found | None:
+def _begin_network(task: Task, rng: np.random.Generator, plan: StartBudget) -> ShapeCandidate | None:
     """Return a random network that was made to meet the limits, or that misses them least; None without any."""
-    best: Found | None = None
+    best: ShapeCandidate | None = None
     evaluations = plan.drawn
     for first in draw_networks(task, rng, plan)[: plan.tries]:
         candidate = satisfy_limits(task, replace(first, evaluations=evaluations), _coarse(task), plan)
@@ -172,7 +172,7 @@ def _begin_network(task: Task, rng: np.random.Generator, plan: StartBudget) -> F
     return best if best.feasible else satisfy_limits(task, best, task.orders[-1], plan)
 
 
-def evaluate_in_model(task: Task, design: Found) -> Found:
+def evaluate_in_model(task: Task, design: ShapeCandidate) -> ShapeCandidate:
     """Return a design that was found in another model with objective and limits as they are in that of the task."""
     program = Shaping(Variables(task, design.order), design.start, Flattest())
     view = program.view(design.x)
@@ -183,16 +183,16 @@ def evaluate_in_model(task: Task, design: Found) -> Found:
     return replace(design, objective=objective, violation=violation, evaluations=design.evaluations + 1)
 
 
-def polish(task: Task, design: Found, plan: StartBudget) -> Found:
+def polish(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandidate:
     """Return a design flattened in every order from its own on, as it is at many poses."""
 
-    def again(finer: Task, design: Found) -> Found:
+    def again(finer: Task, design: ShapeCandidate) -> ShapeCandidate:
         return _minimise_objective(finer, design, design.order, plan, plan.flattening)
 
     return verify(task, flatten(task, design, plan), plan, again)
 
 
-def flatten(task: Task, design: Found, plan: StartBudget, enough: float = -np.inf) -> Found:
+def flatten(task: Task, design: ShapeCandidate, plan: StartBudget, enough: float = -np.inf) -> ShapeCandidate:
     """Return a design flattened in every order from its own on, in each until the half band is small enough."""
     for order in task.orders:
         if order >= design.order and not plan.late():
@@ -203,10 +203,12 @@ def flatten(task: Task, design: Found, plan: StartBudget, enough: float = -np.in
 def verify(
     # task, design, plan: what was searched for, and what came out; where that misses a limit it is returned as it is
     task: Task,
-    design: Found,
+    design: ShapeCandidate,
     plan: StartBudget,
-    again: Callable[[Task, Found], Found],  # what searches on, from a task with more poses and a design
-) -> Found:
+    again: Callable[
+        [Task, ShapeCandidate], ShapeCandidate
+    ],  # what searches on, from a task with more poses and a design
+) -> ShapeCandidate:
     """Return a design with objective, window and limits as they are at many poses."""
     if not design.feasible:
         return design
@@ -223,7 +225,7 @@ def verify(
     return _as_seen(task, design, view)
 
 
-def _shows_all(task: Task, design: Found, view: CloseView | None) -> bool:
+def _shows_all(task: Task, design: ShapeCandidate, view: CloseView | None) -> bool:
     """Return True if a design is at many poses what it was found to be at those of the search."""
     if view is None or _overstress(task, view) > 0:
         return False
@@ -231,10 +233,10 @@ def _shows_all(task: Task, design: Found, view: CloseView | None) -> bool:
         return True
     if task.objective == "range" and design.objective <= task.half_band:
         return view.widest(task.half_band) <= design.start + _MIN_WINDOW_GAIN * task.window[1]
-    return view.half_band(design.start) <= _BAND_RATIO_TOL * design.objective + _NEAR
+    return view.half_band(design.start) <= _BAND_RATIO_TOL * design.objective + _OBJECTIVE_ATOL
 
 
-def _as_seen(task: Task, design: Found, view: CloseView | None) -> Found:
+def _as_seen(task: Task, design: ShapeCandidate, view: CloseView | None) -> ShapeCandidate:
     """Return a design with what was seen at many poses: half band, widest window, stress."""
     if view is None:
         return replace(design, violation=np.inf)
@@ -260,7 +262,7 @@ def _overstress(task: Task, view: CloseView) -> float:
     return 0.0 if allowed is None else max(0.0, float(view.stress.max()) / allowed - 1.0)
 
 
-def round_design(task: Task, design: Found) -> Found:
+def round_design(task: Task, design: ShapeCandidate) -> ShapeCandidate:
     """Return a design with coordinates and coefficients that print short."""
     places, bounds = len(task.coordinates), Variables(task, design.order).bounds
     coordinates = rounded_within(design.x[:places], bounds[:places], COORDINATE_DECIMALS, task.size)
@@ -269,12 +271,12 @@ def round_design(task: Task, design: Found) -> Found:
     )
 
 
-def draw_networks(task: Task, rng: np.random.Generator, plan: StartBudget) -> list[Found]:
+def draw_networks(task: Task, rng: np.random.Generator, plan: StartBudget) -> list[ShapeCandidate]:
     """Return random networks that can be followed over the window, the most promising first.
 
     Straight ones; curved ones too where those cannot move, as a single beam that does not stretch.
     """
-    networks: list[Found] = []
+    networks: list[ShapeCandidate] = []
     for order in dict.fromkeys((0, _coarse(task))):
         variables = Variables(task, order)
         program = Shaping(variables, task.window[0], Flattest())
@@ -285,7 +287,7 @@ def draw_networks(task: Task, rng: np.random.Generator, plan: StartBudget) -> li
             if view is not None:
                 band = _half_band(window_force(view))
                 excess = worst_of(program, x) if band < _SPRING_HALF_BAND else np.inf
-                networks.append(Found(x, order, task.window[0], band, excess, "", 1))
+                networks.append(ShapeCandidate(x, order, task.window[0], band, excess, "", 1))
         if len(networks) >= plan.tries:
             break
     return sorted(
@@ -304,12 +306,12 @@ def _coarse(task: Task) -> int:
 
 def satisfy_limits(
     task: Task,
-    design: Found,
+    design: ShapeCandidate,
     order: int,
     plan: StartBudget,
     give: tuple[str, ...] = tuple(LIMIT_FUNCTIONS),
     share: float = 0.5,
-) -> Found:
+) -> ShapeCandidate:
     """Return a design that misses some limits as little as possible, at a half band that is no larger or small enough.
 
     Given up where a round does not bring what is missed below a share of what it was.
@@ -331,12 +333,12 @@ def satisfy_limits(
 
 
 def _minimise_objective(
-    task: Task, design: Found, order: int, plan: StartBudget, steps: int, enough: float = -np.inf
-) -> Found:
+    task: Task, design: ShapeCandidate, order: int, plan: StartBudget, steps: int, enough: float = -np.inf
+) -> ShapeCandidate:
     """Return a design with the objective minimised, as far as is enough; the one before where that is better."""
     variables, x = Variables(task, design.order).change_order(design.x, order)
     goal = ForceRatio() if task.objective == "paper" else Flattest()
-    program = Shaping(variables, design.start, goal, near=_NEAR_ROWS)
+    program = Shaping(variables, design.start, goal, slopes_below=_NEAR_ROWS)
     z = program.begin(x)
     if z is None:
         return design
@@ -346,7 +348,7 @@ def _minimise_objective(
     return replace(design, evaluations=now.evaluations) if worse else now
 
 
-def found_of(program: Shaping, optimum: Optimum, before: int = 0) -> Found:
+def found_of(program: Shaping, optimum: Optimum, before: int = 0) -> ShapeCandidate:
     """Return an optimum as a design; its objective is measured anew, without the help of the goal's own variables."""
     x, goal = optimum.z[: program.variables.count], program.goal
     start = goal.window_start(optimum.z[program.variables.count :][: len(goal.bounds)], program.start)
@@ -354,7 +356,7 @@ def found_of(program: Shaping, optimum: Optimum, before: int = 0) -> Found:
     view = program.view(x, start)
     if not isinstance(goal, ForceRatio) and view is not None:
         objective = _half_band(window_force(view))
-    return Found(
+    return ShapeCandidate(
         x,
         program.variables.order,
         start,
@@ -378,7 +380,7 @@ def worst_of(program: Shaping, x: FloatArray, start: float | None = None) -> flo
     return worst(program.limits(view))
 
 
-def widen(task: Task, design: Found, plan: StartBudget) -> Found:
+def widen(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandidate:
     """Return the design with the widest window in which the force stays in the wanted band.
 
     The start of the window is a variable like all others; the window grows from the last design, whose force is flatter
@@ -387,9 +389,9 @@ def widen(task: Task, design: Found, plan: StartBudget) -> Found:
     if task.objective != "range" or not (design.feasible and design.objective <= task.half_band):
         return design
     good, task = design, replace(task, points=design.points)
-    refuted: list[Found] = []
+    refuted: list[ShapeCandidate] = []
 
-    def again(finer: Task, design: Found) -> Found:
+    def again(finer: Task, design: ShapeCandidate) -> ShapeCandidate:
         refuted.append(design)
         return _repair(finer, design, replace(good, evaluations=design.evaluations), plan)
 
@@ -408,7 +410,7 @@ def widen(task: Task, design: Found, plan: StartBudget) -> Found:
     return replace(widest, evaluations=wide.evaluations + len(refuted))
 
 
-def refine(task: Task, design: Found, plan: StartBudget) -> Found:
+def refine(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandidate:
     """Return a widened design flattened and widened again in every finer order; never one with a narrower window."""
     for order in task.orders:
         if order > design.order and design.objective <= task.half_band and not plan.late():
@@ -419,11 +421,11 @@ def refine(task: Task, design: Found, plan: StartBudget) -> Found:
     return design
 
 
-def _widest(task: Task, design: Found, plan: StartBudget) -> Found:
+def _widest(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandidate:
     """Return the widest window at the poses of the search."""
     goal = Widest(task.window[1], task.half_band)
     for _ in range(_MAX_WIDENINGS):
-        program = Shaping(Variables(task, design.order), design.start, goal, near=_NEAR_ROWS)
+        program = Shaping(Variables(task, design.order), design.start, goal, slopes_below=_NEAR_ROWS)
         z = program.begin(design.x)
         if z is None or plan.late():
             return design
@@ -436,7 +438,7 @@ def _widest(task: Task, design: Found, plan: StartBudget) -> Found:
     return design
 
 
-def _repair(task: Task, wide: Found, good: Found, plan: StartBudget) -> Found:
+def _repair(task: Task, wide: ShapeCandidate, good: ShapeCandidate, plan: StartBudget) -> ShapeCandidate:
     """Return a design near one that all but meets the limits, that does, at nearly its window; else the good one."""
     start = wide.start
     while start < good.start and not plan.late():

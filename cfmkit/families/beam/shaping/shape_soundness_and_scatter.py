@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
     from cfmkit.families.beam.shaping.limits import Pair
-    from cfmkit.families.beam.shaping.search import Found
+    from cfmkit.families.beam.shaping.search import ShapeCandidate
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.shaping.variables import Variables
 
@@ -67,9 +67,9 @@ class Drawn:
     lost: int  # those that could not
 
 
-def audit_design(variables: Variables, found: Found) -> Audit:
+def audit_design(variables: Variables, design: ShapeCandidate) -> Audit:
     """Return the judgement of a design."""
-    task, network = variables.task, variables.build(found.x)
+    task, network = variables.task, variables.build(design.x)
     at = np.linspace(0.0, task.window[1], N_AUDIT_POSES)
     path = trace(network, Displacement(task.driven, task.direction, at), Control(tolerance=1e-7))
     return Audit(
@@ -100,7 +100,7 @@ def strict_share(at: FloatArray, force: FloatArray) -> float:
     return (count - 1) / (len(fine) - 1)
 
 
-def scatter_within_tolerances(variables: Variables, found: Found, spread: NetworkScatter) -> Drawn:
+def scatter_within_tolerances(variables: Variables, design: ShapeCandidate, spread: NetworkScatter) -> Drawn:
     """Return what is left of the constant force in networks within the tolerances."""
     task, rng = variables.task, np.random.default_rng([spread.seed, 1])
     places = len(task.coordinates)
@@ -109,14 +109,14 @@ def scatter_within_tolerances(variables: Variables, found: Found, spread: Networ
     at = np.linspace(0.0, task.window[1], N_AUDIT_POSES)
     noise = rng.standard_normal((spread.samples, variables.count)) * sizes
     drive = Displacement(task.driven, task.direction, at)
-    networks = (variables.build(found.x + one) for one in noise)
+    networks = (variables.build(design.x + error) for error in noise)
     if task.contact is None:  # followed together where they can be
         outcomes = trace_many(networks, drive, Control(tolerance=1e-5))
-        forces = [one.value.effort for one in outcomes if one.status == "COMPLETE"]
+        forces = [outcome.value.effort for outcome in outcomes if outcome.status == "COMPLETE"]
     else:
         outcomes = trace_many(networks, drive, Control(tolerance=1e-5), partial(_force_at_requested, task))
-        forces = [one.value for one in outcomes if one.status == "COMPLETE"]
-    bands = np.array([half_band(at, force, found.start) for force in forces])
+        forces = [outcome.value for outcome in outcomes if outcome.status == "COMPLETE"]
+    bands = np.array([half_band(at, force, design.start) for force in forces])
     ranges = np.array([strict_share(at, force) for force in forces])
     return Drawn(bands, ranges, spread.samples - len(forces))
 
@@ -132,21 +132,22 @@ def crossing(task: Task, path: Path, pose: int) -> bool:
     lines = {name: path.shape(name, pose) for name in task.network.beams}
     shared = {pair.beams: pair.joints for pair in pairs(task.network)}
     return any(
-        lines_cross(lines[one], lines[other], bool(shared[one, other])) for one, other in combinations(lines, 2)
+        lines_cross(lines[first], lines[second], bool(shared[first, second]))
+        for first, second in combinations(lines, 2)
     ) or any(lines_cross(line, line, True) for line in lines.values())
 
 
-def lines_cross(one: FloatArray, other: FloatArray, joined: bool) -> bool:
+def lines_cross(line: FloatArray, second_line: FloatArray, joined: bool) -> bool:
     """Return True if two polylines (n, 2) cross; pieces that share an end, or touch at a common joint, do not."""
-    p, q = one[:, 0] + 1j * one[:, 1], other[:, 0] + 1j * other[:, 1]
+    p, q = line[:, 0] + 1j * line[:, 1], second_line[:, 0] + 1j * second_line[:, 1]
     a, b, c, d = p[:-1, None], p[1:, None], q[None, :-1], q[None, 1:]
     first = _side(a, b, c) * _side(a, b, d)
     second = _side(c, d, a) * _side(c, d, b)
     hit = (first < 0) & (second < 0)
     if joined:
         size = abs(p[-1] - p[0]) + abs(q[-1] - q[0])
-        near = np.min([abs(u - v) for u in (a, b) for v in (c, d)], axis=0)
-        hit &= near > _JOINT_RTOL * size
+        gap_of_ends = np.min([abs(u - v) for u in (a, b) for v in (c, d)], axis=0)
+        hit &= gap_of_ends > _JOINT_RTOL * size
     return bool(hit.any())
 
 
@@ -182,5 +183,5 @@ def _gap(task: Task, path: Path, pair: Pair) -> float:
 
 def _arc_lengths(line: FloatArray, end: int) -> FloatArray:
     """Return the way along a line from its first (0) or last (1) point."""
-    way = np.append(0.0, np.cumsum(abs(np.diff(line))))
-    return way[-1] - way if end else way
+    arc_length = np.append(0.0, np.cumsum(abs(np.diff(line))))
+    return arc_length[-1] - arc_length if end else arc_length

@@ -44,8 +44,8 @@ class FreeNode(Model):
 
 def _check_increasing(x: Range | None, y: Range | None) -> None:
     """Refuse a range that ends before it begins."""
-    for name, given in (("x", x), ("y", y)):
-        if given is not None and not given[0] < given[1]:
+    for name, limits in (("x", x), ("y", y)):
+        if limits is not None and not limits[0] < limits[1]:
             raise ValueError(f"{name!r} must be increasing")
 
 

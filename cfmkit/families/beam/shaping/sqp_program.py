@@ -39,7 +39,7 @@ class Shaping(DesignProgram):
     cap: float | None = None  # largest value of the goal's last own variable
     # derivatives of rows of stress, envelopes and clearance that hold by more than this are left out: no step that can
     # be trusted makes them miss. The rows themselves are all there
-    near: float = np.inf
+    slopes_below: float = np.inf
     _last: View | None = field(default=None, repr=False)
 
     @property
@@ -50,10 +50,10 @@ class Shaping(DesignProgram):
     @property
     def bounds(self) -> FloatArray:
         """Lowest and highest values of all variables, (n, 2)."""
-        own = self.goal.bounds.copy()
+        bounds = self.goal.bounds.copy()
         if self.cap is not None:
-            own[-1, 1] = self.cap
-        parts = [self.variables.bounds, own]
+            bounds[-1, 1] = self.cap
+        parts = [self.variables.bounds, bounds]
         return np.concatenate([*parts, [(0.0, 100.0)]] if self.elastic else parts)
 
     def view(self, x: FloatArray, start: float | None = None, sloped: bool = False) -> View | None:
@@ -61,10 +61,10 @@ class Shaping(DesignProgram):
         start = self.start if start is None else start
         if self._last is None or self._last.start != start or not np.array_equal(self._last.response.x, x):
             poses = poses_of(self.variables.task, start)
-            found = respond(self.variables, x, poses.at)
-            if found is None:
+            response = respond(self.variables, x, poses.at)
+            if response is None:
                 return None
-            self._last = View(found, poses, start, near=self.near)
+            self._last = View(response, poses, start, slopes_below=self.slopes_below)
         return replace(self._last, sloped=sloped)
 
     def begin(self, x: FloatArray) -> FloatArray | None:
@@ -79,12 +79,12 @@ class Shaping(DesignProgram):
 
     def evaluate(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the goal, its rows and those of all limits at the design and the goal's own variables."""
-        own = z[self.variables.count :]
-        view = self.view(z[: self.variables.count], self.goal.window_start(own, self.start), sloped)
+        goal_values = z[self.variables.count :]
+        view = self.view(z[: self.variables.count], self.goal.window_start(goal_values, self.start), sloped)
         if view is None:
             return None
         try:
-            aim, limits = self.goal.aim(view, own), self.limits(view)
+            aim, limits = self.goal.aim(view, goal_values), self.limits(view)
         except NoAnswer:
             return None
         if aim.by_x is None or aim.rows_by_x is None:
@@ -126,10 +126,10 @@ class Goal(Protocol):
     def start(self, view: View) -> FloatArray:
         """Return its own variables that fit the design best."""
 
-    def window_start(self, own: FloatArray, otherwise: float) -> float:
+    def window_start(self, values: FloatArray, otherwise: float) -> float:
         """Return where the window begins [m]: `otherwise`, if that is not one of its own variables."""
 
-    def aim(self, view: View, own: FloatArray) -> Aim:
+    def aim(self, view: View, values: FloatArray) -> Aim:
         """Return objective and rows."""
 
 
@@ -178,13 +178,13 @@ class Flattest:
         middle = max(0.5 * (force.max() + force.min()), 0.05 * abs(force).max(), LEAST_MIDDLE)
         return np.array([middle, min(10.0, abs(force / middle - 1).max())])
 
-    def window_start(self, own: FloatArray, otherwise: float) -> float:
+    def window_start(self, values: FloatArray, otherwise: float) -> float:
         """Return the given start."""
         return otherwise
 
-    def aim(self, view: View, own: FloatArray) -> Aim:
+    def aim(self, view: View, values: FloatArray) -> Aim:
         """Return the half band and its rows."""
-        level, band = own
+        level, band = values
         unit = unit_of_force(view) * level
         ratio = window_force(view) / unit
         rows = np.concatenate([1 + band - ratio, ratio - 1 + band])
@@ -214,14 +214,14 @@ class Widest:
         """Return level and window of the design."""
         return np.array([Flattest().start(view)[0], view.poses.at[view.poses.window[0]] / self.end])
 
-    def window_start(self, own: FloatArray, otherwise: float) -> float:
+    def window_start(self, values: FloatArray, otherwise: float) -> float:
         """Return the start of the window that is wanted."""
-        return float(own[1]) * self.end
+        return float(values[1]) * self.end
 
-    def aim(self, view: View, own: FloatArray) -> Aim:
+    def aim(self, view: View, values: FloatArray) -> Aim:
         """Return the share of the travel before the window, and the rows of the half band."""
-        flat = Flattest().aim(view, np.array([own[0], self.half_band]))
-        level, share = own
+        flat = Flattest().aim(view, np.array([values[0], self.half_band]))
+        level, share = values
         at = view.poses.at[view.poses.window]
         force = view.response.state.force[view.poses.window] / (unit_of_force(view) * level)
         moves = (1 - (at - at[0]) / (at[-1] - at[0])) * self.end
@@ -249,15 +249,15 @@ class ForceRatio:
         """Return nothing."""
         return np.zeros(0)
 
-    def window_start(self, own: FloatArray, otherwise: float) -> float:
+    def window_start(self, values: FloatArray, otherwise: float) -> float:
         """Return the given start."""
         return otherwise
 
-    def aim(self, view: View, own: FloatArray) -> Aim:
+    def aim(self, view: View, values: FloatArray) -> Aim:
         """Return the objective; it has no rows."""
         at, from_ = view.response.state.force[view.poses.compared]
         none = np.zeros((0, len(view.response.x)))
         if not view.sloped:
-            return Aim(at / from_ - 1, None, own, own, None, np.zeros((0, 0)))
+            return Aim(at / from_ - 1, None, values, values, None, np.zeros((0, 0)))
         by_at, by_from = view.response.force_slopes[view.poses.compared]
-        return Aim(at / from_ - 1, by_at / from_ - at * by_from / from_**2, own, own, none, np.zeros((0, 0)))
+        return Aim(at / from_ - 1, by_at / from_ - at * by_from / from_**2, values, values, none, np.zeros((0, 0)))

@@ -128,7 +128,9 @@ class Task:
 
         It does not depend on where the free nodes are: a design that is designed again comes out the same.
         """
-        free = {(one.node, one.axis): (one.low, one.high) for one in self.coordinates}
+        free = {
+            (coordinate.node, coordinate.axis): (coordinate.low, coordinate.high) for coordinate in self.coordinates
+        }
         spans = []
         for axis in (0, 1):
             places = [free.get((name, axis), ((node.x, node.y)[axis],)) for name, node in self.network.nodes.items()]

@@ -75,13 +75,16 @@ class Variables:
     def read(self) -> FloatArray:
         """Return the variables of the task's own network; terms above the order are dropped."""
         nodes, beams = self.task.network.nodes, self.task.network.beams
-        places = [(nodes[one.node].x, nodes[one.node].y)[one.axis] / self.task.size for one in self.task.coordinates]
+        places = [
+            (nodes[coordinate.node].x, nodes[coordinate.node].y)[coordinate.axis] / self.task.size
+            for coordinate in self.task.coordinates
+        ]
         rows = [self._coefficients(beams[beam].shape) for beam in self.task.shaped]
         return np.array([*places, *(value for row in rows for value in row)], dtype=float)
 
     def _coefficients(self, shape: Any) -> list[float]:
-        given = list(shape.coefficients[1:]) if isinstance(shape, Polynomial) else []
-        return (given + [0.0] * self.order)[: self.order]
+        coefficients = list(shape.coefficients[1:]) if isinstance(shape, Polynomial) else []
+        return (coefficients + [0.0] * self.order)[: self.order]
 
     def change_order(self, x: FloatArray, order: int) -> tuple[Variables, FloatArray]:
         """Return the variables of another order and the same shapes in them, terms above the order dropped."""
@@ -186,7 +189,7 @@ def sound(variables: Variables, x: FloatArray) -> bool:
     least = _least_chord(variables, network)
     if any(abs(b - a) < least for a, b in chords.values()):
         return False
-    return not any(_cross(*chords[one], *chords[other]) for one, other in combinations(chords, 2))
+    return not any(_cross(*chords[first], *chords[second]) for first, second in combinations(chords, 2))
 
 
 def _least_chord(variables: Variables, network: Network) -> float:

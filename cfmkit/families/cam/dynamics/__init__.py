@@ -6,5 +6,7 @@
 from __future__ import annotations
 
 from cfmkit.families.cam.dynamics.force_of_given_motion import analyze
+from cfmkit.families.cam.dynamics.inverse import MotionResponse, respond, statics
+from cfmkit.families.cam.dynamics.machine_from_spec import build
 
-__all__ = ["analyze"]
+__all__ = ["MotionResponse", "analyze", "build", "respond", "statics"]

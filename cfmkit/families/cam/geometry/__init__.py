@@ -1,1 +1,11 @@
 """Cam and rollers: profile slope, roller path, cut flank, and tracks on it as designed and as built."""
+
+from cfmkit.lazy_names import lazy_names
+
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "designed_and_built_flanks": "DesignFlank",
+        "slope_law": "SlopeLaw",
+    },
+)

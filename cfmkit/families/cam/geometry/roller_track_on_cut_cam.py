@@ -139,19 +139,6 @@ class Track:
         Material left on the flank beyond the profile, >= 0 [m]; it rounds a corner. Missing
         material is not an offset: it is the cam cut for a larger roller (`flank_from_roller_path.cut`).
 
-    Attributes
-    ----------
-    start : float
-        Slider position at the start of the track [m], height above the path's first point.
-    dead_point : float
-        Smallest slider position the track can hold [m]; below `start` only where the
-        slider has to fall before it can rise.
-    corner_end, end : float
-        Slider positions at which the roller leaves the corner (`start` if there is none,
-        or it is passed over) and at which the track ends [m].
-    turns_back : bool
-        Whether the track ends because the slider would fall beyond, before the flank does.
-
     Raises
     ------
     NoTrack
@@ -187,6 +174,10 @@ class Track:
         """Set the slider positions at which pieces begin and end."""
         pivots = self.profile.corner is not None
         at_corner, rate = self._evaluate_corner(self._pivots[0]) if pivots else self._evaluate_flank(self.profile.start)
+        # Positions of the slider [m], as heights above the path's first point. The dead point is the lowest that the
+        # track can hold, below the start only where the slider has to fall before it can rise; at `corner_end` the
+        # roller leaves the corner (the start if there is none, or it is passed over). `turns_back`: the track ends
+        # because the slider would fall beyond, before the flank does.
         self.start = self.dead_point = at_corner
         if pivots and agree(self._evaluate_corner(self._pivots[1])[1] > 0):
             self.flank_range, self.turns_back = self._rising(skip=False)

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-MILLIMETRE = 1e-3  # thicknesses and widths are counted in mm
+METRES_PER_MM = 1e-3  # thicknesses and widths are counted in mm
 
 Goal = Literal["stroke", "ripple", "rms"]
 
@@ -108,11 +108,11 @@ class Form:
 
     def width_of(self, x: FloatArray) -> float:
         """Return the width [m]."""
-        return float(np.real(x[-1])) * MILLIMETRE if self.width is None else self.width
+        return float(np.real(x[-1])) * METRES_PER_MM if self.width is None else self.width
 
     def strip(self, x: Any, corners: FloatArray) -> Strip:
         """Return the strip that numbers describe: thicknesses and width in mm, shares of the pieces' lengths."""
-        thickness = np.asarray(x[: self.count]) * MILLIMETRE
+        thickness = np.asarray(x[: self.count]) * METRES_PER_MM
         if self.count == 1:
             return Strip(corners, self.width_of(x), np.repeat(thickness, 2), np.array([0.0, 1.0]))
         return Strip(corners, self.width_of(x), thickness, self.places(x, corners))

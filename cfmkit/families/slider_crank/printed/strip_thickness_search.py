@@ -12,7 +12,7 @@ from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.no_mechanism import no_design
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.printed.sqp_program import MILLIMETRE, Form, StripProgram
+from cfmkit.families.slider_crank.printed.sqp_program import METRES_PER_MM, Form, StripProgram
 from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
@@ -94,10 +94,10 @@ def uniform_thickness(task: StripTask, width: float, guess: float = INITIAL_THIC
     program = _of_one_thickness(task, width)
 
     def step(thickness: float) -> float | None:
-        state = program.state(np.array([thickness / MILLIMETRE, 1.0]))
+        state = program.state(np.array([thickness / METRES_PER_MM, 1.0]))
         if state is None:
             return None
-        wanted = np.asarray(task.share(program.travel(np.array([thickness / MILLIMETRE, 1.0]))))
+        wanted = np.asarray(task.share(program.travel(np.array([thickness / METRES_PER_MM, 1.0]))))
         return float((0.5 * task.force * (wanted.max() + wanted.min()) / _level(state)) ** (1.0 / 3.0))
 
     found = _iterate_thickness(step, guess)
@@ -116,7 +116,7 @@ def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
 
     def step(thickness: float) -> float | None:
         nonlocal width
-        state = _of_one_thickness(task, width).state(np.array([thickness / MILLIMETRE, 1.0]))
+        state = _of_one_thickness(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
         if state is None:
             return None
         factor = limit / _peak(state)
@@ -137,7 +137,7 @@ def uniform_for_width(task: StripTask, width: float) -> tuple[float, float] | No
 
     def step(thickness: float) -> float | None:
         nonlocal worst
-        state = _of_one_thickness(task, width).state(np.array([thickness / MILLIMETRE, 1.0]))
+        state = _of_one_thickness(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
         if state is None:
             return None
         worst = _peak(state)
@@ -359,8 +359,8 @@ def _bounds(task: StripTask, ranges: Ranges, form: Form, count: int) -> FloatArr
 def _uniform(task: StripTask, form: Form, ranges: Ranges, clock: Clock) -> Optimum | None:
     """Return the best strip of one thickness."""
     own = ranges.form
-    width = form.width or float(own[-1].mean()) * MILLIMETRE
-    first = uniform_thickness(task, width, float(own[0].mean()) * MILLIMETRE) / MILLIMETRE
+    width = form.width or float(own[-1].mean()) * METRES_PER_MM
+    first = uniform_thickness(task, width, float(own[0].mean()) * METRES_PER_MM) / METRES_PER_MM
     program = StripProgram(replace(task, ripple=max(task.ripple, COARSE_RIPPLE)), Form(1, width=width))
     last = [100.0 * task.stroke] if task.goal == "stroke" else [2.0]
     bounds = _bounds(task, Ranges(own[:1], ranges.longest), Form(1, width=width), 1)

@@ -20,7 +20,7 @@ import numpy as np
 
 from cfmkit.arrays import LazySequence, distinct
 from cfmkit.curves import Column, Curve
-from cfmkit.families.end_stops import OF_STOPS
+from cfmkit.families.end_stops import STOP_QUANTITIES
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.rows import (
@@ -65,7 +65,7 @@ Ends = tuple[float, float]
 RATE_KEYS = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINT_NAMES)}
 """Where a specification has the rates, and the rows of the springs."""
 ROWS_TOGETHER = 64  # mechanisms that are solved together: few enough for their grids to stay in a processor's cache
-ROW_COLUMNS = columns_of_absent_values(OF_PARTS | OF_STOPS) | dict(SCALAR_QUANTITIES)
+ROW_COLUMNS = columns_of_absent_values(OF_PARTS | STOP_QUANTITIES) | dict(SCALAR_QUANTITIES)
 """What studies may ask of rows: of values that only printed parts and stops have their cells are empty."""
 
 

@@ -67,7 +67,10 @@ class LeafLaw(ABC):
     def negative_stiffness(self) -> Any:
         """Size of the negative stiffness [N/m]: that of the steepest fall of the force; zero if it only rises."""
         places = np.linspace(0.0, 2.0, 801) * self.strip.rise
-        return max(0.0, -float(np.gradient(self.force(places), places).min()))
+        force = self.force(places)
+        rows = zip(np.atleast_2d(force), np.broadcast_to(places, np.atleast_2d(force).shape), strict=True)
+        falls = np.array([[max(0.0, -float(np.gradient(*row).min()))] for row in rows])
+        return falls if np.ndim(force) == 2 else falls.item()
 
     @property
     def linear(self) -> tuple[Any, Any]:

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-T = TypeVar("T")
+LawT = TypeVar("LawT")
 
 
-def stack_laws(laws: Sequence[T]) -> T:
+def stack_laws(laws: Sequence[LawT]) -> LawT:
     """Return laws of one kind as one law with a row for each; one alone is returned as it is, with plain numbers.
 
     Examples

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.export.posed_part import PosedBody
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.leaves.kinds import Edge, Edges
+    from cfmkit.families.vcfm.surroundings_spec import BoughtSprings
 
 
 BLOCK_HEIGHT_RATIO = 0.75  # half height of rigid blocks beyond the middle of a leaf, in its thicknesses
@@ -335,6 +336,11 @@ class Coils:
 
     stiffness: float  # of all [N/m]
     tension: float = 0.0  # force at which they begin to open [N]
+
+    @classmethod
+    def from_springs(cls, springs: BoughtSprings) -> Coils:
+        """Return the law of the springs of a specification."""
+        return cls(springs.count * springs.rate, springs.count * springs.initial_tension)
 
     def force(self, compression: Any) -> FloatArray:
         """Return the force [N] at a deflection [m]; none where it is not positive."""

@@ -14,7 +14,6 @@ import cfmkit
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families.cam.measured_cam_analysis import built_flank, built_track, flanks_of
 from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.studies.point_evaluation import Study
 
 CONFIG = (Path(__file__).parents[2] / "configs/cam.yaml").read_text()
 
@@ -331,25 +330,6 @@ def test_pictures_are_drawn(tmp_path):
     found = built(tmp_path, Errors(waviness=0.01e-3, noise=0.002e-3))
     assert set(figures(found)) == {"loop", "profile", "shares"}
     assert all(draw().axes for draw in figures(found).values())
-
-
-def test_measured_cams_are_no_rows(tmp_path):
-    from cfmkit.families.cam.cams_in_rows import solve_rows
-    from cfmkit.families.rows import Variants
-
-    write(tmp_path, measured())
-    spec, values = spec_of(tmp_path), {"mechanism.rolling_friction": np.array([0.001, 0.002])}
-    assert not list(solve_rows(Variants(spec, values, lambda _k: spec, 2)))
-
-
-def test_a_study_knows_a_data_file_by_its_content(tmp_path):
-    def key():
-        return Study(spec_of(tmp_path), ("mechanism.rolling_friction",), ()).key((0.002,))
-
-    write(tmp_path, measured())
-    first, again = key(), key()
-    write(tmp_path, measured(Errors(noise=0.001e-3)))
-    assert first == again != key()
 
 
 HOLES = {

@@ -3,9 +3,7 @@
 import pytest
 
 import cfmkit
-from cfmkit.cli.main import main
-from cfmkit.runs.files_a_run_writes import part_of
-from cfmkit.runs.part_on_paper import how_to_print
+from cfmkit.cli import run_command
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.printing import LAYER_STRENGTHS, strands
 
@@ -51,7 +49,7 @@ def test_a_stated_strength_counts_more_than_that_of_the_direction():
 def test_layers_of_a_material_without_strengths_of_layers_are_refused_in_one_line(stated, tmp_path, capsys):
     file = tmp_path / "strip.yaml"
     file.write_text(STRIP.replace("{name: pla, layers: along}", stated))
-    assert main(["analyze", str(file), "--no-plots", "-o", str(tmp_path / "out")]) == 3
+    assert run_command(["analyze", str(file), "--no-plots", "-o", str(tmp_path / "out")]) == 3
     shown = capsys.readouterr()
     assert "no strength along and across the layers is known of" in shown.out + shown.err
 
@@ -87,18 +85,3 @@ def test_a_design_without_whole_strands_says_so_and_is_left():
     found = cfmkit.design(given)
     assert dict(found.notes)["strands"].startswith("left as they are")
     assert found.spec.mechanism.beam.thickness == pytest.approx(0.622e-3, abs=2e-6)
-
-
-@pytest.mark.parametrize(("way", "laid"), [("along", "print lying flat"), ("across", "print standing")])
-def test_the_drawing_says_how_to_lay_the_part_and_of_how_many_strands_it_is(way, laid):
-    spec = cfmkit.loads(STRIP.replace("layers: along", f"layers: {way}"))
-    drawing = part_of(spec)
-    lines = how_to_print(drawing, spec)
-    assert lines[0].startswith(laid)
-    assert lines[1] == "0.96 mm are 2.4 strands of 0.4 mm: whole ones are 0.8 mm (2) or 1.2 mm (3)"
-
-
-def test_a_part_that_is_cut_has_no_lines_on_printing():
-    spec = cfmkit.loads(STRIP.replace("{name: pla, layers: along}", "pom").replace("process: fdm", "process: laser"))
-    drawing = part_of(spec)
-    assert how_to_print(drawing, spec) == ()

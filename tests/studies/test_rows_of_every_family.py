@@ -65,6 +65,7 @@ def test_every_row_of_a_study_is_a_run_of_its_own(stem: str, number: int) -> Non
     [
         ("lan2010", ("mechanism.thickness", "mechanism.nodes.n3.at.0", "mechanism.beams.b1.shape.coefficients.1")),
         ("williams_toggle", ("mechanism.thickness", "analysis.travel")),
+        ("williams_toggle", ("analysis.band",)),
     ],
 )
 def test_rows_of_beams_are_solved_together_and_are_runs_of_their_own(stem: str, paths: tuple[str, ...]) -> None:

@@ -12,7 +12,7 @@ from cfmkit.elastica.mechanics.equations import MarchCode, MarchPlan, begin
 from cfmkit.elastica.mechanics.march import equations
 
 if TYPE_CHECKING:
-    from cfmkit.numerics.continuation.problem import PathEquilibrium
+    from cfmkit.numerics.continuation import PathEquilibrium
 
 
 def states(network: Discretisation, goals: Any) -> list[PathEquilibrium]:

@@ -9,6 +9,7 @@ from beam_support import TOGGLE
 
 import cfmkit
 from cfmkit import Run, api
+from cfmkit.families import family
 from cfmkit.results import Design, Status
 from cfmkit.studies.verify_design_by_solid_model import verify_by_solid
 
@@ -32,10 +33,9 @@ def test_the_solid_of_a_verified_design_has_the_wanted_mean_force():
 def test_widths_are_multiplied_by_what_the_force_misses(monkeypatch):
     """The solid stands in here by the closed forms with 4 % more force: its own numbers are the slow test's."""
     spec = cfmkit.load("configs/vcfm_pla.yaml")
-    from cfmkit.families.vcfm.model import analyze
 
-    def stiffer(given, run):
-        found = analyze(given.replace({"analysis.fidelity": "analytic"}), run)
+    def stiffer(given, _run):
+        found = cfmkit.analyze(given.replace({"analysis.fidelity": "analytic"}))
         return replace(found, curves=tuple(replace(one, effort=1.04 * one.effort) for one in found.curves))
 
     monkeypatch.setattr("cfmkit.families.vcfm.plane_fem_analysis.analyze", stiffer)
@@ -80,10 +80,9 @@ def test_under_a_load_the_widths_make_the_solid_as_stiff_as_the_beams_over_the_t
     path = tmp_path / "pushed.yaml"
     path.write_text(PUSHED)
     spec = cfmkit.load(str(path))
-    from cfmkit.families.beam.model import analyze
 
-    def stiffer(given, run):
-        return analyze(given.replace({"analysis.fidelity": "inextensible", "mechanism.width": 0.0066}), run)
+    def stiffer(given, _run):
+        return cfmkit.analyze(given.replace({"analysis.fidelity": "inextensible", "mechanism.width": 0.0066}))
 
     monkeypatch.setattr("cfmkit.families.beam.plane_fem_analysis.analyze", stiffer)
     found = verify_by_solid(spec, Design(spec, Status.COMPLETE), Run())
@@ -113,15 +112,13 @@ analysis: {travel: 10 mm, points: 11, window: [1 mm, 4 mm]}
 def test_the_force_of_a_rescaled_solid_is_the_wanted_one_at_the_end_of_the_window(monkeypatch, window):
     """Before, the mean was corrected, and not if the force pulls. The solid is a thicker beam here."""
     spec = cfmkit.loads(RESCALED.replace("[1 mm, 4 mm]", window))
-    from cfmkit.families.beam.design import design
-    from cfmkit.families.beam.model import analyze
 
-    def other(given, run):
+    def other(given, _run):
         stiffer = {"analysis.fidelity": "extensible", "mechanism.thickness": 1.02 * given.mechanism.thickness}
-        return analyze(given.replace(stiffer), run)
+        return cfmkit.analyze(given.replace(stiffer))
 
     monkeypatch.setattr("cfmkit.families.beam.plane_fem_analysis.analyze", other)
-    made = verify_by_solid(spec, design(spec, Run()), Run())
+    made = verify_by_solid(spec, family("beam").design.make(spec, Run()), Run())
     sense = 1.0 if "4 mm" in window else -1.0
     solid = api.evaluate(cfmkit.analyze(made.spec), ["nominal_force"])["nominal_force"].value
     assert solid == pytest.approx(sense * 20.0, rel=1e-6)
@@ -133,18 +130,15 @@ def test_the_force_of_a_rescaled_solid_is_the_wanted_one_at_the_end_of_the_windo
 
 @pytest.mark.parametrize("share", [None, "50 %"], ids=["no yield", "a yield"])
 def test_a_solid_from_a_sheet_is_made_of_another_force_and_says_that_margins_are_not_repeated(monkeypatch, share):
-    from cfmkit.families.beam.design import design
-    from cfmkit.families.beam.model import analyze
-
     asked = {"mechanism.part": {"process": "laser", "sheet": "10 mm"}, "design.yield": share}
     spec = cfmkit.loads(RESCALED).replace(asked | {"requirements": ({"metric": "nominal_force", "min": "19 N"},)})
 
-    def softer(given, run):
+    def softer(given, _run):
         thinner = {"mechanism.width": "9.8 mm", "mechanism.part.sheet": "9.8 mm"}
-        return analyze(given.replace(thinner | {"analysis.fidelity": "extensible"}), run)
+        return cfmkit.analyze(given.replace(thinner | {"analysis.fidelity": "extensible"}))
 
     monkeypatch.setattr("cfmkit.families.beam.plane_fem_analysis.analyze", softer)
-    made = verify_by_solid(spec, design(spec, Run()), Run())
+    made = verify_by_solid(spec, family("beam").design.make(spec, Run()), Run())
     (reported,) = (text for word, text in made.notes if word == "verify")
     assert "it is designed for 20.408 N instead of 20 N" in reported  # 20 N / 0.98
     assert ("the margins of design.yield are not repeated" in reported) == (share is not None)
@@ -152,9 +146,7 @@ def test_a_solid_from_a_sheet_is_made_of_another_force_and_says_that_margins_are
 
 def test_a_design_whose_force_pulls_keeps_its_target():
     """Before, +20 N were compared with -20 N: a deviation of 200 %."""
-    from cfmkit.families.beam.design import design
-
-    made = design(cfmkit.loads(RESCALED.replace("[1 mm, 4 mm]", "[7.99 mm, 8 mm]")), Run())
+    made = family("beam").design.make(cfmkit.loads(RESCALED.replace("[1 mm, 4 mm]", "[7.99 mm, 8 mm]")), Run())
     result = cfmkit.analyze(made.spec)
     assert result.target == pytest.approx(-20.0)
     assert api.evaluate(result, ["deviation_from_target"])["deviation_from_target"].value < 0.01

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.runs import papers
 from cfmkit.runs.papers import VERDICT_MEANINGS, check, choose_rows, number, rows
@@ -83,7 +83,7 @@ def test_a_wrong_verdict_is_seen_and_ends_with_5(monkeypatch, capsys, verdict, p
     (row,) = [row for row in rows() if row.what == "force for a stiffness of 1.38 N/mm"]
     wrong = replace(row, printed=(printed,), verdict=verdict)
     monkeypatch.setattr(papers, "rows", lambda: (wrong,))
-    assert main(["papers", "cam"]) == ExitCode.REQUIREMENT_MISSED
+    assert run_command(["papers", "cam"]) == ExitCode.REQUIREMENT_MISSED
     shown = capsys.readouterr()
     assert said in shown.err
     assert "DOES NOT HOLD" in shown.out

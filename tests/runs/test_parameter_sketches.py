@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import pytest
 
 from cfmkit import families
-from cfmkit.cli.main import main
+from cfmkit.cli import run_command
 from cfmkit.errors import UsageError
 from cfmkit.runs.dimension_drawing import DRAWING_FILE, DRAWING_SUFFIXES, read_dimensions, read_drawing
-from cfmkit.specs.keys_and_schema import keys
+from cfmkit.specs import keys
 
 OWN = ["beam", "cam", "slider-crank", "vcfm"]
 DRAWN = [record.name for record in families.records() if record.file(DRAWING_FILE)]
@@ -91,10 +91,10 @@ def test_png_and_pdf_show_the_drawing_as_it_is_now(name):
 @pytest.mark.parametrize("ending", DRAWING_SUFFIXES)
 def test_show_copies_the_drawing_and_replaces_nothing(tmp_path, monkeypatch, capsys, ending):
     monkeypatch.chdir(tmp_path)
-    assert main(["show", "cam", "--figure"]) == 0
+    assert run_command(["show", "cam", "--figure"]) == 0
     assert "mechanism.brace_length" in capsys.readouterr().out
-    assert main(["show", "cam", "--figure"]) == 7
-    assert main(["show", "cam", "--figure", f"mine{ending.upper()}"]) == 0
+    assert run_command(["show", "cam", "--figure"]) == 7
+    assert run_command(["show", "cam", "--figure", f"mine{ending.upper()}"]) == 0
     files = read_drawing(families.family("cam"))
     assert (tmp_path / "cam.png").read_bytes() == files[".png"]
     assert (tmp_path / f"mine{ending.upper()}").read_bytes() == files[ending]
@@ -102,12 +102,12 @@ def test_show_copies_the_drawing_and_replaces_nothing(tmp_path, monkeypatch, cap
 
 def test_a_family_of_another_package_brings_a_drawing_of_its_own(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["show", "oblique", "--figure"]) == 0
+    assert run_command(["show", "oblique", "--figure"]) == 0
     assert "mechanism.half_span" in capsys.readouterr().out
     assert "mechanism.half_span" in (tmp_path / "oblique.svg").read_text()
-    assert main(["show", "oblique", "--figure", "oblique.png"]) == 2
+    assert run_command(["show", "oblique", "--figure", "oblique.png"]) == 2
     assert "ends with .svg, not '.png'" in capsys.readouterr().err
-    assert main(["show", "K_o"]) == 0
+    assert run_command(["show", "K_o"]) == 0
     assert "mechanism.oblique.stiffness" in capsys.readouterr().out
 
 
@@ -121,7 +121,7 @@ def test_a_family_of_another_package_brings_a_drawing_of_its_own(tmp_path, monke
 )
 def test_a_drawing_that_there_is_not_is_refused_in_one_line(tmp_path, monkeypatch, capsys, arguments, said):
     monkeypatch.chdir(tmp_path)
-    assert main(arguments) == 2
+    assert run_command(arguments) == 2
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
@@ -130,7 +130,7 @@ def test_a_family_without_a_drawing_is_refused(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     bare = replace(families.family("cam"), folder="")
     monkeypatch.setattr(families, "family", lambda _: bare)
-    assert main(["show", "cam", "--figure"]) == 2
+    assert run_command(["show", "cam", "--figure"]) == 2
     assert "has no drawing; there are " in capsys.readouterr().err
 
 

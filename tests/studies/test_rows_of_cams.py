@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from given_points import GivenPoints
 from study_rows import assert_rows_equal_runs, study_of
 
 import cfmkit
-from cfmkit.families.cam.cams_in_rows import solve_rows
-from cfmkit.families.rows import Variants
+from cfmkit.families import Variants, family
 from cfmkit.results import Status
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
@@ -21,11 +19,7 @@ from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
 from cfmkit.studies.varied_axes import axes, collect_variations
 
-CLOSED = (
-    "cam", "cam_catalogue", "cam_friction", "cam_gravity", "cam_no_undercut", "cam_preloaded", "cam_six_springs",
-    "studies/cam_bought_parts", "studies/cam_radius_and_constant", "studies/cam_rest_length", "studies/cam_tolerance",
-)  # fmt: skip
-"""Configurations of cams that are moved slowly, for a constant force."""
+solve_rows = family("cam").rows
 
 SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 61})
 
@@ -156,15 +150,6 @@ def test_rows_around_a_cut_cam_are_runs_of_their_own(changes, ranges):
     assert many.vectorised
     compare(many)
     assert len(members(many)) >= 4
-
-
-@pytest.mark.parametrize("stem", CLOSED)
-def test_a_sweep_over_any_number_with_the_requirements_of_its_own_is_solved_in_rows(stem):
-    spec = config(stem)
-    for path, value in spec.leaves():
-        if path.startswith("mechanism.") and isinstance(value, float) and value and ".wound." not in path:
-            plan = GivenPoints({path: np.array([value, value * (1 + 1e-4 if "_factor" in path else 1 - 1e-4)])})
-            assert are_solved_together(Study(spec, plan.paths, metrics_of(spec, ("force_mean",))), plan), path
 
 
 def test_whoever_runs_on_a_corner_is_a_row_too():

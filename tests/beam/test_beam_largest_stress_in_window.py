@@ -11,8 +11,7 @@ from cfmkit import Run, api
 from cfmkit.families import family
 from cfmkit.families.beam.model import solve
 from cfmkit.metrics import evaluate
-from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies import Study, metrics_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 LAN = "beam_lan2010.yaml"

@@ -10,14 +10,11 @@ from study_rows import assert_rows_equal_runs, study_of
 
 import cfmkit
 from cfmkit import api
-from cfmkit.families.rows import Variants
-from cfmkit.families.slider_crank.springs.model import solve_rows
-from cfmkit.plots.study import draw_map, draw_metric
-from cfmkit.plots.study_data_to_draw import DrawnScale, StudyMarks
-from cfmkit.plots.style import png
+from cfmkit.families import Variants, family
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.plan import zip_axes
 from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.sensitivity.setup import prepare
 from cfmkit.studies.variants_in_rows import are_solved_together
 from cfmkit.studies.varied_axes import axes, collect_variations
 
@@ -148,7 +145,7 @@ def test_rows_have_the_warnings_of_single_runs(name, changes, expected):
 def test_what_cannot_be_solved_in_rows_is_left_out():
     spec = config("li2019")
     changes = ({}, {PATHS[3]: 0.0, PATHS[2]: 0.0}, {"mechanism.offset": 1.0}, {"mechanism.crank_length": 3.0}, {})
-    found = [indices.tolist() for indices, _ in solve_rows(variants(spec, changes))]
+    found = [indices.tolist() for indices, _ in family("slider-crank").rows(variants(spec, changes))]
     assert found == [[0, 4]]
 
 
@@ -157,10 +154,9 @@ def test_the_map_has_the_thresholds_to_six_digits():
     spec = config("li2019", mechanism__springs={"slider": "1 N/cm"})
     fold, per_degree = 0.1489334776, 180 / np.pi * 1e-2
     rates = fold * per_degree * (1 + np.linspace(-1e-6, 1e-6, 5))
-    ((_, found),) = solve_rows(variants(spec, [{PATHS[2]: rate} for rate in rates.tolist()]))
+    ((_, found),) = family("slider-crank").rows(variants(spec, [{PATHS[2]: rate} for rate in rates.tolist()]))
     words = [
-        api.family("slider-crank").outputs.words["stiffness_class"][int(kind)]
-        for kind in found.value("stiffness_class")
+        family("slider-crank").outputs.words["stiffness_class"][int(kind)] for kind in found.value("stiffness_class")
     ]
     assert words[:2] == ["bistable"] * 2
     assert words[3:] == ["local negative"] * 2
@@ -175,20 +171,6 @@ def test_words_are_metrics_without_a_range():
     )
 
 
-def test_words_are_drawn_as_regions_and_as_steps():
-    x, y = np.repeat([1.0, 2.0, 3.0], 4), np.tile([1.0, 2.0, 3.0, 4.0], 3)
-    words = ("positive", "zero", "bistable")
-    metric = DrawnScale("stiffness_class", "text", (x > 1.5) * 1.0 + (y > 2.5), words)
-    scales = DrawnScale("a.rate", "stiffness", x), DrawnScale("b.rate", "stiffness", y)
-    found = StudyMarks(scales, (metric,), (3, 4), np.ones(12, bool))
-    figure = draw_map(found, metric)
-    assert [text.get_text() for text in figure.axes[1].get_yticklabels()] == list(words)
-    assert len(png(figure)) > 1000
-    line = StudyMarks((DrawnScale("a.rate", "stiffness", x[::4]),), (), (), np.ones(3, bool))
-    steps = DrawnScale("stiffness_class", "text", np.array([0.0, 1.0, 2.0]), words)
-    assert [text.get_text() for text in draw_metric(line, steps).axes[0].get_yticklabels()] == list(words)
-
-
 def test_lists_side_by_side_may_repeat_a_value_but_not_a_set():
     spec = config("li2019")
     lists = {PATHS[0]: ("0 N*mm/rad", "1 N*mm/rad", "1 N*mm/rad"), PATHS[1]: ("1 N*mm/rad", "0 N*mm/rad", "1 N*mm/rad")}
@@ -201,8 +183,14 @@ def test_lists_side_by_side_may_repeat_a_value_but_not_a_set():
 
 
 def test_a_sensitivity_of_a_word_is_refused():
-    from cfmkit.studies.sensitivity.setup import prepare
-
     block = {"metrics": ("stiffness_class",), "parameters": {"mechanism.springs.slider": ("0.09 N/mm", "0.11 N/mm")}}
     with pytest.raises(cfmkit.SpecError, match="is a word"):
         prepare(config("li2019", sensitivity=block))
+
+
+def test_rows_whose_sliders_reach_equally_far_are_runs_of_their_own():
+    """From the stretched position the travel is twice its length, whatever the offset."""
+    spec = cfmkit.load("configs/studies/slider_crank_bilancia2019_start.yaml")
+    study, plan = study_of(spec, {"mechanism.offset": np.array([0.059, 0.0595, 0.0604])})
+    assert are_solved_together(study, plan)
+    assert_rows_equal_runs(study, plan)

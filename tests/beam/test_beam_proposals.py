@@ -1,0 +1,26 @@
+"""Shapes of networks that are kept for `suggest`."""
+
+from __future__ import annotations
+
+import pytest
+
+import cfmkit
+from cfmkit.families.beam.proposals import _write_shape, kept_shapes
+
+
+def test_kept_shapes_scale_as_beams_that_only_bend():
+    """Twice as large with twice the thickness: twice the force at twice the travel, the stress as before."""
+    shape = kept_shapes()[0]
+    own = shape.spec.mechanism
+    block = {"youngs_modulus": 2e9, "poisson_ratio": 0.35, "yield_strength": 76e6}
+    end = float(shape.motion[-1])
+    spec = _write_shape(shape, 2.0, block, (2.0 * own.thickness, own.width), (end, 2.0 * end))
+    curve = cfmkit.analyze(spec.replace({"analysis.fidelity": "inextensible"})).curve
+    assert curve.effort[-1] == pytest.approx(2.0 * shape.force[-1], rel=1e-5)
+    assert curve.extra["max_stress"].values[-1] == pytest.approx(shape.stress[-1], rel=1e-4)
+
+
+def test_no_stored_shape_touches_itself():
+    for kept in kept_shapes():
+        result = cfmkit.analyze(kept.spec.replace({"analysis.fidelity": "reissner", "analysis.points": 11}))
+        assert "beams_touch" not in {one.name for one in result.warnings}, kept.name
