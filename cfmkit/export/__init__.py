@@ -56,21 +56,21 @@ def files(
     tolerance = drawing.tolerance if tolerance is None else tolerance
     stem = check_name(drawing.name, "drawing")
     drawn = outlines(drawing.with_reference_square(), tolerance)
-    found: dict[str, bytes] = {}
+    contents: dict[str, bytes] = {}
     if "dxf" in formats:
-        found[f"{stem}.dxf"] = dxf_bytes(drawn, drawing.labels)
+        contents[f"{stem}.dxf"] = dxf_bytes(drawn, drawing.labels)
         if kerf is not None:
-            found[f"{stem}-kerf.dxf"] = dxf_bytes(with_kerf(drawn, kerf), drawing.labels)
+            contents[f"{stem}-kerf.dxf"] = dxf_bytes(with_kerf(drawn, kerf), drawing.labels)
     if "svg" in formats:
-        found[f"{stem}.svg"] = svg_bytes(stem, drawn, drawing.labels)
+        contents[f"{stem}.svg"] = svg_bytes(stem, drawn, drawing.labels)
     if "csv" in formats:
-        found |= write_points(drawing)
-    return found | _bodies(drawing, drawn, tolerance, formats)
+        contents |= write_points(drawing)
+    return contents | _bodies(drawing, drawn, tolerance, formats)
 
 
 def _bodies(drawing: Drawing, drawn: Sequence[Outline], tolerance: float, formats: Sequence[str]) -> dict[str, bytes]:
     """Return the files that have a third dimension."""
-    found: dict[str, bytes] = {}
+    contents: dict[str, bytes] = {}
     if {"stl", "3mf"} & set(formats):
         from cfmkit.export.extrusion import bodies, plates
         from cfmkit.export.stl import stl_bytes
@@ -78,9 +78,9 @@ def _bodies(drawing: Drawing, drawn: Sequence[Outline], tolerance: float, format
 
         extruded = bodies(plates(drawn, drawing.sheet, tolerance))
         writers = {"stl": stl_bytes, "3mf": threemf_bytes}
-        found |= {f"{drawing.name}.{one}": writers[one](drawing.name, extruded) for one in writers if one in formats}
+        contents |= {f"{drawing.name}.{one}": writers[one](drawing.name, extruded) for one in writers if one in formats}
     if "step" in formats:
         from cfmkit.export.step import step_bytes
 
-        found[f"{drawing.name}.step"] = step_bytes(drawing.name, drawn, drawing.sheet)
-    return found
+        contents[f"{drawing.name}.step"] = step_bytes(drawing.name, drawn, drawing.sheet)
+    return contents
