@@ -53,10 +53,10 @@ def _trees_are_forgotten() -> Iterator[None]:
 def _registrations_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave neither metrics nor families that a test registers to the next one."""
     from cfmkit import families
-    from cfmkit.specs import own_metrics
+    from cfmkit.specs import further_metrics
 
-    monkeypatch.setattr(own_metrics, "_METRICS_BY_NAME", {})
-    monkeypatch.setattr(own_metrics, "_TABLE_STAMP", [""])
+    monkeypatch.setattr(further_metrics, "_METRICS_BY_NAME", {})
+    monkeypatch.setattr(further_metrics, "_TABLE_STAMP", [""])
     monkeypatch.setattr(families, "_REGISTERED_FAMILIES", {})
     monkeypatch.setattr(families, "_REGISTRATION_STAMPS", {})
     monkeypatch.setattr(families, "_WITH_OWN_METRICS", {})

@@ -15,7 +15,7 @@ from timing import best
 import cfmkit
 from cfmkit.families import family
 from cfmkit.families.cam.outline import flank_edge
-from cfmkit.numerics.biarcs import fit_arcs
+from cfmkit.numerics.arc_chains import fit_arcs
 from cfmkit.plots.figures import figures
 from cfmkit.plots.style import png
 

@@ -24,13 +24,13 @@ from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.journal import Journal
-from cfmkit.studies.parts.outcomes import analyze_parts
+from cfmkit.studies.parts.drawn_parts import analyze_parts
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.plan import grid
 from cfmkit.studies.point_evaluation import Metric, Row, Study
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.sweep_request_and_files import outputs, summary_of
-from cfmkit.studies.varied_axes import axes, parse_variation
+from cfmkit.studies.variations import axes, parse_variation
 
 ROOT = Path(__file__).parents[1]
 SPEC = cfmkit.load(ROOT / "configs" / "cam.yaml").replace({"requirements": ()})

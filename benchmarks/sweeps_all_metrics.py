@@ -47,7 +47,7 @@ def measured(name: str, configs: Path, singly: bool) -> tuple[float, int, bool]:
     """Return processor time of a sweep [s], its rows, and whether blocks were used."""
     import cfmkit
     from cfmkit.studies import engine, sweep_request_and_files
-    from cfmkit.studies.varied_axes import parse_variation
+    from cfmkit.studies.variations import parse_variation
 
     file, *vary = SWEEPS[name]
     module = sweep_request_and_files

@@ -22,7 +22,7 @@ from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.studies.engine import run
-from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
+from cfmkit.studies.sensitivity.run_and_files import carry_out
 from cfmkit.studies.sensitivity.setup import prepare
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"

@@ -28,7 +28,7 @@ def seconds(name: str, parts: int) -> dict[str, float]:
     from cfmkit.families.run_control import Run
 
     try:
-        from cfmkit.studies.parts.drawn_yields import yields_of
+        from cfmkit.studies.parts.drawn_parts import yields_of
     except ImportError:  # until November 2026
         from cfmkit.studies.yield_of_drawn_parts import yields_of
 

@@ -53,13 +53,12 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.results import Design, Finding, Quantity, Result, Status
     from cfmkit.runs.batch import BatchResult, batch
-    from cfmkit.runs.examples import Example, examples
     from cfmkit.runs.measure_and_calibrate_api import calibrate, correct, measure
     from cfmkit.runs.notebook_result import AnalysisView
     from cfmkit.runs.register import metric, register
-    from cfmkit.runs.study_result import StudyResult
-    from cfmkit.runs.suggest_api import suggest
-    from cfmkit.runs.sweep_and_sensitivity_api import sensitivity, sweep
+    from cfmkit.runs.shipped_files import Example, examples
+    from cfmkit.runs.suggest import suggest
+    from cfmkit.runs.sweep_and_sensitivity_api import StudyResult, sensitivity, sweep
     from cfmkit.specs.spec import Spec
 
 __getattr__, _ = lazy_names(
@@ -67,7 +66,7 @@ __getattr__, _ = lazy_names(
     {
         "api": "analyze check design drawing dumps evaluate export figures load loads",
         "runs.batch": "BatchResult batch",
-        "runs.examples": "Example examples",
+        "runs.shipped_files": "Example examples",
         "curves": "Curve",
         "errors": (
             "CfmError DataError ExitCode FolderInUse GeometryError InputError OutputError Problem QuantityError "
@@ -81,9 +80,8 @@ __getattr__, _ = lazy_names(
         "results": "Design Finding Quantity Result Status",
         "specs.spec": "Spec",
         "runs.register": "metric register",
-        "runs.study_result": "StudyResult",
-        "runs.suggest_api": "suggest",
-        "runs.sweep_and_sensitivity_api": "sensitivity sweep",
+        "runs.sweep_and_sensitivity_api": "StudyResult sensitivity sweep",
+        "runs.suggest": "suggest",
     },
 )
 

@@ -13,7 +13,7 @@ from cfmkit.arrays import Named
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family, origin
 from cfmkit.families.run_control import Run
-from cfmkit.specs.own_metrics import names_of
+from cfmkit.specs.further_metrics import names_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -195,7 +195,7 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     record = family(spec.family)
     if record.design is None:
         raise UsageError(f"{record.phrase} cannot be designed, only analysed")
-    from cfmkit.studies.design_with_margins_and_verification import run_design
+    from cfmkit.studies.delivered_design import run_design
 
     return run_design(spec, record.design.make, run or Run())
 

@@ -278,7 +278,7 @@ class Result:
     def to_pandas(self) -> Any:
         """Return the curves as one tidy `pandas.DataFrame` in border units (mm, N, ...)."""
         from cfmkit.tables import curve_table
-        from cfmkit.tables.optional_libraries import library
+        from cfmkit.tables.table import library
 
         return library("pandas", "to_pandas").DataFrame(dict(curve_table(self.curves).as_dict()))
 
@@ -287,7 +287,7 @@ class Result:
         import numpy as np
 
         from cfmkit.tables import curve_table
-        from cfmkit.tables.optional_libraries import library
+        from cfmkit.tables.table import library
 
         table = curve_table(self.curves)
         found = library("xarray", "to_xarray").Dataset()

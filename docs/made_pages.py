@@ -52,7 +52,7 @@ def gallery(folder: Path) -> str:
     from cfmkit.families import family
     from cfmkit.plots.figures import figures
     from cfmkit.plots.style import png
-    from cfmkit.runs.examples import example
+    from cfmkit.runs.shipped_files import example
 
     parts = ["# Gallery\n", "Every picture is drawn by the command above it while this site is made.\n"]
     for name, changes, about in GALLERY:

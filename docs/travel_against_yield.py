@@ -13,7 +13,7 @@ from pathlib import Path
 import cfmkit
 from cfmkit.families.run_control import Run
 from cfmkit.results import Status
-from cfmkit.studies.parts.outcomes import analyze_parts
+from cfmkit.studies.parts.drawn_parts import analyze_parts
 from cfmkit.studies.parts.parts import Parts
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "studies" / "slider_crank_strip_yield.yaml"

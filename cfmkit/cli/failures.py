@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import typer
 
 from cfmkit import errors
-from cfmkit.documents.document import Document
-from cfmkit.documents.json_document import envelope
+from cfmkit.documents.document import Document, envelope
 from cfmkit.errors import ExitCode, OutputError, SpecError, StoppedBySignal, shorten_quotes
 
 if TYPE_CHECKING:

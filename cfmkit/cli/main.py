@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cfmkit._version import __version__
-from cfmkit.cli import streams
+from cfmkit.cli import output as streams
 from cfmkit.cli.commands import parse, program
 from cfmkit.cli.failures import Stopped, fail
 from cfmkit.cli.output import Terminal
-from cfmkit.documents.json_document import envelope
+from cfmkit.documents.document import envelope
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:

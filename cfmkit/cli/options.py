@@ -1,6 +1,7 @@
-"""Command-line options: functions that declare one, and the sets of options that several commands share.
+"""Command-line options: functions that declare one, sets of them that several commands share, and their completion.
 
 An option or argument is a field of the dataclass that a verb's `run` takes, called as the field unless it states names.
+A shell completes verbs, options and files by itself; here are names of families, topics, and keys.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
-from cfmkit.cli import shell_completion
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -20,6 +20,63 @@ if TYPE_CHECKING:
 
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.plots.figure_options import FigureForm
+
+
+LARGEST_HEAD = 20_000
+"""Characters of a file in which its family is looked for; a completion that reads more would be felt."""
+
+
+def families(incomplete: str) -> list[str]:
+    """Return the names of families that begin with the text typed so far."""
+    from cfmkit.families import names
+
+    return [name for name in names() if name.startswith(incomplete)]
+
+
+def topics(incomplete: str) -> list[str]:
+    """Return what `cfmkit show` explains and begins so: topics, families, and everything else that has a name."""
+    from cfmkit.cli.show_topics import TOPIC_HEADINGS, names
+
+    known = [*TOPIC_HEADINGS, *families("")]
+    # names by the hundred only once somebody has begun one
+    every = [*known, *names()] if incomplete else known
+    return list(dict.fromkeys(name for name in every if name.startswith(incomplete)))
+
+
+def changes(ctx: Any, incomplete: str) -> list[str]:
+    """Return what ``--set`` may begin with: keys of the family of the specification that was named, or of all.
+
+    Items of lists are completed with the number of the first.
+    """
+    from cfmkit import families
+    from cfmkit.specs.keys_and_schema import keys
+
+    path, equals, _ = incomplete.partition("=")
+    records = [families.family(name) for name in _families_named(ctx)]
+    known = {key.path.replace("[]", ".0"): key for record in records for key in keys(record.spec_type)}
+    if equals:
+        words = known[path].kind.split(" | ") if path in known and " | " in known[path].kind else []
+        return [f"{path}={word}" for word in words if f"{path}={word}".startswith(incomplete)]
+    found = [path for path in known if path.startswith(incomplete) and known[path].kind != "block"]
+    # one level at a time would save no key press: names below a block are few
+    return [f"{path}=" for path in found]
+
+
+def _families_named(ctx: Any) -> list[str]:
+    """Return the family of the specification on the command line; all of them where there is none to be read."""
+    from cfmkit import families
+
+    named = [ctx.params.get("spec"), *(ctx.params.get("specs") or ())]
+    found = []
+    for name in filter(None, named):
+        try:
+            with open(name, encoding="utf-8") as file:
+                lines = file.read(LARGEST_HEAD).splitlines()
+        except (OSError, UnicodeDecodeError):
+            continue
+        found += [line.partition(":")[2].split("#")[0].strip() for line in lines if line.startswith("family:")]
+    known = families.names()
+    return [name for name in found if name in known] or list(known)
 
 
 MAX_INTEGER = 2**63 - 1
@@ -99,7 +156,7 @@ class SpecOptions(Common):
         "Replace a value of the spec, with its unit, e.g. --set design.force='60 N'. Repeatable. "
         """Put a key that itself has dots in double quotes: 'a."b.c"=1 mm'. """
         "With a family in front it applies only to specs of that family: cam:design.force='60 N'.",
-        autocompletion=shell_completion.changes,
+        autocompletion=changes,
     )
 
     @property

@@ -1,8 +1,12 @@
-"""Options of output, and its streams: results to standard output, all else to standard error."""
+"""Output: results to standard output, all else to standard error, and options for both.
+
+Standard output and error never end a run: not by a closed pipe, nor by a character that cannot be encoded.
+"""
 
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import sys
 import time
@@ -10,15 +14,73 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.cli import streams
-from cfmkit.errors import visible
+from cfmkit.errors import OutputError, reason_of, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
+    from typing import TextIO
 
     from cfmkit.documents.document import Block, Document
 
     Report = Callable[[float, str], None]
+
+
+def make_tolerant() -> None:
+    """Make both streams escape characters that their encoding lacks; a stream that is closed discards everything."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif hasattr(stream := getattr(sys, name), "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def write_output(text: str) -> None:
+    """Write to standard output; if the reading process has ended (``| head``) the rest is dropped.
+
+    Raises OutputError if it cannot be written for another reason: a full disk behind a redirection.
+    """
+    try:
+        _write(sys.stdout, text)
+    except BrokenPipeError:
+        discard_output(sys.stdout)
+    except OSError as error:
+        discard_output(sys.stdout)
+        raise OutputError(f"cannot write standard output: {reason_of(error)}") from None
+
+
+def write_error(text: str) -> None:
+    """Write to standard error, if that is possible; unprintable characters are escaped."""
+    try:
+        _write(sys.stderr, "\n".join(map(visible, text.split("\n"))))
+    except OSError:
+        discard_output(sys.stderr)
+
+
+def flush() -> None:
+    """Flush both streams, so that nothing is left that could fail when the interpreter ends."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            discard_output(stream)
+
+
+def discard_output(stream: TextIO) -> None:
+    """Redirect a stream to the null device, with what its buffer still holds."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+def can_encode_all(stream: TextIO) -> bool:
+    """Return whether the encoding of a stream has every character."""
+    return (stream.encoding or "").lower().replace("-", "") == "utf8"
+
+
+def _write(stream: TextIO, text: str) -> None:
+    stream.write(text)
+    stream.flush()
+
 
 MIN_PAGE_COLUMNS, MAX_PAGE_COLUMNS = 40, 100
 """Columns of a page: in 40 every number still stands beside its name; wider than 100 a line is hard to read."""
@@ -61,8 +123,8 @@ class Terminal:
         """Print blocks to standard output."""
         from cfmkit.documents.terminal import print_blocks
 
-        ascii_only = not streams.can_encode_all(sys.stdout)
-        streams.write_output(print_blocks(blocks, self.width, sys.stdout.isatty(), ascii_only))
+        ascii_only = not can_encode_all(sys.stdout)
+        write_output(print_blocks(blocks, self.width, sys.stdout.isatty(), ascii_only))
 
     def show_page(self, document: Document) -> None:
         """Print the page of a document to standard output."""
@@ -72,13 +134,13 @@ class Terminal:
 
     def show_json(self, data: Mapping[str, Any]) -> None:
         """Print one JSON document to standard output."""
-        ascii_only = not streams.can_encode_all(sys.stdout)
-        streams.write_output(json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n")
+        ascii_only = not can_encode_all(sys.stdout)
+        write_output(json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n")
 
     def complain(self, lines: Sequence[str]) -> None:
         """Print lines to standard error."""
         for line in lines:
-            streams.write_error(f"{visible(line)}\n")
+            write_error(f"{visible(line)}\n")
 
     @contextmanager
     def progress(self, budget: float | None = None) -> Iterator[Report]:
@@ -123,7 +185,7 @@ class ProgressLines:
             self._reported = now
             left = (now - self._start) * (1.0 - self._most) / self._most
             time_left = f", {duration(left)} left" if self._most >= FIRST_ESTIMATE else ""
-            streams.write_error(f"{100 * self._most:.0f} %{time_left}: {text}\n")
+            write_error(f"{100 * self._most:.0f} %{time_left}: {text}\n")
 
 
 def duration(seconds: float) -> str:

@@ -13,7 +13,7 @@ from collections import deque
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from cfmkit.cli import streams
+from cfmkit.cli import output
 from cfmkit.cli.failures import Stopped
 from cfmkit.cli.output import LINE_EVERY, Bar, duration
 
@@ -72,7 +72,7 @@ class StudyProgress:
             text = f"{self._done} of {self._all} {self._things}, {self._sentence(now)}"
             self._bar.show(self._done, self._all, text)
         else:
-            streams.write_error(f"{self._done} of {self._all} {self._things}, {self._sentence(now)}\n")
+            output.write_error(f"{self._done} of {self._all} {self._things}, {self._sentence(now)}\n")
 
     def _sentence(self, now: float) -> str:
         rate = self._rate(now)
@@ -115,7 +115,7 @@ class StudyProgress:
         if self._bar is not None:
             self._bar.close()
             self._bar = None
-        streams.write_error(f"stopping after the {self._things} that run now; press Ctrl-C again to end at once\n")
+        output.write_error(f"stopping after the {self._things} that run now; press Ctrl-C again to end at once\n")
 
     def close(self) -> None:
         """Remove the bar."""

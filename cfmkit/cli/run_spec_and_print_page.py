@@ -40,7 +40,7 @@ def execute(
         time_budget=budget,
     )
     if task.animate == "mp4":
-        from cfmkit.plots.animation import require_ffmpeg
+        from cfmkit.plots.mechanism_in_motion import require_ffmpeg
 
         require_ffmpeg()
     with terminal.progress(budget) as progress:

@@ -82,7 +82,7 @@ class StudyFolder:
             self.folder.write(name, data)
         if self.in_parquet:
             from cfmkit.tables import read_csv
-            from cfmkit.tables.parquet_writing import parquet
+            from cfmkit.tables.table import parquet
 
             self.folder.write("results.parquet", parquet(read_csv(kept["results.csv"])))
         return kept
@@ -105,13 +105,13 @@ class StudyFolder:
             for name, content in form.write(figure, stem):
                 self.folder.write(name, content)
         if options.report:
-            from cfmkit.documents import html_of_study
+            from cfmkit.documents import report_html
 
             command = shlex.join(["cfmkit", *self.terminal.arguments])
             shown = form.select_page_figures(makers, drawn)
             point = command_of_a_point(options, study.design)
-            page = html_of_study.page(found, study.spec, varied, tables, command, shown, point)
-            self.folder.write(html_of_study.REPORT_NAME, page)
+            page = report_html.study_page(found, study.spec, varied, tables, command, shown, point)
+            self.folder.write(report_html.REPORT_NAME, page)
 
     def commit(
         self, found: Document, study: Study, seed: int, pieces: Sequence[Records], data: Mapping[str, Any]
@@ -165,7 +165,7 @@ def wants_parquet(text: str) -> bool:
     if unknown or not wanted:
         raise UsageError(f"--table: there is no format {''.join(unknown[:1])!r}; there are csv, parquet")
     if "parquet" in wanted:
-        from cfmkit.tables.parquet_writing import require_pyarrow
+        from cfmkit.tables.table import require_pyarrow
 
         require_pyarrow()
     return "parquet" in wanted

@@ -10,7 +10,7 @@ from cfmkit.documents.document import Field, field
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from cfmkit.stock.assumed_lasting import LastingData
+    from cfmkit.stock.materials import LastingData
 
     Section = tuple[str, Sequence[Mapping[str, Any]], tuple[Field, ...]]
 
@@ -24,7 +24,7 @@ PAGE_TEXT = (
 def materials_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, list[dict[str, Any]]]]:
     """Return title, text, tables and records of the page."""
     from cfmkit.stock import MATERIALS_BY_NAME
-    from cfmkit.stock.assumed_lasting import ASSUMED_DATA
+    from cfmkit.stock.materials import ASSUMED_DATA
 
     records = [
         {**asdict(item), "assumed": asdict(ASSUMED_DATA[item.name]) if item.name in ASSUMED_DATA else None}
@@ -66,7 +66,7 @@ def assumed_rows(name: str, entry: LastingData) -> list[dict[str, str]]:
 
     Examples
     --------
-    >>> from cfmkit.stock.assumed_lasting import ASSUMED_DATA
+    >>> from cfmkit.stock.materials import ASSUMED_DATA
     >>> [row["values"] for row in assumed_rows("pc", ASSUMED_DATA["pc"])]
     ['2.4 GPa at once, 2.2 GPa after 1 h, 1.9 GPa after 1000 h, 23 deg C']
     """
@@ -91,7 +91,7 @@ def assumed_rows(name: str, entry: LastingData) -> list[dict[str, str]]:
 
 def properties(item: Mapping[str, Any]) -> str:
     """Return the numbers of a material in words."""
-    from cfmkit.stock.assumed_lasting import ASSUMED_DATA
+    from cfmkit.stock.materials import ASSUMED_DATA
 
     scatter, strength = item["scatter"], item["yield_strength"]
     spread = _spread(scatter["poisson_ratio"])

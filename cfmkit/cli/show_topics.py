@@ -153,7 +153,7 @@ def stock_page() -> Document:
 
 def family_page(name: str) -> Document:
     """Return what a spec of a family may say, what a run can report, and where it comes from."""
-    from cfmkit.runs.dimension_drawing import DRAWING_FILE
+    from cfmkit.runs.shipped_files import DRAWING_FILE
     from cfmkit.specs.keys_and_schema import keys
     from cfmkit.specs.units import border_unit
 
@@ -232,7 +232,7 @@ def find_page(name: str) -> Document | None:
 
 def _symbols(name: str) -> list[Record]:
     """Return what a symbol such as ``theta2`` is in the drawings of the families."""
-    from cfmkit.runs.dimension_drawing import DRAWING_FILE, read_dimensions
+    from cfmkit.runs.shipped_files import DRAWING_FILE, read_dimensions
 
     return [
         {"name": row["symbol"], "family": record.name, "key": row["key"], "meaning": row["meaning"]}
@@ -268,7 +268,7 @@ def _keys(heading: str, name: str) -> set[str]:
 def _measured_in(unit: str) -> list[str]:
     """Return the dimensions that a unit such as ``N/mm`` measures; none if it is not a unit."""
     from cfmkit.specs.units import DIMENSIONS_BY_NAME
-    from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
+    from cfmkit.specs.units.table import border_size, is_unit, unit_size
 
     if not is_unit(unit):
         return []
@@ -293,8 +293,8 @@ def _materials() -> list[Record]:
 def _metrics(effort: Kind | None = None) -> list[Record]:
     """Return the metrics of curves of an effort, or of any, and those of many parts."""
     from cfmkit.metrics import definitions
+    from cfmkit.specs.further_metrics import OF_MANY_PARTS
     from cfmkit.specs.units import border_unit
-    from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
     of_parts = [(name, "ratio", about, False) for name, about in OF_MANY_PARTS.items()]
     of_curves = [(item.name, item.dimension, item.definition, item.per_branch) for item in definitions(effort)]
@@ -306,7 +306,7 @@ def _metrics(effort: Kind | None = None) -> list[Record]:
 
 def _values() -> list[Record]:
     """Return the values of the families, of the causes that they find in a measured loop, and of recordings."""
-    from cfmkit.experiment.value_definitions import define_recorded_values
+    from cfmkit.experiment.recorded_values import define_recorded_values
     from cfmkit.specs.units import border_unit
 
     every = families.records()

@@ -3,11 +3,11 @@
 `objective_and_constraints`
     What a family sees at a point, an objective and limits by name, becomes a program of `cfmkit.numerics.sqp`; which
     limits the point misses, and which of them hold it.
-`bounds_and_rounding`
+`rounded_and_reported_values`
     Numbers within bounds: rounded to what is written, and those that are at a bound.
 `run_many_starts`
     Many starts, in this process or several, each noted when it is finished, within a time budget.
-`reported_values_of_finished_design`
+`rounded_and_reported_values`
     What is reported of a design is what the analysis of its written specification measures.
 `robust_design`
     Values for which made parts are good: margins from tolerances by linear estimate, and drawn parts.

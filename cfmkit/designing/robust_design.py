@@ -5,11 +5,11 @@ Near a design both move in proportion to its values and to the errors of its par
 known by linear estimate, without solving one of them, and so is how far each limit must be drawn in: none is guessed.
 Derivatives are exact where the family has them, and central differences elsewhere.
 
-A step minimises, over such parts, the mean of the worst share of them (the conditional value at risk of the row that is
-missed most, counted in standard deviations of that row) [RU]. That is a linear program. It is followed as far as the
-numbers are trusted to be linear, judged anew where it ends, and repeated until the share that was wanted is reached,
-or no step gains. Where first order does not do, a few drawn parts are solved themselves, at every step
-(`optimise_on_samples`).
+A step minimises, over such parts, the mean of the worst share of them: the conditional value at risk of the row that is
+missed most, counted in standard deviations of that row. To first order in the values of a design it is least where a
+linear program is [RU]. That is followed as far as the numbers are trusted to be linear, judged anew where it ends, and
+repeated until the share that was wanted is reached, or no step gains. Where first order does not do, a few drawn parts
+are solved themselves, at every step (`optimise_on_samples`).
 
 Reference
 ---------
@@ -19,12 +19,9 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-
-from cfmkit.designing.conditional_value_at_risk import best_move, tail_risk
-from cfmkit.designing.first_order import SIGMA_STEP, NearParts, differentiate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,6 +29,128 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+
+
+SIGMA_STEP = 0.5
+"""Step of a difference by an error, in standard deviations: so small that its own curvature does not count."""
+
+
+def differentiate(
+    numbers: Callable[[int, float], FloatArray | None], ends: FloatArray, known: FloatArray | None = None
+) -> FloatArray | None:
+    """Return the derivatives of numbers of a part by some of its values, (q, d); None if a part has no numbers.
+
+    `numbers(k, value)`: those of a part whose k-th value is so, (q,); `ends`, (d, 2): the values between which a
+    difference is taken; `known`, (q, d): exact derivatives, NaN where one is not known.
+    """
+    columns = []
+    for k, (low, high) in enumerate(ends.tolist()):
+        if known is not None and np.isfinite(known[:, k]).all():
+            columns.append(known[:, k])
+            continue
+        above, below = numbers(k, high), numbers(k, low)
+        if above is None or below is None or not (np.isfinite(above).all() and np.isfinite(below).all()):
+            return None
+        columns.append((above - below) / (high - low))
+    return np.array(columns).T
+
+
+@dataclass(frozen=True)
+class NearParts:
+    """Numbers of a perfect part, and their derivatives by the errors of parts."""
+
+    middle: FloatArray  # (q,)
+    by_error: FloatArray  # (q, d)
+
+    def numbers(self, errors: FloatArray) -> FloatArray:
+        """Return the numbers of parts with errors (k, d), (k, q)."""
+        return np.asarray(self.middle + errors @ self.by_error.T)
+
+    def share(self, errors: FloatArray) -> float:
+        """Return the share of parts all of whose numbers are at least zero: of limits, those that keep every one."""
+        return float((self.numbers(errors) >= 0).all(axis=1).mean())
+
+    def spread(self, deviations: FloatArray) -> FloatArray:
+        """Return the standard deviation of each number, (q,), for errors of so large ones (d,)."""
+        return np.asarray(np.sqrt(((self.by_error * deviations) ** 2).sum(axis=1)))
+
+
+FIRST_ROWS, MORE_ROWS, MOST_PROGRAMS, ROW_SELECTION_LIMITS = 4, 2, 12, 1e-7
+"""Rows of a part that a linear program begins with, those that may come in each time, how often, and what counts as
+broken [standard deviations]: two or three programs are usual, of 192 parts and 306 rows each."""
+
+
+def tail_risk(parts: FloatArray, share: float) -> float:
+    """Return the conditional value at risk of the row that parts (k, m) miss most: below zero, the share is reached."""
+    worst = np.sort(-parts.min(axis=1))[::-1]
+    tail = max(1.0, (1.0 - share) * len(worst))
+    whole = int(tail)
+    rest = tail - whole
+    total = worst[:whole].sum() + (rest * worst[whole] if rest and whole < len(worst) else 0.0)
+    return float(total / tail)
+
+
+def best_move(
+    parts: FloatArray,  # (k, m): rows of each part
+    slopes: NDArray[np.float64],  # (k, m, n): their derivatives by the values
+    share: float,  # of parts that are to be good
+    # bounds, x: (n, 2) and (n,): bounds of the values, and where these are
+    bounds: FloatArray,
+    x: FloatArray,
+    trust: float,  # largest move, as a share of the ranges
+) -> FloatArray | None:
+    """Return the move of the values (n,) that lowers the risk most within the trust; None if there is none."""
+    kept = min(FIRST_ROWS, parts.shape[1])
+    # a program with every row of every part is large, and nearly all of its rows are idle: those that its answer would
+    # break come in, until it breaks none
+    chosen = np.zeros(parts.shape, dtype=bool)
+    np.put_along_axis(chosen, np.argpartition(parts, kept - 1, axis=1)[:, :kept], True, axis=1)
+    for _ in range(MOST_PROGRAMS):
+        found = _program(parts, slopes, chosen, share, bounds, x, trust)
+        if found is None:
+            return None
+        move, level, slack = found
+        left = parts + slopes @ move + level + slack[:, None]
+        worst = np.argsort(left, axis=1)[:, :MORE_ROWS]
+        present = np.take_along_axis(chosen, worst, axis=1)
+        broken = (np.take_along_axis(left, worst, axis=1) < -ROW_SELECTION_LIMITS) & ~present
+        if not broken.any():
+            return move
+        np.put_along_axis(chosen, worst, present | broken, axis=1)
+    return move
+
+
+def _program(
+    parts: FloatArray,
+    slopes: NDArray[np.float64],
+    chosen: NDArray[np.bool_],
+    share: float,
+    bounds: FloatArray,
+    x: FloatArray,
+    trust: float,
+) -> tuple[FloatArray, float, FloatArray] | None:
+    """Return the move (n,), the level and the slack of each part (k,) that are best for chosen rows (k, m)."""
+    from scipy.optimize import linprog
+    from scipy.sparse import csr_matrix, hstack
+
+    count, size = len(parts), len(x)
+    reach = bounds[:, 1] - bounds[:, 0]
+    part, row = np.nonzero(chosen)
+    # slack of the part + level + row + slope move >= 0
+    moves = csr_matrix(-slopes[part, row] * reach)
+    level = csr_matrix(-np.ones((len(part), 1)))
+    slack = csr_matrix((-np.ones(len(part)), (np.arange(len(part)), part)), shape=(len(part), count))
+    tail = max(1.0, (1.0 - share) * count)
+    cost = np.concatenate([np.zeros(size), [1.0], np.full(count, 1.0 / tail)])
+    low = np.maximum(-trust, (bounds[:, 0] - x) / reach)
+    high = np.minimum(trust, (bounds[:, 1] - x) / reach)
+    limits = [*zip(low.tolist(), high.tolist(), strict=True), (None, None), *([(0.0, None)] * count)]
+    solve: Any = linprog  # its stubs know no sparse matrices
+    found = solve(cost, hstack([moves, level, slack]).tocsr(), parts[part, row], bounds=limits, method="highs-ds")
+    if found.x is None:
+        return None
+    return np.asarray(found.x[:size] * reach), float(found.x[size]), np.asarray(found.x[size + 1 :])
+
 
 DIFFERENCE_STEP = 2e-4  # step of a difference by a value of the design, as a share of its range
 ONE_SIDED_MEAN = 0.25

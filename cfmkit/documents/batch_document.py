@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.studies.batch_sources_and_outcomes import Entry
-    from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
+    from cfmkit.studies.earlier_batch import BatchComparison
 
 MAX_CHANGES = 8  # changed values on a short page, so that verdicts stay on the screen
 

@@ -88,7 +88,7 @@ def references_of(name: str) -> dict[str, Any]:
     """Return what stands at the end of every page: the papers of a family, and the versions that computed."""
     from cfmkit._version import __version__
     from cfmkit.families import family
-    from cfmkit.store.manifest import imported_versions
+    from cfmkit.store.run_folder import imported_versions
 
     record = family(name)
     versions = {"cfmkit": __version__, **imported_versions()}

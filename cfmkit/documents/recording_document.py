@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.documents.document import Document, GridColumn, Note, PageTable
 from cfmkit.documents.run_document import short_value, warning_of
 from cfmkit.errors import ExitCode
-from cfmkit.experiment.coverage import NOT_RECORDED_TEXT
+from cfmkit.experiment.recorded_values import NOT_RECORDED_TEXT
 from cfmkit.metrics.metric_definitions import words
 
 if TYPE_CHECKING:

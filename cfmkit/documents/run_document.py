@@ -26,8 +26,8 @@ from cfmkit.errors import ExitCode
 from cfmkit.families import family
 from cfmkit.metrics import Window, evaluate, known_metrics, left_of, split_name, window_of
 from cfmkit.metrics.metric_definitions import words
+from cfmkit.specs.further_metrics import OF_MANY_PARTS
 from cfmkit.specs.units import border_unit, format_short, to_border
-from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

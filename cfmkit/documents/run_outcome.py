@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import ExitCode
 from cfmkit.metrics.requirements import judge_part_metric
 from cfmkit.results import Result, Status
-from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
-from cfmkit.tables.json_writing import json_bytes
+from cfmkit.specs.further_metrics import OF_MANY_PARTS
+from cfmkit.tables.csv_and_json import json_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

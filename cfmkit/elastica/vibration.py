@@ -31,9 +31,9 @@ from numpy.polynomial import legendre
 
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.derived_arrays import embed, raise_degree
 from cfmkit.elastica.mechanics.polynomials import basis, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.mechanics.refine import embed, raise_degree
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.errors import InputError
 from cfmkit.numerics.one_blas_thread import one_blas_thread

@@ -1,9 +1,10 @@
 """Measured curves: reading lab files, branches, filters, hysteresis, and what a model makes of them.
 
 `reading` reads a file as it comes, `branches` splits it
-at reversals, `low_pass` smooths each branch, `curves_and_metrics_of_recording` puts the numbers together.
+at reversals, `corrections_and_low_pass` smooths each branch,
+`curves_and_metrics_of_recording` puts the numbers together.
 """
 
 from cfmkit.lazy_names import lazy_names
 
-__getattr__, __all__ = lazy_names(__name__, {"comparison": "compare", "value_definitions": "define_recorded_values"})
+__getattr__, __all__ = lazy_names(__name__, {"comparison": "compare", "recorded_values": "define_recorded_values"})

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import DataError, UsageError
-from cfmkit.experiment.zeros_and_signs import words_of
+from cfmkit.experiment.corrections_and_low_pass import words_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,10 +10,15 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD_BRANCH, UNLOAD_BRANCH
-from cfmkit.experiment.coverage import empty_uncovered, holes_of, large_holes
 from cfmkit.experiment.curves_and_metrics_of_recording import elapsed_fraction
-from cfmkit.experiment.loop_area_and_repeatability import loop_area
-from cfmkit.experiment.value_definitions import RECORDED_VALUES, define_recorded_values
+from cfmkit.experiment.recorded_values import (
+    RECORDED_VALUES,
+    define_recorded_values,
+    empty_uncovered,
+    holes_of,
+    large_holes,
+    loop_area,
+)
 from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
@@ -30,8 +35,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
-    from cfmkit.experiment.coverage import UnrecordedInterval
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
+    from cfmkit.experiment.recorded_values import UnrecordedInterval
     from cfmkit.metrics.compare import Measure
     from cfmkit.results import Result
 

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.experiment.aimed_curve import aim_of, analyze_part
 from cfmkit.experiment.errors_of_made_part import explain, name_of
 from cfmkit.experiment.parameters_to_fit import DATA_PREFIX
-from cfmkit.experiment.redrawn_values import Redesign, largest_miss, limits_of
+from cfmkit.experiment.redrawn_values import Redesign, aim_of, analyze_part, largest_miss, limits_of
 from cfmkit.families.run_control import Run
 from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
@@ -27,9 +26,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.experiment.aimed_curve import AimedCurve
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.experiment.errors_of_made_part import Explanation
+    from cfmkit.experiment.redrawn_values import AimedCurve
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 

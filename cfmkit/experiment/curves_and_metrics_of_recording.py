@@ -22,7 +22,10 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve, Kind
 from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.branches import LOAD_BRANCH, UNLOAD_BRANCH, Cycles, Stroke, Strokes, choose, read_cycles, split
-from cfmkit.experiment.coverage import (
+from cfmkit.experiment.corrections_and_low_pass import DEFAULT_ORDER, LowPass, correct_recording, low_passed
+from cfmkit.experiment.findings import RECORDING_FINDINGS, passages_left_out, spikes_left_out, warnings_of
+from cfmkit.experiment.reading import read_recording
+from cfmkit.experiment.recorded_values import (
     UnrecordedInterval,
     coverage,
     empty_uncovered,
@@ -31,14 +34,11 @@ from cfmkit.experiment.coverage import (
     large_holes,
     least,
     number_of,
+    repeatability,
     select_cycle,
+    turned_loop,
 )  # fmt: skip
-from cfmkit.experiment.findings import RECORDING_FINDINGS, passages_left_out, spikes_left_out, warnings_of
-from cfmkit.experiment.loop_area_and_repeatability import repeatability, turned_loop
-from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
-from cfmkit.experiment.reading import read_recording
 from cfmkit.experiment.reversal_transitions import remove_transitions
-from cfmkit.experiment.zeros_and_signs import correct_recording
 from cfmkit.metrics import Definition, MeasuringFrame, Window, measure, metrics_by_name
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
@@ -122,7 +122,7 @@ def _check_words(low_pass: LowPass | str | None, leave_out: Collection[str]) -> 
     if isinstance(low_pass, str) and low_pass != "default":
         raise UsageError(
             f"low_pass: {low_pass!r} is no filter; give 'default', None for no filter, or a LowPass "
-            f"('read_filter({low_pass!r})' of cfmkit.experiment.low_pass reads one)"
+            f"('read_filter({low_pass!r})' of cfmkit.experiment.corrections_and_low_pass reads one)"
         )
     if isinstance(leave_out, str) or not set(leave_out) <= set(LEFT_OUT):
         raise UsageError(f"leave_out: a collection of {' and '.join(map(repr, LEFT_OUT))} is needed, not {leave_out!r}")
@@ -131,7 +131,7 @@ def _check_words(low_pass: LowPass | str | None, leave_out: Collection[str]) -> 
 def read_measured(
     path: str | os.PathLike[str],  # as for `cfmkit.experiment.reading.read_recording`
     units: str | None = None,  # likewise
-    # tare, zero, flip: as for `cfmkit.experiment.zeros_and_signs.correct_recording`
+    # tare, zero, flip: as for `cfmkit.experiment.corrections_and_low_pass.correct_recording`
     tare: str | float | None = None,
     zero: str | float | None = None,
     flip: Collection[str] = (),

@@ -31,8 +31,8 @@ from cfmkit.families.run_control import Run
 from cfmkit.metrics import Window
 from cfmkit.numerics.robust_statistics import robust_scale
 from cfmkit.specs.units import format_short
-from cfmkit.studies.parts.assumed_errors import assume_errors
-from cfmkit.studies.variable_paths import leaf
+from cfmkit.studies.parts.parts import assume_errors
+from cfmkit.studies.variations import leaf
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.experiment.comparison import Comparison
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.parts.assumed_errors import Assumed
+    from cfmkit.studies.parts.parts import Assumed
 
 STRONG_EVIDENCE = 10.0  # difference of Schwarz's criterion from which one explanation is preferred to another
 MOST_ERRORS = 3  # errors that are fitted at once: a force curve has hardly more independent features

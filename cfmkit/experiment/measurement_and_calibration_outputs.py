@@ -13,9 +13,9 @@ import numpy as np
 
 from cfmkit.curves import Column
 from cfmkit.experiment.calibration import MAX_HALF_INTERVAL, UNDETERMINED_MESSAGE, table
-from cfmkit.experiment.coverage import hole_finding
+from cfmkit.experiment.corrections_and_low_pass import raw_zeros, words_of
 from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
-from cfmkit.experiment.zeros_and_signs import raw_zeros, words_of
+from cfmkit.experiment.recorded_values import hole_finding
 from cfmkit.metrics import flat_metrics, metrics_json, split_name
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
@@ -202,7 +202,7 @@ def files(
     form: FigureForm | None = None,  # how figures are written; default: as PNG, as they are drawn
 ) -> Iterator[tuple[str, bytes]]:
     """Yield every file of a measurement as (name below the folder, content)."""
-    from cfmkit.tables.json_writing import json_bytes
+    from cfmkit.tables.csv_and_json import json_bytes
 
     yield "curve.csv", to_csv(_stack_tables({name: curves_table(report.source) for name, report in reports.items()}))
     yield "cycles.csv", to_csv(_stack_tables({name: cycles_table(report) for name, report in reports.items()}))

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
-from cfmkit.specs.yamlio.allowed_at_path import Slot
-from cfmkit.studies.variable_paths import CannotVary, leaf
+from cfmkit.specs.yamlio.paths import Slot
+from cfmkit.studies.variations import CannotVary, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -1,7 +1,8 @@
 """Drawn values moved until the part that is made of them has the curve that is aimed at.
 
-Values of what is made may move: those that the design chooses, widths and thicknesses; not what is bought, and not the
-widths that a sheet decides. They move as little as possible, widths before thicknesses before all others.
+That curve is the one of a perfect part of the design, at the force that is requested. Values of what is made may move:
+those that the design chooses, widths and thicknesses; not what is bought, and not the widths that a sheet decides. They
+move as little as possible, widths before thicknesses before all others.
 """
 
 from __future__ import annotations
@@ -12,29 +13,113 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from cfmkit.designing.bounds_and_rounding import range_about
+from cfmkit.designing.rounded_and_reported_values import range_about
 from cfmkit.errors import CfmError, SolutionError
-from cfmkit.experiment.aimed_curve import N_PLACES, analyze_part
 from cfmkit.experiment.errors_of_made_part import is_thickness
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE_METRICS
-from cfmkit.metrics import check, values_of_family
+from cfmkit.families.run_control import Run
+from cfmkit.metrics import Undefined, Window, check, frame_of, values_of_family, window_of
+from cfmkit.metrics.compare import effort_at
 from cfmkit.specs.units import format_short, from_border, to_border
-from cfmkit.specs.yamlio.path_notation import read_item_suffix
+from cfmkit.specs.yamlio.paths import read_item_suffix
 from cfmkit.stock.material_and_part_spec import sheet_of
-from cfmkit.studies.parts.assumed_errors import accuracy_of, assume_errors
+from cfmkit.studies.parts.parts import accuracy_of, assume_errors
 from cfmkit.studies.parts.redesign import free_of
 from cfmkit.studies.stock_and_digits import decimals_of
-from cfmkit.studies.variable_paths import leaf
+from cfmkit.studies.variations import leaf
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.experiment.aimed_curve import AimedCurve
+    from cfmkit.curves import Curve
     from cfmkit.experiment.parameters_to_fit import FitParameter
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
+
+
+N_PLACES = 65  # places of the window at which the corrected curve is to be the one that was designed
+LARGEST_RESCALING = 0.03
+"""Deviation of the designed mean from the target up to which it is taken for rounding and removed, too."""
+
+
+@dataclass(frozen=True)
+class AimedCurve:
+    """The curve that a corrected part is to have."""
+
+    places: FloatArray  # (n,) [m or rad]
+    efforts: tuple[FloatArray, ...]  # (n,) of each curve [N or N m]
+    branches: tuple[str, ...]  # whose mean it is
+
+    @property
+    def level(self) -> float:
+        """Root mean square [N or N m]."""
+        return float(np.sqrt(np.mean(np.square(self.efforts))))
+
+    @property
+    def mean_effort(self) -> float:
+        """Mean of the first curve that is aimed at [N or N m]."""
+        return float(np.mean(self.efforts[0]))
+
+    def departure(self, curves: Sequence[Curve]) -> FloatArray:
+        """Return by how much curves are above the aim, over its level, (m n,); NaN where they have no value."""
+        departure: FloatArray = np.concatenate(
+            [
+                middle(curve, self.branches, self.places) - effort
+                for curve, effort in zip(curves, self.efforts, strict=True)
+            ]
+        )
+        return departure / self.level
+
+    def mean(self, curves: Sequence[Curve]) -> float:
+        """Return the mean of the first curve [N or N m]."""
+        return float(np.nanmean(middle(curves[0], self.branches, self.places)))
+
+
+def middle(curve: Curve, branches: Sequence[str], places: FloatArray) -> FloatArray:
+    """Return the mean of some branches of a curve at some places; branches that it does not have are left out.
+
+    Raises SolutionError if a branch turns back.
+    """
+    names = [name for name in branches if name in curve.branches] or list(curve.branches[:1])
+    try:
+        effort: FloatArray = np.mean([effort_at(curve, name, places) for name in names], axis=0)
+    except Undefined:
+        raise SolutionError("the force has several values at one place: such a curve is not corrected") from None
+    return effort
+
+
+def analyze_part(spec: Spec) -> Result:
+    """Return the result of a part.
+
+    Raises SolutionError if it has no curve.
+    """
+    result: Result = family(spec.family).analyze(spec, Run())
+    if not result.curves:
+        raise SolutionError(f"there is no curve to correct: {result.message}")
+    return result
+
+
+def aim_of(nominal: Result) -> AimedCurve:
+    """Return the curve that a perfect part of a drawing has, at the force that is requested.
+
+    A target may hold between the branches or on one of them: it holds where it is met.
+    """
+    curve, target = nominal.curve, frame_of(nominal).target
+    window = window_of(nominal) or Window(float(curve.motion.min()), float(curve.motion.max()))
+    places = np.linspace(window.lo, window.hi, N_PLACES)
+    choices = [curve.branches, *((name,) for name in curve.branches)] if len(curve.branches) > 1 else [curve.branches]
+    branches, scale = tuple(choices[0]), 1.0
+    if target and nominal.target_curve is None and nominal.spec.target_curve is None and len(nominal.curves) == 1:
+        means = [float(np.nanmean(middle(curve, names, places))) for names in choices]
+        nearest = min(range(len(choices)), key=lambda k: (round(abs(means[k] / target - 1.0), 3), k))
+        branches = tuple(choices[nearest])
+        scale = target / means[nearest] if abs(target / means[nearest] - 1.0) <= LARGEST_RESCALING else 1.0
+    efforts = [scale * middle(item, branches, places) for item in nominal.curves]
+    is_known = np.all(np.isfinite(efforts), axis=0)
+    return AimedCurve(places[is_known], tuple(effort[is_known] for effort in efforts), branches)
+
 
 MOST_CHANGE = 3.0  # factor by which a drawn value may change where the design does not limit it
 SECTION_RELUCTANCE = {"width": 1e-4, "thickness": 1e-3}

@@ -47,11 +47,9 @@ def files(
     body; UsageError if the library for a format is not installed.
     """
     from cfmkit.export.arc_outlines import outlines
-    from cfmkit.export.dxf import dxf_bytes
+    from cfmkit.export.contours import check_name
+    from cfmkit.export.dxf_svg_csv import dxf_bytes, svg_bytes, write_points
     from cfmkit.export.kerf import with_kerf
-    from cfmkit.export.layers import check_name
-    from cfmkit.export.points_csv import write_points
-    from cfmkit.export.svg import svg_bytes
 
     tolerance = drawing.tolerance if tolerance is None else tolerance
     stem = check_name(drawing.name, "drawing")
@@ -72,15 +70,13 @@ def _bodies(drawing: Drawing, drawn: Sequence[Outline], tolerance: float, format
     """Return the files that have a third dimension."""
     contents: dict[str, bytes] = {}
     if {"stl", "3mf"} & set(formats):
-        from cfmkit.export.extrusion import bodies, plates
-        from cfmkit.export.stl import stl_bytes
-        from cfmkit.export.three_mf import threemf_bytes
+        from cfmkit.export.bodies_stl_3mf_step import bodies, plates, stl_bytes, threemf_bytes
 
         extruded = bodies(plates(drawn, drawing.sheet, tolerance))
-        writers = {"stl": stl_bytes, "3mf": threemf_bytes}
+        writers = {"bodies_stl_3mf_step": stl_bytes, "3mf": threemf_bytes}
         contents |= {f"{drawing.name}.{one}": writers[one](drawing.name, extruded) for one in writers if one in formats}
     if "step" in formats:
-        from cfmkit.export.step import step_bytes
+        from cfmkit.export.bodies_stl_3mf_step import step_bytes
 
         contents[f"{drawing.name}.step"] = step_bytes(drawing.name, drawn, drawing.sheet)
     return contents

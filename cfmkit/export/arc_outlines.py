@@ -17,8 +17,7 @@ import numpy as np
 
 from cfmkit.errors import GeometryError
 from cfmkit.export.contours import Arc, Contour, Drawing, Edge, Line
-from cfmkit.numerics.arc_chain import ArcChain
-from cfmkit.numerics.biarcs import CoarseDataError, fit_arcs
+from cfmkit.numerics.arc_chains import ArcChain, CoarseDataError, fit_arcs
 from cfmkit.specs.units import format_short, to_border
 
 if TYPE_CHECKING:

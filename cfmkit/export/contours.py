@@ -1,28 +1,127 @@
-"""Planar outlines as values: what families draw and `cfmkit.export` writes.
+"""Planar outlines as values, with layers and sections of beams: what families draw and `cfmkit.export` writes.
 
 A contour is a chain of edges, each ending where the next begins. Smooth curves
 carry exact points and exact unit tangents, so that an exporter can fit arcs or
 splines within a stated tolerance instead of chopping them into a polyline.
-All lengths in metres.
+All lengths in metres. How each layer looks is said for every file format.
+
+Sections of beams, as specified, say how thick a drawn or meshed part must be: across the middle of every smooth piece
+of a beam it has the beam's thickness. Joints are left out: sections at which the part runs on into another beam or a
+block, and short pieces beside a step, which a fillet may thicken.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from cfmkit.arrays import FloatArray, ShortRepr, distinct, read_only
-from cfmkit.export.layers import DRIVEN_LAYER, HELD_LAYER
-from cfmkit.numerics.biarcs import cubic
+from cfmkit.errors import GeometryError
+from cfmkit.numerics.arc_chains import cubic
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
-    from cfmkit.export.beam_sections import BeamSection
     from cfmkit.results import Finding
+
+
+@dataclass(frozen=True)
+class LayerLook:
+    """Colour as AutoCAD index and as RGB, and the dashes [mm] of a line that nothing is cut along."""
+
+    index: int
+    rgb: str
+    dashes: tuple[float, ...] = ()
+
+
+_LAYER_LOOKS = {
+    "cut": LayerLook(1, "#ff0000"),
+    "path": LayerLook(150, "#007fff", (6.0, 1.5, 1.0, 1.5)),
+    "reference": LayerLook(8, "#808080"),
+}
+HELD_LAYER, DRIVEN_LAYER = "held", "driven"
+"""Layers of what stands while the mechanism works, and of what is moved: closed contours that nothing is cut along."""
+ENGRAVED_LAYER = "engraved"  # layer of texts on the parts
+_MARK_LOOKS = {HELD_LAYER: LayerLook(3, "#008000", (1.0, 1.0)), DRIVEN_LAYER: LayerLook(30, "#ff8000", (1.0, 1.0))}
+_MARK_LOOKS[ENGRAVED_LAYER] = LayerLook(5, "#0000ff")
+_OTHER_LOOKS = (LayerLook(6, "#ff00ff"), LayerLook(4, "#00a0a0"), LayerLook(34, "#995200"), LayerLook(92, "#408000"))
+
+
+def looks(used: Iterable[str]) -> dict[str, LayerLook]:
+    """Return the look of the three usual layers, of marks and of every other one in use, in that order."""
+    used = list(dict.fromkeys(used))
+    marks = {name: look for name, look in _MARK_LOOKS.items() if name in used}
+    others = [name for name in used if name not in _LAYER_LOOKS | marks]
+    for name in others:
+        check_name(name, "layer")
+    return _LAYER_LOOKS | marks | {name: _OTHER_LOOKS[index % len(_OTHER_LOOKS)] for index, name in enumerate(others)}
+
+
+def check_name(name: str, what: str) -> str:
+    """Return `name` if it can be part of a file name and of every format.
+
+    Raises GeometryError if it cannot.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}", name):
+        raise GeometryError(f"{name!r} cannot name a {what}: use letters, digits, '-', '_' and '.', at most 100")
+    return name
+
+
+SECTION_RTOL = 1e-3  # largest relative error of an area and of a section modulus, b t^2 / 6
+
+
+@dataclass(frozen=True, eq=False)
+class BeamSection:
+    """A section of a beam as specified."""
+
+    beam: str  # its name, for messages
+    # at, across, (2,): its middle [m], and the unit vector along it
+    at: FloatArray
+    across: FloatArray
+    # thickness, length: of the beam there, and of its piece that is smooth [m]
+    thickness: float
+    length: float
+
+    def cut(self, starts: FloatArray, ends: FloatArray) -> tuple[float, float]:
+        """Return how far the material goes to both sides, as bounded by lines (n, 2) [m]; infinite without a bound."""
+        along = np.array([self.across[1], -self.across[0]])
+        one, other = ((points - self.at) @ along for points in (starts, ends))
+        met = (one > 0) != (other > 0)
+        share = one[met] / (one[met] - other[met])
+        away = ((starts[met] + share[:, None] * (ends[met] - starts[met])) - self.at) @ self.across
+        return (
+            float(-away[away < 0].max(initial=-np.inf)),
+            float(away[away > 0].min(initial=np.inf)),
+        )
+
+    def line(self, cut: tuple[float, float]) -> FloatArray:
+        """Return the ends of the section that reaches so far to both sides (2, 2) [m]."""
+        return np.array([self.at - cut[0] * self.across, self.at + cut[1] * self.across])
+
+    def check(self, measured: float, what: str, remedy: str) -> None:
+        """Refuse a thickness [m] whose section modulus is not that of the specification.
+
+        Raises GeometryError with the beam, the place, both values and a remedy.
+        """
+        if abs((measured / self.thickness) ** 2 - 1.0) <= SECTION_RTOL:
+            return
+        x, y = (format_short(float(one), "length") for one in self.at)
+        found = f"{format_short(measured, 'length')} thick" if np.isfinite(measured) else "endless"
+        raise GeometryError(
+            f"beam {self.beam!r} is {found} in the {what} at ({x}, {y}), but "
+            f"{format_short(self.thickness, 'length')} in the specification: {remedy}"
+        )
+
+
+def lines_of(rings: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return starts and ends (n, 2) of the lines of closed rings (k, 2) of points [m]."""
+    return np.concatenate(list(rings)), np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+
 
 OUTLINE_TOLERANCE = 5e-6  # how far outlines may be from the exact ones by default [m]
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.export.contours import Arc, Contour, Line, Smooth, signed_area
 from cfmkit.export.traced_edges import pair
-from cfmkit.numerics.biarcs import cubic, slope
+from cfmkit.numerics.arc_chains import cubic, slope
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -19,7 +19,7 @@ import numpy as np
 
 from cfmkit.errors import GeometryError
 from cfmkit.export.arc_outlines import check_outlines, flat_points, flat_sagitta, place
-from cfmkit.numerics.arc_chain import ArcChain, points_on
+from cfmkit.numerics.arc_chains import ArcChain, points_on
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:

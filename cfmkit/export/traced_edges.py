@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.export.contours import Arc, Edge, Line, Smooth
-from cfmkit.numerics.biarcs import cubic, slope
+from cfmkit.numerics.arc_chains import cubic, slope
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

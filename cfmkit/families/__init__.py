@@ -16,17 +16,16 @@ from cfmkit.errors import UsageError, visible
 from cfmkit.families import entry_point_plugins
 from cfmkit.families.entry_point_plugins import Unusable, forget_installed
 from cfmkit.lazy_names import lazy_names
-from cfmkit.specs import own_metrics
+from cfmkit.specs import further_metrics
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.families.base import DesignMethod, ElasticParts, Family, Pictures, ResultNames, function_named
-    from cfmkit.families.findings import Finder
+    from cfmkit.families.findings import CannotBuild, Finder, Infeasible
     from cfmkit.families.hardware import PIN_STRENGTH, PartStrength
-    from cfmkit.families.no_mechanism import CannotBuild, Infeasible
+    from cfmkit.families.proposals import Candidate, FamilyOffer, Request
     from cfmkit.families.rows import FindingRule, ScalarQuantity, SolvedRows, Variants
-    from cfmkit.families.suggestion_request import Candidate, FamilyOffer, Request
 
 FAMILY_MODULES = {
     "beam": "cfmkit.families.beam.record",
@@ -108,22 +107,22 @@ def family(name: str) -> Family:
         If there is none; the message names the nearest. Or if a metric of the user has the name of another one.
     """
     record = _record(name)
-    return record if not own_metrics.own_metrics() else _with_own_metrics(record)
+    return record if not further_metrics.own_metrics() else _with_own_metrics(record)
 
 
 def _with_own_metrics(record: Family) -> Family:
     """Return a family whose values have the metrics of the user; the same record until one of them changes."""
     stamp, plain, extended = _WITH_OWN_METRICS.get(record.name, ("", None, record))
-    if stamp != own_metrics.stamp() or plain is not record:
+    if stamp != further_metrics.stamp() or plain is not record:
         from cfmkit.metrics import known_metrics
 
         taken = {*record.outputs.values, *(item.name for item in known_metrics(None))}
-        metrics = own_metrics.own_metrics()
+        metrics = further_metrics.own_metrics()
         if clash := [name for name in metrics if name in taken]:
             raise UsageError(f"the metric {clash[0]!r} needs another name: {record.phrase} has one of this name")
         about = {name: (metric.dimension, metric.definition) for name, metric in metrics.items()}
         extended = replace(record, outputs=replace(record.outputs, values={**record.outputs.values, **about}))
-        _WITH_OWN_METRICS[record.name] = own_metrics.stamp(), record, extended
+        _WITH_OWN_METRICS[record.name] = further_metrics.stamp(), record, extended
     return extended
 
 
@@ -179,7 +178,7 @@ def origin(name: str) -> dict[str, str]:
         ``package``, ``version`` and ``content``, the SHA-256 of its files: what is kept for a later run is of these.
         ``registered`` where functions of this process compute: those of no other process are the same.
     """
-    stamps = [*filter(None, (_REGISTRATION_STAMPS.get(name), own_metrics.stamp()))]
+    stamps = [*filter(None, (_REGISTRATION_STAMPS.get(name), further_metrics.stamp()))]
     return _package_of(name) | ({"registered": " ".join(stamps)} if stamps else {})
 
 
@@ -196,18 +195,17 @@ def origins() -> dict[str, dict[str, str]]:
         offer.name: origin(offer.name) for offer in entry_point_plugins.offers() if offer.name not in FAMILY_MODULES
     }
     computed |= {name: origin(name) for name in _REGISTERED_FAMILIES}
-    return computed | ({"metrics": {"registered": own_metrics.stamp()}} if own_metrics.stamp() else {})
+    return computed | ({"metrics": {"registered": further_metrics.stamp()}} if further_metrics.stamp() else {})
 
 
 __getattr__, _OFFERED_NAMES = lazy_names(
     __name__,
     {
         "base": "DesignMethod ElasticParts Family Pictures ResultNames function_named",
-        "findings": "Finder",
+        "findings": "Finder CannotBuild Infeasible",
         "hardware": "PIN_STRENGTH PartStrength",
-        "no_mechanism": "CannotBuild Infeasible",
         "rows": "FindingRule ScalarQuantity SolvedRows Variants",
-        "suggestion_request": "Candidate FamilyOffer Request",
+        "proposals": "Candidate FamilyOffer Request",
     },
 )
 

@@ -12,7 +12,7 @@ from cfmkit.arrays import LazyMapping
 from cfmkit.errors import CfmError, UsageError
 from cfmkit.families.run_control import Run  # noqa: TC001  packages of other families may import it from here
 from cfmkit.results import OVERWRITTEN_FINDING, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE, Quantity
-from cfmkit.specs.own_metrics import own_metrics
+from cfmkit.specs.further_metrics import own_metrics
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from cfmkit.export.contours import Drawing
     from cfmkit.export.posed_part import PosedPart
     from cfmkit.families.papers import Paper
+    from cfmkit.families.proposals import FamilyOffer, Request
     from cfmkit.families.rows import SolvedRows
-    from cfmkit.families.suggestion_request import FamilyOffer, Request
-    from cfmkit.plots.poses_in_one_svg import Moving
+    from cfmkit.plots.mechanism_in_motion import Moving
     from cfmkit.results import Design, Result
     from cfmkit.solid.adaptive_solution import DrivenPart
-    from cfmkit.specs.own_metrics import OwnMetric
+    from cfmkit.specs.further_metrics import OwnMetric
     from cfmkit.specs.spec import Spec
 
 

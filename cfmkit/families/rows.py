@@ -18,7 +18,7 @@ from cfmkit.errors import CfmError
 from cfmkit.numerics.roots import bracketed_root, bracketed_roots
 from cfmkit.results import Quantity
 from cfmkit.specs.spec import Model
-from cfmkit.specs.yamlio.allowed_at_path import slots_at
+from cfmkit.specs.yamlio.paths import slots_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping

@@ -1,12 +1,12 @@
 """Constant-force metrics by name, over a stated window, per branch; and requirements on them.
 
 `metric_definitions` lists what there is and what a name may mean, `window_metrics` and `ranges` compute it,
-`branches_cut_to_window` cuts windows, `branch_views` is what a metric looks at, `metric_values` runs the definitions
-over a curve, `requirements` compares with bounds, `metrics_json` writes border units.
+`branches` cuts windows, `branch_views` is what a metric looks at, `metric_values` runs the definitions
+over a curve, `requirements` compares with bounds, `metric_values` writes border units.
 """
 
 from cfmkit.metrics.branch_views import Branch, MeasuringFrame
-from cfmkit.metrics.branches_cut_to_window import BranchTrace, Undefined, Window, restrict, traces
+from cfmkit.metrics.branches import BranchTrace, Undefined, Window, restrict, traces
 from cfmkit.metrics.compare import MetricChange
 from cfmkit.metrics.definition import Definition
 from cfmkit.metrics.metric_definitions import (
@@ -22,18 +22,21 @@ from cfmkit.metrics.metric_definitions import (
 )
 from cfmkit.metrics.metric_values import (
     Survey,
+    as_json,
     evaluate,
+    flat_metrics,
     frame_of,
     gaps,
     left_of,
     mean_effort,
     measure,
+    metrics_json,
+    search_json,
     survey,
     travel_of,
     window_of,
     windows_judged,
 )
-from cfmkit.metrics.metrics_json import as_json, flat_metrics, metrics_json, search_json
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
 from cfmkit.metrics.usable_interval_of_all_branches import Cycle
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.metrics import continuous_means_and_extremes, winding_branches
-from cfmkit.metrics.branches_cut_to_window import (
+from cfmkit.metrics import branches, continuous_means_and_extremes
+from cfmkit.metrics.branches import (
     BAND_RTOL,
     WINDOW_RTOL,
     BranchTrace,
@@ -232,7 +232,7 @@ class Branch:
         """Largest and smallest effort in the window: of its points, or of the model next to them."""
         model, path, part = self.frame.closed, self.frame.winding, self.inside
         if path is not None:
-            return winding_branches.extremes(path, *self.ends_on_way)
+            return branches.extremes(path, *self.ends_on_way)
         if model is None:
             return float(part.effort.max()), float(part.effort.min())
         return self._next_to_samples(partial(model.effort, self.name), part.effort, model.peaks)
@@ -314,7 +314,7 @@ class Branch:
         model, path = self.frame.closed, self.frame.winding
         self.inside  # noqa: B018  (raises where the window is not covered)
         if path is not None:
-            return winding_branches.mean(path, *self.ends_on_way)
+            return branches.mean(path, *self.ends_on_way)
         if model is None:
             return float(level(self.spread))
         return continuous_means_and_extremes.mean(partial(model.effort, self.name), model.places, *self.ends)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
-from cfmkit.metrics.branches_cut_to_window import Undefined, Window, traces
+from cfmkit.metrics.branches import Undefined, Window, traces
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:

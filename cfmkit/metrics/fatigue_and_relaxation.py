@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cfmkit.metrics.branches_cut_to_window import Undefined
+from cfmkit.metrics.branches import Undefined
 
 FIRST_TIME = 1e-9
 """In place of a first point at 0, which log t does not have [s]: so early that most of the fall to the next point is

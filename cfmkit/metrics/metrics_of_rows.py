@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.metrics import ranges_many
 from cfmkit.metrics.branch_views import ZERO_EFFORT_SHARE
-from cfmkit.metrics.branches_cut_to_window import BAND_RTOL, WINDOW_RTOL
+from cfmkit.metrics.branches import BAND_RTOL, WINDOW_RTOL
 from cfmkit.metrics.continuous_means_and_extremes import FEW_SAMPLES, extremes, extremes_of_all, mean_of_rows
 from cfmkit.metrics.ranges_many import ManyBranches
 from cfmkit.metrics.spread import ManyWindows, static_balance

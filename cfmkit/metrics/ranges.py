@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.metrics import ranges_many
-from cfmkit.metrics.branches_cut_to_window import Undefined
+from cfmkit.metrics.branches import Undefined
 from cfmkit.metrics.definition import Definition
 
 if TYPE_CHECKING:

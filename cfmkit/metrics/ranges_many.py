@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics.branches_cut_to_window import BAND_RTOL
-from cfmkit.numerics.where_condition_ends import last_places
+from cfmkit.metrics.branches import BAND_RTOL
+from cfmkit.numerics.roots import last_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -19,8 +19,8 @@ from cfmkit.metrics.metric_definitions import (
     values_of_family,
     words,
 )
-from cfmkit.metrics.metric_values import Survey, Surveys, Value, kind_of, survey_of, window_of
-from cfmkit.metrics.metrics_json import finite_border
+from cfmkit.metrics.metric_values import Survey, Surveys, Value, finite_border, kind_of, survey_of, window_of
+from cfmkit.specs.further_metrics import OF_MANY_PARTS
 from cfmkit.specs.units import (
     DIMENSIONS_BY_NAME,
     SHARE_DIMENSION,
@@ -30,7 +30,6 @@ from cfmkit.specs.units import (
     read_one_of,
     to_border,
 )
-from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
-    from cfmkit.metrics.branches_cut_to_window import Window
+    from cfmkit.metrics.branches import Window
     from cfmkit.metrics.definition import Definition
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Requirement, Spec

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics import ranges_many, winding_branches
+from cfmkit.metrics import branches as winding_branches
+from cfmkit.metrics import ranges_many
 from cfmkit.metrics.branch_views import Branch, MeasuringFrame
-from cfmkit.metrics.branches_cut_to_window import BAND_RTOL, BranchTrace, Undefined, Window, traces
+from cfmkit.metrics.branches import BAND_RTOL, BranchTrace, Undefined, Window, traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.metrics import ranges_many, spread, winding_branches
-from cfmkit.metrics.branches_cut_to_window import BranchTrace, Undefined, Window
+from cfmkit.metrics import branches, ranges_many, spread
+from cfmkit.metrics.branches import BranchTrace, Undefined, Window
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.definition import Definition
 from cfmkit.metrics.ranges_many import UNIFORM_POINTS
@@ -186,7 +186,7 @@ def _stress_range(branch: Branch, alone: bool = False) -> tuple[float, float]:
     """
     own, model = _stress(branch.inside), branch.frame.closed
     if (path := branch.frame.winding) is not None:
-        top, bottom = winding_branches.stress_extremes(path, *branch.ends_on_way)
+        top, bottom = branches.stress_extremes(path, *branch.ends_on_way)
         return bottom, top
     if model is None:
         return float(own.min()), float(own.max())

@@ -5,8 +5,8 @@ from cfmkit.lazy_names import lazy_names
 __getattr__, __all__ = lazy_names(
     __name__,
     {
-        "arc_chain": "ArcChain points_on",
-        "monotone_interpolation": "ThroughPoints",
+        "arc_chains": "ArcChain points_on",
+        "interpolation": "ThroughPoints",
         "roots": "bracketed_root",
         "sqp": "Effort Optimum SearchEnding minimize",
     },

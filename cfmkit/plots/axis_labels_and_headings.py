@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.plots.numbers_in_drawings import WholeNumbers, brief
 from cfmkit.plots.style import (
     INCHES_PER_MM,
     NORMAL_FONT,
@@ -18,7 +19,6 @@ from cfmkit.plots.style import (
     is_plain,
     size_mm,
 )
-from cfmkit.plots.tick_numbers import WholeNumbers, brief
 from cfmkit.specs.units import border_unit, format_short
 from cfmkit.tables import border_values
 

@@ -1,9 +1,13 @@
-"""A force over a displacement, or a torque over an angle, on axes.
+"""A force over a displacement, or a torque over an angle, on axes; the main figure; several models together.
 
 Branches are drawn in the order of their path: a curve that folds back shows every
 force at one displacement, gaps stay gaps, and what is unstable is dashed. Names
 stand beside their lines; where the specification bounds the force, the band that it
-allows is shaded.
+allows is shaded. Of several models, what lies between each and the finest one is drawn, too.
+
+The main figure of a result is the same for every family. If the whole curve, drawn from zero, leaves the ripple too
+small to see, a second panel below enlarges the range that is to be constant: that of the requirement bands, or of the
+window of the analysis if there are none.
 """
 
 from __future__ import annotations
@@ -16,23 +20,44 @@ import numpy as np
 
 from cfmkit.curves import Curve
 from cfmkit.metrics import frame_of, window_of
-from cfmkit.plots.axis_labels_and_headings import axis_label, finite_range, shown_range, value_text
+from cfmkit.plots.axis_labels_and_headings import (
+    Heading,
+    axis_label,
+    finite_range,
+    remark,
+    shown_range,
+    value_text,
+    write_heading,
+)
 from cfmkit.plots.bands_from_requirements import Band, bands_of
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import Limit, MarkedRange, level, pad_limits, shade
-from cfmkit.plots.style import BAND_GREEN, LINE_COLOURS, TEXT_GREY, TROUBLE_RED, apply_style, is_plain, overlay, size_mm
+from cfmkit.plots.style import (
+    BAND_GREEN,
+    LINE_COLOURS,
+    TEXT_GREY,
+    TROUBLE_RED,
+    apply_style,
+    axes_mm,
+    is_plain,
+    new_figure,
+    overlay,
+    size_mm,
+)
 from cfmkit.results import Result
-from cfmkit.specs.units import to_border
+from cfmkit.specs.units import from_border, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
     from cfmkit.plots.style import Look
+
 
 BRANCH_RTOL = 2e-3
 """Branches closer than this fraction of the axes are one line, with one name: 0.2 mm of a print of 100 mm is less
@@ -322,3 +347,128 @@ def _unstable_name(lines: list[_Line]) -> list[Label]:
         if finite.sum() >= 2:
             return [Label("unstable", line.color, line.points[finite], prefer=0.5)]
     return []
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """Difference of a curve to the finest one."""
+
+    curve: int  # which of the curves it is
+    name: str  # to write beside the line; empty for none
+    # places, values, (n,): motion and difference of the effort [SI]
+    places: FloatArray
+    values: FloatArray
+
+
+@apply_style
+def fidelity_figure(
+    heading: Heading,  # to write above
+    curves: Sequence[Curve],  # one a model, labelled; at least one
+    gaps: Sequence[Gap],  # at most one for each branch of each curve but the finest
+) -> Figure:
+    """Return curves overlaid, and the differences from the finest below."""
+    figure = new_figure()
+    write_heading(figure, heading)
+    room = 96.0 - heading.height_mm
+    upper, lower = axes_mm(figure, (17, 43, 138, room - 41.0)), axes_mm(figure, (17, 12, 138, 26))
+    plot_curve(list(curves), upper, CurveLook(arrows=False))
+    upper.set_xlabel("")
+    upper.tick_params(labelbottom=False)
+    lower.set_xlim(upper.get_xlim())
+    _draw_gaps(lower, curves, gaps)
+    return figure
+
+
+def _draw_gaps(ax: Axes, curves: Sequence[Curve], gaps: Sequence[Gap]) -> None:
+    kind, motion = curves[0].kind, curves[0].motion_dimension
+    labels, shown = [], [0.0]
+    for gap in gaps:
+        points = np.column_stack([to_border(gap.places, motion), to_border(gap.values, kind)])
+        color = LINE_COLOURS[gap.curve % len(LINE_COLOURS)]
+        ax.plot(*points.T, color=color, linewidth=1.4 if gap.name else 0.8, zorder=3)
+        shown += list(shown_range(points[:, 1]) or ())
+        labels += [Label(gap.name, color, points, prefer=0.5)] if gap.name and np.isfinite(points).any() else []
+    ax.axhline(0.0, color=TEXT_GREY, linewidth=0.7, zorder=2)
+    ax.set_ylim(*pad_limits((min(shown), max(shown)), 0.15, 0.25))
+    ax.set_xlabel(axis_label(curves[0].motion_name, motion))
+    ax.set_ylabel(axis_label("difference", kind))
+    if not labels:
+        remark(ax, (0.5, 0.6), "nothing to compare", ha="center")
+    place_labels(ax, labels)
+
+
+Interval = tuple[float, float]
+
+ENLARGE_BELOW = 0.45
+"""Share of the height below which the range gets a panel of its own: above it that would enlarge it little more than
+twice."""
+MIN_BAND_SHARE = 0.002
+"""The enlarged panel shows at least this fraction of the force to each side: nobody wants to see rounding errors."""
+
+
+@apply_style
+def curve_figure(
+    result: Result,  # with at least one curve
+    look: CurveLook | None = None,  # levels and regions to draw as well
+    subject: str = "",  # for the heading; default: what is drawn over what
+) -> Figure:
+    """Return the force-displacement (or torque-angle) curve of a result, enlarged where it is flat."""
+    look = look or CurveLook()
+    curve = result.curve
+    figure = new_figure()
+    heading = Heading.from_result(result, subject or f"{curve.kind} over {curve.motion_name}")
+    write_heading(figure, heading)
+    room = 86.5 - heading.height_mm
+    detail = None if is_plain() else choose_enlarged_range(result, look)
+    if detail is None:
+        plot_curve(result, axes_mm(figure, (17, 12, 138, room)), look)
+        return figure
+    upper = axes_mm(figure, (17, 63, 138, room - 51.0))
+    lower = axes_mm(figure, (17, 12, 138, 46))
+    plot_curve(result, upper, replace(look, bands=False, names=False, arrows=False))
+    upper.set_xlabel("")
+    upper.tick_params(labelbottom=False)
+    _frame_of_detail(upper, curve, detail)
+    low, high = (float(from_border(end, curve.motion_dimension)) for end in upper.get_xlim())
+    plot_curve(result, lower, replace(look, window=((low, high), detail[1])))
+    return figure
+
+
+def choose_enlarged_range(result: Result, look: CurveLook) -> tuple[Interval, Interval] | None:
+    """Return the range of motion and of effort [SI] to enlarge; None if the whole curve shows it well."""
+    curve = result.curve
+    bands = bands_of(result)
+    spans = [(band.start, band.stop) for band in bands] or [_window(result)]
+    efforts = [curve.effort[(curve.motion >= start) & (curve.motion <= stop)] for start, stop in spans]
+    bounds = [value for band in bands for value in (band.low, band.high) if value is not None]
+    levels = [level.value for level in look.levels]
+    if finite_range(np.concatenate(efforts)) is None:
+        return None
+    inside = finite_range(np.concatenate([*efforts, bounds, levels]))
+    whole = finite_range(np.concatenate([curve.effort, [0.0], bounds, levels]))
+    if inside is None or whole is None or inside[1] - inside[0] >= ENLARGE_BELOW * (whole[1] - whole[0]):
+        return None
+    motion = min(start for start, _ in spans), max(stop for _, stop in spans)
+    middle, half = 0.5 * (inside[0] + inside[1]), 0.65 * (inside[1] - inside[0])
+    half = max(half, MIN_BAND_SHARE * max(abs(inside[0]), abs(inside[1])))
+    return motion, (middle - half, middle + half)
+
+
+def _window(result: Result) -> Interval:
+    """Return the motion to enlarge if there are no requirement bands."""
+    window = window_of(result)
+    if window is not None:
+        return window.lo, window.hi
+    if result.valid:
+        return result.valid[0]
+    return float(result.curve.motion.min()), float(result.curve.motion.max())
+
+
+def _frame_of_detail(ax: Axes, curve: Curve, detail: tuple[Interval, Interval]) -> None:
+    """Draw the frame of what the lower panel enlarges."""
+    low, high = (float(to_border(value, curve.kind)) for value in detail[1])
+    ax.axhspan(low, high, facecolor="none", edgecolor=TEXT_GREY, linewidth=0.5, zorder=1, gid="no-obstacle")
+    ax.annotate(
+        "enlarged below", (0.995, low), xycoords=("axes fraction", "data"), xytext=(0, -2),
+        textcoords="offset points", ha="right", va="top", color=TEXT_GREY, size=6.5,
+    )  # fmt: skip

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.families.base import Family
-    from cfmkit.plots.poses_in_one_svg import Moving
+    from cfmkit.plots.mechanism_in_motion import Moving
     from cfmkit.results import Result
 
 
@@ -23,7 +23,7 @@ def figures(
     if not result.curves:
         return {}
     if family.draw is None:
-        from cfmkit.plots.curve_with_enlarged_band import curve_figure
+        from cfmkit.plots.curves import curve_figure
 
         return {"curve": partial(curve_figure, result)}
     return family.draw.figures(result)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots.axis_labels_and_headings import LEFT_MARGIN, Heading, metric_label, metric_values, write_heading
-from cfmkit.plots.rounding_noise import is_level, remove_rounding
+from cfmkit.plots.numbers_in_drawings import is_level, remove_rounding
 from cfmkit.plots.style import (
     BAND_GREEN,
     LINE_BLUE,

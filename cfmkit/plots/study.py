@@ -15,9 +15,9 @@ from matplotlib.colors import to_hex
 
 from cfmkit.plots.axis_labels_and_headings import finite_range
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.rounding_noise import is_level, remove_rounding
+from cfmkit.plots.numbers_in_drawings import digits_that_differ, is_level, remove_rounding, widen
 from cfmkit.plots.stacked_line_diagrams import pad_limits
-from cfmkit.plots.study_marks import (
+from cfmkit.plots.study_data_and_marks import (
     COLOUR_MAP,
     EMPTY_COLOUR,
     HEAD_HEIGHT,
@@ -41,7 +41,6 @@ from cfmkit.plots.style import (
     is_plain,
     new_figure,
 )
-from cfmkit.plots.tick_numbers import digits_that_differ, widen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -52,7 +51,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.study_data_to_draw import DrawnScale, StudyCurve, StudyMarks
+    from cfmkit.plots.study_data_and_marks import DrawnScale, StudyCurve, StudyMarks
     from cfmkit.plots.style import Look
 
 

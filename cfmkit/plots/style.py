@@ -30,7 +30,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from cfmkit.plots.figure_width import active_layout
-from cfmkit.plots.tick_numbers import WholeNumbers
+from cfmkit.plots.numbers_in_drawings import WholeNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import UNCUT_LAYERS, Arc, DrawnDimension, Line, Smooth
-from cfmkit.export.layers import HELD_LAYER
+from cfmkit.export.contours import HELD_LAYER, UNCUT_LAYERS, Arc, DrawnDimension, Line, Smooth
 from cfmkit.plots.parts import mm
 from cfmkit.plots.style import (
     LINE_VERMILLION,
@@ -36,8 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.beam_sections import BeamSection
-    from cfmkit.export.contours import Contour, Drawing, Edge
+    from cfmkit.export.contours import BeamSection, Contour, Drawing, Edge
     from cfmkit.plots.style import Look
 
 PAPER_SIZE = (240.0, 165.0)  # of the figure [mm]: a landscape A4 sheet within its margins, less a caption

@@ -7,6 +7,6 @@ __getattr__, __all__ = lazy_names(
     {
         "explorer": "Explorer",
         "explorer_server": "ExplorerServer",
-        "suggest_api": "read_request",
+        "suggest": "read_request",
     },
 )

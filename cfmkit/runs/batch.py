@@ -14,7 +14,7 @@ from cfmkit.arrays import Several, shorten_values
 from cfmkit.documents.run_outcome import worst
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
-from cfmkit.runs import batch_output_files
+from cfmkit.runs import batch_files
 from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, read, run_analysis, run_design
 from cfmkit.runs.run import carry_out as carry_out_run
 from cfmkit.studies.batch_sources_and_outcomes import SKIPPED_MESSAGE, Entry
@@ -25,9 +25,8 @@ if TYPE_CHECKING:
 
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
+    from cfmkit.studies.earlier_batch import BatchComparison, KeptRuns
     from cfmkit.studies.engine import Monitor
-    from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
-    from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
     from cfmkit.studies.serial_and_cluster_executors import Executor, Lost
     from cfmkit.tables import Table
 
@@ -263,7 +262,7 @@ class BatchResult:
     @property
     def summary(self) -> Mapping[str, Any]:
         """Content of metrics.json."""
-        found: Mapping[str, Any] = shorten_values(batch_output_files.data(self.entries, self.exit_code, self.compared))
+        found: Mapping[str, Any] = shorten_values(batch_files.data(self.entries, self.exit_code, self.compared))
         return found
 
     @property
@@ -370,11 +369,11 @@ def batch(
     >>> found.exit_code.name, [(one.spec, one.status) for one in found.entries]
     ('OK', [('configs/cam.yaml', 'complete')])
     """
-    from cfmkit.documents.junit import junit as junit_of
-    from cfmkit.documents.junit import prepare_file
-    from cfmkit.runs.batch_reference import BatchReference
+    from cfmkit.documents.continuous_integration import junit as junit_of
+    from cfmkit.documents.continuous_integration import prepare_file
+    from cfmkit.runs.batch_files import BatchReference
     from cfmkit.store import RunFolder
-    from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
+    from cfmkit.studies.earlier_batch import KeptRuns
 
     place, named = os.fspath(out), _list_named(specs)
     given = (changes,) if isinstance(changes, str) else tuple(changes)
@@ -394,13 +393,13 @@ def batch(
         interrupted = watched.stopping()
         compared = None if reference is None else reference.compare(entries, place)
         code = exit_code(entries, interrupted, None if accept else compared)
-        about = batch_output_files.describe_batch(work.arguments, seed, named, code)
-        written = batch_output_files.write(folder, entries, about, page, compared)
+        about = batch_files.describe_batch(work.arguments, seed, named, code)
+        written = batch_files.write(folder, entries, about, page, compared)
     accepted = reference is not None and not interrupted and reference.accept_results(place, entries, work.arguments)
     if write_junit is not None:
         write_junit(junit_of(entries))
     if write_summary is not None:
-        from cfmkit.documents.markdown import summary as in_markdown
+        from cfmkit.documents.continuous_integration import summary as in_markdown
 
         write_summary(in_markdown(entries, compared))
     return BatchResult(entries, code, place, written, compared, reference.folder if reference and accepted else "")

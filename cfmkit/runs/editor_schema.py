@@ -11,7 +11,7 @@ from cfmkit.metrics import known_metrics, values_of_family
 from cfmkit.specs.keys_and_schema import schema as plain_schema
 from cfmkit.specs.yamlio.base_file import BASE_KEY
 from cfmkit.store import atomic_write
-from cfmkit.tables.json_writing import json_bytes
+from cfmkit.tables.csv_and_json import json_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

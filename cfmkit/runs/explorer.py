@@ -165,7 +165,7 @@ class Explorer:
         """Return the mechanism in the middle of its travel as SVG; empty where its family draws none."""
         from cfmkit.families import family
         from cfmkit.plots.figures import moving_of
-        from cfmkit.plots.poses_in_one_svg import still
+        from cfmkit.plots.mechanism_in_motion import still
 
         try:
             result = api.analyze(self.spec(changes))

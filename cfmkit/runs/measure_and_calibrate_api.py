@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from cfmkit.api import AnySpec
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.correction import DesignCorrection
+    from cfmkit.experiment.corrections_and_low_pass import LowPass
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
-    from cfmkit.experiment.low_pass import LowPass
     from cfmkit.experiment.measurement_and_calibration_outputs import MeasureReport
     from cfmkit.experiment.reading import Recording
     from cfmkit.numerics.least_squares import Loss
@@ -119,11 +119,10 @@ class MeasurementSettings:
     def report_on(self, recording: Recording) -> MeasureReport:
         """Return what a recording says."""
         from cfmkit.experiment.branches import read_cycles
-        from cfmkit.experiment.coverage import read_largest_hole
+        from cfmkit.experiment.corrections_and_low_pass import correct_recording, read_filter
         from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measure_recording, require_loop
-        from cfmkit.experiment.low_pass import read_filter
         from cfmkit.experiment.measurement_and_calibration_outputs import report_on
-        from cfmkit.experiment.zeros_and_signs import correct_recording
+        from cfmkit.experiment.recorded_values import read_largest_hole
         from cfmkit.metrics import MeasuringFrame
 
         low_pass: LowPass | Literal["default"] | None
@@ -275,6 +274,7 @@ def _read_curves(
 ) -> MeasuredCurves:
     """Return the branches of a recording, read from its file unless they are given."""
     from cfmkit.experiment.branches import read_cycles
+    from cfmkit.experiment.corrections_and_low_pass import correct_recording
     from cfmkit.experiment.curves_and_metrics_of_recording import (
         LEFT_OUT,
         MeasuredCurves,
@@ -282,7 +282,6 @@ def _read_curves(
         read_measured,
     )
     from cfmkit.experiment.reading import Recording
-    from cfmkit.experiment.zeros_and_signs import correct_recording
 
     if isinstance(data, MeasuredCurves):
         return data

@@ -198,7 +198,7 @@ def number(text: str) -> Number:
     """
     from cfmkit.errors import QuantityError
     from cfmkit.specs.units.strict_decimal_number import read_number
-    from cfmkit.specs.units.unit_size import unit_size
+    from cfmkit.specs.units.table import unit_size
 
     sign, rest = (text[0], text[1:].strip()) if text[:1] in "<>~" else ("", text)
     digits, _, unit = rest.partition(" ")
@@ -251,7 +251,7 @@ class _Scope(NamedTuple):
 @cache
 def _specification(scope: _Scope) -> Spec:
     from cfmkit import api
-    from cfmkit.runs.examples import example
+    from cfmkit.runs.shipped_files import example
 
     if not scope.spec:
         raise ValueError("no example is named")
@@ -343,7 +343,7 @@ def _value_named(name: str, scope: _Scope) -> Any:
 def _varied_values(spec: Spec, path: str) -> tuple[float, ...]:
     """Return the values that a sweep gives to something."""
     from cfmkit.studies.plan import step_axis
-    from cfmkit.studies.varied_axes import axes, collect_variations
+    from cfmkit.studies.variations import axes, collect_variations
 
     for axis in axes(spec, collect_variations(spec.sweep.vary)) if spec.sweep else ():
         if axis.leaf.path == path:

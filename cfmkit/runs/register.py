@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.specs.own_metrics import register_metric
+from cfmkit.specs.further_metrics import register_metric
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -179,7 +179,7 @@ def _sweep_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with paths and values of the block `sweep`, each with its place in the file."""
     if spec.sweep is None:
         return
-    from cfmkit.studies.varied_axes import collect_variations, faults
+    from cfmkit.studies.variations import collect_variations, faults
 
     drawn, joint = spec.sweep.combine in SAMPLE_KINDS, spec.sweep.combine == "zip"
     for request, message in faults(spec, collect_variations(spec.sweep.vary), drawn, joint):
@@ -198,8 +198,8 @@ def _sensitivity_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]
 
 def _design_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with the tolerances of the block `design`, each with its place in the file."""
+    from cfmkit.specs.further_metrics import OF_MANY_PARTS
     from cfmkit.specs.spec import DesignKeys
-    from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
     design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys
     lacking = "is a share of manufactured parts: state their tolerances in 'design.tolerances'"

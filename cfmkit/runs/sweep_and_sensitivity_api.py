@@ -1,33 +1,115 @@
-"""Sweeps and sensitivity studies as Python asks for them: with blocks of a file, or arrays of NumPy, in memory."""
+"""Sweeps and sensitivity studies as Python asks for them, and their outcome: all of it in memory.
+
+Blocks of a file, or arrays of NumPy, go in; the same tables and the same summary as in a study's files come out.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.api import given_arguments, spec_of
+from cfmkit.arrays import shorten_values
+from cfmkit.documents.document import Document
 from cfmkit.errors import QuantityError, UsageError
-from cfmkit.runs.study_result import StudyResult
-from cfmkit.specs.own_metrics import names_of
+from cfmkit.specs.further_metrics import names_of
 from cfmkit.specs.units import format_quantity
 from cfmkit.studies.plan import MOST_POINTS
 from cfmkit.studies.serial_and_cluster_executors import serial
-from cfmkit.studies.variable_paths import CannotVary, leaf
+from cfmkit.studies.variations import CannotVary, leaf
 from cfmkit.tables import read_csv
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
+
+    from matplotlib.figure import Figure
 
     from cfmkit.api import AnySpec, Metric
     from cfmkit.specs.sensitivity_methods import MethodWord
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.study_spec import Combine
     from cfmkit.studies.engine import Records, Work
+    from cfmkit.studies.sensitivity.result_types import Findings
     from cfmkit.studies.serial_and_cluster_executors import Executor
+    from cfmkit.tables import Table
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """The outcome of a sweep or a sensitivity study, in border units (mm, N, ...)."""
+
+    table: Table  # as results.csv: one row per point. ``table["force_ripple"]`` is a column
+    summary: Mapping[str, Any]  # as metrics.json
+    curves: Table | None = None  # as curves.csv, of a sweep that keeps them
+    # indices, convergence: as indices.csv and convergence.csv, of a sensitivity study
+    indices: Table | None = None
+    convergence: Table | None = None
+    varied: tuple[str, ...] = ()  # headers of the columns that were varied
+    spec: Spec | None = None  # what was varied
+    # what a sensitivity study found, which its pictures are drawn from
+    findings: Findings | None = field(default=None, repr=False, compare=False)
+    # what the command line prints of it
+    document: Document = field(default_factory=Document, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Keep the texts of what is inside short."""
+        object.__setattr__(self, "summary", shorten_values(self.summary))
+
+    def __repr__(self) -> str:
+        """Return the study in a line."""
+        return f"<StudyResult: {self.summary.get('message', '')}; {self.table!r}>"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the document of the study, a figure, and the first points."""
+        from cfmkit.documents.notebook import show_html
+        from cfmkit.tables.html import first_rows
+
+        return show_html(self.document, self.figures, first_rows(self.table))
+
+    @property
+    def figures(self) -> Mapping[str, Callable[[], Figure]]:
+        """Functions that draw each picture of a study, by its name: ``study.figures["force_mean"]()``."""
+        if self.findings is not None:
+            from cfmkit.plots.sensitivity import figures
+
+            return figures(self.findings)
+        if self.spec is None or "drawn" not in self.summary:
+            return {}
+        from cfmkit.studies.pictures import makers_of_tables
+
+        return makers_of_tables(self.spec, self.summary, self.table, self.curves)
+
+    def to_pandas(self) -> Any:
+        """Return the points as a `pandas.DataFrame`, columns headed ``force_mean [N]``."""
+        from cfmkit.tables.table import library
+
+        return library("pandas", "to_pandas").DataFrame(dict(self.table.as_dict()))
+
+    def to_xarray(self) -> Any:
+        """Return the points as an `xarray.Dataset`: one dimension per varied value where they are a grid.
+
+        Points that are no grid stand along the dimension ``point``. Units stand in the attribute ``units``.
+        """
+        from cfmkit.tables.table import library
+
+        xarray = library("xarray", "to_xarray")
+        frame = self.to_pandas()
+        axes = list(self.varied)
+        size = int(np.prod([frame[name].nunique() for name in axes])) if axes else 0
+        if axes and size == len(frame) and not frame.duplicated(axes).any():
+            found = xarray.Dataset.from_dataframe(frame.set_index(axes))
+        else:
+            found = xarray.Dataset.from_dataframe(frame.rename_axis("point"))
+        units = {column.header: column.unit for column in self.table.columns}
+        found = found.rename({header: header.partition(" [")[0] for header in units if header in found.variables})
+        for header, unit in units.items():
+            if unit is not None:
+                found[header.partition(" [")[0]].attrs["units"] = unit
+        return found
 
 
 def sweep(
@@ -82,7 +164,7 @@ def sweep(
     >>> cfmkit.sweep(spec, vary=vary, metrics=["theoretical_force"]).table["theoretical_force"].tolist()
     [36.232, 72.464]
     """
-    from cfmkit.documents.sweep_document import document_of
+    from cfmkit.documents.study_documents import sweep_document
     from cfmkit.studies.engine import run
     from cfmkit.studies.sweep_request_and_files import SweepRequest, outputs, prepare, summary_of
 
@@ -99,7 +181,7 @@ def sweep(
     summary = summary_of(records)
     result = _read(outputs(records, summary, spec.sweep is not None and spec.sweep.curves))
     dimensions = {metric.name: metric.dimension for metric in work.study.metrics}
-    document = document_of(spec, result.summary, dimensions, summary.exit_code())
+    document = sweep_document(spec, result.summary, dimensions, summary.exit_code())
     varied = tuple(result.table.headers[: len(work.plan.variables)])
     return replace(result, varied=varied, spec=spec, document=document)
 
@@ -164,10 +246,9 @@ def sensitivity(
     >>> found.summary["yield"]["value"]
     0.8
     """
-    from cfmkit.documents.sensitivity_document import document_of
+    from cfmkit.documents.study_documents import sensitivity_document
     from cfmkit.studies.parts.uncertain_values import with_options
-    from cfmkit.studies.sensitivity.output import outputs
-    from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
+    from cfmkit.studies.sensitivity.run_and_files import carry_out, outputs
     from cfmkit.studies.sensitivity.setup import prepare
 
     spec = spec_of(spec)
@@ -187,7 +268,9 @@ def sensitivity(
     if block:
         spec = spec.replace({"sensitivity": with_options(spec.sensitivity, block)})
     found = carry_out(prepare(spec), partial(_run_work, _executor(jobs)))
-    return replace(_read(outputs(found)), spec=found.setup.study.spec, findings=found, document=document_of(found))
+    return replace(
+        _read(outputs(found)), spec=found.setup.study.spec, findings=found, document=sensitivity_document(found)
+    )
 
 
 def _run_work(executor: Executor, work: Work) -> Records:

@@ -5,6 +5,8 @@ the effort is a cubic through efforts and stiffnesses. Where such a cubic over t
 pose between them most, a pose is solved in the middle of an interval and the cubic compared with it, until that
 difference is small. Halving an interval reduces a smooth curve's error sixteen times [deBoor, ch. IV].
 
+Whether the mesh is the part that was specified, its area and the section moduli of its beams say.
+
 Reference
 ---------
 [deBoor] C. de Boor, A Practical Guide to Splines, Springer 1978.
@@ -21,6 +23,7 @@ import numpy as np
 
 from cfmkit.arrays import FloatArray, read_only
 from cfmkit.errors import GeometryError
+from cfmkit.export.contours import SECTION_RTOL
 from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
@@ -28,20 +31,45 @@ from cfmkit.solid.mesh import mesh
 from cfmkit.solid.mesh_refinement import refine
 from cfmkit.solid.path_following import PathEnd, PosePath, follow, pose_between
 from cfmkit.solid.rigid_groups import Group, Supports, find_within
-from cfmkit.solid.sections_of_mesh import check_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from cfmkit.export.beam_sections import BeamSection
-    from cfmkit.export.contours import Contour
+    from cfmkit.export.contours import BeamSection, Contour
     from cfmkit.solid.equilibrium import Balance
     from cfmkit.solid.followed_part import PathGuide
     from cfmkit.solid.mesh import TriangleMesh
     from cfmkit.solid.mesh_refinement import RefinedMesh
     from cfmkit.solid.plane_stress_law import Law
+
+
+LINES_PER_EDGE = 8  # lines that stand for the parabola of an edge
+
+
+def check_mesh(grid: TriangleMesh, area: float, sections: Sequence[BeamSection]) -> None:
+    """Refuse a mesh whose area [m2] or whose beams are not those of the part.
+
+    Pieces of beams that are shorter than they are thick are not judged: where a thickness changes from station to
+    station elements smooth the kinks between them.
+
+    Raises GeometryError with the place and the values.
+    """
+    if abs(grid.area - area) > SECTION_RTOL * area:
+        raise GeometryError(f"the mesh covers {1e6 * grid.area:.6g} mm2 of the part's {1e6 * area:.6g} mm2")
+    starts, ends = _edges(grid)
+    for section in sections:
+        if section.length >= section.thickness:
+            section.check(sum(section.cut(starts, ends)), "mesh", "check mechanism.part")
+
+
+def _edges(grid: TriangleMesh) -> tuple[FloatArray, FloatArray]:
+    """Return the boundary of a mesh as short lines: starts and ends (n, 2) [m]."""
+    a, b, middle = (grid.nodes[grid.edges[:, k], None] for k in range(3))
+    s = np.linspace(0.0, 1.0, LINES_PER_EDGE + 1)[:, None]
+    curve = (1 - s) * (1 - 2 * s) * a + 4 * s * (1 - s) * middle + s * (2 * s - 1) * b
+    return curve[:, :-1].reshape(-1, 2), curve[:, 1:].reshape(-1, 2)
 
 
 ELEMENTS_ACROSS, FILLET_ELEMENT_RATIO = 1.5, 0.4

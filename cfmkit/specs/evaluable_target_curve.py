@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from cfmkit.numerics.monotone_interpolation import ThroughPoints
+from cfmkit.numerics.interpolation import ThroughPoints
 
 
 @dataclass(frozen=True)

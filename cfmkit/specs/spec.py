@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, create_model, field_validator, model_validator
 
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength, keys_of
-from cfmkit.specs.own_metrics import name_of
+from cfmkit.specs.further_metrics import OF_MANY_PARTS, name_of
 from cfmkit.specs.study_spec import Correlated, Sensitivity, Sweep, Tolerance
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import (
@@ -28,8 +28,7 @@ from cfmkit.specs.units import (
     dimension_of_end,
     ends_increase,
 )
-from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
-from cfmkit.specs.yamlio.path_notation import with_value
+from cfmkit.specs.yamlio.paths import with_value
 
 
 class Requirement(Model):

@@ -100,7 +100,7 @@ class Target(Model):
 
     def curve(self, level: float | None = None) -> TargetCurve:
         """Return it as a function; a line without `start` has a level at zero [N or N m]."""
-        from cfmkit.numerics.monotone_interpolation import (
+        from cfmkit.numerics.interpolation import (
             ThroughPoints,  # numpy, which reading a specification does not need
         )
         from cfmkit.specs.evaluable_target_curve import TargetCurve

@@ -10,10 +10,10 @@ from pydantic import Field, model_validator
 from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw, RelaxationLaw
 from cfmkit.specs.spec import Model
 from cfmkit.specs.units import Ratio, Stress, Time, format_short
-from cfmkit.stock.assumed_lasting import ASSUMED_DATA
+from cfmkit.stock.materials import ASSUMED_DATA
 
 if TYPE_CHECKING:
-    from cfmkit.stock.assumed_lasting import AssumedCreep, AssumedFatigue
+    from cfmkit.stock.materials import AssumedCreep, AssumedFatigue
 
 PositiveStress = Annotated[Stress, Field(gt=0)]
 PositiveTime = Annotated[Time, Field(gt=0)]

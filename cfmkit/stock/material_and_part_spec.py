@@ -19,8 +19,7 @@ from cfmkit.specs.units import Force, Length, Ratio, Stress, format_short
 from cfmkit.specs.units.fields import describe_value
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue, Relaxation, assumed_laws
 from cfmkit.stock.materials import UnknownMaterial, material
-from cfmkit.stock.printing import LAYER_STRENGTHS, Layers
-from cfmkit.stock.processes import PROCESSES_BY_NAME, ProcessAccuracy, ProcessName
+from cfmkit.stock.processes import LAYER_STRENGTHS, PROCESSES_BY_NAME, Layers, ProcessAccuracy, ProcessName
 from cfmkit.stock.stock_series import System  # noqa: TC001  of a field
 
 if TYPE_CHECKING:

@@ -24,13 +24,12 @@ are gone after it, and after a kill both are cleared by the next run.
 
 `safe_disk_changes` makes changes and turns their errors into sentences, `file_names_and_overwrite_checks` says what may
 be written, `lock` keeps other runs out, `transaction` changes many files as one,
-`manifest` is the list of what a run wrote, `run_folder` is what a run works with, and
+`run_folder` is the list of what a run wrote, `run_folder` is what a run works with, and
 `content_hashes_and_versions` gives content its name.
 """
 
 from cfmkit.store.content_hashes_and_versions import code_stamp, file_hash, origin, stable_hash
-from cfmkit.store.manifest import Manifest
-from cfmkit.store.run_folder import RunFolder
+from cfmkit.store.run_folder import Manifest, RunFolder
 from cfmkit.store.safe_disk_changes import FileRecord, atomic_write
 
 __all__ = ["FileRecord", "Manifest", "RunFolder", "atomic_write", "code_stamp", "file_hash", "origin", "stable_hash"]

@@ -2,11 +2,11 @@
 
 A study sees a specification, dotted paths and names of metrics; it knows no family.
 
-`variable_paths` and `varied_axes` say what may vary and how, `plan` enumerates the points,
+`variations` and `variations` say what may vary and how, `plan` enumerates the points,
 `point_evaluation` evaluates one of them, `variants_in_rows` many at once where the family solves them together,
 `serial_and_cluster_executors` and `pool` are ways to get that done, `journal` and `row_blocks_for_journal`
-remember what is finished, `engine` puts these together, `choose_metrics_to_note` names what is
-noted, `tables` writes it, `summary` sums it up, and `sweep_request_and_files` is the study that
+remember what is finished, `engine` puts these together, `point_evaluation` names what is
+noted, `summary_and_tables` writes it, `summary_and_tables` sums it up, and `sweep_request_and_files` is the study that
 varies a specification.
 """
 
@@ -16,12 +16,11 @@ __getattr__, __all__ = lazy_names(
     __name__,
     {
         "batch_sources_and_outcomes": "Entry",
-        "choose_metrics_to_note": "metrics_of",
+        "point_evaluation": "metrics_of Study",
         "comparison_of_fidelities": "choices_of compare",
-        "metric_changes_since_earlier_batch": "BatchComparison",
-        "point_evaluation": "Study",
+        "earlier_batch": "BatchComparison",
         "serial_and_cluster_executors": "Lost serial",
-        "variable_paths": "FIXED_BLOCKS CannotVary leaf paths",
+        "variations": "FIXED_BLOCKS CannotVary leaf paths",
         "variants_in_rows": "are_solved_together evaluate_rows",
     },
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.study import figures
-from cfmkit.plots.study_data_to_draw import PERCENT_DIMENSION, DrawnScale, StudyCurve, StudyMarks, short_names
+from cfmkit.plots.study_data_and_marks import PERCENT_DIMENSION, DrawnScale, StudyCurve, StudyMarks, short_names
 from cfmkit.results import Status
 from cfmkit.specs.keys_and_schema import keys
 from cfmkit.tables import Table, TableColumn, border_values, read_csv
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Plan
     from cfmkit.studies.point_evaluation import Metric
-    from cfmkit.studies.summary import Summary
+    from cfmkit.studies.summary_and_tables import Summary
     from cfmkit.tables import Cell
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.studies.varied_axes import Axis
+    from cfmkit.studies.variations import Axis
 
 Levels = tuple[Any, ...] | NDArray[Any]
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from cfmkit.families.base import Family
-    from cfmkit.specs.own_metrics import OwnMetric
+    from cfmkit.specs.further_metrics import OwnMetric
     from cfmkit.studies.serial_and_cluster_executors import Executor, Stopping, Work
 
     Messages = SimpleQueue[tuple["_Worker", bytes | None]]
@@ -238,10 +238,10 @@ def pack_registrations() -> bytes:
     Raises UsageError if another process cannot import one of them.
     """
     from cfmkit import families
-    from cfmkit.specs import own_metrics
+    from cfmkit.specs import further_metrics
 
     records = families.list_registered().values()
-    metrics = own_metrics.own_metrics().values()
+    metrics = further_metrics.own_metrics().values()
     additions: list[Family | OwnMetric] = [*records, *metrics]
     for added in additions:
         try:
@@ -253,7 +253,10 @@ def pack_registrations() -> bytes:
                 f"{added.name!r} cannot be computed in other processes: put it in a module that they can import, "
                 "or use jobs=1"
             )
-    entries = [(families.register, record) for record in records], [(own_metrics.enter, metric) for metric in metrics]
+    entries = (
+        [(families.register, record) for record in records],
+        [(further_metrics.enter, metric) for metric in metrics],
+    )
     return pickle.dumps([*entries[0], *entries[1]])
 
 

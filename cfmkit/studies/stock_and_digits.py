@@ -20,9 +20,9 @@ from cfmkit.families import family
 from cfmkit.metrics import check, evaluate, mean_effort, values_of_family
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
-from cfmkit.stock.printing import is_whole, strands, strands_in_words
+from cfmkit.stock.processes import is_whole, strands, strands_in_words
 from cfmkit.stock.stock_series import series_of
-from cfmkit.studies.parts.assumed_errors import accuracy_of, process_of_part
+from cfmkit.studies.parts.parts import accuracy_of, process_of_part
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -7,15 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import UsageError
 from cfmkit.families import family
-from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
-from cfmkit.studies.design_with_margins_and_verification import run_design
+from cfmkit.studies.delivered_design import run_design
 from cfmkit.studies.engine import Work
 from cfmkit.studies.plan import MOST_POINTS, Draw, grid, sample_axes, zip_axes
-from cfmkit.studies.point_evaluation import Study
-from cfmkit.studies.summary import Summary, main_columns
-from cfmkit.studies.tables import curves_csv, results_csv
-from cfmkit.studies.variable_paths import length_to_vary
-from cfmkit.studies.varied_axes import WantedVariation, axes, collect_variations
+from cfmkit.studies.point_evaluation import Study, metrics_of, sample_curve
+from cfmkit.studies.summary_and_tables import Summary, curves_csv, main_columns, results_csv
+from cfmkit.studies.variations import WantedVariation, axes, collect_variations, length_to_vary
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -111,7 +108,7 @@ def summary_of(records: Records) -> Summary:
 def outputs(records: Records, summary: Summary, curves: bool = False) -> Iterator[tuple[str, Data]]:
     """Yield every file of a sweep but the pictures as (name, content); the summary is filled on the way."""
     from cfmkit.specs.yamlio import dump
-    from cfmkit.tables.json_writing import json_bytes
+    from cfmkit.tables.csv_and_json import json_bytes
 
     study = records.work.study
     yield "results.csv", results_csv(records, summary.add)

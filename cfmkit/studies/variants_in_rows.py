@@ -11,7 +11,7 @@ from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.rows import Variants, valid
 from cfmkit.metrics import split_name
-from cfmkit.metrics.branches_cut_to_window import WINDOW_RTOL
+from cfmkit.metrics.branches import WINDOW_RTOL
 from cfmkit.metrics.metric_values import worst_branch
 from cfmkit.metrics.metrics_of_rows import CycleRows, metric_of_rows
 from cfmkit.metrics.requirements import Bounds

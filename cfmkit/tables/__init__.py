@@ -6,7 +6,7 @@ columns without a unit hold names, states and counts. What is missing (None, NaN
 or an empty text) is an empty cell.
 """
 
-from cfmkit.tables.csvtext import csv_chunks, read_csv, to_csv
+from cfmkit.tables.csv_and_json import csv_chunks, read_csv, to_csv
 from cfmkit.tables.table import Cell, Table, TableColumn, Values, border_column, border_values, curve_table, text_column
 
 __all__ = [

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import DataError, QuantityError, UsageError
 from cfmkit.specs.units.strict_decimal_number import quote
-from cfmkit.specs.units.table import COMMON_UNIT_SIZES, UNIT_TABLE
-from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
+from cfmkit.specs.units.table import COMMON_UNIT_SIZES, UNIT_TABLE, border_size, is_unit, unit_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

@@ -203,8 +203,7 @@ class LabTable:
 def convert_to_si(values: FloatArray, dimension: str, unit: str) -> FloatArray:
     """Return values with a unit as SI, exactly where the unit is that of cfmkit's own files."""
     from cfmkit.specs.units import from_border
-    from cfmkit.specs.units.table import COMMON_UNIT_SIZES, border_unit
-    from cfmkit.specs.units.unit_size import unit_size
+    from cfmkit.specs.units.table import COMMON_UNIT_SIZES, border_unit, unit_size
 
     if unit == border_unit(dimension):
         return np.asarray(from_border(values, dimension))

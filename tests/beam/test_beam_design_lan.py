@@ -9,13 +9,13 @@ import cfmkit
 import cfmkit.metrics
 from cfmkit import Run
 from cfmkit.families.beam.shaping.design import missed_by, task_of
-from cfmkit.families.beam.shaping.search import ShapeCandidate
-from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
+from cfmkit.families.beam.shaping.multistart import (
     NetworkScatter,
     audit_design,
     scatter_within_tolerances,
 )
-from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.beam.shaping.search import ShapeCandidate
+from cfmkit.families.beam.shaping.task_and_variables import Variables
 from cfmkit.results import Status
 
 CONFIG = "configs/beam_design_lan.yaml"

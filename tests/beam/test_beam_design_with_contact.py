@@ -11,7 +11,7 @@ from beam_support import CONFIGS
 import cfmkit
 from cfmkit.elastica import Control, Displacement, gradient, trace
 from cfmkit.errors import InputError, SpecError
-from cfmkit.families.beam import beams_in_rows
+from cfmkit.families.beam import model
 from cfmkit.families.beam.force_at_few_poses import _replace_values
 from cfmkit.families.beam.network_from_spec import assemble
 from cfmkit.families.beam.shaping.design import task_of
@@ -19,8 +19,7 @@ from cfmkit.families.beam.shaping.report import judge_design
 from cfmkit.families.beam.shaping.response import respond
 from cfmkit.families.beam.shaping.search import ShapeCandidate, StartBudget, evaluate_in_model, flatten
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
-from cfmkit.families.beam.shaping.task import TaskLimits
-from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.beam.shaping.task_and_variables import TaskLimits, Variables
 
 CLOSE = Control(tolerance=1e-10)
 OPTIMISE = {
@@ -143,8 +142,8 @@ def test_a_few_steps_make_the_force_on_a_workpiece_flatter_and_keep_its_mean():
 
 
 def test_mechanisms_with_contacts_are_not_solved_twice_in_a_study(monkeypatch):
-    monkeypatch.setattr(beams_in_rows, "solve", lambda spec: pytest.fail("its own analysis solves it"))
-    assert not list(beams_in_rows.solve_rows([gripper(), leaf_at_a_stop()]))
+    monkeypatch.setattr(model, "solve", lambda spec: pytest.fail("its own analysis solves it"))
+    assert not list(model.solve_rows([gripper(), leaf_at_a_stop()]))
 
 
 def test_a_stop_of_a_rotation_beside_the_contact_is_no_reason_to_refuse_a_search():

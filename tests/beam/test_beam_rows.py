@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.families.beam.beams_in_rows import solve_rows
-from cfmkit.families.beam.model import solve
+from cfmkit.families.beam.model import solve, solve_rows
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 LAN = "beam_lan2010"

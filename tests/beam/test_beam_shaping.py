@@ -17,21 +17,28 @@ from cfmkit.designing import Clock
 from cfmkit.elastica import Polynomial, fit, trace
 from cfmkit.families.beam.shaping import multistart, search
 from cfmkit.families.beam.shaping.design import find_blocking, missed_by, optimise_shape, task_of
-from cfmkit.families.beam.shaping.multistart import explore
-from cfmkit.families.beam.shaping.report import judge_design, write_design
-from cfmkit.families.beam.shaping.response import looked_at
-from cfmkit.families.beam.shaping.search import ShapeCandidate, StartBudget, flatten, search_start, verify
-from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
+from cfmkit.families.beam.shaping.multistart import (
     NetworkScatter,
     audit_design,
+    explore,
     half_band,
     lines_cross,
     scatter_within_tolerances,
     strict_share,
 )
+from cfmkit.families.beam.shaping.report import judge_design, write_design
+from cfmkit.families.beam.shaping.response import looked_at
+from cfmkit.families.beam.shaping.search import ShapeCandidate, StartBudget, flatten, search_start, verify
 from cfmkit.families.beam.shaping.sqp_program import Flattest, ForceRatio, Shaping, Widest
-from cfmkit.families.beam.shaping.task import STRESS_MARGIN, Task, TaskLimits
-from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
+from cfmkit.families.beam.shaping.task_and_variables import (
+    STRESS_MARGIN,
+    Task,
+    TaskLimits,
+    Variables,
+    candidates,
+    lengths,
+    sound,
+)
 from cfmkit.numerics import ThroughPoints
 from cfmkit.results import Status
 from cfmkit.specs import TargetCurve

@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from cfmkit.export import Arc, Line
-from cfmkit.families.cam.clearance import _to_edges
+from cfmkit.families.cam.part_sizes_and_clearances import _to_edges
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -241,7 +241,7 @@ def test_a_travel_beyond_the_stop_is_told_and_partial():
 
 def test_distances_are_those_of_points_on_the_parts():
     """Brute force: many points on each part, against the gaps of the closed formulas."""
-    from cfmkit.families.cam.clearance import clearances
+    from cfmkit.families.cam.part_sizes_and_clearances import clearances
 
     found = analyze(cam(roller_radius="10 mm", envelope=SIZES))
     gaps = {}
@@ -300,8 +300,8 @@ def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
 
 def test_a_roller_meets_the_fillet_of_a_corner_not_the_rest_of_its_circle():
     from cfmkit.export import polygons
-    from cfmkit.families.cam.clearance import BESIDE_FLANKS_PAIR, nearest_pairs
     from cfmkit.families.cam.outline import drawing
+    from cfmkit.families.cam.part_sizes_and_clearances import BESIDE_FLANKS_PAIR, nearest_pairs
 
     wide = {"base_width": "60 mm", "tool_radius": "20 mm"}
     found = analyze(cam(roller_radius="10 mm", plate=wide, envelope={"gap": "1 mm"}))

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from cfmkit.cli import run_command, shell_completion
+from cfmkit.cli import options, run_command
 
 pytestmark = pytest.mark.lists
 
@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def completed(text, **named):
-    return shell_completion.changes(SimpleNamespace(params=named), text)
+    return options.changes(SimpleNamespace(params=named), text)
 
 
 def test_keys_of_set_are_those_of_the_family_on_the_command_line():

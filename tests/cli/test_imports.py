@@ -111,7 +111,7 @@ def test_help_is_independent_of_the_folder_it_is_asked_in(tmp_path):
 
 def test_results_and_their_short_texts_bring_no_numpy():
     """Lists and tables of the command line, completion among them, import results: numpy is half of their time."""
-    check = "import sys, cfmkit.results, cfmkit.cli.shell_completion; print('numpy' in sys.modules)"
+    check = "import sys, cfmkit.results, cfmkit.cli.options; print('numpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 

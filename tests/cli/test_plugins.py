@@ -16,7 +16,7 @@ import pytest
 
 import cfmkit
 from cfmkit import families
-from cfmkit.cli import shell_completion
+from cfmkit.cli import options
 from cfmkit.cli.main import main
 
 SPRINGS = str(plugin_support.PLUGINS[0] / "configs" / "oblique_carrella2007.yaml")
@@ -71,8 +71,8 @@ def test_a_run_says_which_package_computed_it(site):
 
 
 def test_names_are_completed():
-    assert shell_completion.families("ob") == ["oblique"]
-    assert "oblique" in shell_completion.topics("obl")
+    assert options.families("ob") == ["oblique"]
+    assert "oblique" in options.topics("obl")
 
 
 def test_a_family_has_its_article(monkeypatch):

@@ -198,13 +198,13 @@ def test_a_signal_at_any_time_of_a_run_shows_no_traceback_and_leaves_nothing_hal
 EARLY = """
 import signal, sys
 from cfmkit.cli import main, run_spec_and_print_page
-from cfmkit.runs import batch, run, suggest_api
+from cfmkit.runs import batch, run, suggest
 
 def ended(*_, **__):
     signal.raise_signal(signal.SIGTERM)
 
 run_spec_and_print_page.execute = run.read = batch.batch = ended
-suggest_api.read_request = ended
+suggest.read_request = ended
 print(main.main(sys.argv[1:]))
 """
 

@@ -12,8 +12,8 @@ from journal_support import NotesInMemory
 
 from cfmkit import Run
 from cfmkit.designing import objective_and_constraints
-from cfmkit.designing.bounds_and_rounding import find_active_bounds, round_within_bounds
 from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint
+from cfmkit.designing.rounded_and_reported_values import find_active_bounds, round_within_bounds
 from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock, OneStart, Stage, from_record, run_stage
 from cfmkit.numerics import Effort, Optimum, SearchEnding, minimize
 from cfmkit.results import Status

@@ -11,10 +11,8 @@ from batch_entries import ENTRIES, MET, MISSED, entry, hostile_entries
 
 import cfmkit
 from cfmkit.documents import batch_document, html
-from cfmkit.documents.annotations import workflow_commands
 from cfmkit.documents.batch_document import document_of
-from cfmkit.documents.junit import junit
-from cfmkit.documents.markdown import plain, summary
+from cfmkit.documents.continuous_integration import junit, plain, summary, workflow_commands
 from cfmkit.errors import ExitCode
 from cfmkit.metrics import MetricChange
 from cfmkit.studies import BatchComparison, Entry

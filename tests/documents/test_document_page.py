@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import cfmkit
-from cfmkit.documents import run_document, sweep_document
+from cfmkit.documents import run_document, study_documents
 from cfmkit.documents.document import (
     BLANK_LINE,
     CellGrid,
@@ -182,7 +182,7 @@ def test_what_a_sweep_does_not_change_has_no_influence_and_ties_are_counted():
         spec, vary={"mechanism.roller_radius": "8 mm:16 mm:3"}, metrics=["force_ripple", "usable_stroke"]
     )
     dimensions = {"force_ripple": "ratio", "usable_stroke": "length"}
-    lines = page_of(sweep_document.document_of(spec, study.summary, dimensions, ExitCode.OK))
+    lines = page_of(study_documents.sweep_document(spec, study.summary, dimensions, ExitCode.OK))
     assert any(line.split()[:2] == ["force", "ripple"] and "no influence" in line for line in lines)
     assert any(line.split()[:2] == ["usable", "stroke"] and "no influence" not in line for line in lines)
     assert any("point 1 (3 tie)" in line for line in lines)
@@ -200,7 +200,7 @@ def test_a_remedy_costs_a_warning_neither_its_number_nor_its_clause():
 
 def test_the_options_of_the_best_point_are_one_line_to_copy_on_a_narrow_page():
     summary = sweep_summary_of_cam()
-    lines = page_of(sweep_document.document_of(cfmkit.load(CONFIGS / "cam.yaml"), summary, {}, ExitCode.OK), 60)
+    lines = page_of(study_documents.sweep_document(cfmkit.load(CONFIGS / "cam.yaml"), summary, {}, ExitCode.OK), 60)
     (best,) = [line for line in lines if "best  " in line]
     assert best.count("--set") == 2
     assert len(best) > 60

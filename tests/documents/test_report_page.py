@@ -13,7 +13,7 @@ from html_outline import HOSTILE, Outline
 
 import cfmkit
 from cfmkit import api
-from cfmkit.documents import batch_document, html, html_of_run, html_of_study, run_outcome, sweep_document
+from cfmkit.documents import batch_document, html, report_html, run_outcome, study_documents
 from cfmkit.documents.run_document import verdict_of
 from cfmkit.errors import ExitCode
 from cfmkit.families import family
@@ -40,7 +40,7 @@ def reports():
 def made(found, command="cfmkit analyze x.yaml"):
     """Return the page of a report as text."""
     drawn = {name: draw() for name, draw in api.figures(found.result).items()}
-    return html_of_run.page(found, drawn, command).decode()
+    return report_html.run_page(found, drawn, command).decode()
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -91,7 +91,7 @@ def test_hostile_names_messages_and_commands_are_text(reports):
 def test_the_cursor_stands_at_the_motion_of_each_pose(reports):
     found = reports["springs"]
     drawn = {name: draw() for name, draw in api.figures(found.result).items()}
-    text = html_of_run.page(found, drawn).decode()
+    text = report_html.run_page(found, drawn).decode()
     data = json.loads(re.search(r'id="film-data" type="application/json">(.*?)</script>', text)[1])
     cursors = np.array(data["cursors"][-1])
     assert len(data["texts"]) == len(cursors)
@@ -126,7 +126,7 @@ def test_curves_of_a_page_have_the_points_that_their_drawing_needs():
     own = "\n".join(f"5,load,{a},{b}" for a, b in zip(x, force, strict=True))
     back = "\n".join(f"5,unload,{a},{b}" for a, b in ((10, 3), (0, 3), (10, 3)))
     content = f"r [mm],branch,displacement [mm],force [N]\n{own}\n{back}\n".encode()
-    drawn = html_of_study._curves(content, ["r [mm]"], [["5"]])["points"][0]
+    drawn = report_html._curves(content, ["r [mm]"], [["5"]])["points"][0]
     assert 5 < len(drawn["load"][0]) < 60
     assert 1.0 in drawn["load"][0]
     apart = np.abs(np.interp(x, *drawn["load"]) - force)
@@ -166,8 +166,8 @@ def test_a_page_of_a_large_sweep_keeps_what_was_varied_and_says_what_is_left_out
         "metrics": {},
         "warnings": [],
     }
-    document = sweep_document.document_of(spec, summary, {}, ExitCode.OK)
-    found = html_of_study.page(document, spec, ["mechanism.roller_radius"], files, "cfmkit sweep")
+    document = study_documents.sweep_document(spec, summary, {}, ExitCode.OK)
+    found = report_html.study_page(document, spec, ["mechanism.roller_radius"], files, "cfmkit sweep")
     assert len(found) < 5e6
     assert b"more columns are in results.csv" in found
     assert b'"mechanism.roller_radius [mm]"' in found

@@ -12,7 +12,7 @@ from batch_networks import bent, last_effort, standing, two_leaves
 
 import cfmkit.elastica as el
 from cfmkit.elastica.mechanics.march import engine
-from cfmkit.elastica.tracing.follow_alike import follow_alike
+from cfmkit.elastica.tracing.trace_many import follow_alike
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -16,7 +16,7 @@ from scipy.optimize import fsolve
 
 import cfmkit.elastica as el
 from cfmkit.elastica.contact.changes import PieceOfPath
-from cfmkit.elastica.contact.friction import choose_friction
+from cfmkit.elastica.contact.follow import choose_friction
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.results.between_points import interpolate_path

@@ -24,14 +24,14 @@ from cfmkit.elastica.contact.equations import ContactEquations, open_all_contact
 from cfmkit.elastica.contact.terms import gaps
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.compiled import CompiledEquations
-from cfmkit.elastica.mechanics.compiled_batch import CompiledBatch
 from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE, load_compiled
 from cfmkit.elastica.mechanics.designs import set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations, begin
 from cfmkit.elastica.mechanics.march import engine, equations
-from cfmkit.elastica.model.plain_beams_at_once import is_plain
-from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, NEXT_CORRECTION, compare_states
+from cfmkit.elastica.model.beam_fits import is_plain
+from cfmkit.elastica.tracing.accuracy import DEGREES_MORE, NEXT_CORRECTION, compare_states
+from cfmkit.elastica.tracing.trace_many import CompiledBatch
 from cfmkit.numerics.continuation import PathBranch
 
 ROOT = Path(__file__).parents[2]

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.branches import split, turning_points
+from cfmkit.experiment.corrections_and_low_pass import LowPass, low_passed, read_filter
 from cfmkit.experiment.curves_and_metrics_of_recording import measure_recording, numbers_of, require_loop
-from cfmkit.experiment.loop_area_and_repeatability import loop_area
-from cfmkit.experiment.low_pass import LowPass, low_passed, read_filter
 from cfmkit.experiment.reading import Recording
+from cfmkit.experiment.recorded_values import loop_area
 from cfmkit.metrics import Window
 
 

@@ -8,8 +8,8 @@ from experiment_support import reference_case
 from scipy.signal import sosfreqz
 
 from cfmkit.experiment.branches import split
+from cfmkit.experiment.corrections_and_low_pass import LowPass, low_passed
 from cfmkit.experiment.curves_and_metrics_of_recording import Measurement, measure_recording, numbers_of
-from cfmkit.experiment.low_pass import LowPass, low_passed
 from cfmkit.metrics import Window
 
 WINDOW = Window(0.040, 0.210)

@@ -10,10 +10,10 @@ from experiment_support import lossy_loop, reference_case, rows, triangle
 
 import cfmkit
 from cfmkit.errors import UsageError
+from cfmkit.experiment.corrections_and_low_pass import correct_recording
 from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measure_recording, numbers_of
 from cfmkit.experiment.parameters_to_fit import parameters
 from cfmkit.experiment.reading import Recording
-from cfmkit.experiment.zeros_and_signs import correct_recording
 from cfmkit.metrics import Window
 
 

@@ -14,8 +14,8 @@ import cfmkit
 from cfmkit.errors import GeometryError, UsageError
 from cfmkit.export import files
 from cfmkit.export.arc_outlines import outlines
+from cfmkit.export.bodies_stl_3mf_step import bodies, plates
 from cfmkit.export.contours import Drawing, Region, Sheet, circle, polygon
-from cfmkit.export.extrusion import bodies, plates
 
 SQUARE = polygon([(0, 0), (0.04, 0), (0.04, 0.02), (0, 0.02)], "cut")
 HOLE = circle((0.03, 0.01), 0.004, "cut", hole=True)
@@ -154,7 +154,7 @@ def test_an_exception_of_the_cad_kernel_is_one_line(monkeypatch):
         Edge = Vector = Location = None
 
     Kernel.Edge = Kernel
-    monkeypatch.setattr(import_module("cfmkit.export.step"), "_kernel", Kernel)
+    monkeypatch.setattr(import_module("cfmkit.export.bodies_stl_3mf_step"), "_kernel", Kernel)
     with pytest.raises(
         GeometryError, match=r"cannot make a body from the outline \(RuntimeError: StdFail_NotDone: BRep"
     ):

@@ -11,7 +11,7 @@ from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.contours import Arc, Contour, Curve2D, Drawing, Line, Smooth, circle, polygon
-from cfmkit.export.points_csv import write_points
+from cfmkit.export.dxf_svg_csv import write_points
 
 SVG = "{http://www.w3.org/2000/svg}"
 

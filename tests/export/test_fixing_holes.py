@@ -9,7 +9,7 @@ import pytest
 from shapely import Point, Polygon
 
 import cfmkit
-from cfmkit.export.fixing_holes import SCREWS_BY_NAME
+from cfmkit.export.fixing_holes_and_labels import SCREWS_BY_NAME
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

@@ -6,8 +6,22 @@ import pickle
 
 import pytest
 
-from cfmkit.families.findings import Finder, deg, format_at_least, format_at_most, mm, mpa, newton, percent, rate
-from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design, no_result, refusals_answered
+from cfmkit.families.findings import (
+    CannotBuild,
+    Finder,
+    Infeasible,
+    deg,
+    format_at_least,
+    format_at_most,
+    mm,
+    mpa,
+    newton,
+    no_design,
+    no_result,
+    percent,
+    rate,
+    refusals_answered,
+)
 from cfmkit.results import Finding, Status
 from cfmkit.specs import Spec
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.families.flattest_window import ripples
+from cfmkit.families.proposals import ripples
 
 
 def ripple_of(places, effort, start, length):

@@ -129,9 +129,9 @@ ALLOWED = {
     "yaml": lambda path: room_of(path) == "specs.yamlio",
     "ezdxf": lambda path: unit_of(path) == "export",
     "shapely": lambda path: (
-        unit_of(path) in ("export", "solid") or path.name in ("strips_and_gaps.py", "html_of_study.py")
+        unit_of(path) in ("export", "solid") or path.name in ("strips_and_gaps.py", "report_html.py")
     ),
-    "pandas": lambda path: path.name in ("results.py", "study_result.py"),
+    "pandas": lambda path: path.name in ("results.py", "sweep_and_sensitivity_api.py"),
 }
 
 
@@ -162,7 +162,7 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
             "output",
         )
     ]
-    light += [ROOT / "documents" / f"{name}.py" for name in ("document", "json_document", "terminal")]
+    light += [ROOT / "documents" / f"{name}.py" for name in ("document", "terminal")]
     heavy = (
         "numpy",
         "pydantic",

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.metrics.branches_cut_to_window import Undefined
+from cfmkit.metrics.branches import Undefined
 from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw, RelaxationLaw
 from cfmkit.metrics.metric_definitions import words
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cfmkit.curves import Column, Curve
 from cfmkit.metrics import BranchTrace, MeasuringFrame, Window, measure, restrict
-from cfmkit.metrics.branches_cut_to_window import WINDOW_RTOL, _cut_folded
+from cfmkit.metrics.branches import WINDOW_RTOL, _cut_folded
 
 PROPERTY = settings(deadline=None, max_examples=60)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.numerics.barycentric import differentiation, interpolation
+from cfmkit.numerics.interpolation import differentiation, interpolation
 
 
 def test_polynomials_through_nodes_are_exact() -> None:

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from cfmkit.errors import InputError
-from cfmkit.numerics.arc_chain import ArcChain
-from cfmkit.numerics.biarcs import CoarseDataError, biarc, fit_arcs
+from cfmkit.numerics.arc_chains import ArcChain, CoarseDataError, biarc, fit_arcs
 
 # Exact curves: a fraction in [0, 1] -> points and (not yet unit) tangents as x + iy.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.numerics.chebyshev_panels import MAX_PLACES, N_PANEL_NODES, resolve_panels
+from cfmkit.numerics.interpolation import MAX_PLACES, N_PANEL_NODES, resolve_panels
 
 
 def test_smooth_functions_and_one_with_a_corner_are_resolved() -> None:

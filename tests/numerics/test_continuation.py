@@ -11,10 +11,10 @@ from scipy.optimize import brentq
 from small_structures import Structure, bulge, columns, truss
 
 from cfmkit.numerics.continuation.corners import mark_corners
-from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import follow
 from cfmkit.numerics.continuation.path import Options, PathEvent, PathStop, Point, WhyStopped
 from cfmkit.numerics.continuation.problem import Border, PathEquilibrium
+from cfmkit.numerics.continuation.steps import correct
 
 
 def run(structure: Structure, targets: Any, **options: Any) -> tuple[list[Point], list[PathEvent], PathStop]:

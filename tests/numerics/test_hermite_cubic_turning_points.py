@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.numerics.hermite_cubic_turning_points import monotone
+from cfmkit.numerics.sampled_extremes import monotone
 
 
 def test_turning_points_between_samples_are_found():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.numerics.monotone_interpolation import ThroughPoints
+from cfmkit.numerics.interpolation import ThroughPoints
 
 
 @pytest.mark.parametrize("smooth", [True, False])

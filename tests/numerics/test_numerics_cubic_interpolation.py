@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at, values_at
+from cfmkit.numerics.interpolation import bisect, crossing, first_extreme, value_at, values_at
 
 X = np.array([0.0, 0.3, 1.0, 1.4, 2.0, 3.1])
 

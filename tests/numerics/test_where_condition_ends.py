@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from cfmkit.numerics.where_condition_ends import BRACKET_RTOL, last_places
+from cfmkit.numerics.roots import BRACKET_RTOL, last_places
 
 ROOT = 0.3 + 0.4 * np.arange(12) / 11
 CURVES = {

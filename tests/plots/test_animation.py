@@ -11,9 +11,8 @@ from PIL import Image
 import cfmkit
 from cfmkit.cli import run_command
 from cfmkit.families import family
-from cfmkit.plots.animation import FRAME_DURATION, animation, frames
 from cfmkit.plots.figures import moving_of
-from cfmkit.plots.poses_in_one_svg import N_FILM_POSES
+from cfmkit.plots.mechanism_in_motion import FRAME_DURATION, N_FILM_POSES, animation, frames
 
 SPEC = "configs/slider_crank_li2019.yaml"
 

@@ -20,8 +20,7 @@ from plot_support import axes, data_lines, loop_curve, result_of
 from cfmkit import Spec
 from cfmkit.families import Family
 from cfmkit.plots.axis_labels_and_headings import Heading, axis_label, top_axis, value_text, write_heading
-from cfmkit.plots.curve_with_enlarged_band import curve_figure
-from cfmkit.plots.curves import plot_curve
+from cfmkit.plots.curves import curve_figure, plot_curve
 from cfmkit.plots.figures import figures
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.style import (

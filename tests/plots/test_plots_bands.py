@@ -8,8 +8,7 @@ from plot_support import axes, band_boxes, flipped, loop_curve, result_of
 
 from cfmkit.curves import Curve
 from cfmkit.plots.bands_from_requirements import bands_of, limits_on
-from cfmkit.plots.curve_with_enlarged_band import choose_enlarged_range, curve_figure
-from cfmkit.plots.curves import CurveLook, plot_curve
+from cfmkit.plots.curves import CurveLook, choose_enlarged_range, curve_figure, plot_curve
 from cfmkit.plots.style import BAND_GREEN, TROUBLE_RED
 from cfmkit.results import Quantity
 

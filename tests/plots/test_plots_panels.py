@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cfmkit.plots.study import MOST_PANELS, draw_panels, figures, fit_panels
-from cfmkit.plots.study_data_to_draw import DrawnScale, StudyCurve, StudyMarks
+from cfmkit.plots.study_data_and_marks import DrawnScale, StudyCurve, StudyMarks
 
 
 def study(first, second):

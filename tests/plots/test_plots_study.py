@@ -7,7 +7,7 @@ import pytest
 
 import cfmkit
 from cfmkit.plots.study import draw_map, draw_metric, figures
-from cfmkit.plots.study_data_to_draw import DrawnScale, StudyCurve, StudyMarks
+from cfmkit.plots.study_data_and_marks import DrawnScale, StudyCurve, StudyMarks
 from cfmkit.plots.style import png
 
 X = np.repeat(np.linspace(1.0, 3.0, 5), 4)

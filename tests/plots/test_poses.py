@@ -11,7 +11,7 @@ from html_outline import Outline
 import cfmkit
 from cfmkit.families import family
 from cfmkit.plots.figures import moving_of
-from cfmkit.plots.poses_in_one_svg import poses
+from cfmkit.plots.mechanism_in_motion import poses
 from cfmkit.plots.style import axes_mm, new_figure
 from cfmkit.plots.vector_formats import inline, svg
 

@@ -15,8 +15,7 @@ from cfmkit import Run, families, specs
 from cfmkit.errors import ExitCode, SpecError
 from cfmkit.results import Result, Status
 from cfmkit.runs import specfile
-from cfmkit.runs.files_a_run_writes import files
-from cfmkit.runs.run import run_design
+from cfmkit.runs.run import files, run_design
 from cfmkit.runs.specfile import read_spec
 from cfmkit.specs.yamlio import read_document
 
@@ -237,7 +236,7 @@ def test_one_change_of_a_batch_needs_no_list(tmp_path):
 
 def test_export_is_the_function_before_and_after_the_package_of_that_name_is_imported():
     code = (
-        "import cfmkit; before = cfmkit.export; from cfmkit.export import files; import cfmkit.export.dxf; "
+        "import cfmkit; before = cfmkit.export; from cfmkit.export import files; import cfmkit.export.dxf_svg_csv; "
         "assert cfmkit.export is before and callable(before) and callable(files); "
         "from cfmkit import export; assert export is before"
     )

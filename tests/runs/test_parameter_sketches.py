@@ -12,7 +12,7 @@ import pytest
 from cfmkit import families
 from cfmkit.cli import run_command
 from cfmkit.errors import UsageError
-from cfmkit.runs.dimension_drawing import DRAWING_FILE, DRAWING_SUFFIXES, read_dimensions, read_drawing
+from cfmkit.runs.shipped_files import DRAWING_FILE, DRAWING_SUFFIXES, read_dimensions, read_drawing
 from cfmkit.specs import keys
 
 OWN = ["beam", "cam", "slider-crank", "vcfm"]

@@ -9,8 +9,7 @@ import pytest
 
 import cfmkit
 from cfmkit import Run
-from cfmkit.runs.files_a_run_writes import files, part_of
-from cfmkit.runs.part_on_paper import (
+from cfmkit.runs.exported_files import (
     assumed_tolerances,
     how_to_fasten,
     how_to_print,
@@ -19,7 +18,7 @@ from cfmkit.runs.part_on_paper import (
     stated_tolerances,
     weight_in_words,
 )
-from cfmkit.runs.run import run_design
+from cfmkit.runs.run import files, part_of, run_design
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

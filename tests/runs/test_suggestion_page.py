@@ -5,7 +5,7 @@ from __future__ import annotations
 from html_outline import HOSTILE, Outline
 
 from cfmkit.errors import ExitCode
-from cfmkit.runs import suggestion_files
+from cfmkit.runs import suggest
 
 
 def test_a_request_has_a_page_with_every_proposal_and_why_there_are_no_more():
@@ -24,7 +24,7 @@ def test_a_request_has_a_page_with_every_proposal_and_why_there_are_no_more():
         "warnings": [{"name": "search_cut_short", "message": HOSTILE}],
     }  # fmt: skip
     texts = {"1-cam-a b": f"name: {HOSTILE}"}
-    text = suggestion_files.page(reported, ExitCode.OK, texts, {}, HOSTILE).decode()
+    text = suggest.page(reported, ExitCode.OK, texts, {}, HOSTILE).decode()
     outline = Outline(text)
     assert outline.unbalanced == []
     assert {tag for tag, _ in outline.tags}.isdisjoint({"script", "img"})

@@ -5,8 +5,7 @@ from __future__ import annotations
 from suggest_support import POM
 
 import cfmkit
-from cfmkit.runs.suggestion_files import table
-from cfmkit.runs.suggestion_record import as_json
+from cfmkit.runs.suggest import as_json, table
 
 
 def test_what_was_not_judged_meets_nothing_and_says_what_is_missing(monkeypatch):

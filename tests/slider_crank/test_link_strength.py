@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cfmkit.families import PartStrength
-from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, links_that_bear
+from cfmkit.families.slider_crank.springs.hardware import LinkBar, LinkLoads, links_that_bear
 
 
 def loads(axial=0.0, moment=0.0, pin=0.0, rate=0.0, length=0.03):

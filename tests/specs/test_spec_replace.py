@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from cfmkit import SpecError
 from cfmkit.api import load
-from cfmkit.specs.yamlio.path_notation import with_value
+from cfmkit.specs.yamlio.paths import with_value
 
 if TYPE_CHECKING:
     from cfmkit import Spec

@@ -26,8 +26,7 @@ from cfmkit.specs.units import (
     unit_table,
 )
 from cfmkit.specs.units.quantities import decimal_text
-from cfmkit.specs.units.table import COMMON_UNIT_SIZES
-from cfmkit.specs.units.unit_size import border_size, unit_size
+from cfmkit.specs.units.table import COMMON_UNIT_SIZES, border_size, unit_size
 
 READABLE = [name for name in DIMENSIONS_BY_NAME if name != "text"]
 JSON_NUMBER = re.compile(r"[-+]?(0|[1-9][0-9]*|(?=\.[0-9]))(\.[0-9]*)?([eE][-+]?[0-9]+)?")

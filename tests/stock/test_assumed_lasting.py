@@ -7,8 +7,8 @@ import pytest
 
 from cfmkit.cli import run_command
 from cfmkit.stock import MATERIALS_BY_NAME
-from cfmkit.stock.assumed_lasting import ASSUMED_DATA, steel
 from cfmkit.stock.material_and_part_spec import MaterialSpec
+from cfmkit.stock.materials import ASSUMED_DATA, steel
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 STEELS = ("steel-1.4310", "steel-304", "steel-s235")

@@ -5,7 +5,7 @@ import pytest
 import cfmkit
 from cfmkit.cli import run_command
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.printing import LAYER_STRENGTHS, strands
+from cfmkit.stock.processes import LAYER_STRENGTHS, strands
 
 STRIP = """
 cfmkit: 1

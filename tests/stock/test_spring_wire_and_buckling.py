@@ -15,8 +15,7 @@ from cfmkit import Run
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
 from cfmkit.stock.springs.helical_spring_formulas import SEAT_FACTORS, HelicalSpring, buckling_deflection
-from cfmkit.stock.springs.made_to_measure import PIN_SHARE, extension_spring, stiffest, torsion_spring
-from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE, generic
+from cfmkit.stock.springs.offers import PIN_SHARE, SHEAR_SHARE, extension_spring, generic, stiffest, torsion_spring
 from cfmkit.stock.springs.spec import CatalogueSpring, DataSource, offers
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireOutOfRange
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
-from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length, stiffest, torsion_spring
-from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
+from cfmkit.stock.springs.offers import SHEAR_SHARE, extension_spring, loaded_length, stiffest, torsion_spring
 from cfmkit.stock.stock_series import series_of
 
 

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 import cfmkit
 from cfmkit.errors import DataError, SpecError
 from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
-from cfmkit.stock.springs.offer_type_and_generic_series import Miss, generic, nearest
+from cfmkit.stock.springs.offers import Miss, generic, nearest
 from cfmkit.stock.springs.spec import CatalogueSpring, DataSource, offers
 
 CONFIGS = Path(__file__).parents[2] / "configs"

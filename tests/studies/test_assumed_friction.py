@@ -2,7 +2,7 @@
 
 import cfmkit
 from cfmkit import Run
-from cfmkit.studies.assumed_friction import friction_note
+from cfmkit.studies.delivered_design import friction_note
 
 
 def test_rollers_without_ball_bearings_are_said_to_rub_on_their_shafts():

@@ -23,9 +23,8 @@ from cfmkit.studies.batch_sources_and_outcomes import (
     results_table,
     sources,
 )
-from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
+from cfmkit.studies.earlier_batch import Earlier, KeptRuns, changes, changes_table
 from cfmkit.studies.journal import Journal
-from cfmkit.studies.metric_changes_since_earlier_batch import Earlier, changes, changes_table
 from cfmkit.tables import to_csv
 
 
@@ -225,7 +224,7 @@ def test_whatever_was_changed_since_is_computed_anew(finished, change):
 def test_other_options_and_other_code_are_computed_anew(finished, monkeypatch):
     assert recalled("--seed 1") is None
     monkeypatch.setattr(
-        "cfmkit.studies.finished_batch_specs_in_journal.origin",
+        "cfmkit.studies.earlier_batch.origin",
         lambda libraries: origin(libraries) | {"content": "another"},
     )
     assert recalled() is None

@@ -25,7 +25,7 @@ from cfmkit.studies.comparison_of_fidelities import (
     fidelity_of,
     lines_of,
 )
-from cfmkit.studies.variable_paths import CannotVary, leaf
+from cfmkit.studies.variations import CannotVary, leaf
 
 CONFIGS = [*sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")), *plugin_support.CONFIGS]
 CAM = CONFIGS[0].parent / "cam.yaml"

@@ -12,9 +12,9 @@ import cfmkit
 from cfmkit import Run
 from cfmkit.families import family
 from cfmkit.stock import series_of
-from cfmkit.studies.parts.assumed_errors import accuracy_of
+from cfmkit.studies.parts.parts import accuracy_of
 from cfmkit.studies.stock_and_digits import decimals_of, lengths_and_angles
-from cfmkit.studies.suggest.digits_of_proposal import round_to_process
+from cfmkit.studies.suggest.file_of_proposal import round_to_process
 from cfmkit.studies.suggest.proposal_making_and_judging import judge_proposal, numbers_of
 from cfmkit.studies.suggest.search import offer_of
 

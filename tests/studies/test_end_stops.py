@@ -11,8 +11,7 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.results import Status
-from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.variants_in_rows import are_solved_together
 
 GAP = 4e-3

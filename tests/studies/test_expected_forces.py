@@ -10,7 +10,7 @@ import pytest
 import cfmkit
 from cfmkit import Run
 from cfmkit.studies.parts import near_parts
-from cfmkit.studies.parts.expected_forces import expected_forces
+from cfmkit.studies.parts.near_parts import expected_forces
 
 MODULUS = "mechanism.material.youngs_modulus"
 

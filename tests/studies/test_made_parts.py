@@ -15,13 +15,11 @@ from cfmkit.cli import run_command
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.specs.units import TravelShare
-from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.parts import drawn_yields
-from cfmkit.studies.parts.drawn_yields import common_errors, yields_of
-from cfmkit.studies.parts.outcomes import analyze_parts
+from cfmkit.studies.parts import drawn_parts
+from cfmkit.studies.parts.drawn_parts import analyze_parts, common_errors, yields_of
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.parts.share import Share, clopper_pearson
-from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.sensitivity.setup import prepare
 
 MODULUS = "mechanism.material.youngs_modulus"
@@ -209,6 +207,6 @@ def test_a_design_that_is_designed_again_has_the_yield_of_its_parts_before_as_we
     spec = cfmkit.load("configs/cam.yaml").replace({"design.process": "laser", "design.samples": 40})
     nominal = replace(cfmkit.analyze(spec), spec=spec)
     other = yields_of(nominal, spec.replace({"description": "another one"}), Run())
-    monkeypatch.setattr(drawn_yields, "_yield_before", None)
+    monkeypatch.setattr(drawn_parts, "_yield_before", None)
     again = yields_of(nominal, spec, Run())
     assert again.before == again.after == other.before

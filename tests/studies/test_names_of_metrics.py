@@ -9,12 +9,12 @@ import cfmkit
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import definitions, values_of_family
-from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
 from cfmkit.studies.engine import run
+from cfmkit.studies.point_evaluation import metrics_of, sample_curve
 from cfmkit.studies.sensitivity.setup import prepare as prepare_sensitivity
-from cfmkit.studies.summary import Summary, main_columns
+from cfmkit.studies.summary_and_tables import Summary, main_columns
 from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare
-from cfmkit.studies.varied_axes import parse_variation
+from cfmkit.studies.variations import parse_variation
 
 TORQUE = cfmkit.load("configs/slider_crank_li2019.yaml")
 
@@ -30,7 +30,7 @@ def with_requirements(*entries):
 
 
 def test_a_sweep_over_torques_notes_either_name_in_the_same_bytes():
-    from cfmkit.studies.tables import results_csv
+    from cfmkit.studies.summary_and_tables import results_csv
 
     options = parse_variation(f"{STIFFNESS}=[1 N/cm, 1.1 N/cm]")
     written = []

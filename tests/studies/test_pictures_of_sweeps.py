@@ -11,7 +11,7 @@ import cfmkit
 from cfmkit.studies.engine import run
 from cfmkit.studies.pictures import _nominal, findings
 from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare, summary_of
-from cfmkit.studies.varied_axes import collect_variations
+from cfmkit.studies.variations import collect_variations
 from cfmkit.tables import Table, TableColumn
 
 WIDTHS = {"mechanism.contact.width": ("8 mm", "9 mm", "10 mm")}  # which change no force

@@ -13,10 +13,9 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.stock import MATERIALS_BY_NAME, PROCESSES_BY_NAME
 from cfmkit.studies.parts import requirement_rows
-from cfmkit.studies.parts.assumed_errors import assume_errors, tolerances
+from cfmkit.studies.parts.drawn_parts import analyze_parts
 from cfmkit.studies.parts.near_parts import expected_shares, expected_yield
-from cfmkit.studies.parts.outcomes import analyze_parts
-from cfmkit.studies.parts.parts import Parts
+from cfmkit.studies.parts.parts import Parts, assume_errors, tolerances
 from cfmkit.studies.stock_and_digits import decimals_of
 
 STRIP = "configs/slider_crank_strip.yaml"

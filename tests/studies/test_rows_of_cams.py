@@ -9,15 +9,14 @@ from study_rows import assert_rows_equal_runs, study_of
 import cfmkit
 from cfmkit.families import Variants, family
 from cfmkit.results import Status
-from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.plan import Draw, sample_axes
-from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.row_blocks_for_journal import join_rows
 from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
-from cfmkit.studies.varied_axes import axes, collect_variations
+from cfmkit.studies.variations import axes, collect_variations
 
 solve_rows = family("cam").rows
 

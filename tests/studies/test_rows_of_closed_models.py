@@ -11,10 +11,9 @@ from study_rows import assert_rows_equal_runs
 
 import cfmkit
 from cfmkit.families import Variants, family
-from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.point_evaluation import Study
-from cfmkit.studies.variable_paths import FIXED_BLOCKS, CannotVary, leaf
+from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
+from cfmkit.studies.variations import FIXED_BLOCKS, CannotVary, leaf
 
 CLOSED_FIDELITIES = ("quasi-static", "truss", "analytic", "prb")
 

@@ -11,12 +11,11 @@ from study_rows import assert_rows_equal_runs, study_of
 import cfmkit
 from cfmkit import api
 from cfmkit.families import Variants, family
-from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.plan import zip_axes
-from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.sensitivity.setup import prepare
 from cfmkit.studies.variants_in_rows import are_solved_together
-from cfmkit.studies.varied_axes import axes, collect_variations
+from cfmkit.studies.variations import axes, collect_variations
 
 PATHS = tuple(f"mechanism.springs.{name}" for name in ("pivot", "crank_pin", "slider_pin", "slider"))
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cfmkit.studies.parts.share import Share
-from cfmkit.studies.sensitivity import local, monte_carlo_yield, morris, oat, sobol
-from cfmkit.studies.sensitivity.indices import analyze_complete
+from cfmkit.studies.sensitivity import local, morris, oat, sobol, tolerance
+from cfmkit.studies.sensitivity.result_types import analyze_complete
 
 SLOPES = np.array([5.0, 1.0])
 
@@ -31,8 +31,8 @@ def tolerance_setup():
     outputs = np.stack([linear(unit), linear(unit * [0.5, 1]), linear(unit * [1, 0.5])], axis=1)
     return (
         outputs,
-        lambda found: monte_carlo_yield.variance_drops(found, 0),
-        (monte_carlo_yield.VARIANCE_DROP,),
+        lambda found: tolerance.variance_drops(found, 0),
+        (tolerance.VARIANCE_DROP,),
     )
 
 
@@ -96,5 +96,5 @@ def test_failed_samples_are_bad_parts():
     both = np.array([[True, True, True]] * 50 + [[False, True, False]] * 50)
     lost = np.zeros(both.shape, bool)
     lost[3, 2] = True
-    gain = monte_carlo_yield.yield_gains(both, lost)
+    gain = tolerance.yield_gains(both, lost)
     assert gain.value.tolist() == [pytest.approx(0.5), pytest.approx(-0.01)]

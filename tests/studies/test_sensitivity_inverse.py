@@ -12,7 +12,7 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.studies.parts.allowed_tolerances import MAX_TOLERANCE_FACTOR, LimitsAlong, factors_that_keep
 from cfmkit.studies.parts.share import Share
-from cfmkit.studies.sensitivity.output import is_met_by_interval, yield_ok
+from cfmkit.studies.sensitivity.run_and_files import is_met_by_interval, yield_ok
 
 TWO_SIDED = NormalDist().inv_cdf(0.975)
 ERRORS = np.random.default_rng(0).standard_normal((40_000, 2))

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from cfmkit.studies.parts import distributions, share
-from cfmkit.studies.parts.distributions import ParameterSpread
+from cfmkit.studies.parts import share, uncertain_values
 from cfmkit.studies.parts.share import Share
-from cfmkit.studies.sensitivity import local, monte_carlo_yield, morris, oat, sobol
+from cfmkit.studies.parts.uncertain_values import ParameterSpread
+from cfmkit.studies.sensitivity import local, morris, oat, sobol, tolerance
 
 RANGE = {"kind": "uniform", "nominal": 0.0}
 
@@ -164,8 +164,8 @@ def normal(deviation, nominal=0.0, low=-np.inf, high=np.inf):
 
 
 def made(tolerances, matrix, count=40_000, seed=0, groups=()):
-    unit = distributions.draw(matrix, count, np.random.default_rng(seed))
-    return monte_carlo_yield.sample(unit, tolerances, groups)
+    unit = uncertain_values.draw(matrix, count, np.random.default_rng(seed))
+    return tolerance.sample(unit, tolerances, groups)
 
 
 def test_the_yield_of_a_normal_tolerance_is_that_of_the_normal_distribution():
@@ -180,22 +180,22 @@ def test_the_yield_of_a_normal_tolerance_is_that_of_the_normal_distribution():
 
 @pytest.mark.parametrize("correlation", [-0.6, 0.0, 0.5, 1.0])
 def test_the_sum_of_correlated_springs_scatters_as_theory_says(correlation):
-    matrix = distributions.correlation_matrix(2, [((0, 1), correlation)])
+    matrix = uncertain_values.correlation_matrix(2, [((0, 1), correlation)])
     total = made([normal(1.0), normal(1.0)], matrix)[:, 0].sum(axis=1)
     assert total.std() == pytest.approx(sqrt(2 + 2 * correlation), rel=0.02)
 
 
 def test_correlation_leaves_each_distribution_as_it_is():
     spread = ParameterSpread("uniform", 0.0, -1.0, 1.0)
-    points = made([spread, spread], distributions.correlation_matrix(2, [((0, 1), 0.9)]))[:, 0]
+    points = made([spread, spread], uncertain_values.correlation_matrix(2, [((0, 1), 0.9)]))[:, 0]
     # The rank correlation of a Gaussian copula is 6/pi asin(r/2); for uniform parameters it is their own.
     assert np.corrcoef(points.T)[0, 1] == pytest.approx(6 / pi * np.arcsin(0.45), abs=0.01)
     assert points.std(axis=0) == pytest.approx([1 / sqrt(3)] * 2, rel=0.02)
 
 
 def test_correlations_that_cannot_be_are_refused():
-    with pytest.raises(distributions.Incompatible, match="oppose"):
-        distributions.correlation_matrix(3, [((0, 1, 2), -0.9)])
+    with pytest.raises(uncertain_values.Incompatible, match="oppose"):
+        uncertain_values.correlation_matrix(3, [((0, 1, 2), -0.9)])
 
 
 def test_a_truncated_normal_distribution_keeps_its_ends_and_its_shape():
@@ -220,11 +220,11 @@ def test_a_tightened_tolerance_is_the_same_about_the_nominal_value(spread):
 def test_the_tolerance_that_matters_is_the_one_to_tighten():
     points = made([normal(3.0), normal(1.0), normal(1.0)], np.eye(3), groups=((0,), (1, 2)))
     outputs = points.sum(axis=2)
-    (drop,) = monte_carlo_yield.variance_drops(outputs, 0)
+    (drop,) = tolerance.variance_drops(outputs, 0)
     # Halving a tolerance takes three quarters of its share of the variance away.
     np.testing.assert_allclose(drop.value, [0.75 * 9 / 11, 0.75 * 2 / 11], atol=0.01)
     assert (drop.low < drop.value).all()
-    gain = monte_carlo_yield.yield_gains(np.abs(outputs) < 4, np.zeros(outputs.shape, bool))
+    gain = tolerance.yield_gains(np.abs(outputs) < 4, np.zeros(outputs.shape, bool))
     exact = [
         (2 * NormalDist(0, sqrt(after)).cdf(4) - 1) - (2 * NormalDist(0, sqrt(11)).cdf(4) - 1)
         for after in (9 / 4 + 2, 9 + 2 / 4)
@@ -236,7 +236,7 @@ def test_the_tolerance_that_matters_is_the_one_to_tighten():
 def test_common_random_numbers_make_a_gain_sharper_than_two_separate_yields():
     points = made([normal(1.0), normal(0.1)], np.eye(2), 1000, groups=((1,),))
     met = np.abs(points.sum(axis=2)) < 1
-    gain = monte_carlo_yield.yield_gains(met, np.zeros(met.shape, bool))
+    gain = tolerance.yield_gains(met, np.zeros(met.shape, bool))
     alone = Share.from_outcomes(met[:, 0], np.zeros(len(met), bool)).wilson
     assert gain.high[0] - gain.low[0] < 0.5 * (alone[1] - alone[0])
 

@@ -20,10 +20,17 @@ from cfmkit.studies.parts.share import Share
 from cfmkit.studies.sensitivity import METHOD_NAMES
 from cfmkit.studies.sensitivity.evaluation import Evaluator
 from cfmkit.studies.sensitivity.method import method_named
-from cfmkit.studies.sensitivity.output import as_json, exit_code, is_met_by_interval, message, outputs, yield_ok
-from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
+from cfmkit.studies.sensitivity.run_and_files import (
+    as_json,
+    carry_out,
+    exit_code,
+    is_met_by_interval,
+    message,
+    outputs,
+    yield_ok,
+)
 from cfmkit.studies.sensitivity.setup import prepare
-from cfmkit.studies.summary import Summary
+from cfmkit.studies.summary_and_tables import Summary
 
 CONFIG = Path(__file__).parents[2] / "configs" / "studies" / "cam_tolerance.yaml"
 PARAMETERS = {

@@ -15,14 +15,13 @@ import pytest
 import cfmkit
 from cfmkit.errors import UsageError
 from cfmkit.studies import serial_and_cluster_executors as executors
-from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.plan import grid
-from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.serial_and_cluster_executors import Cluster, stamp_of
 from cfmkit.studies.sweep_request_and_files import outputs, summary_of
-from cfmkit.studies.varied_axes import axes, parse_variation
+from cfmkit.studies.variations import axes, parse_variation
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install distributed")
 pytestmark = pytest.mark.filterwarnings("ignore")

@@ -12,17 +12,15 @@ from cfmkit.errors import OutputError, UsageError
 from cfmkit.families import FindingRule, Variants, family
 from cfmkit.results import Finding, Status
 from cfmkit.store import origin
-from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
 from cfmkit.studies.engine import Work, compact, run
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.plan import grid
-from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.point_evaluation import Study, metrics_of, sample_curve
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.row_blocks_for_journal import ResultRows, squeeze, unsqueeze
-from cfmkit.studies.summary import Objective, Summary
+from cfmkit.studies.summary_and_tables import Objective, Summary, results_csv
 from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare
-from cfmkit.studies.tables import results_csv
-from cfmkit.studies.varied_axes import axes, collect_variations, parse_variation
+from cfmkit.studies.variations import axes, collect_variations, parse_variation
 from cfmkit.tables import read_csv
 
 SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 41})
@@ -124,7 +122,7 @@ def test_a_point_is_designed_as_the_design_verb_does_it(monkeypatch):
         return dataclasses.replace(design, spec=design.spec.replace({"mechanism.offset": 0.0003}))
 
     monkeypatch.setattr("cfmkit.studies.parts.redesign.with_design_margins", margins)
-    monkeypatch.setattr("cfmkit.studies.verify_design_by_solid_model.verify_by_solid", as_solid)
+    monkeypatch.setattr("cfmkit.studies.delivered_design.verify_by_solid", as_solid)
     spec = spec.replace({"design.verify": "solid"})
     made = cfmkit.design(spec).spec
     assert (made.mechanism.crank_length, made.mechanism.offset) == (0.0401, 0.0003)

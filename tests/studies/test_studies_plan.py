@@ -7,8 +7,7 @@ import cfmkit
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family, names
 from cfmkit.studies.plan import Draw, grid, sample_axes, zip_axes
-from cfmkit.studies.variable_paths import leaf, paths
-from cfmkit.studies.varied_axes import axes, collect_variations, parse_variation
+from cfmkit.studies.variations import axes, collect_variations, leaf, parse_variation, paths
 
 SPEC = cfmkit.load("configs/cam.yaml")
 RADIUS = "mechanism.roller_radius"

@@ -19,7 +19,7 @@ from cfmkit.results import Status
 from cfmkit.specs.units import TravelShare
 from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.suggest import figures, proposal_making_and_judging, relaxed_requests, search, yield_of_proposal
-from cfmkit.studies.suggest.material_and_fastening_of_proposal import add_screws
+from cfmkit.studies.suggest.file_of_proposal import add_screws
 from cfmkit.studies.suggest.outcome_of_search import Suggestions
 from cfmkit.studies.suggest.proposal_making_and_judging import (
     ENDED_EARLY,

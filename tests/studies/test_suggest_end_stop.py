@@ -14,7 +14,7 @@ import cfmkit
 from cfmkit import Run
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.studies.suggest.end_stop_of_proposal import NO_END_STOP
+from cfmkit.studies.suggest.file_of_proposal import NO_END_STOP
 from cfmkit.studies.suggest.search import offer_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -18,14 +18,12 @@ from cfmkit.families import family, function_named
 from cfmkit.metrics import values_of_family
 from cfmkit.results import Quantity
 from cfmkit.stock.springs import WIRES_BY_NAME
-from cfmkit.studies.parts.assumed_errors import assume_errors
 from cfmkit.studies.parts.near_parts import expected_shares
-from cfmkit.studies.parts.parts import Parts
+from cfmkit.studies.parts.parts import Parts, assume_errors
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
-from cfmkit.studies.suggest.misses_in_words import raised_out
 from cfmkit.studies.suggest.outcome_of_search import Suggestions
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, judge_proposal, make_proposal
-from cfmkit.studies.suggest.requirements_of_request import list_misses_within_mesh_error, list_requirements
+from cfmkit.studies.suggest.requirements_and_misses import list_misses_within_mesh_error, list_requirements, raised_out
 from cfmkit.studies.suggest.search import _Making, _Times, offer_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"

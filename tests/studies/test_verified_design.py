@@ -11,7 +11,7 @@ import cfmkit
 from cfmkit import Run, api
 from cfmkit.families import family
 from cfmkit.results import Design, Status
-from cfmkit.studies.verify_design_by_solid_model import verify_by_solid
+from cfmkit.studies.delivered_design import verify_by_solid
 
 QUICK = ("analysis.solid.poses=9", "analysis.solid.error=0.1", "analysis.points=61", "design.verify=solid")
 

@@ -10,7 +10,7 @@ import cfmkit
 from cfmkit.cli import run_command
 from cfmkit.errors import UsageError
 from cfmkit.tables import Table, TableColumn, read_csv
-from cfmkit.tables.parquet_writing import parquet
+from cfmkit.tables.table import parquet
 
 VARY = {
     "mechanism.roller_radius": ["8 mm", "10 mm"],

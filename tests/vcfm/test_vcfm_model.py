@@ -15,12 +15,10 @@ from cfmkit import api
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.families import family
-from cfmkit.families.vcfm.flattening_widths_or_window import extreme_sums
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring, parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
-from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw
-from cfmkit.families.vcfm.leaves.laws_in_rows import stack_laws
+from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, stack_laws
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.s_form import POLE_LOAD, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.v_beam import TrussLeaf, VBeam
@@ -28,6 +26,7 @@ from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
 from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES, spread
+from cfmkit.families.vcfm.range_and_flatness_findings import extreme_sums
 from cfmkit.metrics import evaluate
 from cfmkit.results import Status
 from cfmkit.studies import are_solved_together

@@ -46,13 +46,13 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Document:
     words: tuple[str, ...] = ()
     if options.data is not None:
         inputs, words = data_record(options.data), ("--data", options.data, *chain(*given_measurement_options(options)))
-        from cfmkit.runs.comparisons import analyze_beside_recording
+        from cfmkit.runs.comparisons_and_corrections import analyze_beside_recording
 
         work = partial(analyze_beside_recording, read_measured(options.data, options))
     else:
         refuse_without_data(options)
     if options.compare_fidelity:
-        from cfmkit.runs.comparisons import analyze_by_each_model
+        from cfmkit.runs.comparisons_and_corrections import analyze_by_each_model
 
         work = partial(analyze_by_each_model, work)
     verb = Verb("analyze", work, inputs, words=words)

@@ -140,7 +140,7 @@ def _tolerance(options: BatchOptions) -> float | None:
 
 
 def _annotations(found: BatchResult) -> Iterator[str]:
-    from cfmkit.documents.annotations import workflow_commands
+    from cfmkit.documents.continuous_integration import workflow_commands
 
     return workflow_commands(found.entries, _place_of, found.compared.changes if found.compared else ())
 

@@ -68,7 +68,7 @@ def compute(options: CalibrateOptions, source: MeasuredCurves, spec: Spec, run: 
     """Return the report on the fitted mechanism."""
     from cfmkit.experiment.parameters_to_fit import split_bounds
     from cfmkit.numerics.least_squares import LOSS_NAMES
-    from cfmkit.runs.comparisons import report_on_calibration
+    from cfmkit.runs.comparisons_and_corrections import report_on_calibration
     from cfmkit.runs.measure_and_calibrate_api import calibrate
 
     loss = next(name for name in LOSS_NAMES if name == options.loss)

@@ -43,7 +43,7 @@ def run(options: CorrectOptions, terminal: Terminal) -> Document:
     """Correct a design by the recording of its part: what differs is fitted, what is made is drawn anew."""
     from cfmkit.cli.run_spec_and_print_page import execute
     from cfmkit.errors import UsageError
-    from cfmkit.runs.correct import report_on_corrected
+    from cfmkit.runs.comparisons_and_corrections import report_on_corrected
     from cfmkit.runs.run import Verb
 
     if options.fit is not None and not options.fit.strip():

@@ -42,7 +42,7 @@ class ExamplesOptions(Common):
 
 def run(options: ExamplesOptions, terminal: Terminal) -> Document:
     """List the examples that come with cfmkit, copy one, or run them to check an installation; nothing is replaced."""
-    from cfmkit.runs.examples import copy, examples
+    from cfmkit.runs.shipped_files import copy, examples
 
     if options.run is not None:
         if options.name is not None or options.out is not None:
@@ -67,7 +67,7 @@ def _verb(name: str, path: str) -> str:
     """Return what an example is for: a study for the study that it states."""
     from cfmkit.api import load
     from cfmkit.families import family
-    from cfmkit.runs.examples import example
+    from cfmkit.runs.shipped_files import example
 
     spec = load(path)
     if "/" in name:
@@ -83,7 +83,7 @@ def _check_examples(name: str, options: ExamplesOptions, terminal: Terminal) -> 
 
     from cfmkit.cli.progress import watching
     from cfmkit.runs.batch import batch
-    from cfmkit.runs.examples import example, examples
+    from cfmkit.runs.shipped_files import example, examples
 
     if name in (ALL_EXAMPLES, QUICK_EXAMPLES):
         mechanisms = [one for one in examples() if "/" not in one.name]

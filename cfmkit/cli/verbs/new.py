@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cfmkit.cli import shell_completion
+from cfmkit.cli import options as shell_completion
 from cfmkit.cli.options import Common, argument, flag, option
 from cfmkit.documents.document import Document, Paragraph, Tone, Verbatim, next_command
 from cfmkit.errors import OutputError, UsageError, visible

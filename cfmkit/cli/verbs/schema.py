@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.cli import shell_completion
+from cfmkit.cli import options as shell_completion
 from cfmkit.cli.options import Common, argument
 from cfmkit.documents.document import Document, JsonText, with_skipped_families
 

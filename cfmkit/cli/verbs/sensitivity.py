@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.cli import shell_completion
+from cfmkit.cli import options as shell_completion
 from cfmkit.cli.options import StudyOptions, flag, option
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.specs.sensitivity_methods import MethodWord, describe_methods, describe_samples
@@ -52,10 +52,9 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
     interruption, run the same command again to continue.
     """
     from cfmkit.cli.run_study_in_folder import open_study
-    from cfmkit.documents.sensitivity_document import document_of
+    from cfmkit.documents.study_documents import sensitivity_document
     from cfmkit.runs.run import RunTask, placing, read
-    from cfmkit.studies.sensitivity.output import as_json, outputs
-    from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
+    from cfmkit.studies.sensitivity.run_and_files import as_json, carry_out, outputs
     from cfmkit.studies.sensitivity.setup import prepare
 
     start = time.perf_counter()
@@ -66,7 +65,7 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
         study.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
         found = replace(carry_out(setup, study.compute), fresh=options.fresh)
         tables = study.write_tables(outputs(found))
-        page = document_of(found)
+        page = sensitivity_document(found)
         study.write_pages(page, setup.study, found.setup.paths, tables, partial(_pictures, found))
         data, pieces = as_json(found), [piece.records for piece in found.evaluator.pieces]
         finished = study.commit(page, setup.study, setup.seed, pieces, data)
@@ -131,7 +130,7 @@ def spread(option: str) -> tuple[str, Any]:
 
 def _quiet(found: Findings, data: Mapping[str, Any], code: ExitCode) -> Iterator[str]:
     """Yield what a user must hear who has asked to hear nothing else."""
-    from cfmkit.studies.sensitivity.output import message
+    from cfmkit.studies.sensitivity.run_and_files import message
 
     if code not in (ExitCode.OK, ExitCode.REQUIREMENT_MISSED):
         yield f"{data['status']:<9}{message(found)}"

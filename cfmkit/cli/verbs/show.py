@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from cfmkit.cli import shell_completion, verbs
+from cfmkit.cli import options as shell_completion
+from cfmkit.cli import verbs
 from cfmkit.cli.options import Common, argument, option
 from cfmkit.documents.document import BLANK_LINE, Document, Paragraph, Tone, field, record_table, with_skipped_families
 from cfmkit.errors import UsageError, visible
@@ -60,7 +61,7 @@ def _copy_drawing(name: str | None, given: str) -> Document:
     """Copy the drawing of a family to a file that is not there yet."""
     from pathlib import Path
 
-    from cfmkit.runs.dimension_drawing import find_drawn_family, read_dimensions, read_drawing
+    from cfmkit.runs.shipped_files import find_drawn_family, read_dimensions, read_drawing
     from cfmkit.store.safe_disk_changes import reporting, write_new
 
     record = find_drawn_family(name)

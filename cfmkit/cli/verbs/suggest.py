@@ -100,9 +100,10 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     from cfmkit.documents import suggestion_document
     from cfmkit.documents.document import Written, with_skipped_families
     from cfmkit.families.run_control import Run
-    from cfmkit.runs import suggestion_files, suggestion_record
+    from cfmkit.runs import suggest as suggestion_files
+    from cfmkit.runs import suggest as suggestion_record
     from cfmkit.runs.run import long_run
-    from cfmkit.runs.suggest_api import read_request
+    from cfmkit.runs.suggest import read_request
     from cfmkit.store import RunFolder
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import cores

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.cli import shell_completion
+from cfmkit.cli import options as shell_completion
 from cfmkit.cli.options import StudyOptions, flag, option
 from cfmkit.errors import CfmError, ExitCode, UsageError, lines_of
 from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS, list_phrases
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.documents.document import Document
     from cfmkit.specs.yamlio import YamlDocument
     from cfmkit.studies.engine import Records
-    from cfmkit.studies.summary import Summary
+    from cfmkit.studies.summary_and_tables import Summary
     from cfmkit.studies.sweep_request_and_files import SweepRequest
 
 HELP_POSITION = 22
@@ -51,7 +51,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
     Finished points are kept in the folder: after an interruption, run the same command again to continue.
     """
     from cfmkit.cli.run_study_in_folder import open_study
-    from cfmkit.documents import sweep_document
+    from cfmkit.documents import study_documents
     from cfmkit.runs.run import RunTask, placing, read
     from cfmkit.studies.sweep_request_and_files import outputs, prepare, summary_of, writes_curves
 
@@ -67,7 +67,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
         tables = study.write_tables(outputs(records, summary, writes_curves(spec, asked)))  # which fill the summary
         code, reported = exit_code(records, summary), summary.as_json(records)
         dimensions = {one.name: one.dimension for one in work.study.metrics}
-        found = sweep_document.document_of(spec, reported, dimensions, code, reused=records.reused)
+        found = study_documents.sweep_document(spec, reported, dimensions, code, reused=records.reused)
         varied = [item.path for item in work.plan.variables]
         study.write_pages(found, work.study, varied, tables, partial(_pictures, records, summary))
         finished = study.commit(found, work.study, options.seed, [records], reported)
@@ -81,7 +81,7 @@ def request(options: SweepOptions) -> SweepRequest:
     """
     from cfmkit.cli.run_study_in_folder import names
     from cfmkit.studies.sweep_request_and_files import SweepRequest
-    from cfmkit.studies.varied_axes import parse_variation
+    from cfmkit.studies.variations import parse_variation
 
     if options.zip and options.sample:
         raise UsageError("--zip and --sample exclude each other")

@@ -10,9 +10,9 @@ from cfmkit.elastica.contact.path_items import ContactChange
 from cfmkit.elastica.contact.side_changes import locate_side_change
 from cfmkit.elastica.contact.step_between import StepBetween
 from cfmkit.elastica.model.contact import BeamOnObstacle
-from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 from cfmkit.numerics.continuation.problem import largest_motion
+from cfmkit.numerics.continuation.steps import correct
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

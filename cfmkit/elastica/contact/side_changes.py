@@ -13,14 +13,18 @@ import numpy as np
 from cfmkit.elastica.contact.changes import PieceOfPath
 from cfmkit.elastica.contact.edges import find_mate
 from cfmkit.elastica.contact.line_tangent import KINK_REACH
-from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
 from cfmkit.elastica.contact.path_items import ContactChange
 from cfmkit.elastica.contact.places_of_sides import (
     find_nearest_places,
     find_pads_at,
     find_partner,
+    guess_laid,
     lay_anew,
     list_remaining_places,
+    may_lie,
+    presses,
+    presses_where_it_spreads,
+    why_not_laid,
 )
 from cfmkit.elastica.contact.side_conditions import NEW_PLACE, step_inwards
 from cfmkit.elastica.contact.side_gaps import LoadStage

@@ -26,7 +26,7 @@ from cfmkit.elastica.contact.line_tangent import line_leaves_normal, measure_com
 from cfmkit.elastica.contact.pair_gaps import make_gaps
 from cfmkit.elastica.contact.side_gaps import join_sides, search_sides
 from cfmkit.elastica.mechanics.contact_arrays import side_contacts
-from cfmkit.elastica.mechanics.element_tables import smooth_marks
+from cfmkit.elastica.mechanics.elements import smooth_marks
 from cfmkit.elastica.mechanics.energy import line_load
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, lengths_at, with_places

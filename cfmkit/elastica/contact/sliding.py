@@ -39,7 +39,7 @@ from cfmkit.elastica.mechanics.moving_elements import (
     unloaded_beam_at,
 )
 from cfmkit.elastica.mechanics.polynomials import shape_functions
-from cfmkit.elastica.model.plain_beams_at_once import has_polynomial_angle
+from cfmkit.elastica.model.beam_fits import has_polynomial_angle
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.contact.changes import FEWEST_SAMPLES, MAX_SLOPE_STEPS, SAMPLES_PER_RADIUS
-from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
-from cfmkit.numerics.continuation.steps import hermite
+from cfmkit.numerics.continuation.steps import correct, hermite
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

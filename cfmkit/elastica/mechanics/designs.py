@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.network_arrays import fill_arrays, join_held
 from cfmkit.elastica.model.beam_fits import BeamFits, fit_networks
-from cfmkit.elastica.model.driven_node import find_driven_node
+from cfmkit.elastica.model.drive import find_driven_node
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 

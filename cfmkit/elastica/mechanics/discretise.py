@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-from cfmkit.elastica.mechanics.element_cuts import (
+from cfmkit.elastica.mechanics.elements import (
     TAUT_RATIO,
+    MechanicsUnits,
     MovingCuts,
     find_cuts,
     find_moving_cuts,
@@ -28,13 +29,10 @@ from cfmkit.elastica.mechanics.element_cuts import (
 )
 from cfmkit.elastica.mechanics.network_arrays import fill_arrays, join_held
 from cfmkit.elastica.mechanics.numbering import Numbering, Topology, find_free, number
-from cfmkit.elastica.mechanics.units import MechanicsUnits
-from cfmkit.elastica.model.beam_fits import BeamFits
+from cfmkit.elastica.model.beam_fits import BeamFits, is_plain
 from cfmkit.elastica.model.contact import BeamSide, Stop
-from cfmkit.elastica.model.drive import Displacement, Loading
-from cfmkit.elastica.model.driven_node import FRAME_OF_DRIVE, find_driven_node
+from cfmkit.elastica.model.drive import FRAME_OF_DRIVE, Displacement, Loading, find_driven_node
 from cfmkit.elastica.model.network import PointLoad, TorsionSpring, apart, spring_ends
-from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:

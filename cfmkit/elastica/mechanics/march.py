@@ -13,9 +13,8 @@ import numpy as np
 
 from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
 from cfmkit.elastica.contact.sliding import SlidingEquations
-from cfmkit.elastica.mechanics.compiled import CompiledEquations
+from cfmkit.elastica.mechanics.compiled import CompiledEquations, are_sides_compiled
 from cfmkit.elastica.mechanics.compiled_module import MAX_DEGREE, load_compiled
-from cfmkit.elastica.mechanics.compiled_sides import are_sides_compiled
 from cfmkit.elastica.mechanics.contact_arrays import are_compiled, side_contacts
 from cfmkit.elastica.mechanics.equations import (
     LinearEquations,

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.element_tables import smooth_marks, smooth_tables
-from cfmkit.elastica.model.plain_beams_at_once import has_polynomial_angle
+from cfmkit.elastica.mechanics.elements import smooth_marks, smooth_tables
+from cfmkit.elastica.model.beam_fits import has_polynomial_angle
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """Numbers of networks of one topology as arrays with a leading axis: of one, of a batch, of complex steps of variables.
 
 Networks differ in places of nodes, offsets, shapes, sections, supports, springs and loads. Beams that are plain
-(`cfmkit.elastica.model.plain_beams_at_once`: a polynomial angle, one thickness) are set up together.
+(`cfmkit.elastica.model.beam_fits`: a polynomial angle, one thickness) are set up together.
 """
 
 from __future__ import annotations
@@ -11,19 +11,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.element_tables import element_tables
-from cfmkit.elastica.model.driven_node import FRAME_OF_DRIVE
+from cfmkit.elastica.mechanics.elements import element_tables
+from cfmkit.elastica.model.drive import FRAME_OF_DRIVE
 from cfmkit.elastica.model.network import LineLoad
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.elements import MechanicsUnits
     from cfmkit.elastica.mechanics.numbering import Numbering
-    from cfmkit.elastica.mechanics.units import MechanicsUnits
     from cfmkit.elastica.model.beam_fits import BeamFits
-    from cfmkit.elastica.model.drive import Drive
-    from cfmkit.elastica.model.driven_node import DrivenNode
+    from cfmkit.elastica.model.drive import Drive, DrivenNode
     from cfmkit.elastica.model.network import Network
 
     Loaded = tuple[Network, Drive]

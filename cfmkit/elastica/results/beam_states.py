@@ -20,6 +20,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import CURLING_TABLES, design_of
+from cfmkit.elastica.mechanics.elements import MechanicsUnits
 from cfmkit.elastica.mechanics.polynomials import (
     basis,
     integrals,
@@ -28,7 +29,6 @@ from cfmkit.elastica.mechanics.polynomials import (
     shape_functions,
 )
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.mechanics.wide_strip import bending_moment
 from cfmkit.numerics.dual_array import DualArray, dual_of_steps, plain
 

@@ -7,6 +7,10 @@ bifurcation, where the path has a corner, everything is parted.
 
 Under a load the place is the driven node's motion (`between_loads`).
 
+At a bifurcation a path changes to another branch, and its curves have a kink: nothing may be interpolated across one.
+On the branch that parts from a path the change of shape grows with the root of the drive from there on: in that root it
+is smooth.
+
 Assumes: a path on which the drive, or under a load the motion, does not turn back.
 """
 
@@ -21,15 +25,75 @@ import numpy as np
 from cfmkit.arrays import Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
-from cfmkit.elastica.results.smooth_variable_beside_bifurcation import Corner, SmoothStretch
-from cfmkit.elastica.results.stress_between_points import insert_knots, largest_inside, solve_extremes, solve_passes
-from cfmkit.numerics.cubic_interpolation import crossing, inner_extremes, values_at
+from cfmkit.elastica.results.stress_extremes import insert_knots, largest_inside, solve_extremes, solve_passes
+from cfmkit.numerics.interpolation import crossing, inner_extremes, values_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.equations import NumpyEquations, SolvedStates
     from cfmkit.elastica.results.path import EquilibriumPath
-    from cfmkit.elastica.results.stress_between_points import Knots
+    from cfmkit.elastica.results.stress_extremes import Knots
+
+
+@dataclass(frozen=True, eq=False)
+class Corner:
+    """A bifurcation between two points of a path."""
+
+    drive: float  # where, dimensionless
+    y: FloatArray  # (unknowns,) the equilibrium there
+    # below, above: whether a branch that parts from the other one is at smaller, and at larger values of the drive
+    below: bool
+    above: bool
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothStretch:
+    """A path between two corners, or up to an end of the path: None."""
+
+    low: Corner | None
+    high: Corner | None
+
+    @property
+    def _roots(self) -> tuple[float | None, float | None]:
+        """The ends [dimensionless] from which the change of shape grows with a root."""
+        opens = self.low.drive if self.low is not None and self.low.above else None
+        return opens, self.high.drive if self.high is not None and self.high.below else None
+
+    def smooth(self, drive: FloatArray) -> FloatArray:
+        """Return the variable in which the path is smooth, increasing with the drive: the drive where no root is."""
+        low, high = self._roots
+        if low is not None and high is not None:
+            return np.asarray(np.arccos(1.0 - 2.0 * np.clip((drive - low) / (high - low), 0.0, 1.0)))
+        if low is not None:
+            return np.sqrt(np.maximum(drive - low, 0.0))
+        if high is not None:
+            return np.asarray(-np.sqrt(np.maximum(high - drive, 0.0)))
+        return drive
+
+    def drive(self, smooth: FloatArray) -> FloatArray:
+        """Return the drive where the smooth variable has some values."""
+        low, high = self._roots
+        if low is not None and high is not None:
+            return np.asarray(low + 0.5 * (high - low) * (1.0 - np.cos(smooth)))
+        if low is not None:
+            return np.asarray(low + smooth**2)
+        if high is not None:
+            return np.asarray(high - smooth**2)
+        return smooth
+
+    def with_ends(
+        self, drive: FloatArray, values: FloatArray, at_low: FloatArray | None, at_high: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return points on the stretch and values there, (n, k), with those at the corners, which may be points.
+
+        Where the path ends at a corner there may be no point besides it: `drive` is then empty.
+        """
+        if self.low is not None and at_low is not None and self.low.drive not in drive[:1]:
+            drive, values = np.append(self.low.drive, drive), np.vstack([at_low, values])
+        if self.high is not None and at_high is not None and self.high.drive not in drive[-1:]:
+            drive, values = np.append(drive, self.high.drive), np.vstack([values, at_high])
+        return drive, values
+
 
 MIN_PATH_POINTS = 4  # points of a path below which nothing is said of what lies between them: a cubic needs four
 N_EXTREME_ROUNDS = 3

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics.derived_arrays import make_inextensible
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.similar_arrays import make_inextensible
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -23,7 +23,7 @@ from cfmkit.elastica.results.between_points import (
     MIN_STRAY_DISTANCE,
     N_EXTREME_ROUNDS,
 )
-from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
+from cfmkit.numerics.interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -18,16 +18,16 @@ from cfmkit.arrays import Several, read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.results.between_points import MAX_RELATIVE_STRAY, MIN_STRAY_DISTANCE, N_EXTREME_ROUNDS, PLACE_RTOL
-from cfmkit.elastica.results.stress_between_points import (
+from cfmkit.elastica.results.stress_extremes import (
     choose_few_points,
     find_near_largest,
     insert_knots,
     largest_of_runs,
+    largest_stresses_of_designs,
     runs_of_points,
     solve_all_extremes,
 )
-from cfmkit.elastica.results.stress_extremes import largest_stresses_of_designs
-from cfmkit.numerics.cubic_interpolation import inner_extremes_of_rows
+from cfmkit.numerics.interpolation import inner_extremes_of_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.contact.path_items import ContactChange, Remeshed
+from cfmkit.elastica.mechanics.derived_arrays import make_inextensible
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.mechanics.similar_arrays import make_inextensible
 from cfmkit.elastica.results.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
-from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import each_point, follow_together
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
+from cfmkit.numerics.continuation.steps import correct
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -12,17 +12,24 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece
+from cfmkit.elastica.mechanics.derived_arrays import embed, raise_degree
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
-from cfmkit.elastica.mechanics.refine import embed, raise_degree
+from cfmkit.elastica.model.beam_fits import coils
 from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Control, Loading
-from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
-from cfmkit.elastica.tracing.error_estimate import CORRECTION_ERROR, DEGREES_MORE, pick_points, point_errors, polish
+from cfmkit.elastica.tracing.accuracy import (
+    CORRECTION_ERROR,
+    DEGREES_MORE,
+    drop_locked_points,
+    find_tension,
+    pick_points,
+    point_errors,
+    polish,
+)
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import DriveStart, find_start, follow_network, is_stretched
-from cfmkit.elastica.tracing.taut_beams import drop_locked_points, find_tension
 from cfmkit.numerics.continuation.events import relocate
 from cfmkit.numerics.continuation.path import (
     MarchedSteps,
@@ -384,7 +391,7 @@ def _states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points:
         pieces.append(StatesOfPiece(arrays, z, drives))
     if len(pieces) == 1 or start.problem.remesh is None:
         return Equilibria(*pieces[0])
-    from cfmkit.elastica.contact.joined_pieces import join_pieces
+    from cfmkit.elastica.contact.path_items import join_pieces
 
     drives = np.concatenate([piece.drive for piece in pieces])
     return Equilibria(*join_pieces([piece for piece in pieces if len(piece.drive)], start.problem.remesh), drives)

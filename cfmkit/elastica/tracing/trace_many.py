@@ -1,4 +1,9 @@
-"""Many networks under one drive: in this process or over several, one outcome each, failures kept as such."""
+"""Many networks under one drive: in this process or over several, one outcome each, failures kept as such.
+
+Networks that differ in places, shapes and sections alone are followed together by compiled code, as rows of models. One
+of them is traced by itself. The others are followed with the lowest degree that serves that one, and with a higher one
+through a few values of the drive: the difference is the error of each.
+"""
 
 from __future__ import annotations
 
@@ -10,20 +15,217 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.model.drive import Control
+from cfmkit.elastica.mechanics.compiled import CompiledEquations, angle_laws, compare_rows, plan_row_of
+from cfmkit.elastica.mechanics.compiled_module import ADDRESS_FIELDS, COUNT_FIELDS, load_compiled, slope_products
+from cfmkit.elastica.mechanics.designs import make_up, set_up
+from cfmkit.elastica.mechanics.discretise import discretise
+from cfmkit.elastica.mechanics.equations import ComparedStates, MarchCode, MarchPlan
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.model.beam_fits import is_plain
+from cfmkit.elastica.model.drive import Control, Loading
+from cfmkit.elastica.model.network import apart
 from cfmkit.elastica.results.path import PathStatus
-from cfmkit.elastica.tracing.follow_alike import follow_alike
+from cfmkit.elastica.tracing.accuracy import (
+    DEGREES_MORE,
+    ERROR_SAFETY,
+    NEXT_CORRECTION,
+    ROUNDING_ERROR,
+    pick_points,
+)
+from cfmkit.elastica.tracing.start import FREE_LENGTH_KEYS, next_correction
 from cfmkit.elastica.tracing.trace import trace
-from cfmkit.errors import CfmError
+from cfmkit.errors import CfmError, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from concurrent.futures import Future
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.designs import NetworkDesigns
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.results.path import Path
+
+
+def is_compiled(mesh: Discretisation) -> bool:
+    """Return True if compiled code has networks like one as rows: without contacts, which have arrays of their own."""
+    own = equations(mesh)
+    return isinstance(own, CompiledEquations) and not mesh.contacts and not own.follows
+
+
+class CompiledBatch:
+    """Real designs that were set up together, without constant loads or displaced supports, as rows of models."""
+
+    def __init__(self, designs: NetworkDesigns) -> None:
+        """Make the rows: the template's, with addresses of arrays that differ from design to design."""
+        template: Any = equations(designs.template)
+        mesh, tables = designs.template, designs.tables
+        self.mesh, self.count, self.effort_unit = mesh, designs.count, template.effort_unit
+        rule, bending = basis(mesh.degree), tables["weight"] * tables["rigidity"]
+        bend = (bending[..., 0] / rule.weights[0])[..., None] * (rule.weights @ slope_products(mesh.degree))
+        arrays = tables | designs.places | {"bend": bend}  # what is the same along an element, but for the weights
+        self.laws = angle_laws(designs.fits[0].bundle.coefficients, mesh)
+        self._kept = {name: np.ascontiguousarray(array, float) for name, array in arrays.items()}
+        self.rows = np.tile(template.row, (self.count, 1))
+        for name, array in self._kept.items():
+            addresses = array.ctypes.data + array.strides[0] * np.arange(self.count)
+            self.rows[:, len(COUNT_FIELDS) + ADDRESS_FIELDS.index(name)] = addresses
+
+    def march(
+        self,
+        targets: FloatArray,
+        first_step: float = 0.05,
+        tolerance: float = 1e-9,
+        largest_turn: float = MarchPlan.largest_turn,
+        chosen: Sequence[int] = (),
+    ) -> tuple[FloatArray, Any, FloatArray]:
+        """Return the efforts under a drive by a motion, each design followed from rest.
+
+        Parameters
+        ----------
+        targets : (k,) array
+            Values of the drive [m or rad].
+        first_step : float
+            Share of the range of the drive.
+        tolerance : float
+            Of corrections, relative to the largest motion and force.
+        largest_turn : float
+            Change of a motion in one step [rad, or lengths of a beam].
+        chosen : sequence of int
+            Targets at which the states are wanted, too.
+
+        Returns
+        -------
+        efforts : (d, k) array
+            [N or N m]; not a number from where a path does not simply go on.
+        codes : (d,) int array
+            `MarchCode` of each.
+        states : (d, chosen, size) array
+            All unknowns.
+        """
+        mesh, goals = self.mesh, np.ascontiguousarray(targets, float) / self.mesh.scales.drive
+        span = max(float(goals.max()), 0.0) - min(float(goals.min()), 0.0)
+        plan = MarchPlan(first_step * span, span, largest_turn=largest_turn, tolerance=tolerance)
+        efforts, codes = np.full((self.count, len(goals)), np.nan), np.zeros(self.count, np.int64)
+        free, some = np.full((self.count, len(chosen), len(mesh.free)), np.nan), np.array(chosen, np.int64)
+        plan_row = plan_row_of(plan, 0, True)
+        if not load_compiled().march_many(self.rows, plan_row, goals, efforts, codes, some, free, plan.room):
+            raise MemoryError
+        states = np.tile(goals[some, None] * mesh.rate, (self.count, 1, 1))
+        states[..., mesh.free] = free
+        return efforts * self.effort_unit, codes, states
+
+    def compare(self, states: FloatArray, drives: FloatArray, degree: int, tolerance: float) -> ComparedStates:
+        """Return how states (d, k, size) at some drives (k,) [m or rad] differ from equilibria of a higher degree."""
+        ways = drives / self.mesh.scales.drive
+        return compare_rows(self.rows, self.mesh, self.laws, states, ways, degree, tolerance)
+
+
+LOWEST_DEGREE = 4
+ERROR_MARGIN = 4.0  # tolerances over the error of the network that was traced, at the degree of all
+
+
+def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> FloatArray | None:
+    """Return the efforts of networks that are like one that was traced, at all requested values of the drive.
+
+    Parameters
+    ----------
+    path : Path
+        Of the one.
+    networks : sequence of Network
+        The others.
+    control : Control
+        As the one was traced.
+
+    Returns
+    -------
+    (d, k) array or None
+        [N or N m]; not a number in rows of networks that must be traced by themselves: those of another topology, those
+        that lose their stability, or miss the tolerance. None if the one has events, or bears anything at rest.
+    """
+    if not _goes_straight_on(path, control):
+        return None
+    efforts = np.full((len(networks), len(path.load_case.points)), np.nan)
+    own = _get_common_values(path.network)
+    alike = [k for k, network in enumerate(networks) if _get_common_values(network) == own]
+    if alike:
+        try:
+            efforts[alike] = _follow(path, [networks[k] for k in alike], control)
+        except InputError:  # one of them cannot exist
+            return efforts
+    return efforts
+
+
+def _get_common_values(network: Network) -> Any:
+    """Return what is the same in networks that are set up together; None if this one cannot be."""
+    if network.contacts or not all(is_plain(beam) and beam.closure == "rotscale" for beam in network.beams.values()):
+        return None
+    supports = [node.support for node in network.nodes.values()]
+    arms = [apart(network, link.node) for link in network.links]
+    beams = [_get_beam_kind(beam) for beam in network.beams.values()]
+    return make_up(network), supports, arms, beams, network.springs, network.loads
+
+
+def _get_beam_kind(beam: Beam) -> Any:
+    """Return whether a plain beam has offsets, stretches, and gets a floor of flexibility because it is straight."""
+    shape: Any = beam.shape
+    stretches = beam.section.axial
+    return any(beam.start_offset), any(beam.end_offset), stretches, not stretches and not any(shape.coefficients[1:])
+
+
+def _goes_straight_on(path: Path, control: Control) -> bool:
+    """Return True if a network rests before its drive, is set up without cuts, and nothing happens on its path."""
+    arrays = path.mesh
+    springs = [spring.item for spring in arrays.springs]
+    rests = not (
+        path.network.loads
+        or arrays.base.any()
+        or any(getattr(s, name, None) for s in springs for name in FREE_LENGTH_KEYS)
+    )
+    quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
+    simple = _get_common_values(path.network) is not None and arrays.pieces == 1 and not arrays.tension
+    alone = control.imperfection or isinstance(path.load_case, Loading) or np.any(arrays.floored)
+    return bool(rests and quiet and simple and not alone and is_compiled(arrays))
+
+
+def _follow(path: Path, networks: list[Network], control: Control) -> Any:
+    """Return the efforts of networks that are like that of a path."""
+    drive, points = path.load_case, path.load_case.points
+    origin, pairs = (path.network, drive), [(network, drive) for network in networks]
+
+    def set_up_at(degree: int, some: list[Any]) -> CompiledBatch:
+        template = discretise(*origin, degree, scales=path.mesh.scales, fits=path.mesh.fits)
+        return CompiledBatch(set_up(template, origin, some))
+
+    def efforts_of(batch: CompiledBatch, chosen: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
+        correction, turn = next_correction(control), control.largest_turn
+        efforts, codes, states = batch.march(points, tolerance=correction, largest_turn=turn, chosen=chosen)
+        return np.where((codes == MarchCode.DONE)[:, None], efforts, np.nan), states
+
+    highest = path.mesh.degree + DEGREES_MORE
+    exact = efforts_of(set_up_at(highest, [origin]))[0][0]
+    size = np.abs(exact).max()
+    degrees = range(LOWEST_DEGREE, highest)
+    errors = ((k, np.abs(efforts_of(set_up_at(k, [origin]))[0][0] - exact).max()) for k in degrees)
+    degree = next((k for k, error in errors if ERROR_MARGIN * error <= control.tolerance * size), highest)
+    few = np.sort(path.requested[pick_points(path, ())])
+    efforts = np.full((len(pairs), len(points)), np.nan)
+    left = np.arange(len(pairs))
+    while left.size and degree <= highest:  # a degree for all, a higher one for those that miss the tolerance
+        batch = set_up_at(degree, [pairs[k] for k in left])
+        coarse, states = efforts_of(batch, few.tolist())
+        finer = batch.compare(states, points[few], degree + DEGREES_MORE, NEXT_CORRECTION)
+        change = np.abs(finer.effort * batch.effort_unit - coarse[:, few])
+        change[~finer.converged | (finer.unstable != 0)] = np.nan
+        error = ERROR_SAFETY * change.max(axis=1) + ROUNDING_ERROR * size
+        accurate = error <= control.tolerance * np.abs(coarse).max(axis=1)
+        efforts[left[accurate]] = coarse[accurate]
+        left, degree = left[~accurate], degree + DEGREES_MORE
+    return efforts
+
 
 _CHUNK_SIZE, _CHUNKS_PER_PROCESS = 256, 2  # networks set up at once; chunks for each process that are on their way
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from cfmkit.elastica.results.observed import Observed
-from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at
+from cfmkit.numerics.interpolation import bisect, crossing, first_extreme, value_at
 from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.contact import Contact
     from cfmkit.elastica.results.path import ContactEvent
     from cfmkit.families.beam.network_from_spec import Assembly
-    from cfmkit.families.beam.requested_node_columns import LazyColumns
-    from cfmkit.families.beam.solution import Solution
+    from cfmkit.families.beam.solution import LazyColumns, Solution
 
 N_SIDE = 129  # places of every element at which the side of a beam is looked at
 N_MEAN = 17  # places of the rule for a mean between two corners

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.contours import signed_area
-from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock
+from cfmkit.export.drawn_as_specified import DrawnBlock
 from cfmkit.export.union import OutlinePiece
 from cfmkit.families.beam.network_from_spec import is_on_axis, mirror_axis, moving_nodes
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points

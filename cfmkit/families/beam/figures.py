@@ -21,11 +21,10 @@ from cfmkit.families.fem_results import number_fillets
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, color_key, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
-from cfmkit.plots.curve_with_enlarged_band import curve_figure
-from cfmkit.plots.curves import CurveLook
+from cfmkit.plots.curves import CurveLook, curve_figure
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
-from cfmkit.plots.rounding_noise import zero_rounding
+from cfmkit.plots.mechanism_in_motion import Moving, choose_poses
+from cfmkit.plots.numbers_in_drawings import zero_rounding
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import stress_map_figure, stress_views
 from cfmkit.plots.style import (

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import distinct
-from cfmkit.metrics.winding_branches import places_inside
-from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
+from cfmkit.metrics.branches import places_inside
+from cfmkit.numerics.interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -12,9 +12,15 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Region, Sheet, Smooth, circle, mark
-from cfmkit.export.drawn_as_specified import SpecifiedPiece, check_outline
-from cfmkit.export.fixing_holes import add_fixing_holes
-from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock, DrawnStrip, NodesAndBodies, joined_away_from_nodes
+from cfmkit.export.drawn_as_specified import (
+    DrawnBlock,
+    DrawnStrip,
+    NodesAndBodies,
+    SpecifiedPiece,
+    check_outline,
+    joined_away_from_nodes,
+)
+from cfmkit.export.fixing_holes_and_labels import add_fixing_holes
 from cfmkit.export.union import OutlinePiece
 from cfmkit.families.beam.drawn_pieces import STANDING_DISTANCE, both_halves, drawn_parts
 from cfmkit.families.beam.finding_names import finding
@@ -35,7 +41,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.strips_joined_away_from_nodes import Join
+    from cfmkit.export.drawn_as_specified import Join
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.families.beam.strips_and_gaps import BeamStrip

@@ -16,18 +16,23 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
-from cfmkit.export.fixing_holes import remove_screws
+from cfmkit.export.fixing_holes_and_labels import remove_screws
 from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
 from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.network_from_spec import assemble, constant_load, is_on_axis, mirror_axis, resolve
 from cfmkit.families.beam.outline import drawing
 from cfmkit.families.beam.part import drawn_fillet, regions, standing_frame
-from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import EXTREME_METRICS, RANGE_METRICS, SCALAR_DEFINITIONS, number_of, target_of
-from cfmkit.families.beam.solid_nodes_and_fillets import SolidNodes, fillets
+from cfmkit.families.beam.solid_under_load_nodes_and_fillets import (
+    SolidNodes,
+    driven_by_load,
+    fillets,
+    load_of_one,
+    moved_far_enough,
+)
+from cfmkit.families.beam.solution import output_columns
 from cfmkit.families.beam.strips_and_gaps import mirror_points
 from cfmkit.families.beam.tip_on_uneven_surface import N_PLACES, curve_of, findings_along, follow_surface, values_along
-from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.fem_results import (
     columns_of_solid,
     drop_repeats,

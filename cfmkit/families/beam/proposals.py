@@ -27,10 +27,16 @@ from cfmkit.families.beam.network_from_spec import assemble
 from cfmkit.families.beam.part import as_made, part_over_motion
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.findings import mm, percent
-from cfmkit.families.flattest_window import flattest, ripples
+from cfmkit.families.proposals import (
+    Candidate,
+    FamilyOffer,
+    aim_below_stiffening,
+    flattest,
+    is_too_wide,
+    name_variant,
+    ripples,
+)
 from cfmkit.families.run_control import Run
-from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening, is_too_wide
-from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
 from cfmkit.specs.units import Place
 from cfmkit.specs.yamlio import read_document
 from cfmkit.stock.material_and_part_spec import MaterialSpec
@@ -39,7 +45,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.suggestion_request import Request
+    from cfmkit.families.proposals import Request
     from cfmkit.results import Result
 
 SHAPE_FILES = ("lan-2010", "lan-flat", "lan-wide", "lan-tall", "arch", "end-effector-leg")

@@ -11,11 +11,10 @@ from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS
 from cfmkit.families.deferred_imports import deferred_imports
 
 with deferred_imports():
-    from cfmkit.families.beam.beams_in_rows import solve_rows
     from cfmkit.families.beam.design import design
     from cfmkit.families.beam.figures import figures, moving
     from cfmkit.families.beam.force_at_few_poses import sample_poses
-    from cfmkit.families.beam.model import analyze
+    from cfmkit.families.beam.model import analyze, solve_rows
     from cfmkit.families.beam.outline import drawing
     from cfmkit.families.beam.part import part_over_motion
     from cfmkit.families.beam.plane_fem_analysis import analyze as analyze_solid

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from cfmkit.designing.bounds_and_rounding import range_about
+from cfmkit.designing.rounded_and_reported_values import range_about
 from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:

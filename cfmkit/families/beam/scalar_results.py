@@ -14,7 +14,7 @@ from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.end_stops import CONTACT_QUANTITIES
 from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
 from cfmkit.families.rows import ScalarQuantity, or_nan
-from cfmkit.numerics.cubic_interpolation import value_at
+from cfmkit.numerics.interpolation import value_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

@@ -1,17 +1,19 @@
-"""Solution of a beam mechanism.
+"""Solution of a beam mechanism, and its columns of nodes and beams.
 
-Every other file of this family may import these types.
+Columns are those that `analysis.outputs` asks for, of beams and of solids alike, and forces. Every other file of this
+family may import these types.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
+from cfmkit.curves import Column
 from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam
 from cfmkit.elastica.results.between_loads import interpolate_loads
 from cfmkit.elastica.results.between_points import interpolate_path
@@ -24,14 +26,17 @@ from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thicke
 from cfmkit.families.beam.strips_and_gaps import BeamGap, mirror_points, smallest_gap
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path
     from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.elastica.results.folding_path_between_points import AlongTheWay
     from cfmkit.elastica.vibration import Frequencies
-    from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.families.beam.spec import BeamSpec, Outputs
+
+    Read = Callable[[str], FloatArray]  # from a name to three values at each of n points, (n, 3)
+    LazyColumns = dict[str, Callable[[], Column]]
 
 
 _DISPLACEMENT_RTOL = 1e-15
@@ -259,3 +264,34 @@ def pairs_in_contact(network: Network) -> set[frozenset[str]]:
     ends = {(name, node) for name, beam in network.beams.items() for node in (beam.start, beam.end)}
     at_pads = {frozenset((name, pad.beam)) for pad in pads for name, node in ends if node == pad.node}
     return at_pads | {frozenset((item.beam, item.partner)) for item in network.contacts if isinstance(item, BeamOnBeam)}
+
+
+MOTION_DIMENSIONS = {"x": "length", "y": "length", "rotation": "angle"}
+REACTION_DIMENSIONS = {"fx": "force", "fy": "force", "m": "torque"}
+END_FORCES = {"force_x": "force", "force_y": "force", "moment": "torque"}
+"""What three columns of a node or a beam are called after its name, and their dimensions."""
+
+
+def columns_of(name: str, read: Read, endings: Mapping[str, str]) -> LazyColumns:
+    """Return three columns of a node or a beam, each as what computes it."""
+
+    def column(k: int, dimension: str) -> Column:
+        return Column(read(name)[:, k], dimension)
+
+    return {f"{name}_{end}": partial(column, k, dimension) for k, (end, dimension) in enumerate(endings.items())}
+
+
+def output_columns(
+    outputs: Outputs,
+    motion: Read,  # from a node to its x, y [m] and rotation [rad] at the points of the curve, (n, 3)
+    # from a node to the force x, y [N] and the moment [N m] that hold it, of support and of a drive by a motion, for
+    # one copy, (n, 3)
+    reaction: Read,
+) -> LazyColumns:
+    """Return the columns of the nodes that are named, each as what computes it."""
+    columns: LazyColumns = {}
+    for name in outputs.nodes:
+        columns |= columns_of(name, motion, MOTION_DIMENSIONS)
+    for name in outputs.reactions:
+        columns |= columns_of(name, reaction, REACTION_DIMENSIONS)
+    return columns

@@ -10,8 +10,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.errors import GeometryError
-from cfmkit.export.beam_sections import BeamSection
-from cfmkit.export.contours import Line, Smooth
+from cfmkit.export.contours import BeamSection, Line, Smooth
 from cfmkit.export.union import OutlinePiece
 from cfmkit.specs.units import format_short
 

@@ -26,8 +26,8 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.end_stops import LARGEST_FORCE
-from cfmkit.numerics.cubic_interpolation import bisect, values_at
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between
+from cfmkit.numerics.interpolation import bisect, values_at
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import format_short
 

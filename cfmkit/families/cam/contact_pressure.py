@@ -18,9 +18,9 @@ from cfmkit.families.rows import rows_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.assembly import Assembly
     from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
     from cfmkit.families.cam.spec import Contact, Mechanism
+    from cfmkit.families.cam.statics import Assembly
     from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 

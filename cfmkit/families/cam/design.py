@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.cam.assembly import TRAVEL_RTOL
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
@@ -34,12 +33,20 @@ from cfmkit.families.cam.mechanism_from_spec import (
     weights_of,
 )
 from cfmkit.families.cam.outline import plate_notes
-from cfmkit.families.cam.statics import forces
+from cfmkit.families.cam.statics import TRAVEL_RTOL, forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
-from cfmkit.families.findings import format_at_least, format_at_most, mm, newton, rate
-from cfmkit.families.no_mechanism import CannotBuild, Infeasible, refusals_answered
+from cfmkit.families.findings import (
+    CannotBuild,
+    Infeasible,
+    format_at_least,
+    format_at_most,
+    mm,
+    newton,
+    rate,
+    refusals_answered,
+)
 from cfmkit.results import OVERWRITTEN_FINDING, Design, Finding, Status
-from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
+from cfmkit.stock.springs.offers import Miss, nearest
 from cfmkit.stock.springs.spec import offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 
@@ -50,7 +57,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.families.cam.statics import Loads
     from cfmkit.families.run_control import Run
-    from cfmkit.stock.springs.offer_type_and_generic_series import Offer
+    from cfmkit.stock.springs.offers import Offer
 
 
 @dataclass(frozen=True)

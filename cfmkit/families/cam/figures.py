@@ -8,20 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.assembly import constant_force
-from cfmkit.families.cam.clearance import nearest_pairs
 from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.part import moment, pivoting, pose, scene, start_curve, swallowtail
-from cfmkit.families.cam.part_sizes import count_of
+from cfmkit.families.cam.part_sizes_and_clearances import count_of, nearest_pairs
+from cfmkit.families.cam.statics import constant_force
 from cfmkit.numerics.holes_in_samples import holes_between
 from cfmkit.plots import parts
 from cfmkit.plots.assembly import assembly_figure
 from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, right_axis, top_axis, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
-from cfmkit.plots.curve_with_enlarged_band import curve_figure
-from cfmkit.plots.curves import CurveLook, plot_curve
+from cfmkit.plots.curves import CurveLook, curve_figure, plot_curve
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
+from cfmkit.plots.mechanism_in_motion import Moving, choose_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.style import (
     LINE_BLACK,

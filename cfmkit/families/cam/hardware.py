@@ -19,7 +19,7 @@ import numpy as np
 from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc
 from cfmkit.export.posed_part import PosedBody
 from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.part_sizes import (
+from cfmkit.families.cam.part_sizes_and_clearances import (
     BRACE_WIDTH,
     PLATE_THICKNESS,
     count_of,

@@ -20,8 +20,8 @@ from cfmkit.families.cam.solution_of_measured_cam import Sides
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.assembly import Assembly
     from cfmkit.families.cam.spec import Manufacturing
+    from cfmkit.families.cam.statics import Assembly
     from cfmkit.numerics.rigid_point_registration import CurveFrame
 
 

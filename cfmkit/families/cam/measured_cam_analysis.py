@@ -25,7 +25,6 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
-from cfmkit.families.cam.assembly import Assembly, target_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import describe_unmeasured, finding, findings_of_built, left_out, rubbing_left_out
 from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
@@ -45,8 +44,8 @@ from cfmkit.families.cam.scalar_results import (
     values_of_built,
 )
 from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides, large_holes, requested_travel
-from cfmkit.families.findings import mm
-from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.families.cam.statics import Assembly, target_force
+from cfmkit.families.findings import CannotBuild, mm, no_result
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between
 from cfmkit.numerics.rigid_point_registration import (
     CurveFrame,

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.measured_deviation_definitions import DEVIATION_DEFINITIONS
+from cfmkit.families.cam.scalar_results import DEVIATION_DEFINITIONS
 from cfmkit.families.cam.solution import Solution
 from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides
 from cfmkit.results import Quantity, quantities

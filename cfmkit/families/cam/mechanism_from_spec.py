@@ -12,18 +12,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.assembly import TRAVEL_RTOL, Assembly
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, WholeCamUndercut, cut_cam
 from cfmkit.families.cam.geometry.path import CAMS_KEPT, RollerPath, reached_path
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track, track_of
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.cam.statics import STANDARD_GRAVITY, Loads, Losses
+from cfmkit.families.cam.statics import STANDARD_GRAVITY, TRAVEL_RTOL, Assembly, Loads, Losses
 from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
-from cfmkit.families.findings import mm
+from cfmkit.families.findings import CannotBuild, mm
 from cfmkit.families.guide_friction import GuideFriction
-from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.families.rows import agree, fails, refuse_columns, remember_plain
 
 if TYPE_CHECKING:

@@ -27,8 +27,7 @@ from cfmkit.export.contours import (
     circle,
 )
 from cfmkit.families.cam.mechanism_from_spec import assemble_sides, flanks_crossing
-from cfmkit.families.findings import mm, rate
-from cfmkit.families.no_mechanism import CannotBuild
+from cfmkit.families.findings import CannotBuild, mm, rate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

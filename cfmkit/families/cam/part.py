@@ -11,7 +11,7 @@ from cfmkit.curves import Curve
 from cfmkit.export.contours import polygons
 from cfmkit.export.posed_part import PosedBody, PosedPart, box, rectangle
 from cfmkit.families.cam.hardware import cut_plate, hardware
-from cfmkit.families.cam.part_sizes import (
+from cfmkit.families.cam.part_sizes_and_clearances import (
     BRACE_WIDTH,
     PLATE_THICKNESS,
     count_of,

@@ -23,21 +23,21 @@ import numpy as np
 from cfmkit.errors import SolutionError
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.hardware import BEARING_IN_ROLLER, SHAFT_IN_ROLLER, roller_shaft
-from cfmkit.families.cam.part_sizes import BRACE_WIDTH, coil_diameter, count_of, depth_of, stack_height
+from cfmkit.families.cam.part_sizes_and_clearances import BRACE_WIDTH, coil_diameter, count_of, depth_of, stack_height
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
 from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, guide_rods, pin_for, series_sizes
-from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
+from cfmkit.families.proposals import Candidate, FamilyOffer, name_variant
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.springs.made_to_measure import as_stated, extension_spring
+from cfmkit.stock.springs.offers import as_stated, extension_spring
 from cfmkit.stock.stock_series import BALL_BEARINGS
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.proposals import Request
     from cfmkit.families.run_control import Run
-    from cfmkit.families.suggestion_request import Request
     from cfmkit.stock.stock_series import Bearing
 
 ROLLING_FRICTION = 0.002

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from cfmkit.families.base import DesignMethod, Family, Pictures, ResultNames
 from cfmkit.families.cam.findings import CAM_FINDINGS
-from cfmkit.families.cam.measured_deviation_definitions import DEVIATION_DEFINITIONS
 from cfmkit.families.cam.mechanism_from_spec import resolve
-from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS
+from cfmkit.families.cam.scalar_results import DEVIATION_DEFINITIONS, SCALAR_DEFINITIONS
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.deferred_imports import deferred_imports
 
 with deferred_imports():
-    from cfmkit.families.cam.cams_in_rows import solve_rows
     from cfmkit.families.cam.design import design
     from cfmkit.families.cam.dynamics import analyze as analyze_motion
     from cfmkit.families.cam.figures import figures, moving
     from cfmkit.families.cam.measured_deviation_causes import attribute
-    from cfmkit.families.cam.model import analyze
+    from cfmkit.families.cam.model import analyze, solve_rows
     from cfmkit.families.cam.outline import drawing
     from cfmkit.families.cam.part import part_over_motion
     from cfmkit.families.cam.proposals import propose

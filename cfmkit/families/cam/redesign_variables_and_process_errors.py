@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.designing.bounds_and_rounding import range_about
+from cfmkit.designing.rounded_and_reported_values import range_about
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.contact_pressure import flank_pressure
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.families.cam.solution_of_measured_cam import large_holes, profile_coverage, requested_travel, window_mask
-from cfmkit.families.cam.statics import Losses, normal_turn
+from cfmkit.families.cam.statics import Losses, constant_force, normal_turn
 from cfmkit.families.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values, or_nan, quantity_of_each, row_of
 from cfmkit.results import Quantity
@@ -25,11 +24,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.assembly import Assembly
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam
-    from cfmkit.families.cam.statics import Forces
+    from cfmkit.families.cam.statics import Assembly, Forces
 
 
 BUILT_DEFINITIONS = {
@@ -449,3 +447,20 @@ def errors_used(built: MeasuredCam) -> FloatArray:
 def root_mean_square(values: FloatArray) -> float:
     """Return the root mean square of values."""
     return float(np.sqrt(np.mean(values**2)))
+
+
+DEVIATION_DEFINITIONS = {
+    "data_friction": (
+        "ratio",
+        "rolling friction whose loop has the measured area, over the displacements that are compared",
+    ),
+    "data_rest_error": (
+        "length",
+        "by how much the springs' rest length must exceed the stated one to explain the measured midline",
+    ),
+    "data_off_design": ("force", "root mean square of the measured force less that of the design without friction"),
+    "data_by_profile": ("force", "root mean square contribution of the measured errors of the profile"),
+    "data_by_friction": ("force", "root mean square contribution of the friction that gives the measured loop area"),
+    "data_by_rest_length": ("force", "root mean square contribution of the springs' rest length, its error included"),
+    "data_unexplained": ("force", "root mean square of the remainder"),
+}

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import Several, ShortRepr
-from cfmkit.families.cam.assembly import TRAVEL_RTOL, target_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
 from cfmkit.families.cam.geometry.path import RollerPath
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, TrackStates
-from cfmkit.families.cam.statics import Forces, forces, jams
+from cfmkit.families.cam.statics import TRAVEL_RTOL, Forces, forces, jams, target_force
 from cfmkit.families.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.rows import PlacesKept, is_column, row_of, rows_of
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.assembly import Assembly
+    from cfmkit.families.cam.statics import Assembly
     from cfmkit.specs.units import Ends
 
 

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.assembly import Assembly
-    from cfmkit.families.cam.statics import Loads
+    from cfmkit.families.cam.statics import Assembly, Loads
     from cfmkit.numerics.rigid_point_registration import Registration
 
 

@@ -13,7 +13,7 @@ from cfmkit.specs.units import Stiffness
 from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire, settle_rate, wire_of
 
 if TYPE_CHECKING:
-    from cfmkit.stock.springs.offer_type_and_generic_series import Offer
+    from cfmkit.stock.springs.offers import Offer
 
 PositiveStiffness = Annotated[Stiffness, Field(gt=0)]
 

@@ -36,7 +36,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.guide_friction import FRICTIONLESS_GUIDE, GuideFriction
 from cfmkit.families.rows import rows_of
-from cfmkit.numerics.where_condition_ends import last_places
+from cfmkit.numerics.roots import last_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,10 +44,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.geometry.roller_track_on_cut_cam import Track, TrackStates, TrackStretch
     from cfmkit.families.cam.geometry.slope_law import Real
+    from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.results import Finding
 
     Interval = tuple[float, float]
+
 
 STANDARD_GRAVITY = 9.80665  # standard acceleration of gravity, exact by definition (3rd CGPM, 1901) [m/s^2]
 JAM_SHARES = np.sort(np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 40), 1.0 - np.geomspace(1e-6, 0.1, 20)]))
@@ -423,3 +427,34 @@ def _places(part: TrackStretch, states: TrackStates | None) -> FloatArray:
             np.concatenate([known_places, np.broadcast_to(grid, (*known_places.shape[:-1], grid.shape[-1]))], axis=-1)
         )
     return np.minimum(np.maximum(grid, part.low), part.high)
+
+
+TRAVEL_RTOL = 1e-6
+"""A travel that is short by so little is not short: on a nearly vertical path rounding in x alone costs 1e-8."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A mechanism put together; several of one kind have columns (m, 1) for numbers that differ."""
+
+    spec: CamSpec  # with every derived value written out
+    profile: CamProfile  # the cam as cut
+    track: Track  # where the roller runs
+    loads: Loads  # springs and weights
+    # travel that the cut profile offers with its own brace [m]; short of the specified stroke where the geometry ends
+    # first
+    stroke: float
+    shortfall: Finding | None = None  # why `stroke` is short, if it is
+
+
+def constant_force(assembly: Assembly) -> float:
+    """Return the force that the profile is cut for, with the springs and weights built in [N]."""
+    law, loads = assembly.profile.path.law, assembly.loads
+    return 4.0 * loads.stiffness * law.force_constant + loads.slider_weight
+
+
+def target_force(spec: CamSpec, assembly: Assembly) -> float | None:
+    """Return the constant force that is wanted or that the profile is cut for [N]; None if it follows a curve."""
+    if spec.target_curve is not None or assembly.spec.mechanism.profile.curve is not None:
+        return None
+    return spec.design.force if spec.design else constant_force(assembly)

@@ -20,7 +20,7 @@ from cfmkit.families.rows import fails, refuse_columns
 if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.spec import CamDesign
-    from cfmkit.numerics.monotone_interpolation import ThroughPoints
+    from cfmkit.numerics.interpolation import ThroughPoints
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 

@@ -21,11 +21,11 @@ from cfmkit.families.slider_crank.sprung_linkage_proposals import (
     with_links,
 )
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
-from cfmkit.stock.springs.offer_type_and_generic_series import generic
+from cfmkit.stock.springs.offers import generic
 from cfmkit.stock.springs.spec import CatalogueSpring
 
 if TYPE_CHECKING:
-    from cfmkit.families.suggestion_request import Candidate, Request
+    from cfmkit.families.proposals import Candidate, Request
 
 
 def with_catalogue_springs(made: Candidate) -> Candidate:

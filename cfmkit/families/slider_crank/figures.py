@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.plots.poses_in_one_svg import Moving
+    from cfmkit.plots.mechanism_in_motion import Moving
     from cfmkit.results import Result
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, minimax
-from cfmkit.stock.springs.made_to_measure import stiffest
+from cfmkit.stock.springs.offers import stiffest
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

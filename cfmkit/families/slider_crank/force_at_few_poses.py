@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.base import Sampled
-from cfmkit.families.no_mechanism import CannotBuild
+from cfmkit.families.findings import CannotBuild
 from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import mm
-from cfmkit.families.flattest_window import flattest
+from cfmkit.families.proposals import Candidate, FamilyOffer, aim_below_stiffening, flattest, name_variant
 from cfmkit.families.slider_crank.catalogue_spring_proposals import with_catalogue_springs
 from cfmkit.families.slider_crank.printed.outline import drawing
 from cfmkit.families.slider_crank.printed.part import PAD_SIZE
@@ -29,8 +29,6 @@ from cfmkit.families.slider_crank.sprung_linkage_proposals import (
     pushed_linkage,
     turned_linkages,
 )
-from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
-from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 
@@ -38,8 +36,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.proposals import Request
     from cfmkit.families.run_control import Run
-    from cfmkit.families.suggestion_request import Request
 
 
 PUSHED_PROPORTIONS = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.designing.bounds_and_rounding import range_about
+from cfmkit.designing.rounded_and_reported_values import range_about
 from cfmkit.families.slider_crank.printed.design import DEFAULT_THICKNESS
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.stock.material_and_part_spec import sheet_of

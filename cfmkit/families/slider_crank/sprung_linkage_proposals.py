@@ -16,6 +16,7 @@ import numpy as np
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import deg, mm, percent
 from cfmkit.families.hardware import PartStrength, guide_rods
+from cfmkit.families.proposals import Candidate, FamilyOffer
 from cfmkit.families.slider_crank.flattest_springs_that_fit import (
     TRAVEL_RTOL,
     SprungMotion,
@@ -24,31 +25,30 @@ from cfmkit.families.slider_crank.flattest_springs_that_fit import (
 )
 from cfmkit.families.slider_crank.linkage import Linkage, linkage_of
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
+from cfmkit.families.slider_crank.springs.hardware import least_sheet, link_loads, links_that_bear
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
-from cfmkit.families.slider_crank.springs.link_strength import least_sheet, link_loads, links_that_bear
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.springs.part import N_SHEETS, height_of
 from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemble
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
-from cfmkit.families.suggestion_request import Candidate, FamilyOffer
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.helical_spring_formulas import YOUNGS_MODULUS, HelicalSpring
-from cfmkit.stock.springs.made_to_measure import (
+from cfmkit.stock.springs.offers import (
     MAX_INDEX,
     as_stated,
     extension_spring,
+    largest_load,
     shortest_torsion_spring,
     torsion_spring,
 )
-from cfmkit.stock.springs.offer_type_and_generic_series import largest_load
 from cfmkit.stock.stock_series import series_of
 
 if TYPE_CHECKING:
+    from cfmkit.families.proposals import MaterialBlock, Request
     from cfmkit.families.slider_crank.flattest_springs_that_fit import HeldEffort
-    from cfmkit.families.slider_crank.springs.link_strength import LinkLoads
-    from cfmkit.families.suggestion_request import MaterialBlock, Request
+    from cfmkit.families.slider_crank.springs.hardware import LinkLoads
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import format_at_least, mm, mpa, newton
-from cfmkit.families.no_mechanism import no_design, refusals_answered
+from cfmkit.families.findings import format_at_least, mm, mpa, newton, no_design, refusals_answered
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, share_of
 from cfmkit.families.vcfm.leaf_sizing import (

@@ -18,9 +18,8 @@ from cfmkit.families.vcfm.plane_fem_analysis import fillets
 from cfmkit.metrics.longest_interval_in_band import flat_window
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
-from cfmkit.plots.curve_with_enlarged_band import curve_figure
-from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
+from cfmkit.plots.curves import CurveLook, curve_figure, plot_curve
+from cfmkit.plots.mechanism_in_motion import Moving, choose_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import (

@@ -23,22 +23,23 @@ from cfmkit.families.findings import (
     too_soft,
 )
 from cfmkit.families.rows import FindingRule
-from cfmkit.families.vcfm.bought_parts import buckles, buckling, is_overstretched, overstretching
-from cfmkit.families.vcfm.flattening_widths_or_window import flattening, ripple_inside
 from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, leaf_law, leaf_spring, spring_room
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.s_form import POLE_LOAD
 from cfmkit.families.vcfm.leaves.v_beam import FLAT_BUCKLED_ABOVE
-from cfmkit.families.vcfm.range_of_closed_forms import (
+from cfmkit.families.vcfm.range_and_flatness_findings import (
+    flattening,
     is_stocky,
     leaves_out_of_range,
     range_of_leaves,
     range_of_leaves_in_short,
     range_of_spring,
+    ripple_inside,
     spring_out_of_range,
     stocky_leaves,
 )
 from cfmkit.families.vcfm.solution import LIMIT_RTOL, goes_beyond
+from cfmkit.families.vcfm.surroundings import buckles, buckling, is_overstretched, overstretching
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.numerics.chebyshev_panels import ChebyshevPanels, coefficients, nodes_of
+from cfmkit.numerics.interpolation import ChebyshevPanels, coefficients, nodes_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

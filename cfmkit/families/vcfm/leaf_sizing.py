@@ -21,12 +21,12 @@ from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import MAX_LEAF_ANGLE, buckled_stress, critical_force, stress_overestimate
 from cfmkit.specs.units import format_short
-from cfmkit.specs.units.windows import TravelShare
+from cfmkit.specs.units.fields import TravelShare
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.families.no_mechanism import Infeasible
+    from cfmkit.families.findings import Infeasible
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
 
 

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import mm, mpa
-from cfmkit.families.no_mechanism import Infeasible, no_design, refusals_answered
+from cfmkit.families.findings import Infeasible, mm, mpa, no_design, refusals_answered
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws, room_of_coils
 from cfmkit.families.vcfm.leaf_sizing import (
@@ -36,10 +35,10 @@ from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.families.vcfm.leaves.v_beam import MAX_LEAF_ANGLE, VBeam, onset_and_exit
 from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
-from cfmkit.stock.springs.guides import guide_words
-from cfmkit.stock.springs.offer_type_and_generic_series import Miss, guide_rod_for, nearest
+from cfmkit.stock.springs.offers import Miss, guide_rod_for, nearest
 from cfmkit.stock.springs.spec import offers, support_of, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse
+from cfmkit.stock.springs.support_spec import guide_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
     from cfmkit.families.vcfm.surroundings_spec import BoughtSprings
-    from cfmkit.stock.springs.offer_type_and_generic_series import Offer
+    from cfmkit.stock.springs.offers import Offer
 
 RETURN_TRAVEL_RATIO = 1.5
 """How far back leaves are followed, over where the closed form has the shuttle at rest: their width is still open."""

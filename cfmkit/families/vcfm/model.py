@@ -17,14 +17,14 @@ from cfmkit.arrays import LazySequence, ShortRepr, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.rows import SolvedRows, findings_of_one, rows_of, valid, values_of_one, with_values
-from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, LeafSamples, Rows
 from cfmkit.families.vcfm.findings import FINDING_RULES, closed_spring, finding, is_closed
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
-from cfmkit.families.vcfm.leaves.laws_in_rows import stack_laws
+from cfmkit.families.vcfm.leaves.kinds import stack_laws
 from cfmkit.families.vcfm.quantities import ROW_COLUMNS, SCALAR_QUANTITIES, adjustability, readings
 from cfmkit.families.vcfm.solution import Solution, target_of
-from cfmkit.numerics.where_condition_ends import last_places
+from cfmkit.families.vcfm.surroundings import parts_of
+from cfmkit.numerics.roots import last_places
 from cfmkit.results import ROUND_OFF, Result, Status
 from cfmkit.stock.parts_list import parts_tables
 

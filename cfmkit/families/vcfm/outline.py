@@ -23,13 +23,12 @@ from cfmkit.export.contours import (
 )
 from cfmkit.export.drawn_as_specified import check_outline
 from cfmkit.export.fillets import round_inside_corners, sharp_notes
-from cfmkit.export.fixing_holes import add_fixing_holes
+from cfmkit.export.fixing_holes_and_labels import add_fixing_holes
 from cfmkit.export.posed_part import rectangle
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law
 from cfmkit.families.vcfm.part import leaves_contours, sizes_of_frame, specified_pieces, spring_contours
-from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_notes
+from cfmkit.families.vcfm.surroundings import FrameSizes, frame_notes, parts_of
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:

@@ -16,15 +16,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.beam_sections import BeamSection
-from cfmkit.export.contours import Arc, Contour, Edge, Line, Smooth
+from cfmkit.export.contours import Arc, BeamSection, Contour, Edge, Line, Smooth
 from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.fillets import round_inside_corners
 from cfmkit.export.posed_part import MIRROR_FACTORS, PosedBody, PosedPart, band, join_poses, rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.rows import with_values
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring
-from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_sizes
+from cfmkit.families.vcfm.surroundings import FrameSizes, frame_sizes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

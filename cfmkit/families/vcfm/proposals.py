@@ -21,11 +21,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import SolutionError
-from cfmkit.families.findings import mm
-from cfmkit.families.no_mechanism import Infeasible
+from cfmkit.families.findings import Infeasible, mm
+from cfmkit.families.proposals import Candidate, FamilyOffer, is_too_wide, name_variant
 from cfmkit.families.run_control import Run
-from cfmkit.families.stiffening_of_wide_beams import is_too_wide
-from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
@@ -33,13 +31,13 @@ from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthen, open_co
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.springs.offer_type_and_generic_series import generic
+from cfmkit.stock.springs.offers import generic
 from cfmkit.stock.springs.spec import CatalogueSpring
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.suggestion_request import MaterialBlock, Request
+    from cfmkit.families.proposals import MaterialBlock, Request
     from cfmkit.families.vcfm.design import DesignSizes
 
 
@@ -74,7 +72,7 @@ SPRING_CLEARANCE_RATIO = 1.2  # room across that a helical spring takes, over it
 MAX_PROPOSALS = 28
 FINISH_FUNCTION = "cfmkit.families.vcfm.proposals:finish"
 FINISH_WITH = "cfmkit.families.vcfm.proposals:finish_with"
-CORRECTION_FUNCTION = "cfmkit.families.vcfm.proposals_corrected_by_solids:correct"
+CORRECTION_FUNCTION = "cfmkit.families.vcfm.proposal_sizes:correct"
 """What finishes what the family's design has made, and what corrects it by its solids."""
 
 
@@ -325,7 +323,7 @@ def finish(spec: VcfmSpec, request: Request) -> VcfmSpec:
 
 def _use_flattest_window(spec: VcfmSpec, request: Request, preloads: tuple[float, ...], end: float) -> VcfmSpec:
     """Return a mechanism with preloads and the flattest window, looked for up to a little behind an end [m]."""
-    from cfmkit.families.flattest_window import flattest
+    from cfmkit.families.proposals import flattest
     from cfmkit.families.vcfm.exact_model import analyze
 
     wide = end + 0.2 * request.travel

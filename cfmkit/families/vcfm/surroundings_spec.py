@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from cfmkit.specs.spec import NonNegativeLength, PositiveLength
 from cfmkit.specs.units import Stiffness
 from cfmkit.stock.material_and_part_spec import CutPart, PartFrame, RoundedCorners
-from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
+from cfmkit.stock.springs.offers import unguided_deflection
 from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire, settle_rate
 from cfmkit.stock.springs.support_spec import SpringSupport
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.problem import Border, arc_weights, force_change, largest_motion
-from cfmkit.numerics.continuation.steps import CHORD_COSINE, FORCE_SHARE, MOTION_ROUNDING
+from cfmkit.numerics.continuation.steps import CHORD_COSINE, FORCE_SHARE, MOTION_ROUNDING, correct
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.numerics.continuation.arc import step_along, unit_tangent
-from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.problem import Border, arc_weights, largest_motion
-from cfmkit.numerics.continuation.steps import hermite, predict
+from cfmkit.numerics.continuation.steps import correct, hermite, predict
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.numerics.continuation.branch_ends import find_passed_end, primary_slope
+from cfmkit.numerics.continuation.branches import find_passed_end, primary_slope
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.corners import crosses_bend, mark_corners
 from cfmkit.numerics.continuation.events import locate_loss

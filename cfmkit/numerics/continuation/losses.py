@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.numerics.continuation.arc import step_along
-from cfmkit.numerics.continuation.branch_ends import primary_slope
 from cfmkit.numerics.continuation.branches import (
     LAST_AMPLITUDES,
     MODE_AMPLITUDES,
@@ -17,13 +16,13 @@ from cfmkit.numerics.continuation.branches import (
     enter_branch,
     find_beside,
     opens_at,
+    primary_slope,
 )
 from cfmkit.numerics.continuation.corners import corner_between
-from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.path import PathBranch, PathEvent, PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import PathEquilibrium, arc_weights, largest_motion
-from cfmkit.numerics.continuation.steps import advance
+from cfmkit.numerics.continuation.steps import advance, correct
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

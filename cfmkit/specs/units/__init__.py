@@ -3,16 +3,18 @@
 Inside cfmkit every number is SI (m, N, rad, Pa, kg, s). Text with units exists in
 specifications, options, tables and messages only, and passes through here.
 
-`strict_decimal_number` reads decimals strictly, `table` lists dimensions and units, `unit_size`
+`strict_decimal_number` reads decimals strictly, `table` lists dimensions and units, `table`
 knows the exact size of a unit (pint, loaded on first use), `quantities` reads and
 writes text, `fields` holds the annotated types for specifications.
 """
 
 from cfmkit.specs.units.fields import (
+    SHARE_DIMENSION,
     Angle,
     BareFloat,
     Density,
     Displacement,
+    Ends,
     Factor,
     Force,
     Inertia,
@@ -27,8 +29,13 @@ from cfmkit.specs.units.fields import (
     Stress,
     Time,
     Torque,
+    TravelShare,
     UnitField,
+    attach_dimension,
+    dimension_of_end,
+    ends_increase,
     quantity,
+    window_places,
 )
 from cfmkit.specs.units.quantities import (
     format_quantity,
@@ -43,16 +50,7 @@ from cfmkit.specs.units.table import (
     border_unit,
     from_border,
     to_border,
-)
-from cfmkit.specs.units.unit_size import unit_table
-from cfmkit.specs.units.windows import (
-    SHARE_DIMENSION,
-    Ends,
-    TravelShare,
-    attach_dimension,
-    dimension_of_end,
-    ends_increase,
-    window_places,
+    unit_table,
 )
 
 __all__ = [

@@ -24,11 +24,14 @@ from cfmkit.specs.units.table import (
     UNIT_TABLE,
     UNITLESS_DIMENSIONS,
     UNITS_BY_SYMBOL,
+    Size,
+    border_size,
     border_unit,
     dimension_of,
+    is_unit,
     to_border,
+    unit_size,
 )
-from cfmkit.specs.units.unit_size import Size, border_size, is_unit, unit_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

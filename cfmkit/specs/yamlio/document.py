@@ -19,7 +19,7 @@ from cfmkit.errors import Problem, SpecError, UsageError
 from cfmkit.specs.units.fields import BareFloat, BareInt
 from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.specs.yamlio.explain_validation_errors import explain, not_among
-from cfmkit.specs.yamlio.path_notation import NoSuchPlace, Path, parse_indices, to_dotted, with_value
+from cfmkit.specs.yamlio.paths import NoSuchPlace, Path, parse_indices, to_dotted, with_value
 from cfmkit.specs.yamlio.tree_builder import MAX_DEPTH, MAX_FILE_BYTES, Fault, ParsedYaml, read_text
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from cfmkit.errors import QuantityError
 from cfmkit.specs.units.quantities import decimal_text
 from cfmkit.specs.units.strict_decimal_number import odd_character
-from cfmkit.specs.yamlio.allowed_at_path import Slot
+from cfmkit.specs.yamlio.paths import Slot
 from cfmkit.specs.yamlio.tree_builder import read_plain
 
 LINE_WIDTH = 100

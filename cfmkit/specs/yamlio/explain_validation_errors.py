@@ -17,8 +17,7 @@ from pydantic import BaseModel
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.units.fields import describe_value
 from cfmkit.specs.units.strict_decimal_number import quote
-from cfmkit.specs.yamlio.allowed_at_path import Trace, describe_expected, trace
-from cfmkit.specs.yamlio.path_notation import Path, to_dotted
+from cfmkit.specs.yamlio.paths import Path, Trace, describe_expected, to_dotted, trace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

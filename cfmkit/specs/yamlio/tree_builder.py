@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     from yaml.error import Mark, YAMLError
 
-    from cfmkit.specs.yamlio.path_notation import Path
+    from cfmkit.specs.yamlio.paths import Path
 
 
 MAX_FILE_BYTES = 1_000_000

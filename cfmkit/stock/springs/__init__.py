@@ -6,7 +6,7 @@ __getattr__, __all__ = lazy_names(
     __name__,
     {
         "helical_spring_formulas": "HelicalSpring",
-        "offer_type_and_generic_series": "generic",
+        "offers": "generic",
         "wire_materials": "WIRES_BY_NAME",
     },
 )

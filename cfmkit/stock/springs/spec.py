@@ -14,10 +14,10 @@ from cfmkit.errors import DataError, reason_of
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.spec import Model, is_made, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
-from cfmkit.specs.units.unit_size import is_unit
+from cfmkit.specs.units.table import is_unit
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue
 from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
-from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC_SERIES, Offer, generic
+from cfmkit.stock.springs.offers import GENERIC_SERIES, Offer, generic
 from cfmkit.stock.springs.support_spec import SpringSupport
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireName, WireOutOfRange
 from cfmkit.tables.lab_columns import split_header

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.metrics.branches_cut_to_window import Undefined
+from cfmkit.metrics.branches import Undefined
 from cfmkit.results import Quantity
 from cfmkit.stock.springs.wire_materials import WireOutOfRange
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
     from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
-    from cfmkit.stock.springs.offer_type_and_generic_series import Offer
+    from cfmkit.stock.springs.offers import Offer
 
 WIRE_DEFINITIONS = {
     "wire_stress_max": (

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.reported_values_of_finished_design import search_values
 from cfmkit.designing.robust_design import (
     NoPart,
     PartSlopes,
@@ -26,6 +25,7 @@ from cfmkit.designing.robust_design import (
     optimise_on_samples,
     with_margins,
 )
+from cfmkit.designing.rounded_and_reported_values import search_values
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.errors import CfmError, SpecError
 from cfmkit.errors import Problem as Fault
@@ -44,7 +44,7 @@ from cfmkit.studies.parts.requirement_rows import (
     stated_places,
 )
 from cfmkit.studies.parts.share import Share
-from cfmkit.studies.variable_paths import CannotVary, leaf
+from cfmkit.studies.variations import CannotVary, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -20,8 +20,7 @@ from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Status
 from cfmkit.specs.units import TravelShare
-from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.variants_in_rows import SolvedVariants
 
 if TYPE_CHECKING:

@@ -2,13 +2,13 @@
 
 Sampling and analysing are apart: a method draws points, somebody evaluates them, the
 method reads the outcome. The statistics work on plain arrays and know no mechanism:
-`oat`, `local`, `morris`, `sobol` and `monte_carlo_yield`, with `indices` (what a sample without a value
+`oat`, `local`, `morris`, `sobol` and `tolerance`, with `result_types` (what a sample without a value
 means for an index: never "no influence"). Distributions, made parts, shares of good ones and the tolerances that keep a
 yield are those of `cfmkit.studies.parts`.
 
 A method is a module of its name with a record `SENSITIVITY_METHOD` (`method`), listed in
-`cfmkit.specs.sensitivity_methods`. `setup` says what is to be done, `run_sensitivity_method` joins method and
-engine, `result_types` and `output` say what came out.
+`cfmkit.specs.sensitivity_methods`. `setup` says what is to be done, `run_and_files` joins method and
+engine, `result_types` and `run_and_files` say what came out.
 """
 
 from cfmkit.specs.sensitivity_methods import METHOD_NAMES

@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.parts.allowed_tolerances import LEAST_FACTOR, allowed_tolerances
-from cfmkit.studies.parts.distributions import values_at
+from cfmkit.studies.parts.uncertain_values import values_at
 from cfmkit.studies.sensitivity.method import Method
 from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
 from cfmkit.studies.sensitivity.result_types import to_stated_value as reported

@@ -16,10 +16,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.studies.parts.distributions import values_across
-from cfmkit.studies.sensitivity.indices import N_RESAMPLES, Analysis, Index, analyze_complete, problem
+from cfmkit.studies.parts.uncertain_values import values_across
 from cfmkit.studies.sensitivity.method import Method
-from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
+from cfmkit.studies.sensitivity.result_types import (
+    N_RESAMPLES,
+    Analysis,
+    Findings,
+    Index,
+    IndexLine,
+    analyze_complete,
+    lines_of,
+    problem,
+)
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.studies.sensitivity.indices import Analysis, Index
 from cfmkit.studies.sensitivity.method import Method
-from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
+from cfmkit.studies.sensitivity.result_types import Analysis, Findings, Index, IndexLine, lines_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -1,24 +1,69 @@
-"""Outcome of a sensitivity study: indices as lines of a tidy table, the yield, and how many samples failed."""
+"""Outcome of a sensitivity study: indices as lines of a tidy table, the yield, and how many samples failed.
+
+An index is one value a parameter, with its interval; it is not stated where a sample has no value.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from cfmkit.specs.units import border_unit, to_border
-from cfmkit.studies.sensitivity.indices import varies_not
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.parts.share import Share
     from cfmkit.studies.point_evaluation import Metric
     from cfmkit.studies.sensitivity.evaluation import Evaluator
-    from cfmkit.studies.sensitivity.indices import Analysis
     from cfmkit.studies.sensitivity.setup import Setup
+
+
+N_RESAMPLES = 200  # bootstrap samples behind an interval
+CONSTANT_OUTPUT_RTOL = 1e-12
+"""An output that varies less than so much of its size does not vary: it has no variance to share out."""
+
+
+@dataclass(frozen=True)
+class Index:
+    """One index of every parameter, with its interval; NaN where it cannot be stated."""
+
+    name: str
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+Analysis = tuple[Index, ...]
+
+
+def unstated_indices(names: tuple[str, ...], count: int) -> Analysis:
+    """Return indices of so many parameters that are not stated."""
+    gap = np.full(count, np.nan)
+    return tuple(Index(name, gap, gap, gap) for name in names)
+
+
+def analyze_complete(
+    outputs: FloatArray, analyze: Callable[[FloatArray], Analysis], names: tuple[str, ...], count: int
+) -> Analysis:
+    """Return the indices of one output; not stated where one of its samples failed, whose output is NaN."""
+    return unstated_indices(names, count) if np.isnan(outputs).any() else analyze(outputs)
+
+
+def problem(count: int) -> dict[str, Any]:
+    """Return a unit cube as SALib wants it described."""
+    return {"num_vars": count, "names": [str(k) for k in range(count)], "bounds": [[0.0, 1.0]] * count}
+
+
+def varies_not(outputs: FloatArray) -> bool:
+    """Return whether all outputs are the same, but for rounding."""
+    return bool(np.ptp(outputs) <= CONSTANT_OUTPUT_RTOL * np.abs(outputs).max())
+
 
 IN_UNITS = ("at_low_end", "at_high_end", "swing", "mu_star", "mu", "sigma")
 """Indices that are amounts of the metric; others are ratios."""

@@ -15,14 +15,13 @@ from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Finding
 from cfmkit.specs.sensitivity_methods import METHOD_NAMES
 from cfmkit.specs.units import TravelShare, border_unit, format_short, to_border
-from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.design_with_margins_and_verification import run_design
+from cfmkit.studies.delivered_design import run_design
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.parts.uncertain_values import together
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
-from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.sensitivity.method import method_named
-from cfmkit.studies.variable_paths import length_to_vary
+from cfmkit.studies.variations import length_to_vary
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -15,18 +15,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.studies.parts.distributions import values_at
-from cfmkit.studies.sensitivity.indices import (
+from cfmkit.studies.parts.uncertain_values import values_at
+from cfmkit.studies.sensitivity.method import Method
+from cfmkit.studies.sensitivity.result_types import (
     N_RESAMPLES,
     Analysis,
+    Findings,
     Index,
+    IndexLine,
     analyze_complete,
+    lines_of,
     problem,
     unstated_indices,
     varies_not,
 )
-from cfmkit.studies.sensitivity.method import Method
-from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cfmkit.families.suggestion_request import Request
+    from cfmkit.families.proposals import Request
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
 
 N_COLUMNS = 3

@@ -12,7 +12,7 @@ from cfmkit.studies.suggest.relaxed_requests import LAST_FACTOR
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.families.suggestion_request import FamilyOffer, Request
+    from cfmkit.families.proposals import FamilyOffer, Request
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
 
 

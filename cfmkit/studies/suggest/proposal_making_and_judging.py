@@ -18,31 +18,34 @@ from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE_METRICS, add_size, function_named
 from cfmkit.families.hardware import SAFETY_METRICS
+from cfmkit.families.proposals import stiffening
 from cfmkit.families.run_control import Run
-from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump, read_document
-from cfmkit.studies.parts.assumed_errors import accuracy_of
+from cfmkit.studies.parts.parts import accuracy_of
 from cfmkit.studies.stock_and_digits import decimals_of
-from cfmkit.studies.suggest.digits_of_proposal import round_to_process
-from cfmkit.studies.suggest.end_stop_of_proposal import add_end_stop, note_end_stop, remove_end_stop
-from cfmkit.studies.suggest.material_and_fastening_of_proposal import add_process_and_materials, add_screws
-from cfmkit.studies.suggest.misses_in_words import (
+from cfmkit.studies.suggest.file_of_proposal import (
+    add_end_stop,
+    add_process_and_materials,
+    add_screws,
+    block_for_redesign,
+    note_end_stop,
+    remove_end_stop,
+    round_to_process,
+)
+from cfmkit.studies.suggest.requirements_and_misses import (
+    LIFE_METRICS,
     disqualifying,
     largest_force,
+    list_misses_within_mesh_error,
+    list_requirements,
+    list_unjudged,
     raised_out,
     sides_outside,
     too_short,
     too_thin,
     topic_of,
-)
-from cfmkit.studies.suggest.redesign_of_proposal import block_for_redesign
-from cfmkit.studies.suggest.requirements_of_request import (
-    LIFE_METRICS,
-    list_misses_within_mesh_error,
-    list_requirements,
-    list_unjudged,
     windows_of,
 )
 from cfmkit.studies.suggest.yield_of_proposal import (
@@ -57,7 +60,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.families.base import BoundingBox
-    from cfmkit.families.suggestion_request import Candidate, Request
+    from cfmkit.families.proposals import Candidate, Request
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 

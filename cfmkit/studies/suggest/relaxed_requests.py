@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from cfmkit.designing.run_many_starts import Clock
-    from cfmkit.families.suggestion_request import Candidate, Request
+    from cfmkit.families.proposals import Candidate, Request
 
     Relaxed = tuple[Request, str]
     Relaxation = Callable[[Request, float], Relaxed | None]

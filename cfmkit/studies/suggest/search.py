@@ -21,14 +21,14 @@ import numpy as np
 
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families import Unusable, family, names
+from cfmkit.families.proposals import FamilyOffer
 from cfmkit.families.run_control import Run
-from cfmkit.families.suggestion_request import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump
 from cfmkit.store.content_hashes_and_versions import code_stamp, stable_hash
 from cfmkit.studies.pool import give_up_at
 from cfmkit.studies.serial_and_cluster_executors import Lost, lost_to, surviving
-from cfmkit.studies.suggest.end_stop_of_proposal import NO_END_STOP
+from cfmkit.studies.suggest.file_of_proposal import NO_END_STOP
 from cfmkit.studies.suggest.outcome_of_search import Answered, Suggestions
 from cfmkit.studies.suggest.proposal_making_and_judging import (
     ENDED_EARLY,
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from cfmkit.families.base import Family
-    from cfmkit.families.suggestion_request import Candidate, Request
+    from cfmkit.families.proposals import Candidate, Request
     from cfmkit.studies.serial_and_cluster_executors import Executor, Stopping, Work
 
 ENOUGH_PROPOSALS, ENOUGH_WITH_PARTS = 3, 2

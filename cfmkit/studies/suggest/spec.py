@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from cfmkit.families.base import article
-from cfmkit.families.suggestion_request import Request, Springs
+from cfmkit.families.proposals import Request, Springs
 from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Ratio, Torque, format_short
 from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec, SafetyFactor

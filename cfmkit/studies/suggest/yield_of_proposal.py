@@ -1,7 +1,7 @@
 """The share of a proposal's manufactured parts that would meet the requirements, and values moved until it suffices.
 
 The share is estimated to first order, then counted in random parts. Parts have the tolerances that are assumed of the
-process (`cfmkit.studies.parts.assumed_errors`) and are drawn as `cfmkit sensitivity` draws them of the block
+process (`cfmkit.studies.parts.parts`) and are drawn as `cfmkit sensitivity` draws them of the block
 `sensitivity` that the proposal's file says, so that its answer is the same.
 
 A proposal that misses the required yield alone is designed again: with margins, as by `design.yield`. What may
@@ -17,17 +17,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.bounds_and_rounding import range_about
 from cfmkit.designing.robust_design import NoPart, with_margins
+from cfmkit.designing.rounded_and_reported_values import range_about
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
-from cfmkit.studies.parts.assumed_errors import assume_errors, tolerances
+from cfmkit.studies.parts.drawn_parts import analyze_parts
 from cfmkit.studies.parts.near_parts import Unknown, expected_shares
-from cfmkit.studies.parts.outcomes import analyze_parts
-from cfmkit.studies.parts.parts import Parts
+from cfmkit.studies.parts.parts import Parts, assume_errors, tolerances
 from cfmkit.studies.parts.redesign import PartNumbers
 from cfmkit.studies.parts.requirement_rows import requirement_rows
 from cfmkit.studies.parts.share import percent
@@ -37,11 +36,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.families.suggestion_request import Candidate, Request
+    from cfmkit.families.proposals import Candidate, Request
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.parts.assumed_errors import Assumed
     from cfmkit.studies.parts.near_parts import ExpectedShares
+    from cfmkit.studies.parts.parts import Assumed
 
 N_DRAWN = 100
 """Parts that are drawn of a proposal, each analysed in full: one standard deviation is 3 % where 90 % are good."""

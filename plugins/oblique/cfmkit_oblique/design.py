@@ -9,8 +9,7 @@ It grows with g: the largest g within the tolerance has the shortest springs. g 
 
 from math import hypot, sqrt
 
-from cfmkit.families.findings import format_at_least, format_at_most, mm
-from cfmkit.families.no_mechanism import Infeasible, refusals_answered
+from cfmkit.families.findings import Infeasible, format_at_least, format_at_most, mm, refusals_answered
 from cfmkit.families.run_control import Run
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status

@@ -7,8 +7,7 @@ from matplotlib.figure import Figure
 
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text
-from cfmkit.plots.curve_with_enlarged_band import curve_figure
-from cfmkit.plots.curves import CurveLook
+from cfmkit.plots.curves import CurveLook, curve_figure
 from cfmkit.plots.stacked_line_diagrams import Limit
 from cfmkit.plots.style import apply_style
 from cfmkit.results import Result

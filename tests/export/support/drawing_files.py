@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.export.arc_outlines import outlines
-from cfmkit.export.dxf import dxf_bytes
-from cfmkit.export.svg import svg_bytes
+from cfmkit.export.dxf_svg_csv import dxf_bytes, svg_bytes
 
 if TYPE_CHECKING:
     from cfmkit.export.contours import Drawing

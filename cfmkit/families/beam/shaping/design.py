@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.designing import objective_and_constraints as design_limits
-from cfmkit.designing.bounds_and_rounding import find_active_bounds
+from cfmkit.designing.rounded_and_reported_values import find_active_bounds
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.network_from_spec import assemble, known_allowable_stresses, thickest_of
-from cfmkit.families.beam.shaping.multistart import Explored, explore, rank
+from cfmkit.families.beam.shaping.multistart import Explored, NetworkScatter, explore, rank, scatter_within_tolerances
 from cfmkit.families.beam.shaping.report import REISSNER_MODEL, Judged, judge_design, notes_of, search_of, starts_table
 from cfmkit.families.beam.shaping.search import (
     VIOLATION_TOL,
@@ -25,10 +25,15 @@ from cfmkit.families.beam.shaping.search import (
     satisfy_limits,
     widen,
 )
-from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScatter, scatter_within_tolerances
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
-from cfmkit.families.beam.shaping.task import BENDING_ONLY, STRESS_MARGIN, Coordinate, Task, TaskLimits
-from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.beam.shaping.task_and_variables import (
+    BENDING_ONLY,
+    STRESS_MARGIN,
+    Coordinate,
+    Task,
+    TaskLimits,
+    Variables,
+)
 from cfmkit.families.findings import percent
 from cfmkit.families.rows import with_values
 from cfmkit.results import Design, Finding, Status

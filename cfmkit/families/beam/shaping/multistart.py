@@ -1,20 +1,28 @@
-"""All starts of a design: each searched, the best of them widened, and what orders them.
+"""All starts of a design: each searched, the best of them widened and audited, and what orders them.
 
 For the widest window each start is searched twice: over the requested window, and over one that begins farther. Most
 starts end in one family of shapes, and what is flattest over the requested window seldom is in another one whose window
 can be widened farther.
+
+The audit judges a shape on terms that the search does not use: the stable branch, true gaps and crossings, and what is
+left of the constant force when nodes and coefficients are off by their tolerances. Force and stress are judged by the
+analysis of the specification that is written.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.designing.run_many_starts import Done, OneStart, Stage, from_record, run_stage
+from cfmkit.elastica import Control, Displacement, PathStatus, trace
+from cfmkit.elastica.tracing.trace_many import trace_many
+from cfmkit.families.beam.network_from_spec import thickest_of
+from cfmkit.families.beam.shaping.limits import pairs
 from cfmkit.families.beam.shaping.search import (
     VIOLATION_TOL,
     ShapeCandidate,
@@ -25,14 +33,177 @@ from cfmkit.families.beam.shaping.search import (
     searched_far,
     widen,
 )
-from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audit_design
-from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.beam.shaping.task_and_variables import Variables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-    from cfmkit.families.beam.shaping.task import Task
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Path
+    from cfmkit.families.beam.shaping.limits import Pair
+    from cfmkit.families.beam.shaping.task_and_variables import Task
     from cfmkit.families.run_control import Run
+
+
+N_AUDIT_POSES = 61
+STRICT_BAND = 0.05  # of the largest force: the strict range is that of `cfmkit analyze`, (max - min) <= 5 % of max
+_JOINT_RTOL = 1e-4  # of the chords: lines that end in a joint meet within the error of the path
+
+
+@dataclass(frozen=True)
+class NetworkScatter:
+    """Standard deviations of node coordinates [m] and shape coefficients [rad], and how many networks are drawn."""
+
+    nodes: float
+    coefficients: float
+    samples: int
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Whether a mechanism exists as drawn."""
+
+    # complete, stable: whether the whole way is reached, and stable at all poses
+    complete: bool
+    stable: bool
+    crossings: int  # poses, of 61 from rest to the end, at which beams cross
+    gap: float | None  # least distance of surfaces away from joints at any pose [m]
+
+    @property
+    def sound(self) -> bool:
+        """Whether the mechanism exists as drawn, all the way."""
+        return self.complete and self.stable and self.crossings == 0
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Networks drawn within the tolerances."""
+
+    # bands, ranges, (n,): half bands and strict shares of those that could be followed
+    bands: FloatArray
+    ranges: FloatArray
+    lost: int  # those that could not
+
+
+def audit_design(variables: Variables, design: ShapeCandidate) -> Audit:
+    """Return the judgement of a design."""
+    task, network = variables.task, variables.build(design.x)
+    at = np.linspace(0.0, task.window[1], N_AUDIT_POSES)
+    path = trace(network, Displacement(task.driven, task.direction, at), Control(tolerance=1e-7))
+    return Audit(
+        path.status is PathStatus.COMPLETE,
+        bool(path.stable.all()),
+        sum(crossing(task, path, int(k)) for k in path.at_requested),
+        _least_gap(task, path),
+    )
+
+
+def half_band(at: FloatArray, force: FloatArray, start: float) -> float:
+    """Return (max - min)/(max + min) of a force from `start` on; between poses a cubic."""
+    from scipy.interpolate import CubicSpline
+
+    inside = CubicSpline(at, force)(np.linspace(start, at[-1], 201))
+    return float(np.ptp(inside) / (inside.max() + inside.min()))
+
+
+def strict_share(at: FloatArray, force: FloatArray) -> float:
+    """Return the largest share of the travel up to its end over which (max - min) <= 5 % of max."""
+    from scipy.interpolate import CubicSpline
+
+    fine = np.linspace(0.0, at[-1], 2001)
+    values = CubicSpline(at, force)(fine)[::-1]
+    tops, bottoms = np.maximum.accumulate(values), np.minimum.accumulate(values)
+    good = tops - bottoms <= STRICT_BAND * tops
+    count = len(good) if good.all() else int(good.argmin())
+    return (count - 1) / (len(fine) - 1)
+
+
+def scatter_within_tolerances(variables: Variables, design: ShapeCandidate, spread: NetworkScatter) -> Drawn:
+    """Return what is left of the constant force in networks within the tolerances."""
+    task, rng = variables.task, np.random.default_rng([spread.seed, 1])
+    places = len(task.coordinates)
+    sizes = np.full(variables.count, spread.coefficients)
+    sizes[:places] = spread.nodes / task.size
+    at = np.linspace(0.0, task.window[1], N_AUDIT_POSES)
+    noise = rng.standard_normal((spread.samples, variables.count)) * sizes
+    drive = Displacement(task.driven, task.direction, at)
+    networks = (variables.build(design.x + error) for error in noise)
+    if task.contact is None:  # followed together where they can be
+        outcomes = trace_many(networks, drive, Control(tolerance=1e-5))
+        forces = [outcome.value.effort for outcome in outcomes if outcome.status == "COMPLETE"]
+    else:
+        outcomes = trace_many(networks, drive, Control(tolerance=1e-5), partial(_force_at_requested, task))
+        forces = [outcome.value for outcome in outcomes if outcome.status == "COMPLETE"]
+    bands = np.array([half_band(at, force, design.start) for force in forces])
+    ranges = np.array([strict_share(at, force) for force in forces])
+    return Drawn(bands, ranges, spread.samples - len(forces))
+
+
+def _force_at_requested(task: Task, path: Path) -> FloatArray:
+    """Return the force that is to be constant at the requested points of a path."""
+    force: FloatArray = task.force(path)[path.at_requested]
+    return force
+
+
+def crossing(task: Task, path: Path, pose: int) -> bool:
+    """Return True if centre lines of different beams cross at a pose, or one crosses itself."""
+    lines = {name: path.shape(name, pose) for name in task.network.beams}
+    shared = {pair.beams: pair.joints for pair in pairs(task.network)}
+    return any(
+        lines_cross(lines[first], lines[second], bool(shared[first, second]))
+        for first, second in combinations(lines, 2)
+    ) or any(lines_cross(line, line, True) for line in lines.values())
+
+
+def lines_cross(line: FloatArray, second_line: FloatArray, joined: bool) -> bool:
+    """Return True if two polylines (n, 2) cross; pieces that share an end, or touch at a common joint, do not."""
+    p, q = line[:, 0] + 1j * line[:, 1], second_line[:, 0] + 1j * second_line[:, 1]
+    a, b, c, d = p[:-1, None], p[1:, None], q[None, :-1], q[None, 1:]
+    first = _side(a, b, c) * _side(a, b, d)
+    second = _side(c, d, a) * _side(c, d, b)
+    hit = (first < 0) & (second < 0)
+    if joined:
+        size = abs(p[-1] - p[0]) + abs(q[-1] - q[0])
+        gap_of_ends = np.min([abs(u - v) for u in (a, b) for v in (c, d)], axis=0)
+        hit &= gap_of_ends > _JOINT_RTOL * size
+    return bool(hit.any())
+
+
+def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    return np.asarray(np.imag(np.conj(b - a) * (c - a)))
+
+
+def _least_gap(task: Task, path: Path) -> float | None:
+    """Return the least distance of surfaces of different beams, away from where they meet [m]."""
+    least = np.inf
+    for pair in pairs(task.network):
+        if not pair.alone:
+            least = min(least, _gap(task, path, pair))
+    return float(least) if np.isfinite(least) else None
+
+
+def _gap(task: Task, path: Path, pair: Pair) -> float:
+    sections = [task.network.beams[name].section for name in pair.beams]
+    thickness = 0.5 * sum(thickest_of(section) for section in sections)
+    wanted = thickness + (task.limits.clearance or 0.0)
+    least = np.inf
+    for pose in path.at_requested:
+        p, q = (path.shape(name, int(pose)) @ [1, 1j] for name in pair.beams)
+        distance = abs(p[:, None] - q[None, :])
+        away = np.full(distance.shape, np.inf)
+        for i, j in pair.joints:
+            away = np.minimum(away, _arc_lengths(p, i)[:, None] + _arc_lengths(q, j)[None, :])
+        far = task.limits.opening * away >= wanted
+        if far.any():
+            least = min(least, float(distance[far].min()) - thickness)
+    return least
+
+
+def _arc_lengths(line: FloatArray, end: int) -> FloatArray:
+    """Return the way along a line from its first (0) or last (1) point."""
+    arc_length = np.append(0.0, np.cumsum(abs(np.diff(line))))
+    return arc_length[-1] - arc_length if end else arc_length
 
 
 _N_REFINED = 3  # of the widest: one in a finer order takes as long as a widening, and others gain little

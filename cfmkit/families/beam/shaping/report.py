@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.reported_values_of_finished_design import measure_metrics
+from cfmkit.designing.rounded_and_reported_values import measure_metrics
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.beam.contacts import force_extremes
 from cfmkit.families.beam.model import analyze
+from cfmkit.families.beam.shaping.multistart import Audit, audit_design
 from cfmkit.families.beam.shaping.search import COORDINATE_DECIMALS, ShapeCandidate
-from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audit_design
-from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.beam.shaping.task_and_variables import Variables
 from cfmkit.families.findings import percent
 from cfmkit.families.run_control import Run
 from cfmkit.results import Quantity, Searched, Status
@@ -26,9 +26,8 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from cfmkit.families.beam.shaping.multistart import Explored
-    from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Drawn, NetworkScatter
-    from cfmkit.families.beam.shaping.task import Task
+    from cfmkit.families.beam.shaping.multistart import Drawn, Explored, NetworkScatter
+    from cfmkit.families.beam.shaping.task_and_variables import Task
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.results import Result
     from cfmkit.tables import Table

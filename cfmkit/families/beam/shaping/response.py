@@ -17,15 +17,14 @@ from cfmkit.arrays import distinct, read_only
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.results import beam_states
 from cfmkit.errors import CfmError
-from cfmkit.families.beam.shaping.variables import Length, has_pad_inside, has_vanished_beam, lengths
+from cfmkit.families.beam.shaping.task_and_variables import Length, has_pad_inside, has_vanished_beam, lengths
 from cfmkit.numerics.quadrature import clenshaw_curtis
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path, Section
     from cfmkit.elastica.sensitivity import Gradient
-    from cfmkit.families.beam.shaping.task import Task
-    from cfmkit.families.beam.shaping.variables import Variables
+    from cfmkit.families.beam.shaping.task_and_variables import Task, Variables
     from cfmkit.numerics.dual_array import DualArray
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.bounds_and_rounding import round_within_bounds as rounded_within
 from cfmkit.designing.objective_and_constraints import worst
+from cfmkit.designing.rounded_and_reported_values import round_within_bounds as rounded_within
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families.beam.shaping.limits import LIMIT_FUNCTIONS
 from cfmkit.families.beam.shaping.response import looked_at
 from cfmkit.families.beam.shaping.sqp_program import BAND_WEIGHT, Flattest, ForceRatio, Shaping, Widest, window_force
-from cfmkit.families.beam.shaping.variables import Variables, candidates
+from cfmkit.families.beam.shaping.task_and_variables import Variables, candidates
 from cfmkit.numerics.sqp import Effort, Optimum, minimize
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.shaping.response import CloseView
-    from cfmkit.families.beam.shaping.task import Task
+    from cfmkit.families.beam.shaping.task_and_variables import Task
 
 
 VIOLATION_TOL = 1e-4  # a limit missed by less than this share holds

@@ -23,7 +23,7 @@ from cfmkit.families.beam.shaping.response import NoAnswer, PosePlan, View, pose
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.beam.shaping.variables import Variables
+    from cfmkit.families.beam.shaping.task_and_variables import Variables
 
 
 @dataclass(eq=False)

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.assembly import constant_force
+from cfmkit.families.cam.statics import constant_force
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text
 from cfmkit.plots.bands_from_requirements import limits_on
-from cfmkit.plots.curve_with_enlarged_band import curve_figure
-from cfmkit.plots.curves import CurveLook
+from cfmkit.plots.curves import CurveLook, curve_figure
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.style import LINE_BLUE, LINE_PURPLE, LINE_VERMILLION, TEXT_GREY, apply_style

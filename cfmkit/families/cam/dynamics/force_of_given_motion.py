@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.curves import Column, Curve
-from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.dynamics.findings import findings_of, leaves_profile, runs_on_corner
 from cfmkit.families.cam.dynamics.inverse import respond, statics
@@ -29,8 +28,8 @@ from cfmkit.families.cam.dynamics.scalar_results import contact_pressure, slow_f
 from cfmkit.families.cam.dynamics.solution import Build, History, MotionSolution
 from cfmkit.families.cam.findings import finding, rubbing_left_out
 from cfmkit.families.cam.mechanism_from_spec import displacement_origin, flanks_cross, rollers_overlap
-from cfmkit.families.findings import mm, newton
-from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.families.cam.statics import constant_force
+from cfmkit.families.findings import CannotBuild, mm, newton, no_result
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
 

@@ -12,8 +12,8 @@ from cfmkit.families.cam.mechanism_from_spec import assemble_sides, cam_start_he
 from cfmkit.families.cam.statics import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
-    from cfmkit.families.cam.assembly import Assembly
     from cfmkit.families.cam.spec import CamSpec, Dynamics, Errors, LeftMasses, Masses, Mechanism
+    from cfmkit.families.cam.statics import Assembly
 
 
 def build(spec: CamSpec) -> Build:

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.contact_pressure import pressure
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS
-from cfmkit.families.cam.statics import STANDARD_GRAVITY
+from cfmkit.families.cam.statics import STANDARD_GRAVITY, constant_force
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:

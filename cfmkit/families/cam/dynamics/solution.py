@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.assembly import Assembly
     from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, Moment
     from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.families.cam.statics import Assembly
 
 
 @dataclass(frozen=True, repr=False)

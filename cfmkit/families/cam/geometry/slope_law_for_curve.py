@@ -30,7 +30,7 @@ from cfmkit.numerics.roots import FLOAT_EPS, bracketed_root, invert_increasing
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.numerics.monotone_interpolation import ThroughPoints
+    from cfmkit.numerics.interpolation import ThroughPoints
 
 NEAR_START = 1e-7  # share of the travel next to a start at zero force within which 0/0 is taken from a place beside it
 PATH_END_FACTOR = 1.05  # times the curve's end: so far a path that is cut for friction is integrated

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from cfmkit.numerics.monotone_interpolation import ThroughPoints
+from cfmkit.numerics.interpolation import ThroughPoints
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveLength
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.target_curve import MOST_POINTS, Interpolation

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.bounds_and_rounding import find_active_bounds
+from cfmkit.designing.rounded_and_reported_values import find_active_bounds
 from cfmkit.families.findings import mm, mpa
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import strip_chain
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd

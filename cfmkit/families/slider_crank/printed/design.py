@@ -14,12 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.bounds_and_rounding import round_within_bounds
-from cfmkit.designing.reported_values_of_finished_design import measure_metrics, search_values
+from cfmkit.designing.rounded_and_reported_values import measure_metrics, round_within_bounds, search_values
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.errors import InputError
-from cfmkit.families.findings import mm, mpa, newton, percent
-from cfmkit.families.no_mechanism import no_design, refusals_answered
+from cfmkit.families.findings import mm, mpa, newton, no_design, percent, refusals_answered
 from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle

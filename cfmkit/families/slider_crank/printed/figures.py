@@ -12,10 +12,10 @@ from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP_
 from cfmkit.families.slider_crank.printed.part import bodies, choose_points
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
-from cfmkit.plots.curve_with_enlarged_band import curve_figure
+from cfmkit.plots.curves import curve_figure
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.poses_in_one_svg import Moving
-from cfmkit.plots.poses_in_one_svg import choose_poses as film_poses
+from cfmkit.plots.mechanism_in_motion import Moving
+from cfmkit.plots.mechanism_in_motion import choose_poses as film_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import stress_map_figure, stress_views
 from cfmkit.plots.style import (

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.reported_values_of_finished_design import search_values
+from cfmkit.designing.rounded_and_reported_values import search_values
 from cfmkit.errors import InputError
-from cfmkit.families.findings import mm
-from cfmkit.families.no_mechanism import no_design
+from cfmkit.families.findings import mm, no_design
 from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import side_of

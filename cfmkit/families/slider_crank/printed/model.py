@@ -14,7 +14,7 @@ from cfmkit.arrays import LazyMapping, LazySequence
 from cfmkit.curves import Column, Curve
 from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.errors import InputError
-from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.families.findings import CannotBuild, no_result
 from cfmkit.families.rows import findings_of_one, values_of_one, with_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import linkage_of, resolve, side_of, unloaded_angle

@@ -11,7 +11,7 @@ from cfmkit.export.arc_outlines import check_simple
 from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Region, Sheet, circle, mark
 from cfmkit.export.drawn_as_specified import check_outline
 from cfmkit.export.fillets import round_inside_corners, sharp_notes
-from cfmkit.export.fixing_holes import add_fixing_holes, remove_screws
+from cfmkit.export.fixing_holes_and_labels import add_fixing_holes, remove_screws
 from cfmkit.export.posed_part import PosedBody, swept
 from cfmkit.families.fem_results import remove_frame
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP_BEAM
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.beam_sections import BeamSection
+    from cfmkit.export.contours import BeamSection
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.export.beam_sections import BeamSection
-from cfmkit.export.contours import Contour, Line, polygon
+from cfmkit.export.contours import BeamSection, Contour, Line, polygon
 from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.posed_part import PosedBody, PosedPart
 from cfmkit.families.slider_crank.linkage import linkage_of, unloaded_angle

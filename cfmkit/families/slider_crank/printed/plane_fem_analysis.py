@@ -33,8 +33,7 @@ from cfmkit.families.fem_results import (
     with_nominal,
     with_steps,
 )
-from cfmkit.families.findings import sharp_inside
-from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.families.findings import CannotBuild, no_result, sharp_inside
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction

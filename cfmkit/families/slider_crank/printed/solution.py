@@ -20,7 +20,7 @@ from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.slider_crank.printed.equilibrium_path import ANALYSIS_TOLERANCE, PressingEnd
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, STRIP_BEAM
 from cfmkit.metrics.continuous_means_and_extremes import mean
-from cfmkit.numerics.chebyshev_panels import nodes_of, resolve_panels
+from cfmkit.numerics.interpolation import nodes_of, resolve_panels
 from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain, Pressed
     from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
-    from cfmkit.numerics.chebyshev_panels import ChebyshevPanels
+    from cfmkit.numerics.interpolation import ChebyshevPanels
 
 
 FIRST_NODE_SHARE = 1e-6

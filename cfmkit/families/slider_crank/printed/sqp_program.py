@@ -32,7 +32,7 @@ from cfmkit.elastica.results.path import N_PLACES
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.printed.equilibrium_path import FIRST_STEP
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, STRIP_BEAM, Strip, spread
-from cfmkit.numerics.barycentric import differentiation, interpolation
+from cfmkit.numerics.interpolation import differentiation, interpolation
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock, OneStart, Stage, from_record, run_stage
-from cfmkit.families.findings import mm, mpa, newton, percent
-from cfmkit.families.no_mechanism import no_design
+from cfmkit.families.findings import mm, mpa, newton, no_design, percent
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.sqp_program import METRES_PER_MM, Form, StripProgram

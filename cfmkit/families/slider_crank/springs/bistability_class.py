@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
-    from cfmkit.numerics.hermite_cubic_turning_points import Monotone
+    from cfmkit.numerics.sampled_extremes import Monotone
 
     Ends = tuple[FloatArray, ...]
 

@@ -23,8 +23,7 @@ from cfmkit.families.slider_crank.springs.largest_turns_and_forces import Motion
 from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
-from cfmkit.stock.springs.made_to_measure import PIN_SHARE
-from cfmkit.stock.springs.offer_type_and_generic_series import Miss, Offer, guide_rod_for, nearest
+from cfmkit.stock.springs.offers import PIN_SHARE, Miss, Offer, guide_rod_for, nearest
 from cfmkit.stock.springs.spec import offers, support_of, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse, orient_to_larger
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design, refusals_answered
+from cfmkit.families.findings import CannotBuild, Infeasible, no_design, refusals_answered
 from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import resolve

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from cfmkit.designing.reported_values_of_finished_design import measure_metrics, search_values
+from cfmkit.designing.rounded_and_reported_values import measure_metrics, search_values
 from cfmkit.families.findings import percent
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.findings import finding

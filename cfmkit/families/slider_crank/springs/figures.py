@@ -19,10 +19,9 @@ from cfmkit.plots import parts
 from cfmkit.plots.assembly import assembly_figure
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
-from cfmkit.plots.curve_with_enlarged_band import curve_figure
-from cfmkit.plots.curves import CurveLook, plot_curve
+from cfmkit.plots.curves import CurveLook, curve_figure, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
+from cfmkit.plots.mechanism_in_motion import Moving, choose_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.style import (
     LINE_BLUE,
@@ -38,7 +37,7 @@ from cfmkit.plots.style import (
     new_figure,
 )
 from cfmkit.specs.units import format_short, to_border
-from cfmkit.stock.springs.made_to_measure import loaded_length
+from cfmkit.stock.springs.offers import loaded_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -21,7 +21,7 @@ from cfmkit.families.slider_crank.springs.bistability_class import (
 from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
-from cfmkit.stock.springs.guides import guide_cure, guide_needed
+from cfmkit.stock.springs.support_spec import guide_cure, guide_needed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -21,8 +21,7 @@ import numpy as np
 from cfmkit.arrays import LazySequence, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import STOP_QUANTITIES
-from cfmkit.families.findings import deg, mm
-from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.families.findings import CannotBuild, deg, mm, no_result
 from cfmkit.families.rows import (
     SolvedRows,
     columns_of_absent_values,
@@ -41,8 +40,8 @@ from cfmkit.families.slider_crank.springs.scalar_results import SCALAR_QUANTITIE
 from cfmkit.families.slider_crank.springs.solution import ClosedFormEffort, Solution, target_of
 from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN, asked_motion, assemble
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
-from cfmkit.metrics.branches_cut_to_window import find_between_ends
-from cfmkit.numerics.cubic_interpolation import bisect
+from cfmkit.metrics.branches import find_between_ends
+from cfmkit.numerics.interpolation import bisect
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import parts_tables
 

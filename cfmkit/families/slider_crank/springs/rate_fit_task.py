@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.no_mechanism import Infeasible
+from cfmkit.families.findings import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
 from cfmkit.families.slider_crank.springs.friction import branch

@@ -12,8 +12,8 @@ import numpy as np
 
 from cfmkit.families.rows import ScalarQuantity, quantity_of_each
 from cfmkit.families.slider_crank.springs.bistability_class import CLASS_NAMES, small_angle_number
-from cfmkit.families.slider_crank.springs.link_strength import STRENGTH_DEFINITIONS as LINK_DEFINITIONS
-from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, allowable_of, link_loads, link_of
+from cfmkit.families.slider_crank.springs.hardware import STRENGTH_DEFINITIONS as LINK_DEFINITIONS
+from cfmkit.families.slider_crank.springs.hardware import LinkBar, LinkLoads, allowable_of, link_loads, link_of
 from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES

@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from cfmkit.specs.spec import DesignBlock, Model, PositiveForce, PositiveLength, is_made, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, Torque
-from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
+from cfmkit.stock.springs.offers import unguided_deflection
 from cfmkit.stock.springs.spec import RATE_RTOL, Catalogue, Life, SpringSafety, SpringWire
 from cfmkit.stock.springs.support_spec import SpringSupport
 

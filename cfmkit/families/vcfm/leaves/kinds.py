@@ -1,22 +1,26 @@
 """Kinds of leaves that snap through and of springs of leaves: what the law of one gives, and the record of a kind.
 
 A kind is a subclass of `LeafLaw` or `LeafSpring` and a record `LeafKind` or `SpringKind`, both in one file of this
-folder; the record is listed in `leaves_spec`. Specification, findings, figures, drawings, models and proposals read the
-record and the law: none of them compares names.
+folder; the record is listed in `leaves_spec`. Specification, findings, figures, drawings, models and
+proposals read the record and the law: none of them compares names. Laws of several leaves stand as one law, one leaf a
+row: numbers become columns (r, 1), and travels are (r, n).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
 from cfmkit.families.vcfm.leaves.s_form import bent_leaf
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Section
@@ -262,3 +266,73 @@ class SpringKind(StructureKind):
     is_linear: bool = True  # whether its stiffness is constant
     stands_on_ends: bool = False  # whether its two ends stand, and its middle is driven
     drawing_note: str = ""  # on the drawing of the whole spring
+
+
+LawT = TypeVar("LawT")
+
+
+def stack_laws(laws: Sequence[LawT]) -> LawT:
+    """Return laws of one kind as one law with a row for each; one alone is returned as it is, with plain numbers.
+
+    Examples
+    --------
+    >>> from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
+    >>> stack_laws([Coils(100.0), Coils(200.0)]).force(0.1).tolist()
+    [[10.0], [20.0]]
+    """
+    first: Any = laws[0]
+    if len(laws) == 1:
+        return laws[0]
+    if getattr(first, "one_by_one", False):  # its tables and searches are not arrays over leaves
+        column = np.empty((len(laws), 1), dtype=object)
+        column[:, 0] = laws
+        return LawsOneByOne(column)  # type: ignore[return-value]
+    if not is_dataclass(first):
+        return np.array(laws, dtype=float)[:, None]  # type: ignore[return-value]
+    columns = {item.name: stack_laws([getattr(law, item.name) for law in laws]) for item in fields(first)}
+    return type(laws[0])(**columns)
+
+
+@dataclass(frozen=True)
+class LawsOneByOne:
+    """Laws that are asked one after the other, each for its row of travels (r, n)."""
+
+    column: NDArray[np.object_]  # (r, 1)
+    one_by_one: ClassVar[bool] = True
+
+    @property
+    def laws(self) -> list[Any]:
+        """The law of each row."""
+        return list(self.column[:, 0])
+
+    @cached_property
+    def strip(self) -> Any:
+        """The leaves' dimensions, a row each."""
+        return stack_laws([law.strip for law in self.laws])
+
+    def force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of each leaf along the motion [N]."""
+        return np.asarray(self._evaluate_each("force", travel))
+
+    def stress(self, travel: FloatArray) -> FloatArray:
+        """Return the largest stress of each leaf [Pa]."""
+        return np.asarray(self._evaluate_each("stress", travel))
+
+    def state(self, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return `force` and `stress`."""
+        return self.force(travel), self.stress(travel)
+
+    def is_buckled(self, travel: FloatArray) -> Any:
+        """Return whether each leaf is buckled."""
+        return self._evaluate_each("is_buckled", travel)
+
+    def _evaluate_each(self, name: str, travel: FloatArray) -> Any:
+        travel_rows = np.broadcast_to(travel, (len(self.laws), travel.shape[1]))
+        return np.stack([np.asarray(getattr(law, name)(row)) for law, row in zip(self.laws, travel_rows, strict=True)])
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what the laws know of themselves: a column, or a column for each of several numbers."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        values = np.array([np.ravel(getattr(law, name)) for law in self.laws], dtype=float)
+        return values if values.shape[1] == 1 else tuple(column[:, None] for column in values.T)

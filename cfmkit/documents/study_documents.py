@@ -1,0 +1,288 @@
+"""The documents of studies: what `cfmkit sweep` and `cfmkit sensitivity` print.
+
+Of a sweep: how many points meet the requirements, the best one, ranges of results. Of a sensitivity study: the yield,
+and the values in the order of their influence.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.documents.document import (
+    MAX_WARNING_LENGTH,
+    Document,
+    GridColumn,
+    Note,
+    PageTable,
+    Tone,
+    ValueRow,
+    WarningEntry,
+    Written,
+    format_bounds,
+    name_in_words,
+    shortened_to_clause,
+)
+from cfmkit.documents.run_document import value_and_bounds, warning_of
+from cfmkit.errors import ExitCode
+from cfmkit.metrics.metric_definitions import words
+from cfmkit.studies.sensitivity.result_types import IN_UNITS
+from cfmkit.studies.sensitivity.run_and_files import exit_code, is_met_by_interval, message, warnings, yield_ok
+from cfmkit.studies.sensitivity.tolerance import VARIANCE_DROP, YIELD_GAIN
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.specs.spec import Spec
+    from cfmkit.studies.parts.share import Share
+    from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
+
+
+MAX_RANGES = 6  # results whose range a short page shows
+NO_INFLUENCE_RTOL = 1e-9
+"""Share of a value by which it may change and still counts as the same: rounding of sums leaves as much."""
+
+
+def sweep_document(
+    spec: Spec,  # what was varied
+    summary: Mapping[str, Any],  # what metrics.json says of it
+    dimensions: Mapping[str, str],  # of its metrics, by name
+    code: ExitCode,  # of the process
+    files: Written | None = None,  # what was written
+    reused: int = 0,  # points that came from the journal
+) -> Document:
+    """Return the document of a sweep."""
+    counts = summary["points"]
+    ends = ", ".join(f"{count} {name_in_words(name)}" for name, count in counts.items() if name != "total")
+    again = f" ({reused} from the journal)" if reused else ""
+    return Document(
+        exit_code=code,
+        title=" ".join(spec.name.split()),
+        summary=f"{counts['total']} points: {ends}{again}" if counts["total"] else "no point was finished",
+        verdict=_sweep_verdict(summary, code),
+        headline=(
+            *(
+                ValueRow(
+                    _describe_objective(one["metric"]),
+                    f"met at {one['met']} of {one['of']}",
+                    format_bounds(one),
+                    bool(one["ok"]),
+                )
+                for one in summary["requirements"]
+            ),
+            *_best(summary, dimensions),
+        ),
+        tables=tuple(_ranges(summary, dimensions)),
+        notes=tuple(_settings(summary)),
+        warnings=tuple(
+            WarningEntry(
+                one["name"],
+                shortened_to_clause(one["message"], MAX_WARNING_LENGTH - len(one["name"]) - 2),
+                one["message"],
+            )
+            for one in summary["warnings"]
+        ),
+        files=files,
+    )
+
+
+def _sweep_verdict(summary: Mapping[str, Any], code: ExitCode) -> str:
+    if code is ExitCode.REQUIREMENT_MISSED:
+        return "no point meets every requirement"
+    if code is not ExitCode.OK:
+        return name_in_words(str(summary["status"] if code is not ExitCode.INTERRUPTED else "interrupted"))
+    return "requirements can be met" if summary["requirements"] else "complete"
+
+
+def _settings(summary: Mapping[str, Any]) -> Iterator[Note]:
+    """Yield what was varied, at the best point, as options that can be pasted."""
+    if summary["best"]:
+        values = summary["best"]["values"].items()
+        settings = [f"{path}={''.join(str(value).split())}" for path, value in values]
+        yield Note("best", " ".join(f"--set {setting}" for setting in settings), whole=True, is_command=True)
+
+
+def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[ValueRow]:
+    best = summary["best"]
+    if not best:
+        return
+    metric = summary["metrics"][best["by"]]
+    value = _quantity(metric["value"], metric["unit"], dimensions.get(best["by"], ""))
+    tie = f" ({best['ties']} tie)" if best["ties"] > 1 else ""
+    yield ValueRow(f"{best['sense']} {_describe_objective(best['by'])}", f"{value}, point {best['point']}{tie}")
+
+
+def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[PageTable]:
+    """Yield the range of every result, beside its value at the best point; what does not change comes last."""
+    leading: list[tuple[str, ...]] = []
+    rows: list[tuple[str, ...]] = []
+    constant: list[tuple[str, ...]] = []
+    first = [summary["best"]["by"]] if summary["best"] else []
+    asked = [one["metric"] for one in summary["requirements"]]
+    names = [name for name in dict.fromkeys((*first, *asked, *summary["range"])) if name in summary["range"]]
+    for name in names:
+        one, dimension = summary["range"][name], dimensions.get(name, "")
+        low, high = (_quantity(one[end], one["unit"], dimension) for end in ("min", "max"))
+        at_best = summary["metrics"].get(name, {}).get("value")
+        shown = "" if at_best is None else _quantity(at_best, one["unit"], dimension)
+        if one["max"] - one["min"] <= NO_INFLUENCE_RTOL * max(abs(one["min"]), abs(one["max"])):
+            row, others = (_describe_objective(name), low, "no influence", shown), constant
+        else:
+            row, others = (_describe_objective(name), low, high, shown), rows
+        (leading if name in (*first, *asked) else others).append(row)
+    if leading or rows:
+        heads = ("from", "to", *(("best point",) if summary["best"] else ()))
+        columns = (GridColumn("range of"), *(GridColumn(head, wraps=False) for head in heads))
+        yield PageTable("", columns, tuple(row[: len(columns)] for row in (*leading, *rows)), MAX_RANGES)
+    if constant:
+        columns = (GridColumn("no influence on"), GridColumn("value", wraps=False))
+        yield PageTable("Results without influence", columns, tuple(row[:2] for row in constant), 0)
+
+
+def _describe_objective(label: str) -> str:
+    """Return the label of a result as people write it, with its branch and window.
+
+    Examples
+    --------
+    >>> _describe_objective("force_mean[load] over 5 ... 235 mm")
+    'force mean on load over 5 to 235 mm'
+    """
+    return name_in_words(label).replace("[", " on ").replace("]", "").replace(" ... ", " to ")
+
+
+def _quantity(value: float | str, unit: str, dimension: str) -> str:
+    """Return a value in its border unit; of what has none, shares are percentages, counts and factors are not."""
+    if isinstance(value, str):
+        return value
+    if dimension == "ratio":
+        return f"{100 * value:.4g} %"
+    return f"{value:.5g}" if unit == "1" else f"{value:.5g} {unit}"
+
+
+PERCENT_INDICES = (YIELD_GAIN, VARIANCE_DROP)  # indices that are shown in percent
+NO_INFLUENCE_INDEX = 1e-12
+"""An index below this is the rounding of a difference of numbers near 1 (2e-16 each), not an influence."""
+MAX_PARAMETERS = 6  # parameters of each metric on a short page: two metrics with them fit on a screen of 24 lines
+
+
+def sensitivity_document(found: Findings, files: Written | None = None) -> Document:
+    """Return the document of a sensitivity study."""
+    evaluator, spec = found.evaluator, found.setup.study.spec
+    reused = sum(piece.records.reused for piece in evaluator.pieces)
+    again = f" ({reused} from the journal)" if reused else ""
+    return Document(
+        exit_code=exit_code(found),
+        title=" ".join(spec.name.split()),
+        summary=f"{found.setup.method}, {evaluator.count} samples{again}",
+        verdict=_yield_verdict(found),
+        headline=tuple(_yields(found)),
+        tables=tuple(_rankings(found)),
+        notes=tuple(_notes(found)),
+        warnings=tuple(warning_of(item) for item in warnings(found)),
+        files=files,
+    )
+
+
+def _yield_verdict(found: Findings) -> str:
+    if found.interrupted:
+        return "interrupted"
+    if any(not outcome.ok for outcome in found.setup.nominal.outcomes):
+        return "nominal values miss requirements"
+    if found.all_met is None:
+        return f"{found.evaluator.failed} samples failed" if found.evaluator.failed else "complete"
+    return (
+        "yield reached"
+        if yield_ok(found) and found.setup.block.min_yield is not None
+        else ("yield missed" if found.setup.block.min_yield is not None else "complete")
+    )
+
+
+def _notes(found: Findings) -> Iterator[Note]:
+    for outcome in found.setup.nominal.outcomes:
+        if not outcome.ok:
+            yield Note("missed", f"by the nominal values: {outcome.sentence}", tone=Tone.BAD)
+    if found.interrupted:
+        yield Note("stopped", message(found), tone=Tone.BAD, whole=True)
+    if is_met_by_interval(found):
+        yield Note("yield", "its 95 % interval reaches the one that is required: not missed", whole=True)
+    if found.evaluator.failed:
+        yield Note("first", found.evaluator.first_failure)
+
+
+def _yields(found: Findings) -> Iterator[ValueRow]:
+    if found.all_met is None:
+        return
+    wanted = found.setup.block.min_yield
+    bound = "" if wanted is None else f">= {100 * wanted:.4g} %"
+    yield ValueRow("yield", share_of(found.all_met), bound, None if wanted is None else yield_ok(found))
+    for outcome, one in zip(found.setup.nominal.outcomes, found.each_met, strict=True):
+        yield ValueRow(words(outcome.metric), f"{share_of(one)}  {_describe_metric(value_and_bounds(outcome)[1])}")
+
+
+def share_of(one: Share) -> str:
+    """Return the share of parts that are good, with its 95 % interval."""
+    if one.value != one.value:
+        return f"not stated: {one.failed} of {one.count} parts have no result"
+    low, high = (f"{100 * end:.1f}" for end in one.wilson)
+    least, most = (100 * (one.good + more) / one.count for more in (0, one.failed))
+    value = f"{least:.1f} to {most:.1f} %" if one.failed else f"{100 * one.value:.1f} %"
+    return f"{value} (95 %: {low} to {high} %)"
+
+
+def _rankings(found: Findings) -> Iterator[PageTable]:
+    shares = {metric.label for metric in found.setup.study.metrics if metric.dimension == "ratio"}
+    for metric, each in _group_by_metric(found).items():
+        indices = [name for name in found.setup.record.indices if any(name in lines for lines in each.values())]
+        ranked = enumerate(indices)
+        heads = (
+            GridColumn(_describe_metric(metric)),
+            *(GridColumn(name_in_words(name), wraps=False, rank=rank) for rank, name in ranked),
+        )
+        rows = tuple(
+            (_drop_block(parameter), *(_index(lines.get(name), metric in shares) for name in indices))
+            for parameter, lines in each.items()
+        )
+        yield PageTable("", heads, rows, MAX_PARAMETERS)
+
+
+def _describe_metric(label: str) -> str:
+    """Return the label of a column with its window, or the limits of a requirement, as people write it."""
+    return name_in_words(label).replace(" ... ", " to ")
+
+
+def _drop_block(parameters: str) -> str:
+    """Return parameters without the block that nearly all stand in."""
+    return ", ".join(path.removeprefix("mechanism.") for path in parameters.split(", "))
+
+
+def _group_by_metric(found: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:
+    """Return metric -> parameter -> index -> line, the parameters with the largest influence first."""
+    tree: dict[str, dict[str, dict[str, IndexLine]]] = defaultdict(lambda: defaultdict(dict))
+    for one in found.lines:
+        tree[one.metric][one.parameter][one.index] = one
+    rank = partial(_rank, found.setup.record.indices)
+    return {metric: dict(sorted(each.items(), key=rank)) for metric, each in tree.items()}
+
+
+def _rank(indices: tuple[str, ...], item: tuple[str, dict[str, IndexLine]]) -> float:
+    """Return how far up a parameter stands: largest first, those without a value before all."""
+    line = next((item[1][name] for name in indices if name in item[1]), None)
+    return 0.0 if line is None else -abs(line.value) if line.value is not None else -float("inf")
+
+
+def _index(line: IndexLine | None, of_share: bool) -> str:
+    """Return an index with its interval; in per cent if it is a share, or has the unit of a metric that is one."""
+    if line is None or line.value is None:
+        return "not stated"
+    percent = line.index in PERCENT_INDICES or (of_share and line.index in IN_UNITS and line.unit == "1")
+    unit = " %" if percent else "" if line.unit == "1" else f" {line.unit}"
+    value, low, high = (None if end is None else _short(end, percent) for end in (line.value, line.low, line.high))
+    if low is None or low == value == high:
+        return "no influence" if value == "0" else f"{value}{unit}"
+    return f"at least {value}{unit}" if high is None else f"{value}{unit}  ({low} to {high})"
+
+
+def _short(value: float, percent: bool) -> str:
+    """Return a number of three digits; what is nothing but rounding is zero."""
+    return "0" if abs(value) < NO_INFLUENCE_INDEX else f"{100 * value if percent else value:.3g}"
