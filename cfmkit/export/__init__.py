@@ -73,7 +73,7 @@ def _bodies(drawing: Drawing, drawn: Sequence[Outline], tolerance: float, format
         from cfmkit.export.bodies_stl_3mf_step import bodies, plates, stl_bytes, threemf_bytes
 
         extruded = bodies(plates(drawn, drawing.sheet, tolerance))
-        writers = {"bodies_stl_3mf_step": stl_bytes, "3mf": threemf_bytes}
+        writers = {"stl": stl_bytes, "3mf": threemf_bytes}
         contents |= {f"{drawing.name}.{one}": writers[one](drawing.name, extruded) for one in writers if one in formats}
     if "step" in formats:
         from cfmkit.export.bodies_stl_3mf_step import step_bytes

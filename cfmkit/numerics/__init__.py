@@ -7,6 +7,7 @@ __getattr__, __all__ = lazy_names(
     {
         "arc_chains": "ArcChain points_on",
         "interpolation": "ThroughPoints",
+        "rigid_point_registration": "turn_points",
         "roots": "bracketed_root",
         "sqp": "Effort Optimum SearchEnding minimize",
     },

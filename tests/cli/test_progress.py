@@ -17,7 +17,7 @@ def told(monkeypatch):
     def run(events, total, reused=0):
         clock, lines = SimpleNamespace(now=0.0), []
         monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: clock.now))
-        monkeypatch.setattr(progress.streams, "write_error", lines.append)
+        monkeypatch.setattr(progress.output, "write_error", lines.append)
         monitor = StudyProgress(SimpleNamespace(json=False, quiet=False))
         monitor.total(total)
         if reused:
@@ -70,7 +70,7 @@ def test_points_that_get_slower_are_followed(told):
 def test_the_end_of_a_time_budget_is_the_end_of_the_work(monkeypatch):
     clock, lines = SimpleNamespace(now=0.0), []
     monkeypatch.setattr(output, "time", SimpleNamespace(monotonic=lambda: clock.now))
-    monkeypatch.setattr(output.streams, "write_error", lines.append)
+    monkeypatch.setattr(output, "write_error", lines.append)
     monkeypatch.setattr(output.sys, "stderr", SimpleNamespace(isatty=lambda: False))
     with Terminal().progress(180.0) as report:
         clock.now = 90.0

@@ -52,7 +52,7 @@ def alone(motion, efforts, window, name, until=np.inf):
     frame = MeasuringFrame(target=10.0, valid=((0.05, min(float(motion[-1]), until)),))
     view = survey(Curve(path, effort, branch, np.ones(len(path), bool)), frame, window)
     definition = DEFINED[name]
-    value = view.worst(definition, view.each(definition)).value
+    value = view.worst(definition, view.evaluate_each(definition)).value
     return np.nan if value is None else value
 
 

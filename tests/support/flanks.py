@@ -10,6 +10,7 @@ from cam_support import cam
 
 from cfmkit.families.cam import assemble
 from cfmkit.families.cam.geometry import DesignFlank
+from cfmkit.numerics import turn_points
 
 MOVE = np.radians(0.3), np.array([1.5e-3, -0.8e-3])
 """The rigid motion of the reference note's case; its inverse is -0.3 deg, (-1.49579067, 0.80784298) mm."""
@@ -52,6 +53,5 @@ def measured(errors: Errors | None = None, move=MOVE) -> list[np.ndarray]:
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(at.points, axis=0).T))])
         error = errors.offset + errors.waviness * np.sin(2 * np.pi * along / errors.length + number)
         points = at.points + error[:, None] * at.normals + errors.noise * rng.normal(size=at.points.shape)
-        turned = (points @ (1, 1j)) * np.exp(1j * move[0])
-        found.append(np.stack([turned.real, turned.imag], axis=1) + move[1])
+        found.append(turn_points(points, *move))
     return found
