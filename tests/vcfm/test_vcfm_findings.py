@@ -246,6 +246,12 @@ def test_a_constant_force_stays_where_only_the_window_is_wrong():
     assert found.values["constant_force"].value == pytest.approx(found.values["window_force"].value, rel=0.05)
 
 
+@pytest.mark.parametrize(("window", "is_stated"), [("[1.6 mm, 3.3 mm]", False), ("[1.65 mm, 3.3 mm]", True)])
+def test_a_constant_force_needs_half_of_its_window_flat(window, is_stated):
+    """The flat part begins at 2.456 mm: 0.497 and 0.511 of these windows."""
+    assert (analyzed(f"analysis.window={window}").values["constant_force"].value is not None) == is_stated
+
+
 def test_a_sweep_states_a_constant_force_where_a_single_run_does():
     spec = table_i()
     widths = np.linspace(3e-3, 20e-3, 40)

@@ -19,7 +19,7 @@ from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring, parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, stack_laws
-from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond, Folded, UShape
 from cfmkit.families.vcfm.leaves.s_form import POLE_LOAD, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.v_beam import TrussLeaf, VBeam
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
@@ -490,6 +490,28 @@ def test_drawn_leaves_have_the_shape_of_exact_ones(stem, error, travel):
         exact = trace(leaf_network(spec), drive, Control(sign=sign)).shape("leaf", -1)
         apart.append(np.abs(np.interp(drawn[:, 0], *exact.T) - drawn[:, 1]).max())
     assert min(apart) < error * MM
+
+
+def test_a_drawn_u_shape_has_the_shape_of_the_exact_one():
+    from cfmkit.elastica import Displacement, Section, trace
+
+    spring = UShape(LeafStrip(35 * MM, 0.0, 1 * MM, 6 * MM, 1477e6, 0.3), 6 * MM)
+    chain = spring.chain(Section(1477e6, 6 * MM, 1 * MM, axial=False))
+    (drawn,), height = spring.bent_lines(2 * MM, 0.0)
+    path = trace(chain.network, Displacement(chain.node, -0.5 * np.pi, np.array([2 * MM])))
+    corners, places = np.arange(len(drawn)), np.linspace(0, len(drawn) - 1, 40 * len(drawn))
+    line = np.stack([np.interp(places, corners, drawn[:, axis]) for axis in (0, 1)], axis=1)
+    exact = np.concatenate([path.shape(beam, -1) for beam in chain.network.beams])
+    assert height == pytest.approx(10 * MM)
+    assert max(np.hypot(*(line - place).T).min() for place in exact) < 0.02 * MM
+
+
+@pytest.mark.parametrize("kind", [Diamond, Folded])
+def test_the_corner_of_a_spring_stays_half_way_between_its_blocks(kind):
+    spring = kind(replace(LEAF, angle=0.0) if kind is Folded else LEAF)
+    _, (driven, base, corner) = spring.blocks(8 * MM, 3 * MM, 0.5 * MM, 0.0, 1.5 * MM)
+    low, high = base.core[..., 1].max(), driven.core[..., 1].min()
+    assert corner.core[..., 1].mean() == pytest.approx(0.5 * (low + high), abs=1e-12)
 
 
 @pytest.mark.parametrize("loaded", ["whole", "half"])
