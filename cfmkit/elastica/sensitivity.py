@@ -185,7 +185,7 @@ class Gradient:
 
     def dual_stresses(self, elements: Sequence[int], fractions: Any = None) -> tuple[Any, Any]:
         """Return bending and axial stress with their derivatives, as of `dual_states`."""
-        return beam_states.stresses_of_width(*self._widths_and_states(elements, fractions))
+        return beam_states.bending_and_axial_stress(*self._widths_and_states(elements, fractions))
 
     def _widths_and_states(self, elements: Sequence[int], fractions: Any) -> tuple[Any, beam_states.BeamStates]:
         states = self.dual_states(elements, fractions)

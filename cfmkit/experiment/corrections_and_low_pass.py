@@ -52,18 +52,18 @@ def correct_recording(
     if strange := next((word for word in flip if word not in (effort, motion)), None):
         raise UsageError(f"--flip: {strange!r} is not in this recording; it has {effort} and {motion}")
     resting = _resting(recording)
-    shown = [_to_shown_unit(tare, recording.effort[:resting], "--tare", recording.kind)]
-    shown.append(_to_shown_unit(zero, recording.motion[:1], "--zero", recording.motion_dimension))
+    subtracted = [_reading_to_subtract(tare, recording.effort[:resting], "--tare", recording.kind)]
+    subtracted.append(_reading_to_subtract(zero, recording.motion[:1], "--zero", recording.motion_dimension))
     signs = [-1.0 if word in flip else 1.0 for word in (effort, motion)]
-    notes = [*_notes((effort, motion), shown, recording.kind), *(f"sign of the {word} reversed" for word in flip)]
+    notes = [*_notes((effort, motion), subtracted, recording.kind), *(f"sign of the {word} reversed" for word in flip)]
     if not notes:
         return recording
     return replace(
         recording,
-        effort=signs[0] * (recording.effort - shown[0]),
-        motion=signs[1] * (recording.motion - shown[1]),
+        effort=signs[0] * (recording.effort - subtracted[0]),
+        motion=signs[1] * (recording.motion - subtracted[1]),
         notes=(*recording.notes, *notes),
-        zeros=raw_zeros(recording, *shown),
+        zeros=raw_zeros(recording, *subtracted),
         signs=(recording.signs[0] * signs[0], recording.signs[1] * signs[1]),
     )
 
@@ -80,7 +80,8 @@ def _resting(recording: Recording) -> int:
     return max(int(np.argmax(moved)), 1)
 
 
-def _to_shown_unit(value: str | float | None, first: FloatArray, option: str, dimension: str) -> float:
+def _reading_to_subtract(value: str | float | None, resting: FloatArray, option: str, dimension: str) -> float:
+    """Return the reading that ``--tare`` or ``--zero`` makes zero [SI]: 0 without it, the mean at rest for `start`."""
     from cfmkit.specs.units import read_quantity
 
     if value is None:
@@ -88,20 +89,20 @@ def _to_shown_unit(value: str | float | None, first: FloatArray, option: str, di
     if not isinstance(value, str):
         return float(value)
     if value.strip() == START_WORD:
-        return float(first.mean())
+        return float(resting.mean())
     try:
         return read_quantity(value, dimension)
     except QuantityError as error:
         raise UsageError(f"{option}: {error}; or write {START_WORD!r} for the mean before the machine moves") from None
 
 
-def _notes(words: tuple[str, str], shown: list[float], kind: str) -> list[str]:
+def _notes(words: tuple[str, str], subtracted: list[float], kind: str) -> list[str]:
     from cfmkit.specs.units import format_short
 
     dimensions = (kind, "length" if kind == "force" else "angle")
     return [
         f"{format_short(value, dimension, 6)} subtracted from the {word}"
-        for word, value, dimension in zip(words, shown, dimensions, strict=True)
+        for word, value, dimension in zip(words, subtracted, dimensions, strict=True)
         if value
     ]
 

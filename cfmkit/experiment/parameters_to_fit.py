@@ -84,7 +84,7 @@ def parameters(
 
 def _make_zero_parameter(path: str, bounds: tuple[float, float] | None, recording: Recording | None) -> FitParameter:
     """Return a zero of the recording to fit; it starts from none."""
-    dimension = _zero(path, "--fit", recording)
+    dimension = _dimension_of_offset(path, "--fit", recording)
     if recording and path.endswith(("displacement_offset", "angle_offset")):
         size = 0.5 * MAX_ZERO_SHIFT * recording.travel
         low, high = bounds or (-2.0 * size, 2.0 * size)
@@ -96,7 +96,7 @@ def _make_zero_parameter(path: str, bounds: tuple[float, float] | None, recordin
     return FitParameter(path, dimension, 0.0, low, high, size)
 
 
-def _zero(path: str, option: str, recording: Recording | None) -> str:
+def _dimension_of_offset(path: str, option: str, recording: Recording | None) -> str:
     """Return the dimension of a value of the recording."""
     offsets = ZERO_OFFSETS[recording.kind if recording else "force"]
     name = path.removeprefix(DATA_PREFIX)
@@ -221,11 +221,11 @@ def split_bounds(options: Iterable[str]) -> dict[str, str]:
 
 
 def _bound(text: str, path: str, spec: Spec, recording: Recording | None) -> float:
-    """Return a bound of a value of the specification or of the recording, SI."""
+    """Return one end of ``--bounds`` from its text [SI]: of a path of the file, or of the recording (`DATA_PREFIX`)."""
     from cfmkit.specs.units import read_quantity
 
     if path.startswith(DATA_PREFIX):
-        return read_quantity(text, _zero(path, "--bounds", recording))
+        return read_quantity(text, _dimension_of_offset(path, "--bounds", recording))
     return float(leaf(type(spec), path).read(_number(text))[0])
 
 

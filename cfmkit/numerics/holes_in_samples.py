@@ -44,7 +44,7 @@ def is_hole_after(places: FloatArray) -> NDArray[np.bool_]:
 
 
 def holes_between(places: FloatArray, low: float, high: float) -> list[tuple[float, float]]:
-    """Return the holes between places in increasing order, as far as they are between two ends."""
+    """Return the holes between places in increasing order, cut to low..high; none outside of the places."""
     after = np.flatnonzero(is_hole_after(places))
     ends = zip(places[after].tolist(), places[after + 1].tolist(), strict=True)
     inside = [(max(start, low), min(stop, high)) for start, stop in ends]

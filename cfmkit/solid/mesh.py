@@ -87,7 +87,7 @@ def mesh(
     field = sizes(rings, size, share, across)
     laid = [_boundary_nodes(ring, field, _crossings(ring, seams, field, near)) for ring in rings]
     fixed = np.concatenate([ring.locate(arc) for ring, arc in zip(rings, laid, strict=True)])
-    on_seams = [_sewn(region, field, seam) for seam in seams]
+    on_seams = [_points_on_seam(region, field, seam) for seam in seams]
     sewn = np.concatenate([np.zeros((0, 2)), *on_seams])
     kept_from = Spacing(field, sewn)
     inside = kept_from(_sample_interior(region, field, np.random.default_rng(seed)))
@@ -282,10 +282,11 @@ def _too_many(nodes: int) -> GeometryError:
     return GeometryError(f"the mesh would have more than {MOST_NODES} nodes ({nodes:.2g}): allow larger elements")
 
 
-def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
+def _points_on_seam(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
     """Return points (k, 2) [m] by size along a line through the part, none of them close to its boundary.
 
-    An end inside the part is one of them: the section at a node where beams meet is held over its whole length.
+    An end inside the part is one of them, unless it is that close: the section at a node where beams meet is held over
+    its whole length.
     """
     from shapely import contains_xy, distance
     from shapely import points as points_of

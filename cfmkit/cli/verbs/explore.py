@@ -31,8 +31,8 @@ class ExploreOptions(SpecOptions):
 def run(options: ExploreOptions, terminal: Terminal) -> Document:
     """Change the numbers of a spec with sliders in the browser; curve, metrics and requirements follow.
 
-    The page is available on this computer only, at an address with a token. No file outside the spec's folder is read
-    or written. Ctrl-C ends the server.
+    The page is available on this computer only, at an address with a token. The page saves files in
+    the spec's folder only. Ctrl-C ends the server.
     """
     from cfmkit.errors import UsageError
     from cfmkit.runs.explorer import Explorer

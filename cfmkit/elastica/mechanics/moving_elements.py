@@ -47,7 +47,10 @@ def compute_moved_tables(mesh: Discretisation, places: Any) -> dict[str, Any]:
 
 
 def with_places(mesh: Discretisation, z: Any) -> Discretisation:
-    """Return the arrays with contacts at their places in states (..., size): tables of elements are (..., e, q)."""
+    """Return the arrays with contacts at their places in states (..., size): tables of elements are (..., e, q).
+
+    The same arrays, if no element moves.
+    """
     return mesh if mesh.moving is None else replace(mesh, elements=move_elements(mesh, z))
 
 

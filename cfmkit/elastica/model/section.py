@@ -134,12 +134,15 @@ class Section:
         return bending, axial, shear
 
     def curling(self, thickness: Any) -> tuple[Any, Any]:
-        """Return what says how far curling is hindered: th^4/K^2 [m2] and nu^2/(1 - nu^2), none unless it is wide."""
-        return curling(self.width, thickness, self.poisson_ratio) if self.wide else (0.0 * thickness, 0.0)
+        """Return the `curling_coefficients`; zeros unless it is wide."""
+        return curling_coefficients(self.width, thickness, self.poisson_ratio) if self.wide else (0.0 * thickness, 0.0)
 
 
-def curling(width: Any, thickness: Any, poisson_ratio: Any) -> tuple[Any, Any]:
-    """Return th^4/K^2 [m2] and nu^2/(1 - nu^2) of a wide strip: see `cfmkit.elastica.mechanics.wide_strip`."""
+def curling_coefficients(width: Any, thickness: Any, poisson_ratio: Any) -> tuple[Any, Any]:
+    """Return 3 (1 - nu^2) b^4/t^2 [m2] and nu^2/(1 - nu^2) of a wide strip, b wide and t thick.
+
+    The law is that of `cfmkit.elastica.mechanics.wide_strip`.
+    """
     plane = 1 - poisson_ratio**2
     return 3 * plane * (width**2 / thickness) ** 2, poisson_ratio**2 / plane
 
@@ -167,7 +170,7 @@ def hindered_share(width: Any, thickness: Any, poisson_ratio: Any, curvature: An
     0.0342
     """
     bent = np.sin(np.pi * (np.arange(_N_SINE_SAMPLES) + 0.5) / _N_SINE_SAMPLES) ** 2
-    curl, plate = curling(width, thickness, poisson_ratio)
+    curl, plate = curling_coefficients(width, thickness, poisson_ratio)
     return plate * (curl_hindered(np.multiply.outer(curl * curvature**2, bent)) @ bent) / bent.sum()
 
 

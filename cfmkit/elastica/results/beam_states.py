@@ -364,8 +364,8 @@ def sections_of_width(width: Any, beam_states: BeamStates) -> BeamSections:
     )
 
 
-def stresses_of_width(width: Any, beam_states: BeamStates) -> tuple[Any, Any]:
-    """Return bending and axial stress as of `sections_of_width`, for which forces across sections are not needed."""
+def bending_and_axial_stress(width: Any, beam_states: BeamStates) -> tuple[Any, Any]:
+    """Return bending stress (signed) and axial stress [Pa] at all places of a beam of a width [m]."""
     at = energy.SectionForces(beam_states.angle + beam_states.turn, beam_states.h, beam_states.v)
     return _stresses(width, beam_states, at)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics.polynomials import basis
-from cfmkit.elastica.model.section import curl_hindered, curling
+from cfmkit.elastica.model.section import curl_hindered, curling_coefficients
 from cfmkit.elastica.results.beam_states import elements_of, forces_of_elements
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
             density = 0.5 * moment**2 / rigidity * weights
             energies[number] += density.sum(axis=1)
             if not section.wide:
-                curl, plate = curling(section.width, thickness, section.poisson_ratio)
+                curl, plate = curling_coefficients(section.width, thickness, section.poisson_ratio)
                 hindered = plate * curl_hindered(curl * (rest + moment / rigidity) ** 2)
                 lost[number] += (density * hindered).sum(axis=1)
     total = energies.sum(axis=0)

@@ -78,6 +78,7 @@ class PathsOfDesigns:
 
     @cached_property
     def _unknowns(self) -> FloatArray:
+        """Free unknowns at the points of every path, (d, n, free), padded."""
         return self._pad([law.own_unknowns for law in self.laws])
 
     @cached_property

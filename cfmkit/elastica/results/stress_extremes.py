@@ -116,7 +116,10 @@ def extremes_of_designs(
 
 
 def _highest(own: Sequence[Sequence[int]], parts: Sequence[tuple[Any, Any, Any]]) -> tuple[Any, Any, Any, Any]:
-    """Return the highest values of each beam from those of all elements, which are parts of the points."""
+    """Return the highest stress of each beam [Pa], its place, element and fraction of the element, (b, p, c) each.
+
+    `parts` are what `_tops` returns for all elements, in pieces of the points; of equal stresses the first one counts.
+    """
     value, place, fraction = (np.concatenate(column, axis=1) for column in zip(*parts, strict=True))
     shape, end = (len(own), *value.shape[1:]), 0
     best, chosen = np.full(shape, -np.inf), np.zeros(shape, int)

@@ -132,7 +132,7 @@ class Scene:
 
 
 def scene(solution: Solution) -> Scene:
-    """Return the parts that do not move, and what the mechanism sweeps over the whole solution."""
+    """Return what is the same at every position [m]: plate, right flank, right roller's path, view of all motion."""
     (_, bottom), (across, top) = box(bodies(solution)).tolist()
     height = top - bottom
     half = max(1.06 * across, MIN_ASPECT_RATIO * height)

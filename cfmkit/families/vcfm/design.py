@@ -154,7 +154,7 @@ def size_spring_leaf(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip, thickn
 
 
 def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
-    """Raise if the leaves would rather buckle out of the plane."""
+    """Raise Infeasible, with a long enough leaf, if leaves are below twice as wide as thick: they buckle sideways."""
     if leaf.width >= MIN_WIDTH_RATIO * leaf.thickness:
         return
 

@@ -101,7 +101,8 @@ def _slenderness(solution: Solution) -> FloatArray:
 # --- what is reported of a built mechanism, and the spring's room ---------------------------------------------------
 
 
-def _contradicts(solution: Solution) -> Any:
+def _do_measured_values_contradict(solution: Solution) -> Any:
+    """Return whether reported force and K_p cannot both hold for these leaves, (m,); False where none are reported."""
     if solution.spec.analysis.measured is None or not solution.leaf_kind.buckles:
         return False  # such leaves push where they are flat
     balance = solution.spread_over_mechanisms(solution.parts.balance)
@@ -113,7 +114,7 @@ def _contradicts(solution: Solution) -> Any:
     return (_slenderness(solution) >= FLAT_BUCKLED_ABOVE) & apart
 
 
-def _contradiction(solution: Solution) -> Sentence:
+def _describe_contradiction(solution: Solution) -> Sentence:
     reported = solution.spec.analysis.measured
     assert reported is not None
     balance = float(solution.parts.balance)
@@ -444,7 +445,7 @@ def _unstable_branch(solution: Solution) -> Sentence:
 
 
 FINDING_RULES: tuple[FindingRule[Solution], ...] = (
-    FindingRule("measured_contradiction", _contradicts, _contradiction),
+    FindingRule("measured_contradiction", _do_measured_values_contradict, _describe_contradiction),
     FindingRule("spring_closed", is_closed, closed_spring),
     FindingRule("truss_law", lambda solution: solution.fidelity == "truss", _truss),
     FindingRule("no_negative_stiffness", _only_rises, _rising_force),

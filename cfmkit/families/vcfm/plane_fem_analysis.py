@@ -135,16 +135,16 @@ class SolidSampler(ExactSampler):
             self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
         self.accuracy = self.mesh_error.force
 
-    def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
-        """Return at which travels [m] leaves and, unless it is bought, spring have a pose."""
-        has_pose = _poses_at(travel, (self.pushed, self.pulled))
+    def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_]:
+        """Return at which travels (n,) [m] leaves and spring (unless bought) were solved for, not interpolated."""
+        is_solved = _is_solved_at(travel, (self.pushed, self.pulled))
         if self.coils is None:
-            has_pose &= _poses_at(self.chain.travel * (travel + preload), self.sides)
-        return has_pose
+            is_solved &= _is_solved_at(self.chain.travel * (travel + preload), self.sides)
+        return is_solved
 
 
-def _poses_at(places: FloatArray, paths: Sequence[SolidPath]) -> NDArray[np.bool_]:
-    """Return at which travels (n,) [m] one of some paths has a pose."""
+def _is_solved_at(places: FloatArray, paths: Sequence[SolidPath]) -> NDArray[np.bool_]:
+    """Return at which travels (n,) [m] one of some paths was solved for."""
     travels = np.concatenate([path.solved.course.solved_travel for path in paths])
     same_travel = 1e-9 * float(np.abs(travels).max(initial=0.0))
     return np.asarray((np.abs(places[:, None] - travels) <= same_travel).any(axis=1))

@@ -272,7 +272,7 @@ class _Builder:
             self._complain(whole, path, message)
 
     def _key(self, event: Event, path: Path) -> str:
-        """Return a key; what is not a plain name is complained about and replaced by its text."""
+        """Return a key, after a complaint if it is no plain name: then its text, of a list or block an empty one."""
         self._refuse_decoration(event, path)
         if not isinstance(event, ScalarEvent):
             self._node(event, (*path, ""))

@@ -93,12 +93,12 @@ class WireMaterial:
         """Largest diameter with a published strength [m]; infinite if there is none."""
         return 1e-3 * self.strengths[-1].thickest if self.strengths else float("inf")
 
-    def check_diameter(self, wire: float) -> None:
-        """Raise `WireOutOfRange` if the strength of a diameter [m] is not published."""
-        if self.strengths and not any(entry.includes(wire) for entry in self.strengths):
+    def check_diameter(self, diameter: float) -> None:
+        """Raise `WireOutOfRange` if strengths of this class are published, but not of this diameter [m]."""
+        if self.strengths and not any(entry.includes(diameter) for entry in self.strengths):
             raise WireOutOfRange(
                 f"{self.name} is listed from {1e3 * self.thinnest:g} to {1e3 * self.thickest:g} mm "
-                f"(Shigley, Table 10-4), and the wire is {1e3 * wire:.4g} mm"
+                f"(Shigley, Table 10-4), and the wire is {1e3 * diameter:.4g} mm"
             )
 
     def tensile_strength(self, wire: float) -> float:

@@ -186,7 +186,7 @@ class Response:
         beams = self.path.network.beams
         width = np.repeat([beams[self.path.mesh.elements.beam[k]].section.width for k in elements], len(fractions))
         states = self.states
-        bending, axial = beam_states.stresses_of_width(width, states)
+        bending, axial = beam_states.bending_and_axial_stress(width, states)
         lines = {
             name: BeamAtPoses(
                 at.place,
@@ -226,13 +226,13 @@ class Response:
         bending, axial = self._gradient.dual_stresses(*self._elements)
         return {"x": states.x, "y": states.y, "bending": bending, "axial": axial}
 
-    def slopes_at(self, what: str, pose: Any, row: Any) -> FloatArray:
-        """Return derivatives (..., k) of a coordinate or stress of `BeamAtPoses` at poses and rows, (...) each."""
-        shape = np.broadcast_shapes(np.shape(pose), np.shape(row))
+    def slopes_at(self, what: str, pose: Any, sample: Any) -> FloatArray:
+        """Return derivatives (..., k) by the variables of a column of `BeamAtPoses`; samples are `RowsOfBeam.index`."""
+        shape = np.broadcast_shapes(np.shape(pose), np.shape(sample))
         if 0 in shape:
             return np.empty((*shape, len(self.x)))
         parts = _STRESS_PARTS.get(what, {what: 1.0})
-        slopes = [factor * self._dual[name].all_slopes[:, pose, row] for name, factor in parts.items()]
+        slopes = [factor * self._dual[name].all_slopes[:, pose, sample] for name, factor in parts.items()]
         return np.asarray(np.moveaxis(sum(slopes[1:], slopes[0]), 0, -1))
 
 

@@ -44,7 +44,7 @@ class Shaping(DesignProgram):
 
     @property
     def poses(self) -> PosePlan:
-        """The poses for the window at the beginning."""
+        """The poses for the window that begins at `start`."""
         return poses_of(self.variables.task, self.start)
 
     @property

@@ -35,7 +35,7 @@ def _run_in(share: float) -> ScalarQuantity[Solution]:
     )
 
 
-def _largest(values: FloatArray) -> float:
+def _largest_magnitude(values: FloatArray) -> float:
     return float(np.abs(values).max())
 
 
@@ -58,10 +58,14 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "run_in_95": _run_in(0.95),
     "run_in_98": _run_in(0.98),
     "side_force_max": ScalarQuantity(
-        "force", "largest transverse force of the slider on its guide", lambda solution: _largest(solution.side_force)
+        "force",
+        "largest transverse force of the slider on its guide",
+        lambda solution: _largest_magnitude(solution.side_force),
     ),
     "guide_moment_max": ScalarQuantity(
-        "torque", "largest moment of the slider on its guide", lambda solution: _largest(solution.guide_moment)
+        "torque",
+        "largest moment of the slider on its guide",
+        lambda solution: _largest_magnitude(solution.guide_moment),
     ),
     "allowable_stress": ScalarQuantity(
         "stress",

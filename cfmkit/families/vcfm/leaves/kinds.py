@@ -138,7 +138,7 @@ class LeafSpring(ABC):
     @property
     @abstractmethod
     def stiffness(self) -> Any:
-        """K_p, unloaded [N/m]."""
+        """Stiffness of the unloaded spring, K_p of Ding [N/m]."""
 
     def force(self, compression: Any) -> Any:
         """Return the force [N] at a compression [m]."""

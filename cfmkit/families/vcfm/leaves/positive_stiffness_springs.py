@@ -76,7 +76,7 @@ class Diamond(LeafSpring):
 
     @property
     def stiffness(self) -> Any:
-        """K_p, unloaded [N/m]."""
+        """Stiffness of the unloaded spring, K_p [N/m]."""
         return self.pairs * self.share / leaf_compliance(self.strip)
 
     def stress(self, compression: Any) -> Any:
@@ -148,7 +148,7 @@ class TrussDiamond(Diamond):
 
     @property
     def stiffness(self) -> Any:
-        """K_p [N/m]."""
+        """Stiffness, K_p [N/m]."""
         return 2.0 * self.share * 6.0 * self.strip.bending / self.strip.reach**3
 
 
@@ -174,7 +174,7 @@ class UShape(LeafSpring):
 
     @property
     def stiffness(self) -> Any:
-        """K_p, unloaded [N/m]."""
+        """Stiffness of the unloaded spring, K_p [N/m]."""
         developed, centroid, second = self.moments
         return self.share * self.strip.bending / (second - centroid**2 * developed)
 
@@ -272,7 +272,7 @@ class StraightSpring(LeafSpring):
 
     @property
     def stiffness(self) -> Any:
-        """K_p, unloaded [N/m]; it grows with the square of the compression."""
+        """Stiffness of the unloaded spring, K_p [N/m]; it grows with the square of the compression."""
         return self.share * 2.0 * 12.0 * self.strip.bending / self.strip.length**3
 
     def force(self, compression: Any) -> FloatArray:
