@@ -224,7 +224,7 @@ def test_names_that_no_file_should_have_are_refused(name):
 
 SCRIPT = """
 import hashlib, sys
-sys.path[:0] = [sys.argv[1], sys.argv[1] + '/../support']
+sys.path[:0] = [sys.argv[1], sys.argv[1] + '/support', sys.argv[1] + '/../support']
 from test_export_dxf import plate
 from cfmkit.export import files
 for name, data in sorted(files(plate(), kerf=2e-4).items()):
@@ -268,7 +268,7 @@ def test_importing_the_exporter_imports_neither_ezdxf_nor_shapely():
 def test_a_machine_without_room_for_a_temporary_folder_gets_an_output_error(tmp_path):
     code = """
 import sys, tempfile
-sys.path[:0] = [sys.argv[1], sys.argv[1] + '/../support']
+sys.path[:0] = [sys.argv[1], sys.argv[1] + '/support', sys.argv[1] + '/../support']
 from test_export_dxf import plate
 from drawing_files import write_dxf
 from cfmkit.errors import OutputError

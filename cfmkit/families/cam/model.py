@@ -425,6 +425,9 @@ def _solve_alike(
         return
     samples = len(rows) * assembly.spec.analysis.points
     for some in np.array_split(np.arange(len(rows)), -(-samples // MAX_SAMPLES_AT_ONCE)):
+        if len(some) == 1 < len(rows):  # numbers in place of columns
+            yield from _solve_alike(rows[some], spec_of, windows_of)
+            continue
         parcel = replace(rows_of(assembly, some), track=track.select_rows(some)) if len(some) < len(rows) else assembly
         windows = windows_of(rows[some])
         yield rows[some], _solve_group(replace(solve(parcel, len(some)), windows=windows), rows[some])
