@@ -269,3 +269,13 @@ def test_a_window_that_some_travels_leave_no_width_is_refused_as_each_mechanism_
     assert {run(many).row(k).status(0) for k in range(4)} == {
         (alone.status, alone.message) for alone in (many.study.evaluate(many.plan.point(k)) for k in range(4))
     }
+
+
+@pytest.mark.parametrize("path", ["brace_length", "roller_radius", "profile.offset"])
+def test_rows_that_are_solved_a_few_at_a_time_are_runs(path, monkeypatch):
+    """Two rows a parcel: the last of five was a bug of the whole sweep, and others had the cams of the first parcel."""
+    monkeypatch.setattr("cfmkit.families.cam.model.MAX_SAMPLES_AT_ONCE", 2 * 61 + 1)
+    start, step = {"brace_length": (0.2, 0.01), "roller_radius": (0.01, 1e-3), "profile.offset": (-1e-3, 1e-4)}[path]
+    many = listed({f"mechanism.{path}": [start + step * k for k in range(5)]})
+    assert len(compare(many)) == 5
+    assert members(many) == set(range(5))

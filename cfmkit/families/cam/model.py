@@ -30,6 +30,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import CfmError, Problem, SpecError
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, left_out, rules_of
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import select_profiles
 from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.mechanism_from_spec import assemble, check_first_pose, check_springs, displacement_origin
 from cfmkit.families.cam.part_sizes_and_clearances import smallest, touching
@@ -428,7 +429,10 @@ def _solve_alike(
         if len(some) == 1 < len(rows):  # numbers in place of columns
             yield from _solve_alike(rows[some], spec_of, windows_of)
             continue
-        parcel = replace(rows_of(assembly, some), track=track.select_rows(some)) if len(some) < len(rows) else assembly
+        parcel = assembly
+        if len(some) < len(rows):
+            profile = select_profiles(assembly.profile, some)
+            parcel = replace(rows_of(assembly, some), track=track.select_rows(some), profile=profile)
         windows = windows_of(rows[some])
         yield rows[some], _solve_group(replace(solve(parcel, len(some)), windows=windows), rows[some])
 

@@ -398,15 +398,19 @@ def _join(on_corner: NDArray[np.bool_], corner: NDArray[Any], flank: NDArray[Any
     return joined
 
 
+def select_profiles(profile: CamProfile, rows: Any) -> CamProfile:
+    """Return some of the cams of one kind side by side."""
+    law, radius, end, corner = rows_of((profile.path.law, profile.roller_radius, profile.end, profile.corner), rows)
+    return CamProfile(RollerPath(law, end), radius, end, corner)
+
+
 class TrackRows(Track):
     """Tracks of one kind side by side: numbers that differ are columns (m, 1), slider positions are (m, n)."""
 
     def select_rows(self, rows: Any) -> TrackRows:
         """Return some of the tracks."""
-        chosen, values, profile = object.__new__(TrackRows), dict(vars(self)), self.profile
-        del values["profile"]
-        law, radius, end, corner = rows_of((profile.path.law, profile.roller_radius, profile.end, profile.corner), rows)
-        chosen.profile = CamProfile(RollerPath(law, end), radius, end, corner)
+        chosen, values = object.__new__(TrackRows), dict(vars(self))
+        chosen.profile = select_profiles(values.pop("profile"), rows)
         vars(chosen).update({name: rows_of(value, rows) for name, value in values.items()})
         return chosen
 
