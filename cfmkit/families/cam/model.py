@@ -424,8 +424,8 @@ def _solve_alike(
         return
     except CfmError:  # whoever analyses it alone says why
         return
-    samples = len(rows) * assembly.spec.analysis.points
-    for some in np.array_split(np.arange(len(rows)), -(-samples // MAX_SAMPLES_AT_ONCE)):
+    few = max(MAX_SAMPLES_AT_ONCE // assembly.spec.analysis.points, 1)
+    for some in np.array_split(np.arange(len(rows)), -(-len(rows) // few)):
         if len(some) == 1 < len(rows):  # numbers in place of columns
             yield from _solve_alike(rows[some], spec_of, windows_of)
             continue
