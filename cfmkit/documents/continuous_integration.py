@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 LOCATION_PATTERN = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<reported>.*)", re.DOTALL)
-"""How the fault of a file begins."""
+"""Place and message of a fault of a file."""
 MAX_CHANGES_IN_ANNOTATION = 8  # changed values in one annotation: GitHub cuts long ones
 
 

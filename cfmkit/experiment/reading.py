@@ -78,9 +78,9 @@ class Recording(ShortRepr):
     kind: Kind = "force"
     """Which pair `motion` and `effort` are: "force" or "torque"."""
     decisions: Decisions | None = field(default=None, compare=False)
-    """How the file was read; None if no file was."""
+    """Choices that the reader made in the file; None if it was made of arrays."""
     notes: tuple[str, ...] = field(default=(), compare=False)
-    """What was changed since."""
+    """A sentence for each correction after reading."""
     zeros: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
     """Of effort and motion: what was subtracted from the readings since [N, m] or [N m, rad]."""
     signs: tuple[float, float] = field(default=(1.0, 1.0), compare=False)

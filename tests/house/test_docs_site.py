@@ -4,33 +4,24 @@ from __future__ import annotations
 
 import re
 import runpy
-import sys
-from pathlib import Path
 
 import pytest
+from site_pages import DOCS, load_site, read_pages
 from sources import PACKAGE
 
 import cfmkit
 
 pytestmark = pytest.mark.lists
 
-DOCS = Path(__file__).parents[2] / "docs"
-
 
 @pytest.fixture(scope="module")
 def site():
-    """The module that makes the pages; Sphinx is not needed for them."""
-    sys.path.insert(0, str(DOCS))
-    try:
-        import made_pages
-    finally:
-        sys.path.remove(str(DOCS))
-    return made_pages
+    return load_site()
 
 
 @pytest.fixture(scope="module")
-def pages(site):
-    return site.made()
+def pages():
+    return read_pages()
 
 
 def test_every_command_is_in_its_page(pages):

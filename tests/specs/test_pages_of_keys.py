@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 
 import pytest
+from site_pages import read_pages
 
 from cfmkit import families
 from cfmkit.specs.keys_and_schema import keys
@@ -14,28 +13,9 @@ from cfmkit.specs.keys_and_schema import keys
 pytestmark = pytest.mark.lists
 
 
-DOCS = Path(__file__).parents[2] / "docs"
-
-
-@pytest.fixture(scope="module")
-def site():
-    """The module that makes the pages; Sphinx is not needed for them."""
-    sys.path.insert(0, str(DOCS))
-    try:
-        import made_pages
-    finally:
-        sys.path.remove(str(DOCS))
-    return made_pages
-
-
-@pytest.fixture(scope="module")
-def pages(site):
-    return site.made()
-
-
 @pytest.mark.parametrize("name", families.names())
-def test_every_key_of_a_family_is_in_its_page_with_its_kind(name, pages):
-    page = pages[f"keys_{name.replace('-', '_')}.md"]
+def test_every_key_of_a_family_is_in_its_page_with_its_kind(name):
+    page = read_pages()[f"keys_{name.replace('-', '_')}.md"]
     rows = [line for line in page.splitlines() if line.startswith("| `")]
     known = sorted(key.path for key in keys(families.family(name).spec_type))
     shown = sorted(row.split("`")[1] for row in rows)

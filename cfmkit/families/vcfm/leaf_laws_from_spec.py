@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LeafLaws:
-    """A mechanism's leaves, their laws and how many there are; of several mechanisms, columns (`laws_in_rows`)."""
+    """A mechanism's leaves, their laws and how many there are; of several mechanisms, columns (`leaves.kinds`)."""
 
     leaf: LeafLaw  # law of one half-beam of the snap-through structure
     spring: LeafSpring | Coils  # law of the spring, as much of it as is loaded

@@ -340,7 +340,7 @@ def _curve(push: Push, stops: EndStops, pressed: bool) -> Curve:
 
 @dataclass(frozen=True)
 class LawSampler:
-    """Samples of closed forms: of one mechanism, or of one for each row (`laws_in_rows`)."""
+    """Samples of closed forms: of one mechanism, or of one for each row."""
 
     parts: LeafLaws
 

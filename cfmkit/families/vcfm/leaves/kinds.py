@@ -42,7 +42,7 @@ class LeafLaw(ABC):
     strip: LeafStrip
 
     one_by_one: ClassVar[bool] = True
-    """Whether it is a law of plain numbers only; if not, fields may be columns, and travels rows (`laws_in_rows`)."""
+    """Whether it is a law of plain numbers only; if not, fields may be columns, and travels rows (`stack_laws`)."""
 
     @abstractmethod
     def force(self, travel: Any) -> Any:
