@@ -111,7 +111,7 @@ def test_the_force_that_a_design_sees_is_the_column_of_the_contact():
     assert judged.half_band == pytest.approx(ripple / (2 - ripple), rel=1e-9)
     assert column.max() - column.min() <= ripple * column.max() * (1 + 1e-9)
     poses = np.array([0.0, 9e-3, 14e-3])
-    force = respond(Variables(task, 1), found.x, poses).state.force
+    force = respond(Variables(task, 1), found.x, poses).force
     assert force[1:] == pytest.approx(column[[0, -1]], rel=1e-3)
     assert judged.spec.mechanism.obstacles == spec.mechanism.obstacles
 
