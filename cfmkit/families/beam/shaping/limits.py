@@ -52,7 +52,7 @@ class View:
 
     @property
     def task(self) -> Task:
-        """What is shaped."""
+        """Task that the design is of."""
         return self.response.variables.task
 
     @cached_property
@@ -82,7 +82,7 @@ class View:
 
     @property
     def levelling(self) -> FloatArray | float:
-        """What makes a force level that follows the task's curve, at the poses of the window; 1 without one."""
+        """Factors that make a force level that follows the task's curve, at the poses of the window; 1 without one."""
         curve, places = self.task.shape, self.poses.at[self.poses.window]
         return 1.0 if curve is None else 1.0 / curve.evaluate(places * self.task.layers)
 
@@ -317,7 +317,7 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
     samples = view.response.samples
     thin = [_thin_out(beam) for beam in samples.values()]
     place, row = np.stack([beam.place for beam in thin]), np.stack([beam.index for beam in thin])
-    x, y = (np.stack([view.response.column(axis)[shown][:, own] for own in row]) for axis in "xy")
+    x, y = (np.stack([view.response.column(axis)[shown][:, chosen] for chosen in row]) for axis in "xy")
     numbers = {name: k for k, name in enumerate(samples)}
     first, second = np.array([[numbers[name] for name in pair.beams] for pair in couples]).T
     ways = _Ways.from_beams(view, couples, place[first], place[second])

@@ -243,8 +243,8 @@ def _as_seen(task: Task, design: ShapeCandidate, view: CloseView | None) -> Shap
         wider = design.start < task.window[0]  # one that was not widened yet is left as flat as it is
         starts = [widest, design.start] if wider and widest < design.start else [max(widest, design.start)]
     for start in starts:  # the mean force is over another window
-        other = None if start == design.start else evaluate_in_model(task, replace(design, start=start))
-        violation = design.violation if other is None else max(design.violation, other.violation)
+        moved = None if start == design.start else evaluate_in_model(task, replace(design, start=start))
+        violation = design.violation if moved is None else max(design.violation, moved.violation)
         if violation <= VIOLATION_TOL:
             break
     return replace(design, start=start, objective=view.half_band(start), violation=violation)
@@ -342,8 +342,8 @@ def _minimise_objective(
 def found_of(program: Shaping, optimum: Optimum, before: int = 0) -> ShapeCandidate:
     """Return an optimum as a design; its objective is measured anew, without the help of the goal's own variables."""
     variables, goal = program.variables, program.goal
-    x, own = np.split(optimum.z, [variables.count])
-    start = goal.window_start(own, program.start)
+    x, values = np.split(optimum.z, [variables.count])
+    start = goal.window_start(values, program.start)
     view = program.view(x, start)
     violation = np.inf if view is None else view.violation
     objective = optimum.objective if isinstance(goal, ForceRatio) or view is None else view.half_band

@@ -71,12 +71,12 @@ class Shaping(DesignProgram):
 
     def evaluate(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the goal, its rows and those of all limits at the design and the goal's own variables."""
-        x, own = np.split(z, [self.variables.count])
-        view = self.view(x, self.goal.window_start(own, self.start))
+        x, values = np.split(z, [self.variables.count])
+        view = self.view(x, self.goal.window_start(values, self.start))
         if view is None:
             return None
         try:
-            aim = self.goal.aim(view, own, sloped)
+            aim = self.goal.aim(view, values, sloped)
             return replace(aim, rows=[*aim.rows, *view.list_limits(sloped)])
         except NoAnswer:
             return None
@@ -97,12 +97,12 @@ class Goal(ABC):
     def start(self, view: View) -> FloatArray:
         """Return its own variables that fit the design best."""
 
-    def window_start(self, own: FloatArray, otherwise: float) -> float:
+    def window_start(self, values: FloatArray, otherwise: float) -> float:
         """Return where the window begins [m]: `otherwise`, if that is not one of its own variables."""
         return otherwise
 
     @abstractmethod
-    def aim(self, view: View, own: FloatArray, sloped: bool) -> SeenPoint:
+    def aim(self, view: View, values: FloatArray, sloped: bool) -> SeenPoint:
         """Return objective and rows, with derivatives by the design variables and then by its own, or without."""
 
 
@@ -125,9 +125,9 @@ class Flattest(Goal):
         middle = max(0.5 * (force.max() + force.min()), 0.05 * abs(force).max(), LEAST_MIDDLE)
         return np.array([middle, min(10.0, abs(force / middle - 1).max())])
 
-    def aim(self, view: View, own: FloatArray, sloped: bool) -> SeenPoint:
+    def aim(self, view: View, values: FloatArray, sloped: bool) -> SeenPoint:
         """Return the half band and its rows."""
-        level, band = own
+        level, band = values
         unit = unit_of_force(view) * level
         ratio = view.window_force / unit
         rows, objective = np.concatenate([1 + band - ratio, ratio - 1 + band]), BAND_WEIGHT * float(band)
@@ -161,13 +161,13 @@ class Widest(Goal):
         """Return level and window of the design."""
         return np.array([Flattest().start(view)[0], view.poses.at[view.poses.window[0]] / self.end])
 
-    def window_start(self, own: FloatArray, otherwise: float) -> float:
+    def window_start(self, values: FloatArray, otherwise: float) -> float:
         """Return the start of the window that is wanted."""
-        return float(own[1]) * self.end
+        return float(values[1]) * self.end
 
-    def aim(self, view: View, own: FloatArray, sloped: bool) -> SeenPoint:
+    def aim(self, view: View, values: FloatArray, sloped: bool) -> SeenPoint:
         """Return the share of the travel before the window, and the rows of the half band."""
-        level, share = own
+        level, share = values
         (rows,) = Flattest().aim(view, np.array([level, self.half_band]), sloped).rows
         if rows.slopes is None:
             return SeenPoint(float(share), None, [rows])
@@ -198,7 +198,7 @@ class ForceRatio(Goal):
         """Return nothing."""
         return np.zeros(0)
 
-    def aim(self, view: View, own: FloatArray, sloped: bool) -> SeenPoint:
+    def aim(self, view: View, values: FloatArray, sloped: bool) -> SeenPoint:
         """Return the objective; it has no rows."""
         at, from_ = view.response.force[view.poses.compared]
         if not sloped:

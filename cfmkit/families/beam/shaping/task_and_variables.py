@@ -199,8 +199,8 @@ class Variables:
         nodes, beams = self.task.network.nodes, self.task.network.beams
         places = [getattr(nodes[place.node], place.key) / self.task.size for place in self.task.coordinates]
         shapes = [beams[beam].shape for beam in self.task.shaped]
-        known = [shape.coefficients[1:] if isinstance(shape, Polynomial) else () for shape in shapes]
-        rows = [((*row, *[0.0] * self.order)[: self.order]) for row in known]
+        coefficients = [shape.coefficients[1:] if isinstance(shape, Polynomial) else () for shape in shapes]
+        rows = [((*row, *[0.0] * self.order)[: self.order]) for row in coefficients]
         return np.array([*places, *(value for row in rows for value in row)], dtype=float)
 
     def change_order(self, x: FloatArray, order: int) -> tuple[Variables, FloatArray]:
