@@ -10,7 +10,7 @@ from vee_leaf import VEE
 
 import cfmkit
 from cfmkit.families.beam.network_from_spec import assemble
-from cfmkit.families.beam.plane_fem_analysis import driven_part
+from cfmkit.families.beam.solid_part import driven_part
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.results import Status
 

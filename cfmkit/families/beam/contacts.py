@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -240,7 +239,7 @@ def _first_contact(solution: Solution) -> float | None:
         return None
     if first is not None:
         path_at_changes = path.take(path.changes_contact)
-        motion = replace(solution, path=path_at_changes, keep=np.arange(len(path_at_changes)), ends=()).motion
+        motion = solution.on_path(path_at_changes).motion
         return float(motion[int(np.abs(path_at_changes.drive - first.drive).argmin())])
     closed = any(path.contact_force(number)[0] > 0 for number in range(len(contacts)))
     return float(solution.motion[0]) if closed else None

@@ -19,7 +19,6 @@ import numpy as np
 from cfmkit.errors import InputError
 from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.model import solve
-from cfmkit.families.beam.network_from_spec import thickest
 from cfmkit.families.beam.path_ending import ending_of
 from cfmkit.families.beam.scalar_results import force_at_end, number_of
 from cfmkit.results import Design, Status
@@ -142,7 +141,7 @@ def _sizes(mechanism: Mechanism) -> dict[str, float]:
     """Return what a rescaling may change, by its key: size, largest thickness and largest width of the beams [m]."""
     return {
         "size": size_of(mechanism),
-        "thickness": max(map(thickest, mechanism.collect_beam_values("thickness").values())),
+        "thickness": max(max(mechanism.list_thicknesses(name)) for name in mechanism.beams),
         "width": max(mechanism.collect_beam_values("width").values()),
     }
 

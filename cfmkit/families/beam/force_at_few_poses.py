@@ -56,8 +56,8 @@ def sample_poses(
 def _find_slopes(assembly: Assembly, path: Path, at: NDArray[np.int64], paths: Sequence[str]) -> dict[str, Sampled]:
     """Return derivatives of force and stress at some points of a path by values of the specification."""
     # other nodes of a chain follow from its beams, and other stages from the first, through numbers that stay real
-    spec, copies = assembly.spec, assembly.spec.mechanism.copies
-    if spec.mechanism.closure == "chain" or (copies is not None and copies.layers > 1):
+    spec = assembly.spec
+    if spec.mechanism.closure == "chain" or spec.mechanism.layers > 1:
         return {}
     smooth_keys = [name for name in paths if _SMOOTH_KEYS.fullmatch(name) and isinstance(spec.get_value(name), float)]
     if not smooth_keys:

@@ -60,7 +60,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.curves import Kind
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.elastica.results.path import ContactEvent
@@ -71,9 +70,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
-_MAX_TRAVEL_RATIO = (
-    3.0  # travel in lengths from the driven node to a support: at the end these are at least twice as long
-)
+_MAX_TRAVEL_RATIO = 3.0  # travel in lengths from the driven node to a support: these are at least twice as long then
 _COIL_PLACES = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms
 
 
@@ -167,7 +164,7 @@ def _refuse_torn_beams(assembly: Assembly) -> None:
     if not drive.is_displacement or travel is None:
         return
     # each of several stages makes its share of the travel
-    most = _MAX_TRAVEL_RATIO * (spec.mechanism.copies.layers if spec.mechanism.copies is not None else 1)
+    most = _MAX_TRAVEL_RATIO * spec.mechanism.layers
     straight = {name: distance(network, beam.start, beam.end) for name, beam in network.beams.items()}
     if abs(spec.extent) <= most * _way_to_support(network, drive.node, straight):
         return
@@ -249,12 +246,8 @@ def _columns(solution: Solution) -> LazyColumns:
 def _curve_of(solution: Solution, columns: LazyColumns, stable: Any) -> Curve:
     """Return a curve with columns that are computed when they are read."""
     extra = LazyMapping(columns, lambda name: columns[name]())
-    return Curve(solution.motion, solution.effort, "load", stable, extra, kind_of(solution))  # type: ignore[arg-type]
-
-
-def kind_of(solution: Solution) -> Kind:
-    """Return what the effort of a curve is."""
-    return "torque" if solution.spec.mechanism.drive.turns else "force"
+    kind = solution.spec.mechanism.drive.effort_dimension
+    return Curve(solution.motion, solution.effort, "load", stable, extra, kind)  # type: ignore[arg-type]
 
 
 def _ends(solution: Solution) -> Curve | None:
@@ -412,7 +405,7 @@ class BeamRows:
             (np.array([solution.motion[0] for solution in each]), np.array([solution.motion[-1] for solution in each])),
             self._part_efforts,
             StressRows(tuple, self._stress_at, allowable, paths.largest_stress),
-            kind_of(each[0]),
+            each[0].spec.mechanism.drive.effort_dimension,
             None if np.isnan(pose).any() else pose,
             _pad_rows([law.peaks for law in self._laws], np.nan),
             traced=True,
@@ -473,7 +466,7 @@ def _kind(solution: Solution) -> Hashable:
     path, analysis = solution.path, solution.spec.analysis
     stated = analysis.reference is None, solution.assembly.allowable_stress is None
     arrays = path.mesh.degree, path.mesh.elements.unknowns.tobytes(), tuple(path.network.beams)
-    return *arrays, kind_of(solution), solution.spec.stress, *stated
+    return *arrays, solution.spec.mechanism.drive.turns, solution.spec.stress, *stated
 
 
 def solve_rows(specs: Sequence[BeamSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[BeamRows]]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -142,7 +141,7 @@ def _cross_stiffness(solution: Solution) -> float:
     window = window_of(solution)
 
     def observe(path: Path) -> FloatArray:
-        return -replace(solution, path=path, keep=np.arange(len(path)), ends=()).cross_stiffness[None]
+        return -solution.on_path(path).cross_stiffness[None]
 
     if _passes_pole(solution, drive.direction, window) or _has_pole(solution, observe, window):
         return math.nan

@@ -78,9 +78,8 @@ def with_stretch_and_shear(spec: BeamSpec) -> BeamSpec:
 
 def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
     """Return what is to be shaped; of layers in series one, which moves its share."""
-    mechanism = spec.mechanism
-    layers = mechanism.copies.layers if mechanism.copies else 1
-    if layers > 1 and mechanism.copies:
+    mechanism, layers = spec.mechanism, spec.mechanism.layers
+    if layers > 1:
         spec = with_values(spec, {"mechanism.copies.layers": 1})
     assembly = assemble(spec)
     bends = assemble(spec.replace({"analysis.fidelity": BENDING_ONLY})).network
