@@ -12,7 +12,7 @@ import cfmkit
 from cfmkit.elastica import Control, Displacement, gradient, trace
 from cfmkit.errors import InputError, SpecError
 from cfmkit.families.beam import model
-from cfmkit.families.beam.force_at_few_poses import _replace_values
+from cfmkit.families.beam.force_at_few_poses import replace_values
 from cfmkit.families.beam.network_from_spec import assemble
 from cfmkit.families.beam.shaping.design import task_of
 from cfmkit.families.beam.shaping.report import judge_design
@@ -60,7 +60,7 @@ def test_forces_with_closed_contacts_have_the_derivatives_of_differences(spec, n
     drive = Displacement(assembly.driven, assembly.direction, np.linspace(0.0, spec.extent, 4))
 
     def build(values):
-        return assemble(_replace_values(spec, dict(zip(names, values, strict=True)))).network
+        return assemble(replace_values(spec, dict(zip(names, values, strict=True)))).network
 
     def forces(values):
         path = trace(build(values), drive, CLOSE)

@@ -42,7 +42,7 @@ def largest(
 ) -> float | None:
     """Return the largest of some values along a path, where its motion is in a window; None if there is none."""
     path, law, winding = solution.path, solution.model_between_points, solution.winding
-    points = solution.on_path(path)
+    points = solution.replace_path(path)
     rows, reached = observe(path), points.motion
     ask: Callable[[FloatArray], Path]
     if law is not None:

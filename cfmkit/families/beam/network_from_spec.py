@@ -17,7 +17,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from cfmkit.families.rows import with_values
 from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -316,6 +316,23 @@ def resolve(spec: BeamSpec) -> BeamSpec:
     fidelity = spec.fidelity
     model = {"mechanism.axial": fidelity != "inextensible", "mechanism.shear": fidelity in ("reissner", "solid")}
     return with_values(spec, {**model, "analysis.fidelity": fidelity, "analysis.stress": spec.stress})
+
+
+def change_at(block: Any, path: str, change: Callable[[Any], Any]) -> Any:
+    """Return a block with what is at a dotted path changed, of every item where the path has *; if there is anything.
+
+    Nothing is validated: values may be complex.
+    """
+    if block is None or not path:
+        return block if block is None else change(block)
+    head, _, rest = path.partition(".")
+    if isinstance(block, dict):
+        return {name: change_at(item, rest, change) if head in ("*", name) else item for name, item in block.items()}
+    if isinstance(block, tuple):
+        return tuple(change_at(item, rest, change) if head in ("*", str(k)) else item for k, item in enumerate(block))
+    if getattr(block, head, None) is None:
+        return block
+    return block.model_copy(update={head: change_at(getattr(block, head), rest, change)})
 
 
 def move_free_nodes(network: Network) -> Network:

@@ -105,7 +105,7 @@ class Solution(ShortRepr):
         """The equilibria at every place of the way of a path whose motion turns back."""
         if self.model_between_points is not None:
             return None
-        return interpolate_folding_path(self.path, self.on_path)
+        return interpolate_folding_path(self.path, self.replace_path)
 
     @cached_property
     def with_ends(self) -> Solution:
@@ -154,16 +154,16 @@ class Solution(ShortRepr):
     def _solved_part_efforts(self, places: FloatArray) -> FloatArray:
         assert self.model_between_points is not None
         path = self.model_between_points.solve_at(places)
-        return np.where(path.accurate, self.on_path(path).largest_member_efforts, np.nan)
+        return np.where(path.accurate, self.replace_path(path).largest_member_efforts, np.nan)
 
-    def on_path(self, path: Path) -> Solution:
+    def replace_path(self, path: Path) -> Solution:
         """Return the solution with another path, all of whose points make the curve."""
         return replace(self, path=path, keep=np.arange(len(path)), ends=())
 
     @cached_property
     def largest_member_efforts(self) -> FloatArray:
         """Largest effort of one beam or spring of one copy at every point of the curve [N or N m]."""
-        return read_only(largest_member_efforts(self.path, self.keep, lambda path: self.on_path(path).motion))
+        return read_only(largest_member_efforts(self.path, self.keep, lambda path: self.replace_path(path).motion))
 
     @cached_property
     def accurate(self) -> Any:
