@@ -46,12 +46,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.families.fem_results import FilletRow
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
-    from cfmkit.solid.adaptive_solution import AdaptiveSolution, MeshError
+    from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart, MeshError
     from cfmkit.solid.meshed_part import MeshSolution
     from cfmkit.solid.path_up_to_load import LoadPath
     from cfmkit.tables import Table
@@ -239,6 +240,27 @@ def _solve_loaded_part(spec: BeamSpec, assembly: Assembly, solved: AdaptiveSolut
     else:
         motion = travels_at(fine.course, np.linspace(0.0, load, spec.analysis.points))
     return SolidSolution(assembly, solved, motion, reached)
+
+
+def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
+    """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
+    spec = spec.replace({"analysis.fidelity": "solid"})
+    if spec.mechanism.drive.by_load:
+        spec = moved_far_enough(spec)
+    return (driven_part(spec, assemble(spec)),)
+
+
+def elastic_networks(spec: BeamSpec) -> tuple[DrivenNetwork, ...]:
+    """Return the same as beams, for decks of other solvers; none where a node is turned that is free to move."""
+    from cfmkit.elastica import Displacement, Rotation
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
+
+    assembly = assemble(spec)
+    drive = assembly.drive()
+    if isinstance(drive, Rotation):
+        support = assembly.network.nodes[drive.node].support
+        return (DrivenNetwork("beams", assembly.network, drive),) if support.along and support.across else ()
+    return (DrivenNetwork("beams", assembly.network, drive),) if isinstance(drive, Displacement) else ()
 
 
 def _explain_ending(solution: SolidSolution) -> str:

@@ -18,9 +18,9 @@ with deferred_imports():
     from cfmkit.families.beam.outline import drawing
     from cfmkit.families.beam.part import part_over_motion
     from cfmkit.families.beam.plane_fem_analysis import analyze as analyze_solid
+    from cfmkit.families.beam.plane_fem_analysis import elastic_networks, elastic_parts
     from cfmkit.families.beam.proposals import propose
     from cfmkit.families.beam.redesign_variables_and_process_errors import errors, free
-    from cfmkit.families.beam.solid_part import elastic_networks, elastic_parts
 
 FAMILY_RECORD = Family(
     name="beam",

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.part import HeldPlace
     from cfmkit.families.beam.spec import BeamSpec
@@ -56,27 +55,6 @@ def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:
 
     analysis, reacting = spec.analysis, bool(spec.analysis.outputs.reactions)
     return DrivenPart("beams", part_of(spec, assembly), analysis.solid.error, tuple(_stops(spec)), reacting)
-
-
-def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
-    """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
-    spec = spec.replace({"analysis.fidelity": "solid"})
-    if spec.mechanism.drive.by_load:
-        spec = moved_far_enough(spec)
-    return (driven_part(spec, assemble(spec)),)
-
-
-def elastic_networks(spec: BeamSpec) -> tuple[DrivenNetwork, ...]:
-    """Return the same as beams, for decks of other solvers; none where a node is turned that is free to move."""
-    from cfmkit.elastica import Displacement, Rotation
-    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
-
-    assembly = assemble(spec)
-    drive = assembly.drive()
-    if isinstance(drive, Rotation):
-        support = assembly.network.nodes[drive.node].support
-        return (DrivenNetwork("beams", assembly.network, drive),) if support.along and support.across else ()
-    return (DrivenNetwork("beams", assembly.network, drive),) if isinstance(drive, Displacement) else ()
 
 
 def _stops(spec: BeamSpec) -> list[float]:
