@@ -288,7 +288,7 @@ class BeamSpec(Spec):
 
 
 def _list_faults(spec: BeamSpec, as_made: bool) -> Iterator[Iterable[Fault]]:
-    """Yield what is wrong group by group: one is asked for only where nothing was wrong in those before it."""
+    """Yield what is wrong group by group: one is computed only where nothing was wrong in those before it."""
     mechanism, part = spec.mechanism, spec.mechanism.part
     yield _extent_faults(spec)
     if part is not None and not as_made:
@@ -419,7 +419,7 @@ def _several(spec: BeamSpec, key: Literal["material", "width"]) -> bool:
 
 
 def _vibration_faults(spec: BeamSpec) -> Iterator[Fault]:
-    """Yield what is missing for natural frequencies, if they are asked for."""
+    """Yield what is missing for natural frequencies, if they are requested."""
     mechanism, place = spec.mechanism, ("analysis", "modes")
     if spec.analysis.modes and mechanism.wide_beams:
         yield place, "natural frequencies are known of narrow beams only: drop mechanism.wide_beams"
