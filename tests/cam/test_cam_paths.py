@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
-from cfmkit.families.cam.geometry.path import RollerPath, ideal_position, reach
+from cfmkit.families.cam.geometry.path import RollerPath, reach
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent, drop
 
 SLOW = settings(deadline=None, max_examples=30)
@@ -86,7 +86,7 @@ def test_without_friction_force_times_travel_is_the_energy_of_the_springs(law, s
     # F s = K (2D)^2 / 2 with F = 4 K A.
     travel = (x - law.rest_half_width) ** 2 / (2 * law.force_constant)
     assert RollerPath(law, x).travel(x) == pytest.approx(travel, rel=1e-9, abs=1e-16)
-    assert ideal_position(law, travel) == pytest.approx(x, rel=1e-12)
+    assert law.position(travel) == pytest.approx(x, rel=1e-12)
 
 
 @FAST

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.part import moment, pivoting, pose, scene, start_curve, swallowtail
-from cfmkit.families.cam.part_sizes_and_clearances import count_of, nearest_pairs
+from cfmkit.families.cam.part_sizes_and_clearances import nearest_pairs
 from cfmkit.families.cam.statics import constant_force
 from cfmkit.numerics.holes_in_samples import holes_between
 from cfmkit.plots import parts
@@ -168,7 +168,7 @@ def _names_at_start(solution: Solution, index: int, _view: Scene) -> list[Label]
 def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
     drawn_pose, number, height = (
         pose(solution, index),
-        count_of(solution.assembly.spec.mechanism.springs),
+        solution.assembly.spec.mechanism.springs.number,
         view.box[3] - view.box[1],
     )
     radius, (x, y) = solution.assembly.spec.mechanism.roller_radius, drawn_pose.roller
@@ -260,7 +260,7 @@ def springs(result: Result) -> Figure:
     figure = diagram_figure(Heading.from_result(result, "elongation of the springs"), [diagram], right_mm=17.0)
     stiffness, count = (
         float(to_border(solution.assembly.loads.stiffness, "stiffness")),
-        count_of(solution.assembly.spec.mechanism.springs),
+        solution.assembly.spec.mechanism.springs.number,
     )
     words = "the spring" if count == 1 else f"the {count} springs"
     tension = count * solution.assembly.spec.mechanism.springs.initial_tension

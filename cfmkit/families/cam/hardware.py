@@ -22,7 +22,6 @@ from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.part_sizes_and_clearances import (
     BRACE_WIDTH,
     PLATE_THICKNESS,
-    count_of,
     pin_path,
     roller_path,
     stack_height,
@@ -224,7 +223,7 @@ class _Hooks:
 def _hooks(solution: Solution, brace: float, slider: float) -> _Hooks:
     springs = solution.assembly.spec.mechanism.springs
     stretch, half_width = float(solution.elongation.max()), solution.assembly.spec.mechanism.rest_half_width
-    count, (wire, coil) = count_of(springs), wire_and_coil(springs, stretch, half_width) or (0.0, math.inf)
+    count, (wire, coil) = springs.number, wire_and_coil(springs, stretch, half_width) or (0.0, math.inf)
     outer = wire + coil if wire else 0.0
     share = (count + 1) // 2 / count
     pull = share * (springs.total * stretch + springs.initial_tension * count)
@@ -340,7 +339,7 @@ def _parts(
     yield ListedPart("on its guide", "slider", 2, data, "make", slider, "", "slider")
     half = loads.rods.slider_thickness
     yield pin_part("slider pin", 2, pin, brace + half, loads.pull, "slider pin")
-    long = thick + 2.0 * (brace + half) + min(count_of(mechanism.springs), 2) * hooks.outer
+    long = thick + 2.0 * (brace + half) + min(mechanism.springs.number, 2) * hooks.outer
     shafts = pin_part("shafts of the rollers", 2, shaft, long, loads.press, "shaft")
     end = hooks.seat(shaft)
     yield shafts if end == shaft else replace(shafts, data=f"{shafts.data}, ends turned to {mm(end)} for the loops")
@@ -360,7 +359,7 @@ def _parts(
     springs = mechanism.springs
     wound = springs.wound
     size = f"wire {mm(wound.wire)}, coil {mm(wound.coil)}, {wound.turns:g} turns" if wound else ""
-    data, number = _springs_in_words(mechanism, hooks, shaft), count_of(springs)
+    data, number = _springs_in_words(mechanism, hooks, shaft), springs.number
     yield ListedPart("between the rollers", springs.name or "", number, data, "buy", size, "", "spring")
 
 
@@ -395,7 +394,7 @@ def _drawn_bodies(
     yield PosedBody.polygon("plate", "held", cut_plate(solution)[0].points(OUTLINE_TOLERANCE))
     yield from (body for body in standing if body.name == "screw")
     thick = min(0.35 * width, 0.5 * hooks.outer)
-    for place in hooks.places(count_of(solution.assembly.spec.mechanism.springs)):
+    for place in hooks.places(solution.assembly.spec.mechanism.springs.number):
         hook = rollers + np.array([0.0, place])
         yield PosedBody.line("spring", "free", np.stack([hook, hook * mirror], axis=1), thick)
     for side in (np.ones(2), mirror):

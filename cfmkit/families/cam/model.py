@@ -33,15 +33,17 @@ from cfmkit.families.cam.findings import finding, left_out, rules_of
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import select_profiles
 from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.mechanism_from_spec import assemble, check_first_pose, check_springs, displacement_origin
-from cfmkit.families.cam.part_sizes_and_clearances import smallest, touching
-from cfmkit.families.cam.scalar_results import ROW_COLUMNS, SCALAR_QUANTITIES, contact_pressure, curve_cut_for
+from cfmkit.families.cam.part_sizes_and_clearances import touching
+from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS, SCALAR_QUANTITIES, curve_cut_for
 from cfmkit.families.cam.solution import DenseLoop, Solution
 from cfmkit.families.cam.statics import TRAVEL_RTOL, Assembly, forces, target_force
+from cfmkit.families.cam.values_and_findings_of_measured_cam import PROFILE_DEFINITIONS
 from cfmkit.families.findings import CannotBuild, mm, no_result
 from cfmkit.families.rows import (
     RowsDiffer,
     SolvedRows,
     agree,
+    columns_of_absent_values,
     drop_numbers,
     fails,
     findings_of_one,
@@ -115,7 +117,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         status=status,
         message=message,
         curves=(_curve(solution),),
-        values=values_of_one(SCALAR_QUANTITIES, solution) | smallest(solution),
+        values=values_of_one(SCALAR_QUANTITIES, solution),
         warnings=LazySequence(partial(_findings, solution, short)),
         travel=(
             solution.origin + float(solution.travel[0]),
@@ -272,7 +274,7 @@ def _curve(solution: Solution) -> Curve:
         shares = {kind: np.where(np.isfinite(share), share, np.nan) for kind, share in shares.items()}
         extra |= {f"lost_to_{kind}": Column(share, "force") for kind, share in shares.items()}
     if solution.assembly.spec.mechanism.contact:
-        pressed = loop(contact_pressure(solution), contact_pressure(solution, down))
+        pressed = loop(solution.contact_pressure(up), solution.contact_pressure(down))
         extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
     branch = np.repeat(["load", "unload"], points)
     return Curve(loop(solution.travel) + solution.origin, force, branch, stable, extra)
@@ -435,6 +437,10 @@ def _solve_alike(
             parcel = replace(rows_of(assembly, some), track=track.select_rows(some), profile=profile)
         windows = windows_of(rows[some])
         yield rows[some], _solve_group(replace(solve(parcel, len(some)), windows=windows), rows[some])
+
+
+ROW_COLUMNS = columns_of_absent_values(SCALAR_DEFINITIONS | PROFILE_DEFINITIONS) | dict(SCALAR_QUANTITIES)
+"""What studies may ask of rows: of values that only motions and measured cams have their cells are empty."""
 
 
 def _solve_group(solution: Solution, chosen: Rows) -> SolvedRows[Solution]:

@@ -14,7 +14,6 @@ from cfmkit.families.cam.hardware import cut_plate, hardware
 from cfmkit.families.cam.part_sizes_and_clearances import (
     BRACE_WIDTH,
     PLATE_THICKNESS,
-    count_of,
     depth_of,
     pin_path,
     roller_path,
@@ -53,7 +52,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
     if depth is None:
         reported = "no steel spring fits between the rollers"
     # plate, two rollers, four braces, two halves of the slider
-    pieces = 9 + count_of(mechanism.springs)
+    pieces = 9 + mechanism.springs.number
     joining = hardware(solution)
     depth = None if depth is None else depth + joining.slider_excess
     depth = None if depth is None else 0.5 * depth + max(0.5 * depth, 0.5 * thick + joining.screw_head_height)

@@ -14,9 +14,7 @@ from cfmkit.arrays import FloatArray
 from cfmkit.export.contours import Arc, Line
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS
 from cfmkit.families.findings import mm
-from cfmkit.results import Quantity
 from cfmkit.stock.springs.offers import extension_spring
 
 if TYPE_CHECKING:
@@ -55,7 +53,7 @@ def depth_of(
 ) -> float | None:
     """Return the depth with springs of a known wire, else wound of steel wire [m]; None if no such spring fits."""
     outer = coil_diameter(springs, stretch, half_width, safety)
-    return None if outer is None else thick + 2.0 * min(thick, BRACE_WIDTH) + min(count_of(springs), 2) * outer
+    return None if outer is None else thick + 2.0 * min(thick, BRACE_WIDTH) + min(springs.number, 2) * outer
 
 
 def coil_diameter(springs: Springs, stretch: float, half_width: float, safety: float = 1.0) -> float | None:
@@ -73,7 +71,7 @@ def wire_and_coil(
     """Return the wire's diameter and the mean one of the coil of each spring [m], as `coil_diameter` has them."""
     if springs.wound is not None:
         return springs.wound.wire, springs.wound.coil
-    made = extension_spring(springs.total / count_of(springs), stretch, 2.0 * half_width, safety)
+    made = extension_spring(springs.total / springs.number, stretch, 2.0 * half_width, safety)
     return None if made is None else (made.wire, made.coil)
 
 
@@ -84,11 +82,6 @@ def stack_height(outer: float, count: int) -> float:
     (0.02, 0.03)
     """
     return outer * ((count + 1) // 2)
-
-
-def count_of(springs: Springs) -> int:
-    """Return how many springs there are."""
-    return len(springs.each) if isinstance(springs.each, tuple) else springs.count or 1
 
 
 BESIDE_FLANKS_PAIR, OVERLAP_TOL = "roller and plate beside the flanks", 1e-9
@@ -137,11 +130,10 @@ def nearest_pairs(solution: Solution) -> dict[str, FloatArray]:
     return gaps
 
 
-def smallest(solution: Solution) -> dict[str, Quantity]:
-    """Return the smallest distance by name; nothing where no sizes are given."""
-    least = {pair: float(gap.min()) for pair, gap in nearest_pairs(solution).items()}
-    gaps = [gap for pair, gap in least.items() if pair != BESIDE_FLANKS_PAIR or gap < -OVERLAP_TOL]
-    return {"clearance_min": Quantity(min(gaps), *SCALAR_DEFINITIONS["clearance_min"])} if gaps else {}
+def smallest_gap(solution: Solution) -> float:
+    """Return the smallest distance of all pairs [m]."""
+    gaps = [(pair, float(gap.min())) for pair, gap in clearances(solution)]
+    return min(gap for pair, gap in gaps if pair != BESIDE_FLANKS_PAIR or gap < -OVERLAP_TOL)
 
 
 def touching(solution: Solution) -> Iterator[Finding]:

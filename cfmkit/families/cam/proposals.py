@@ -23,7 +23,7 @@ import numpy as np
 from cfmkit.errors import SolutionError
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.hardware import BEARING_IN_ROLLER, SHAFT_IN_ROLLER, roller_shaft
-from cfmkit.families.cam.part_sizes_and_clearances import BRACE_WIDTH, coil_diameter, count_of, depth_of, stack_height
+from cfmkit.families.cam.part_sizes_and_clearances import BRACE_WIDTH, coil_diameter, depth_of, stack_height
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
@@ -263,7 +263,7 @@ def with_wire(spec: CamSpec, request: Request) -> CamSpec:
     if springs.wound is not None or solution is None:
         return with_bearings(spec, request)
     stretch, length = float(solution.elongation.max()), 2.0 * spec.mechanism.rest_half_width
-    coil = extension_spring(springs.total / count_of(springs), stretch, length, request.safety)
+    coil = extension_spring(springs.total / springs.number, stretch, length, request.safety)
     if coil is None:
         return with_bearings(spec, request)
     stated = {"count": springs.count, "preload": springs.preload} if springs.preload else {"count": springs.count}
@@ -293,7 +293,7 @@ def widen_plate(spec: CamSpec, request: Request) -> CamSpec:
     from cfmkit.families.run_control import Run
     from cfmkit.metrics import evaluate
 
-    if count_of(spec.mechanism.springs) % 2:
+    if spec.mechanism.springs.number % 2:
         raise SolutionError("an odd number of springs of the catalogue would pull on one side of the plate")
     springs = spec.mechanism.springs
     if springs.wound is not None:  # the rate is that of the wire

@@ -124,6 +124,10 @@ class Solution(ShortRepr):
         """Up and down; one where they are alike."""
         return (self.up,) if self.up is self.down else (self.up, self.down)
 
+    def contact_pressure(self, state: Forces) -> FloatArray:
+        """Return the pressure of the line contact on the way up or down [Pa]; NaN on the corner."""
+        return flank_pressure(self.assembly, self.states, state.contact)
+
     @cached_property
     def effort_error(self) -> Any:
         """Rounding of the sum of springs and weights on the slider [N]."""
@@ -329,7 +333,7 @@ class Solution(ShortRepr):
         allowable = allowable_stress(self.mechanism)
 
         def read() -> list[RowSamples]:
-            values = self._spread_over_rows(stress(flank_pressure(self.assembly, self.states, state.contact)))
+            values = self._spread_over_rows(stress(self.contact_pressure(state)))
             curve = self.branches[name].samples
             return [RowSamples(curve.motion, values, curve.count)]
 

@@ -8,17 +8,21 @@ force is not known (`MeasuredCam.unmeasured`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
+from cfmkit.families.cam.contact_pressure import flank_pressure
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.statics import levers, load_on_contact, load_on_slider
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
 from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
@@ -83,6 +87,12 @@ class MeasuredCam(ShortRepr):
         return tuple(joined)
 
     @property
+    def measured(self) -> tuple[tuple[float, float], ...]:
+        """Travels between which both contacts are on measured points [m]."""
+        ends = [float(self.travel[0]), *(place for hole in self.unmeasured for place in hole), float(self.travel[-1])]
+        return tuple((low, high) for low, high in zip(ends[::2], ends[1::2], strict=True) if low < high)
+
+    @property
     def elongation(self) -> FloatArray:
         """Elongation of the springs, (n,) [m]."""
         opened = self.assembly.spec.mechanism.springs.tension_stretch
@@ -93,41 +103,60 @@ class MeasuredCam(ShortRepr):
         loads, friction = self.assembly.loads, self.assembly.spec.mechanism.rolling_friction
         return self.sides.forces(loads, direction * friction, loads.rest_half_width)
 
+    @property
+    def requested(self) -> tuple[float, float]:
+        """Displacements at which the motion starts, and at which it was to end [m]."""
+        start, end = float(self.travel[0]), self.assembly.spec.analysis.travel or float(self.travel[-1])
+        return start + self.origin, end + self.origin
 
-def travel_window(built: MeasuredCam) -> tuple[float, float]:
-    """Return the travels at which the window begins and ends, by default the whole travel [m]."""
-    window = built.assembly.spec.analysis.window
-    if window is None:
-        return float(built.travel[0]), float(built.travel[-1])
-    low, high = window_places(window, requested_travel(built))
-    return low - built.origin, high - built.origin
+    @property
+    def window(self) -> tuple[float, float]:
+        """Displacements at which the window begins and ends, by default those of the whole travel [m]."""
+        stated = self.assembly.spec.analysis.window
+        if stated is not None:
+            return window_places(stated, self.requested)
+        return float(self.travel[0] + self.origin), float(self.travel[-1] + self.origin)
+
+    @property
+    def in_window(self) -> NDArray[np.bool_]:
+        """Which travels lie in the window, (n,); all if it holds fewer than 3."""
+        (low, high), places = self.window, self.travel + self.origin
+        inside: NDArray[np.bool_] = (places >= low) & (places <= high)
+        return inside if inside.sum() > 2 else np.ones(len(places), dtype=bool)
+
+    @property
+    def hole_shares(self) -> list[float]:
+        """Widths of the intervals in the window that were not measured, over that of the window."""
+        low, high = self.window
+        ends = ((start + self.origin, stop + self.origin) for start, stop in self.unmeasured)
+        return [max(min(stop, high) - max(start, low), 0.0) / (high - low) for start, stop in ends]
+
+    @property
+    def has_large_hole(self) -> bool:
+        """Whether so much of the window was not measured that what holds over all of it is not known."""
+        return any(share > MAX_HOLE_SHARE for share in self.hole_shares)
+
+    @property
+    def half_extent(self) -> float:
+        """Half the height of the measured part [m]: where an angle is felt."""
+        return 0.5 * float(np.ptp(np.concatenate([points[:, 1] for points in self.registration.points])))
+
+    def used(self, values: Iterable[FloatArray]) -> FloatArray:
+        """Return values of the points of both flanks that count."""
+        return np.concatenate([item[keep] for item, keep in zip(values, self.registration.used, strict=True)])
+
+    @cached_property
+    def errors(self) -> FloatArray:
+        """Errors of the points that count, of both flanks [m]."""
+        return self.used(self.registration.errors)
+
+    def pressure(self, direction: float) -> FloatArray:
+        """Return the larger pressure of both contacts on the way up (1) or down (-1), the flank as designed [Pa]."""
+        track, forces = self.assembly.track, self.forces(direction)
+        states = track.states(track.start + self.travel)
+        return flank_pressure(self.assembly, states, np.maximum(forces[1], forces[2]))
 
 
-def large_holes(built: MeasuredCam) -> tuple[tuple[float, float], ...]:
-    """Return the intervals of travel in the window that were not measured, unless they are very small [m]."""
-    start, stop = travel_window(built)
-    inside = ((max(low, start), min(high, stop)) for low, high in built.unmeasured)
-    return tuple((low, high) for low, high in inside if high - low > MAX_HOLE_SHARE * (stop - start))
-
-
-def profile_coverage(built: MeasuredCam) -> float:
-    """Return the share of the window that was measured, 0 to 1."""
-    start, stop = travel_window(built)
-    missing = sum(max(min(high, stop) - max(low, start), 0.0) for low, high in built.unmeasured)
-    return 1.0 - missing / (stop - start)
-
-
-def window_mask(built: MeasuredCam) -> NDArray[np.bool_]:
-    """Return which travels lie in ``analysis.window``, (n,); all if there is no window, or if it holds fewer than 3."""
-    place, window = built.travel + built.origin, built.assembly.spec.analysis.window
-    if window is None:
-        return np.ones(len(place), dtype=bool)
-    low, high = window_places(window, requested_travel(built))
-    inside: NDArray[np.bool_] = (place >= low) & (place <= high)
-    return inside if inside.sum() > 2 else np.ones(len(place), dtype=bool)
-
-
-def requested_travel(built: MeasuredCam) -> tuple[float, float]:
-    """Return where the displacement starts and where it was to end [m]."""
-    start, end = float(built.travel[0]), built.assembly.spec.analysis.travel or float(built.travel[-1])
-    return start + built.origin, end + built.origin
+def root_mean_square(*parts: FloatArray) -> float:
+    """Return the root mean square of all values of some arrays."""
+    return float(np.sqrt(np.mean(np.square(np.concatenate(parts)))))

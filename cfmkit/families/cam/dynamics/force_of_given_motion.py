@@ -212,17 +212,16 @@ def multibody_history(
     """
     model = NineCoordinates(machine)
     trajectory = model.run(motion, points, scheme, first)
-    right, left = reactions(model, trajectory)
-    center = np.array([right.center, left.center])
+    center, contact, traction, roller_pin, slider_pin, spin = reactions(model, trajectory)
     return History(
         times=trajectory.times,
         moment=motion.evaluate(trajectory.times),
         force=trajectory.force,
-        contact=np.array([right.contact, left.contact]),
-        traction=np.array([right.traction, left.traction]),
-        spin=np.array([right.spin, left.spin]),
-        brace=np.abs([right.roller_pin, left.roller_pin]),
-        pin=np.abs([right.slider_pin, left.slider_pin]),
+        contact=contact,
+        traction=traction,
+        spin=spin,
+        brace=np.abs(roller_pin),
+        pin=np.abs(slider_pin),
         elongation=machine.springs.elongation(np.abs(center[0] + center[1].conj())),
         center=center,
         on_corner=np.zeros(len(trajectory.times), dtype=bool),

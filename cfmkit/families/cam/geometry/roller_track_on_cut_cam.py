@@ -19,7 +19,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
-from cfmkit.families.cam.geometry.path import RollerPath, ideal_position
+from cfmkit.families.cam.geometry.path import RollerPath
 from cfmkit.families.cam.geometry.slope_law import Real, brace_tangent
 from cfmkit.families.rows import agree, fails, is_column, root_between, rows_of
 from cfmkit.numerics.roots import bracketed_root, invert_increasing
@@ -272,7 +272,7 @@ class Track:
 
     def _flank_bend(self, u: FloatArray) -> FloatArray:
         law = self.profile.path.law
-        bend: FloatArray = law.slope_derivative(u)
+        bend: FloatArray = law.slopes(u)[1]
         return bend / (1.0 + self.shift / law.curvature_radius(u)) if self._is_shifted else bend
 
     def _corner_states(self, slider: FloatArray, rows: Any = None) -> TrackStates:
@@ -347,10 +347,10 @@ class Track:
         low, high = self.flank_range
         if self._is_ideal:
             travel = np.maximum(slider - self._slider(law.rest_half_width, 0.0), 0.0)
-            return np.minimum(np.maximum(ideal_position(law, travel), low), high)
+            return np.minimum(np.maximum(law.position(travel), low), high)
         zero, places, excess = self._guide
         root = np.sqrt(np.maximum(slider - zero, 0.0))
-        guess = ideal_position(law, root * root) + self._interpolate(root, places, excess)
+        guess = law.position(root * root) + self._interpolate(root, places, excess)
         return invert_increasing(self._evaluate_flank, slider, self.flank_range, guess)
 
     @staticmethod
@@ -368,7 +368,7 @@ class Track:
         slider = self._evaluate_flank(knots)[0]
         zero = np.minimum(self.start, slider[..., :1])
         root = np.sqrt(np.maximum(slider - zero, 0.0))
-        return zero, root, knots - ideal_position(self.profile.path.law, root * root)
+        return zero, root, knots - self.profile.path.law.position(root * root)
 
 
 def track_of(profile: CamProfile, roller_radius: Any, brace_length: Any, offset: Any = 0.0) -> Track:
