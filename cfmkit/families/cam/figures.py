@@ -234,7 +234,7 @@ def contact(result: Result) -> Figure:
     ]
     if not alike:
         series.append(Series(down.contact, "contact, down", LINE_VERMILLION, prefer=0.3))
-    angle = [Series(solution.pressure_angle, "between the brace's pull and the roller's motion", LINE_BLUE)]
+    angle = [Series(solution.states.pressure_angle, "between the brace's pull and the roller's motion", LINE_BLUE)]
     ranges = regions(solution)
     limits = [Limit(np.pi / 2, "90 deg: no leverage on the roller"), *limits_on(result, "pressure_angle_max")]
     unnamed = [replace(region, text="") for region in ranges]

@@ -35,7 +35,7 @@ from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.mechanism_from_spec import assemble, check_first_pose, check_springs, displacement_origin
 from cfmkit.families.cam.part_sizes_and_clearances import touching
 from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS, SCALAR_QUANTITIES, curve_cut_for
-from cfmkit.families.cam.solution import DenseLoop, Solution
+from cfmkit.families.cam.solution import Solution
 from cfmkit.families.cam.statics import TRAVEL_RTOL, Assembly, forces, target_force
 from cfmkit.families.cam.values_and_findings_of_measured_cam import PROFILE_DEFINITIONS
 from cfmkit.families.findings import CannotBuild, mm, no_result
@@ -104,7 +104,6 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     solution = with_band(solution, run.seed)
-    loop = DenseLoop(solution)
     short = shortfalls(assembly, float(solution.travel[-1]))
     failed = int(np.isnan(solution.up.slider[1:]).sum() + np.isnan(solution.down.slider[1:]).sum())
     status, message = Status.COMPLETE, ""
@@ -132,9 +131,9 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         target=target_force(spec, assembly),
         target_curve=None if spec.target_curve else curve_cut_for(assembly),
         allowable_stress=allowable_stress(spec.mechanism),
-        closed=loop,
+        closed=solution,
         effort_error=solution.effort_error,
-        part_efforts=loop.part_efforts,
+        part_efforts=solution.part_efforts,
         tables=parts_tables(partial(_hardware_parts, solution)),
         state=solution,
     )
@@ -261,7 +260,7 @@ def _curve(solution: Solution) -> Curve:
         "contact_force": Column(contact, "force"),
         "brace_force": Column(loop(up.brace, down.brace), "force"),
         "spring_elongation": Column(loop(solution.elongation), "length"),
-        "pressure_angle": Column(loop(solution.pressure_angle), "angle"),
+        "pressure_angle": Column(loop(solution.states.pressure_angle), "angle"),
         "roller_x": Column(loop(states.x), "length"),
         "roller_y": Column(loop(states.y), "length"),
         "contact": Column(loop(np.where(states.on_corner, "corner", "flank")), "text"),

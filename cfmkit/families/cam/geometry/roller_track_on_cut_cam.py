@@ -66,6 +66,12 @@ class TrackStates(ShortRepr):
         """d2y/dx2 of the centre's track, (n,) [1/m]; it is wanted at dead points alone."""
         return self.compute_bend()
 
+    @cached_property
+    def pressure_angle(self) -> FloatArray:
+        """Angle between a brace's pull and its roller's motion [rad]; at 90 deg the slider moves nothing."""
+        angle: FloatArray = np.arctan2(1.0 + self.slope * self.tangent, self.slope - self.tangent)
+        return angle
+
     def __reduce__(self) -> tuple[Any, ...]:
         # what computes the last array may not be pickled
         return TrackStates, (*self.fields(), partial(np.asarray, self.bend))
