@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from cfmkit.families import CannotBuild
-from cfmkit.families.cam.mechanism_from_spec import assemble, hanging_weights
+from cfmkit.families.cam.mechanism_from_spec import assemble, weights_of
 from cfmkit.families.cam.statics import STANDARD_GRAVITY
 
 SLOW = settings(deadline=None, max_examples=60)
@@ -60,7 +60,7 @@ def test_forces_are_those_of_the_free_bodies(mechanism, shares, up):
     spec, assembly = mechanism
     mu = spec.mechanism.rolling_friction
     found = at(spec, travels(assembly, shares), mu if up else -mu)
-    weights = hanging_weights(spec.mechanism.masses) if spec.gravity else (0.0, 0.0)
+    weights = weights_of(spec.mechanism).along if spec.gravity else (0.0, 0.0)
     for i, x in enumerate(found.x):
         spring = 2 * spec.mechanism.springs.total * max(x - spec.mechanism.rest_half_width, 0)
         expected = cam_oracles.free_bodies(

@@ -104,7 +104,10 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     solution = with_band(solution, run.seed)
-    short = shortfalls(assembly, float(solution.travel[-1]))
+    first, last = solution.travel[[0, -1]].tolist()
+    short, requested = shortfalls(assembly, last), solution.requested
+    if short and not spec.analysis.travel:  # as far as the flank was to be cut
+        requested = float(assembly.spec.mechanism.profile.stroke or 0.0)
     failed = int(np.isnan(solution.up.slider[1:]).sum() + np.isnan(solution.down.slider[1:]).sum())
     status, message = Status.COMPLETE, ""
     if short:
@@ -118,16 +121,8 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         curves=(_curve(solution),),
         values=values_of_one(SCALAR_QUANTITIES, solution),
         warnings=LazySequence(partial(_findings, solution, short)),
-        travel=(
-            solution.origin + float(solution.travel[0]),
-            solution.origin + _requested_travel(solution, bool(short)),
-        ),
-        valid=(
-            (
-                max(solution.corner_travel, float(solution.travel[0])) + solution.origin,
-                float(solution.travel[-1]) + solution.origin,
-            ),
-        ),
+        travel=(solution.origin + first, solution.origin + requested),
+        valid=((max(solution.corner_travel, first) + solution.origin, last + solution.origin),),
         target=target_force(spec, assembly),
         target_curve=None if spec.target_curve else curve_cut_for(assembly),
         allowable_stress=allowable_stress(spec.mechanism),
@@ -156,30 +151,20 @@ def with_band(solution: Solution, seed: int) -> Solution:
     return replace(solution, band=force_band(solution.assembly, tolerance, solution.travel, seed))
 
 
-def _requested_travel(solution: Solution, short: bool) -> float:
-    """Return how far the slider was to go [m]; without a request, as far as the flank was to be cut."""
-    spec = solution.assembly.spec
-    return float(spec.mechanism.profile.stroke or 0.0) if short and not spec.analysis.travel else solution.requested
-
-
 def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:
     """Return the spec with the defaults of the analysis made explicit."""
-    travel = _requested_travel(solution, short=False)
-    analysis = spec.analysis.model_copy(update={"travel": travel, "gravity": spec.gravity, "fidelity": "quasi-static"})
-    return spec.model_copy(update={"analysis": analysis})
+    stated = {"travel": solution.requested, "gravity": spec.gravity, "fidelity": "quasi-static"}
+    return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=stated)})
 
 
 def _hardware_parts(solution: Solution) -> tuple[ListedPart, ...]:
-    return tuple(hardware(solution).parts)
+    return hardware(solution).parts
 
 
-def solve(
-    assembly: Assembly,  # one mechanism; or several whose numbers are columns
-    count: int = 1,  # number of mechanisms
-) -> Solution:
+def solve(assembly: Assembly, count: int = 1) -> Solution:
     """Return states and forces over the travel that the analysis asks for, as far as the track goes.
 
-    Raises CannotBuild if a stop leaves no travel.
+    Of one mechanism, or of `count` whose numbers are columns. Raises CannotBuild if a stop leaves no travel.
     """
     spec, track, loads = assembly.spec, assembly.track, assembly.loads
     low, end = reachable_travel(assembly)
@@ -216,32 +201,23 @@ def shortfalls(assembly: Assembly, reached: Any) -> tuple[Finding, ...]:
     """Return why the curve ends, at a travel [m], before what was requested, or before the flank does."""
     warnings = [assembly.shortfall] if assembly.shortfall else []
     asked = assembly.spec.analysis.travel
-    short = asked is not None and fails(reached < asked * (1 - TRAVEL_RTOL))
-    if asked is not None and short and travel_between_stops(assembly.spec)[1] <= reached * (1 + TRAVEL_RTOL):
-        warnings.append(
-            finding(
-                "end_stop",
-                f"the requested travel is {mm(asked)}, but the slider is stopped at {mm(reached)} "
-                "('mechanism.stops.upper')",
-            )
+    is_short = asked is not None and fails(reached < asked * (1 - TRAVEL_RTOL))
+    if asked is not None and is_short and travel_between_stops(assembly.spec)[1] <= reached * (1 + TRAVEL_RTOL):
+        stopped = f"but the slider is stopped at {mm(reached)} ('mechanism.stops.upper')"
+        warnings.append(finding("end_stop", f"the requested travel is {mm(asked)}, {stopped}"))
+    elif assembly.track.turns_back and (is_short or asked is None):
+        message = (
+            f"with a brace of {mm(assembly.track.brace_length)} on this cam the slider stops rising after "
+            f"{mm(reached)} of travel, before the flank ends, and the force is unbounded there; use a longer "
+            "brace ('mechanism.brace_length'), or a cam cut for this one ('mechanism.profile.brace_length')"
         )
-    elif assembly.track.turns_back and (short or asked is None):
-        warnings.append(
-            finding(
-                "brace_too_short",
-                f"with a brace of {mm(assembly.track.brace_length)} on this cam the slider stops rising after "
-                f"{mm(reached)} of travel, before the flank ends, and the force is unbounded there; use a longer "
-                "brace ('mechanism.brace_length'), or a cam cut for this one ('mechanism.profile.brace_length')",
-            )
+        warnings.append(finding("brace_too_short", message))
+    elif asked is not None and is_short:
+        message = (
+            f"the requested travel is {mm(asked)}, but the profile is cut for {mm(reached)} with these parts; "
+            "cut a longer profile ('mechanism.profile.stroke') or request less ('analysis.travel')"
         )
-    elif asked is not None and short:
-        warnings.append(
-            finding(
-                "outside_profile",
-                f"the requested travel is {mm(asked)}, but the profile is cut for {mm(reached)} with these parts; "
-                "cut a longer profile ('mechanism.profile.stroke') or request less ('analysis.travel')",
-            )
-        )
+        warnings.append(finding("outside_profile", message))
     return tuple(warnings)
 
 

@@ -259,7 +259,7 @@ class Solution(ShortRepr):
         (m, k), or (k,) for all.
         """
         corner = np.minimum(self.corner_travel, self.travel[..., -1:])
-        return corner * (ON_CORNER if corner.any() else ON_CORNER[:0]) + self.origin
+        return np.asarray(corner * (ON_CORNER if corner.any() else ON_CORNER[:0]) + self.origin)
 
     def effort(self, branch: str, places: FloatArray, rows: Any = None) -> FloatArray:
         """Return the force on the way up or down at displacements of each mechanism, or of some, (k, n) [N]."""
