@@ -97,6 +97,17 @@ class Solution(ShortRepr):
         parts = [row_of((cam.path.law, cam.roller_radius, cam.end), row) for row in range(self.count)]
         return np.array([[read(CamProfile(RollerPath(law, end), radius, end))] for law, radius, end in parts])
 
+    @cached_property
+    def roller_path(self) -> FloatArray:
+        """Positions of the right roller's axis, of one mechanism, (n, 2) [m]."""
+        return np.column_stack([self.states.x, self.states.y])
+
+    @cached_property
+    def pin_path(self) -> FloatArray:
+        """Positions of the slider's pin, of one mechanism, (n, 2) [m]."""
+        (x, y), length = self.roller_path.T, self.assembly.track.brace_length
+        return np.column_stack([0.0 * x, y + np.sqrt((length - x) * (length + x))])
+
     def column(self, value: Any) -> FloatArray:
         """Return a number of each mechanism, (m,)."""
         return np.broadcast_to(np.ravel(value), self.count)
