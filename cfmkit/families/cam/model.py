@@ -252,7 +252,7 @@ def _curve(solution: Solution) -> Curve:
         pressed = loop(solution.contact_pressure(up), solution.contact_pressure(down))
         extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
     branch = np.repeat(["load", "unload"], points)
-    return Curve(loop(solution.travel) + solution.origin, force, branch, stable, extra)
+    return Curve(loop(solution.displacement), force, branch, stable, extra)
 
 
 MAX_SAMPLES_AT_ONCE = 250_000

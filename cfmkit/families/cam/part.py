@@ -63,7 +63,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
 
 def bodies(solution: Solution) -> tuple[PosedBody, ...]:
     """Return the boxes of the plate and its holes, the rollers, and the slider's pin as large, at every point."""
-    radius = solution.assembly.spec.mechanism.roller_radius
+    radius = solution.mechanism.roller_radius
     plate = [PosedBody.polygon("plate", "held", rectangle(*contour.extents)) for contour in cut_plate(solution)]
     right = PosedBody.line("roller", "contact", solution.roller_path[:, None], radius)
     return (*plate, right, right.mirror(), PosedBody.line("slider", "driven", solution.pin_path[:, None], radius))
@@ -102,14 +102,14 @@ def _contact(solution: Solution, index: int) -> Point:
         normal = toward / np.hypot(*toward)
     else:
         normal = np.array(profile.normal(float(states.parameter[index])))
-    x, y = center - solution.assembly.spec.mechanism.roller_radius * normal
+    x, y = center - solution.mechanism.roller_radius * normal
     return float(x), float(y)
 
 
 def surface(solution: Solution, points: int = 400) -> FloatArray:
     """Return the right flank as the roller finds it, material left on it included, (n, 2) [m]."""
     profile = solution.assembly.track.profile  # with material missing: the flank cut for a larger roller
-    offset = max(solution.assembly.spec.mechanism.profile.offset, 0.0) - profile.roller_radius
+    offset = max(solution.mechanism.profile.offset, 0.0) - profile.roller_radius
     share = np.linspace(0.0, 1.0, points)
     u = profile.start + (profile.end - profile.start) * share**2
     return np.column_stack(profile.offset_points(u, offset))

@@ -74,7 +74,7 @@ def clearances(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
 
     Only what `mechanism.envelope` gives a size is looked at. The cam's flank, on which the roller runs, is left out.
     """
-    mechanism, states = solution.assembly.spec.mechanism, solution.states
+    mechanism, states = solution.mechanism, solution.states
     sizes, radius = mechanism.envelope, mechanism.roller_radius
     if sizes is None:
         return
@@ -117,7 +117,7 @@ def smallest_gap(solution: Solution) -> float:
 
 def touching(solution: Solution) -> Iterator[Finding]:
     """Yield which parts come nearer than wanted, the worst first."""
-    envelope, reported = solution.assembly.spec.mechanism.envelope, set()
+    envelope, reported = solution.mechanism.envelope, set()
     for pair, gap in sorted(clearances(solution), key=lambda item: float(item[1].min())):
         least = int(np.argmin(gap))
         if (

@@ -86,8 +86,7 @@ def _bearing_turns(solution: Solution) -> FloatArray:
 def _friction_energy(solution: Solution, kind: str) -> FloatArray:
     """Return the energy that a kind of friction takes over the window, up and down [J]."""
     up, down = (state.lost or {} for state in (solution.up, solution.down))
-    places = solution.travel + solution.origin
-    return integrate_between(places, up[kind] + down[kind], *solution.window)
+    return integrate_between(solution.displacement, up[kind] + down[kind], *solution.window)
 
 
 def _loop_area(solution: Solution) -> FloatArray:

@@ -98,6 +98,11 @@ class Solution(ShortRepr):
         return np.array([[read(CamProfile(RollerPath(law, end), radius, end))] for law, radius, end in parts])
 
     @cached_property
+    def displacement(self) -> FloatArray:
+        """Displacement of the slider, the travel from the origin that is asked for [m]."""
+        return np.asarray(self.travel + self.origin)
+
+    @cached_property
     def roller_path(self) -> FloatArray:
         """Positions of the right roller's axis, of one mechanism, (n, 2) [m]."""
         return np.column_stack([self.states.x, self.states.y])
@@ -295,7 +300,7 @@ class Solution(ShortRepr):
     @cached_property
     def branches(self) -> dict[str, CurveRows]:
         """The curves by branch, up and down."""
-        motion = self._spread_over_rows(self.travel + self.origin)
+        motion = self._spread_over_rows(self.displacement)
         corner, first = self.column(self.corner_travel), self.column(self.travel[..., :1])
         valid = np.maximum(corner, first) + self.column(self.origin), motion[:, -1]
         target = target_force(self.assembly.spec, self.assembly)
