@@ -32,7 +32,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
     turns_vertical,
     weights_of,
 )
-from cfmkit.families.cam.outline import plate_notes
+from cfmkit.families.cam.outline import CutPlate
 from cfmkit.families.cam.statics import TRAVEL_RTOL, forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.findings import (
@@ -340,15 +340,10 @@ def _stroke_of(law: SlopeLaw, target: CamDesign, springs: Springs) -> float:
     return max(float(path.travel(end)), 0.0) if end > law.rest_half_width else 0.0
 
 
-def two_way_gap(
-    law: SlopeLaw,  # what the cam is cut for
-    target: CamDesign,  # the stroke
-    loads: Loads,  # springs, weights, and what rubs beside the rollers
-    friction: float,  # rolling friction
-) -> float:
+def two_way_gap(law: SlopeLaw, target: CamDesign, loads: Loads, friction: float) -> float:
     """Return the largest |F/F0 - 1| of both directions over the stroke, the first fiftieth left out.
 
-    Infinite if friction holds the roller somewhere.
+    Of a cam cut for a slope law with a rolling friction; infinite if friction holds the roller somewhere.
     """
     path, end = reach(law, target.stroke)
     x = np.linspace(law.rest_half_width, end, 801)
@@ -427,7 +422,7 @@ def _plate_lacks(spec: CamSpec) -> Iterator[Finding]:
         sides = assemble_sides(spec)
     except CannotBuild:
         return
-    for note in plate_notes((sides[0].profile, sides[1].profile), spec.mechanism.plate):
+    for note in CutPlate((sides[0].profile, sides[1].profile), spec.mechanism.plate).notes:
         yield finding("plate_incomplete", note)
 
 

@@ -76,12 +76,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 
 
 @apply_style
-def draw_mechanism(
-    solution: Solution,  # a solved mechanism
-    index: int,  # which of its points
-    ax: Axes,  # to draw on
-    view: Scene | None = None,  # of the same solution, where several positions are drawn
-) -> Axes:
+def draw_mechanism(solution: Solution, index: int, ax: Axes, view: Scene | None = None) -> Axes:
     """Draw the mechanism to scale at one point of the solution; return the axes, which are in millimetres."""
     view, drawn_pose = view or scene(solution), pose(solution, index)
     radius, height = solution.mechanism.roller_radius, view.box[3] - view.box[1]

@@ -91,12 +91,8 @@ def is_overstretched(longest: FloatArray | float, limit: float) -> Any:
     return np.asarray(longest > limit * (1 + LIMIT_RTOL))
 
 
-def find_overstress(
-    mechanism: Mechanism,  # with its contact
-    largest: float | None,  # largest pressure [Pa]
-    place: str,  # where that is
-) -> Finding | None:
-    """Return what to say where the contact yields; None if it does not."""
+def find_overstress(mechanism: Mechanism, largest: float | None, place: str) -> Finding | None:
+    """Return what to say where the contact yields under the largest pressure [Pa]; None if it does not."""
     allowable = allowable_stress(mechanism)
     if mechanism.contact is None or allowable is None or largest is None or not yields(largest, allowable):
         return None

@@ -18,7 +18,7 @@ import numpy as np
 
 from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc
 from cfmkit.export.posed_part import PosedBody
-from cfmkit.families.cam.outline import plate_contours
+from cfmkit.families.cam.outline import CutPlate
 from cfmkit.families.cam.part_sizes_and_clearances import (
     BRACE_WIDTH,
     PLATE_THICKNESS,
@@ -251,7 +251,7 @@ def _largest(solution: Solution, name: str) -> float:
 def cut_plate(solution: Solution) -> tuple[Contour, ...]:
     """Return the outline of the plate and its holes."""
     profile = solution.assembly.track.profile
-    return plate_contours((profile, profile), solution.assembly.spec.mechanism.plate)
+    return CutPlate((profile, profile), solution.assembly.spec.mechanism.plate).contours
 
 
 def roller_shaft(solution: Solution) -> tuple[float, Bearing | None]:
@@ -287,11 +287,10 @@ def _shaft(loads: _SizingLoads, faults: dict[str, str]) -> tuple[float, Bearing 
 def _springs_in_words(mechanism: Mechanism, hooks: _Hooks, shaft: float) -> str:
     """Return what the springs between the rollers must be, and how long: the insides of loops lie beyond the axes."""
     springs = mechanism.springs
-    rates = springs.each if isinstance(springs.each, tuple) else (springs.each,)
     limit = f", up to {length_in_words(springs.max_elongation)}" if springs.max_elongation else ""
     opens = f", initial tension {newton(springs.initial_tension)}" if springs.initial_tension else ""
     tight = f", stretched by {length_in_words(mechanism.preload)} at the start" if mechanism.preload else ""
-    reported = " to ".join(dict.fromkeys((rate(min(rates)), rate(max(rates)))))
+    reported = " to ".join(dict.fromkeys((rate(min(springs.rates)), rate(max(springs.rates)))))
     relaxed = 2.0 * mechanism.springs_rest + springs.tension_stretch
     where = "between the axes of the bars' holes" if hooks.height else "between the axes of the shafts"
     inside = "" if hooks.height else f" ({mm(relaxed + hooks.seat(shaft))} inside the loops)"

@@ -67,13 +67,8 @@ class DrawnError:
         return np.asarray((along, 1.0 - at.curvature * beside, np.zeros_like(along))[derivative])
 
 
-def force_band(
-    assembly: Assembly,  # the design and the loads
-    tolerance: Manufacturing,  # standard deviations of the errors
-    travel: FloatArray,  # (n,): where the force is wanted [m]
-    seed: int,  # of the generator: the same seed draws the same cams
-) -> ForceBand:
-    """Return the forces of cams that are cut with errors."""
+def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray, seed: int) -> ForceBand:
+    """Return the forces at travels (n,) [m] of cams that are cut with errors of those standard deviations."""
     generator = np.random.default_rng(seed)
     flank = DesignFlank(assembly.profile, 1.0)
     arc = arc_lengths(flank)

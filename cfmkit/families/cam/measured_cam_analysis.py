@@ -371,13 +371,11 @@ class BuiltTrack:
         return np.interp(slider, self.slider, self.x), slope
 
 
-def built_flank(
-    design: DesignFlank,  # the right flank
-    points: FloatArray,  # (n,): path coordinates of the points' feet [m], in any order; those at one place are averaged
-    errors: FloatArray,  # (n,): their distances from the design along its normal [m]
-    noise: float,  # standard deviation of the measurement [m]
-) -> BuiltFlank:
-    """Return a flank from registered points."""
+def built_flank(design: DesignFlank, points: FloatArray, errors: FloatArray, noise: float) -> BuiltFlank:
+    """Return a flank from registered points, whose distances from a right flank have a standard deviation [m].
+
+    Their feet are path coordinates (n,) in any order [m]; points at one place are averaged.
+    """
     arc = arc_lengths(design)
     along = np.interp(points, *arc)
     places, inverse, counts = np.unique(np.round(along, 9), return_inverse=True, return_counts=True)
@@ -385,13 +383,8 @@ def built_flank(
     return BuiltFlank(design, fit_smoothing_spline(places, mean, noise), arc)
 
 
-def built_track(
-    flank: BuiltFlank,  # mirrored to the right
-    # roller_radius, brace_length: of the parts built in [m]
-    roller_radius: float,
-    brace_length: float,
-) -> BuiltTrack:
-    """Return the track of a roller's centre on a built flank."""
+def built_track(flank: BuiltFlank, roller_radius: float, brace_length: float) -> BuiltTrack:
+    """Return the track of a roller's centre on a built flank, which is mirrored to the right."""
     low, high = flank.ends
     places = np.linspace(low, high, max(int((high - low) / PLACE_STEP), 50) + 1)
     base = flank.design.frame(np.interp(places, flank.arc[1], flank.arc[0]))

@@ -48,10 +48,7 @@ _MAX_ROUNDS = 12
 _DIFFERENCE_STEP = 1e-6  # of friction, and of the rest half width [m], for derivatives
 
 
-def attribute(
-    result: Result,  # with its state
-    loop: MeasuredLoop,  # inside what the model covers
-) -> Mapping[str, Quantity]:
+def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
     """Return what explains a measured loop of a mechanism at rest, by name; nothing for a motion."""
     state = result.state
     if not isinstance(state, MeasuredCam | Solution):

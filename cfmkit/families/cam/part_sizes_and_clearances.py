@@ -13,7 +13,7 @@ import numpy as np
 from cfmkit.arrays import FloatArray
 from cfmkit.export.contours import Arc, Line
 from cfmkit.families.cam.findings import finding
-from cfmkit.families.cam.outline import plate_contours
+from cfmkit.families.cam.outline import CutPlate
 from cfmkit.families.findings import mm
 from cfmkit.stock.springs.offers import extension_spring
 
@@ -80,7 +80,7 @@ def clearances(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
         return
     x, y, pin = states.x, states.y, solution.pin_path[:, 1]
     profile = solution.assembly.profile
-    contours = plate_contours((profile, profile), mechanism.plate)
+    contours = CutPlate((profile, profile), mechanism.plate).contours
     yield "roller and roller", 2.0 * (x - radius)
     # The ends of the edges beside the flanks lie on the flanks, which the rollers touch: rounding is no overlap.
     yield BESIDE_FLANKS_PAIR, _to_edges((x, y), contours[0].edges) - radius

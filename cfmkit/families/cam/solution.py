@@ -155,13 +155,12 @@ class Solution(ShortRepr):
     # --- at any travel ----------------------------------------------------------------------------------------------
 
     def evaluate_travel(
-        self,
-        travel: FloatArray,  # (k, m), or of any shape for one mechanism: travels of each mechanism, or of some
-        sign: float,  # 1 or -1
-        rows: Any = None,  # (k,) of int: which mechanisms; default: all
-        flank: bool = False,  # whether places are on the flank: rounding must not take the first one to the corner
+        self, travel: FloatArray, sign: float, rows: Any = None, flank: bool = False
     ) -> tuple[TrackStates, Forces]:
-        """Return where the rollers are, and the forces on the way up (1) or down (-1), at travels [m]."""
+        """Return where the rollers are, and the forces on the way up (1) or down (-1), at travels [m].
+
+        Of all mechanisms, or of `rows` (k,); `flank`: rounding must not take its first place to the corner.
+        """
         track = self.assembly.track if rows is None else self.assembly.track.select_rows(rows)
         slider = track.start + travel
         if rows is None and not flank:

@@ -41,13 +41,11 @@ class Sides:
         """Return the spring force on each roller [N]; springs do not push."""
         return loads.stiffness * np.maximum(self.x[0] + self.x[1] - 2.0 * rest, 0.0)
 
-    def forces(
-        self,
-        loads: Loads,  # springs and weights
-        friction: float,  # positive on the way up, negative on the way down
-        rest: float,  # half width at which the springs are at rest [m]
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the force on the slider and at the right and left contact [N]; NaN where nothing moves a side."""
+    def forces(self, loads: Loads, friction: float, rest: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the force on the slider and at the right and left contact [N]; NaN where nothing moves a side.
+
+        Friction is negative on the way down; the springs are at rest at a half width [m].
+        """
         pull, contacts = np.full_like(self.x[0], loads.slider_weight), []
         spring, weight = self.spring(loads, rest), loads.roller_weight
         for x, slope in zip(self.x, self.slope, strict=True):

@@ -79,6 +79,11 @@ class Springs(Model):
         return 0.0 if self.stiffness is None else self.stiffness
 
     @property
+    def rates(self) -> tuple[float, ...]:
+        """Stiffness of every one of the springs [N/m]."""
+        return self.each if isinstance(self.each, tuple) else (self.each,) * self.number
+
+    @property
     def number(self) -> int:
         """How many springs there are."""
         return len(self.each) if isinstance(self.each, tuple) else 1 if self.count is None else self.count

@@ -241,13 +241,10 @@ class MotionEnding:
     finding: Finding
 
 
-def ending(
-    parts: Build,  # the mechanism and its motion
-    times: FloatArray,  # (n,): at which it is looked at [s]
-    origin: float,  # what is added to slider positions to give displacements [m]
-) -> MotionEnding | None:
+def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | None:
     """Return where a motion becomes impossible; None if it never does.
 
+    It is looked at at times (n,) [s]; `origin` added to a slider position gives the displacement [m].
     Raises CannotBuild if the first pose is impossible already.
     """
     machine, motion = parts.machine, parts.motion

@@ -142,13 +142,11 @@ class MotionResponse:
         return total
 
 
-def respond(
-    machine: Machine,  # the mechanism
-    # position, speed and acceleration of the slider; positions within ``machine.span``, and speeds of one sign: rolling
-    # resistance acts against the motion, also where it begins and ends
-    moment: Moment,
-) -> MotionResponse:
-    """Return the forces of a motion."""
+def respond(machine: Machine, moment: Moment) -> MotionResponse:
+    """Return the forces of a motion of the slider, at positions within ``machine.span``.
+
+    Speeds are of one sign: rolling resistance acts against the motion, also where it begins and ends.
+    """
     parts, stances = machine.constants, machine.stances(moment.position)
     at = kinematics(stances, moment.position, parts.length)
     loads = _loads(machine, parts, at, moment)

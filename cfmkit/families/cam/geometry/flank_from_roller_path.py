@@ -73,12 +73,8 @@ class WholeCamUndercut(ValueError):
     """The roller is so large that no part of the flank is left."""
 
 
-def cut_cam(
-    path: RollerPath,  # the roller-centre path
-    roller_radius: float,  # of the roller that the cam is cut for [m]
-    end: float,  # path coordinate at which the cam ends [m]
-) -> CamProfile:
-    """Return the cam that a roller path gives, trimmed where the roller undercuts its start.
+def cut_cam(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
+    """Return the cam that a roller path gives up to path coordinate `end`, trimmed where the roller undercuts it [m].
 
     Raises WholeCamUndercut if every point of the flank would be cut away.
     """
