@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.measured_cam import MeasuredCam
     from cfmkit.families.cam.part import Scene
     from cfmkit.families.cam.solution import Solution
-    from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam
     from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result
 

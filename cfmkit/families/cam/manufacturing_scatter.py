@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.geometry.flank_from_roller_path import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.measured_cam import Sides
+from cfmkit.families.cam.measured_cam_analysis import track_over_slider
 from cfmkit.families.cam.solution import ForceBand
-from cfmkit.families.cam.solution_of_measured_cam import Sides
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -111,10 +112,7 @@ def _draw_error(
 def _track(assembly: Assembly, built: CurveFrame, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return x [m] and slope of the roller's centre, a radius away from every point of the flank; NaN outside."""
     mechanism = assembly.spec.mechanism
-    x, y = (built.points + mechanism.roller_radius * built.normals).T
-    height = y + np.sqrt((mechanism.brace_length - x) * (mechanism.brace_length + x))
-    rising = np.concatenate([[True], np.diff(np.maximum.accumulate(height)) > 0])
-    slope = built.normals[:, 0] / -built.normals[:, 1]
-    at = height[rising]
-    interpolated = tuple(np.interp(slider, at, values[rising], left=np.nan, right=np.nan) for values in (x, slope))
-    return interpolated[0], interpolated[1]
+    centers = built.points + mechanism.roller_radius * built.normals
+    track = track_over_slider(centers, built, np.zeros(len(centers)), mechanism.brace_length)
+    x, slope = (np.interp(slider, track.slider, of, left=np.nan, right=np.nan) for of in (track.x, track.slope))
+    return x, slope

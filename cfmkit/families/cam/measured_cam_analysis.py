@@ -27,7 +27,14 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, left_out, rubbing_left_out
-from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.geometry.flank_from_roller_path import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.measured_cam import (
+    MEASURED_QUANTITIES,
+    MeasuredCam,
+    Sides,
+    describe_unmeasured,
+    findings_of_built,
+)
 from cfmkit.families.cam.mechanism_from_spec import (
     assemble,
     check_first_pose,
@@ -36,13 +43,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
     displacement_origin,
 )
 from cfmkit.families.cam.scalar_results import curve_cut_for
-from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides
 from cfmkit.families.cam.statics import Assembly, target_force
-from cfmkit.families.cam.values_and_findings_of_measured_cam import (
-    MEASURED_QUANTITIES,
-    describe_unmeasured,
-    findings_of_built,
-)
 from cfmkit.families.findings import CannotBuild, mm, no_result
 from cfmkit.families.rows import values_of_one
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between
@@ -396,7 +397,7 @@ def built_track(flank: BuiltFlank, roller_radius: float, brace_length: float) ->
         gap = centers + lift[:, None] * base.normals - at.points
         lift = lift + (roller_radius - np.hypot(gap[:, 0], gap[:, 1])) / (at.normals * base.normals).sum(axis=1)
     centers = centers + lift[:, None] * base.normals
-    return _track_over_slider(centers, flank.frame(contact), contact, brace_length)
+    return track_over_slider(centers, flank.frame(contact), contact, brace_length)
 
 
 def _lift(
@@ -418,11 +419,11 @@ def _lift(
     return best, places[where]
 
 
-def _track_over_slider(centers: FloatArray, frame: CurveFrame, contact: FloatArray, brace: float) -> BuiltTrack:
+def track_over_slider(centers: FloatArray, frame: CurveFrame, contact: FloatArray, brace: float) -> BuiltTrack:
+    """Return the track of a roller's centre over the slider's position, of centres that touch a flank in frames."""
     x, y = centers.T
     slider = y + np.sqrt((brace - x) * (brace + x))
     # Where a wave makes the slider fall the roller jumps to the next place at which it rises beyond.
-    rising = slider >= np.maximum.accumulate(slider)
-    rising[1:] &= np.diff(np.maximum.accumulate(slider)) > 0
+    rising = np.concatenate([[True], np.diff(np.maximum.accumulate(slider)) > 0])
     slope = frame.normals[:, 0] / -frame.normals[:, 1]
     return BuiltTrack(slider[rising], x[rising], y[rising], slope[rising], contact[rising])

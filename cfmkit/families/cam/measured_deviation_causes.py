@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.measured_cam import MeasuredCam, Sides, root_mean_square
 from cfmkit.families.cam.solution import Solution
-from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides, root_mean_square
 from cfmkit.results import Quantity, quantities
 
 if TYPE_CHECKING:

@@ -32,12 +32,12 @@ from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, left_out, rules_of
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import select_profiles
 from cfmkit.families.cam.hardware import hardware
+from cfmkit.families.cam.measured_cam import PROFILE_DEFINITIONS
 from cfmkit.families.cam.mechanism_from_spec import assemble, check_first_pose, check_springs, displacement_origin
 from cfmkit.families.cam.part_sizes_and_clearances import touching
 from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS, SCALAR_QUANTITIES, curve_cut_for
 from cfmkit.families.cam.solution import Solution
 from cfmkit.families.cam.statics import TRAVEL_RTOL, Assembly, forces, target_force
-from cfmkit.families.cam.values_and_findings_of_measured_cam import PROFILE_DEFINITIONS
 from cfmkit.families.findings import CannotBuild, mm, no_result
 from cfmkit.families.rows import (
     RowsDiffer,

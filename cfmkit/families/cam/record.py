@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from cfmkit.families.base import DesignMethod, Family, Pictures, ResultNames
 from cfmkit.families.cam.findings import CAM_FINDINGS
+from cfmkit.families.cam.measured_cam import PROFILE_DEFINITIONS
 from cfmkit.families.cam.measured_deviation_causes import DEVIATION_DEFINITIONS
 from cfmkit.families.cam.mechanism_from_spec import resolve
 from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS
 from cfmkit.families.cam.spec import CamSpec
-from cfmkit.families.cam.values_and_findings_of_measured_cam import PROFILE_DEFINITIONS
 from cfmkit.families.deferred_imports import deferred_imports
 
 with deferred_imports():

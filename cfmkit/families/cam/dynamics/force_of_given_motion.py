@@ -134,10 +134,7 @@ def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
 def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
     """Return the spec with the defaults of the analysis made explicit."""
     resolved, masses = parts.right.spec, spec.mechanism.masses
-    method = "inverse" if stated_motion(spec).closed else "multibody"
-    dynamics = stated_motion(spec).model_copy(update={"method": method})
-    written_out = {"fidelity": "dynamic", "gravity": spec.gravity, "dynamics": dynamics}
-    analysis = spec.analysis.model_copy(update=written_out)
+    analysis = spec.analysis.model_copy(update={"fidelity": "dynamic", "gravity": spec.gravity})
     changes: dict[str, object] = {"analysis": analysis}
     if masses is not None:
         side = parts.machine.right.parts
