@@ -160,7 +160,7 @@ def design(spec: CamSpec, run: Run) -> Design:
         check_target(target)
     task = _Task.from_spec(spec, target)
     _check_start_of(task)
-    best, *others = _CHOICES[target.choose](task)
+    best, *others = _CHOICE_FUNCTIONS[target.choose](task)
     next_best = tuple(partial(_with_next, task, choice) for choice in others)
     return replace(_with_choice(task, best), next_best=next_best)
 
@@ -261,13 +261,13 @@ def _from_catalogue(task: _Task) -> list[Choice]:
     raise finding.infeasible("no_spring_fits", f"{reported}, or change {change}")
 
 
-_CHOICES: dict[str, Callable[[_Task], list[Choice]]] = {
+_CHOICE_FUNCTIONS: dict[str, Callable[[_Task], list[Choice]]] = {
     "force-constant": _from_springs,
     "stiffness": _from_constant,
     "preload": _with_preload,
     "catalogue": _from_catalogue,
 }
-"""How `design.choose` chooses: what is chosen first, then what is nearly as good."""
+"""Functions by the word of `design.choose`: each returns the best choice, then those that are nearly as good."""
 _BLOCKING_KEYS = {
     "undercut": "'design.avoid_undercut'",
     "brace too short": "'mechanism.brace_length'",

@@ -144,7 +144,7 @@ def _undercut(solution: Solution) -> tuple[str, ...]:
     profile, travel = solution.assembly.track.profile, solution.corner_travel
     assert profile.corner is not None
     law, point = profile.path.law, profile.corner.point
-    (place, radius), missing = law.tightest(profile.end), max(-_offset(solution), 0.0)
+    (place, radius), missing = law.tightest(profile.end), max(-float(solution.mechanism.profile.offset), 0.0)
     where = "at the start" if place <= law.rest_half_width else f"at x = {mm(place)}"
     roller = f"the {mm(profile.roller_radius - missing)} roller"
     roller += f", with {mm(missing)} of the flank missing," if missing else ""
@@ -166,8 +166,7 @@ def _undercut(solution: Solution) -> tuple[str, ...]:
 
 def _undercut_in_short(solution: Solution) -> str:
     law = solution.assembly.track.profile.path.law
-    what = "force not constant" if law.constant else "force not as cut"
-    return f"{what} up to {mm(solution.corner_travel)}"
+    return f"force not {'constant' if law.constant else 'as cut'} up to {mm(solution.corner_travel)}"
 
 
 def _corner_pressure(solution: Solution) -> tuple[str, ...]:
@@ -177,16 +176,10 @@ def _corner_pressure(solution: Solution) -> tuple[str, ...]:
 
 def _preload_cure(solution: Solution) -> float | None:
     """Return the least elongation at the start with which the roller can follow the path [m]; None if none helps."""
-    profile, spec = solution.assembly.track.profile, solution.assembly.spec
-    law = profile.path.law
-    half = law.smallest_preload(profile.roller_radius)
-    if half is None or half >= spec.mechanism.rest_half_width or _offset(solution) < 0:
-        return None
-    return 2.0 * half
-
-
-def _offset(solution: Solution) -> float:
-    return float(solution.mechanism.profile.offset)
+    profile, mechanism = solution.assembly.track.profile, solution.mechanism
+    half = profile.path.law.smallest_preload(profile.roller_radius)
+    is_cure = half is not None and half < mechanism.rest_half_width and mechanism.profile.offset >= 0
+    return 2.0 * half if half is not None and is_cure else None
 
 
 def _jam(number: int) -> FindingRule[Solution]:
@@ -267,8 +260,12 @@ def _is_overstretched(solution: Solution) -> Any:
 
 def _describe_overstretch(solution: Solution) -> tuple[str, ...]:
     limit, longest = solution.mechanism.springs.max_elongation, float(solution.elongation[-1])
-    past = _travel_at(solution, limit)
-    return (f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",)
+    return (describe_overstretch(longest, limit, _travel_at(solution, limit)),)
+
+
+def describe_overstretch(longest: float, limit: float, travel: float) -> str:
+    """Return the sentence on springs stretched beyond a limit that is reached at a travel [m]."""
+    return f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(travel)} of travel"
 
 
 def _slack_cable(direction: Literal["up", "down"]) -> FindingRule[Solution]:
@@ -277,10 +274,9 @@ def _slack_cable(direction: Literal["up", "down"]) -> FindingRule[Solution]:
         return np.asarray((solution.elongation > 0) & (getattr(solution, direction).slider <= 0))
 
     def message(solution: Solution) -> tuple[str, ...]:
-        return (
-            f"on the way {direction} the force on the slider is not positive from "
-            f"{_where(solution.travel, places(solution))} of travel: a cable would go slack",
-        )
+        low, high = (mm(end) for end in solution.travel[places(solution)][[0, -1]].tolist())
+        where = f"from {low} to {high} of travel"
+        return (f"on the way {direction} the force on the slider is not positive {where}: a cable would go slack",)
 
     return FindingRule("slack_cable", lambda solution: places(solution).any(axis=-1), message)
 
@@ -338,11 +334,6 @@ def _is_overstressed(solution: Solution) -> Any:
 def _describe_overstress(solution: Solution) -> tuple[str, ...]:
     top, travel = (float(values[0, 0]) for values in solution.flank.largest_pressure)
     return overstress(solution.mechanism, top, f"at {mm(travel)} of travel")
-
-
-def _where(travel: FloatArray, mask: NDArray[np.bool_]) -> str:
-    hits = np.flatnonzero(mask)
-    return f"{mm(float(travel[hits[0]]))} to {mm(float(travel[hits[-1]]))}"
 
 
 def _is_undercut(solution: Solution) -> Any:

@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.contact_pressure import flank_pressure, worst
-from cfmkit.families.cam.findings import find_overstress, finding, is_overstretched
+from cfmkit.families.cam.findings import describe_overstretch, find_overstress, finding, is_overstretched
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS, integrate_between
 from cfmkit.families.cam.statics import constant_force, levers, load_on_contact, load_on_slider
@@ -143,14 +143,14 @@ class MeasuredCam(ShortRepr):
         """Half the height of the measured part [m]: where an angle is felt."""
         return 0.5 * float(np.ptp(np.concatenate([points[:, 1] for points in self.registration.points])))
 
-    def used(self, values: Iterable[FloatArray]) -> FloatArray:
+    def select_used(self, values: Iterable[FloatArray]) -> FloatArray:
         """Return values of the points of both flanks that count."""
         return np.concatenate([item[keep] for item, keep in zip(values, self.registration.used, strict=True)])
 
     @cached_property
     def errors(self) -> FloatArray:
         """Errors of the points that count, of both flanks [m]."""
-        return self.used(self.registration.errors)
+        return self.select_used(self.registration.errors)
 
     def pressure(self, direction: float) -> FloatArray:
         """Return the larger pressure of both contacts on the way up (1) or down (-1), the flank as designed [Pa]."""
@@ -218,10 +218,12 @@ _PROFILE_QUANTITIES: Mapping[str, ScalarQuantity[MeasuredCam]] = {
     "profile_rmse_x": _quantity(
         "length",
         "root mean square error in x at the same y [SS, fig. 3]",
-        lambda built: root_mean_square(built.used(built.across)),
+        lambda built: root_mean_square(built.select_used(built.across)),
     ),
     "profile_sd_x": _quantity(
-        "length", "standard deviation (n - 1) of the error in x", lambda built: built.used(built.across).std(ddof=1)
+        "length",
+        "standard deviation (n - 1) of the error in x",
+        lambda built: built.select_used(built.across).std(ddof=1),
     ),
     "profile_outliers": _quantity("count", "measured points that the registration ignored", _count_outliers),
     "registration_angle": _quantity(
@@ -319,10 +321,7 @@ def _built_mechanics(built: MeasuredCam) -> Iterator[Finding]:
     limit, longest = built.assembly.spec.mechanism.springs.max_elongation, float(built.elongation.max())
     if limit and is_overstretched(longest, limit):
         past = float(built.travel[np.argmax(built.elongation > limit)])
-        yield finding(
-            "spring_overstretched",
-            f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",
-        )
+        yield finding("spring_overstretched", describe_overstretch(longest, limit, past))
     if (slack := built.elongation < 0).any():
         last = float(built.travel[slack][-1])
         yield finding("spring_slack", f"the springs carry no force up to {mm(last)} of travel: they are too long")

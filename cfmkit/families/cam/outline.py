@@ -170,7 +170,7 @@ class CutPlate:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the plate lacks for want of room: its tab, or some of its fixing holes."""
+        """Sentences on a tab or fixing holes that the plate lacks for want of room."""
         plate, diameter, width, faults = self.plate, self.plate.hole_diameter, self.tab_width, []
         if plate.base_height and not width:
             faults.append("the rollers leave no room for the tab below the cam: the plate has none ('mechanism.plate')")

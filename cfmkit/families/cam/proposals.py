@@ -185,7 +185,7 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
         if request.hysteresis is not None and not size["plain"]:
             fitting = (entry.width for entry in BALL_BEARINGS if _turn_on_bearings(0.0, size["roller"], entry))
             thick = max(thick, *fitting)
-        joints = _Joints.for_size(request, size, press, thick, PartStrength.from_material(material, request.safety))
+        joints = _Joints.from_size(request, size, press, thick, PartStrength.from_material(material, request.safety))
         pin = joints.slider_pin(request, size)
         depths: dict[int, float] = {}
         for count in SPRING_COUNTS if pin is not None else ():
@@ -221,7 +221,7 @@ class _Joints:
     slider: float  # of half of the slider around the rods that guide it [m]
 
     @classmethod
-    def for_size(
+    def from_size(
         cls, request: Request, size: dict[str, float], press: float, thick: float, strength: PartStrength
     ) -> _Joints:
         """Return those of a candidate's sizes."""

@@ -85,7 +85,7 @@ class Springs(Model):
 
     @property
     def number(self) -> int:
-        """How many springs there are."""
+        """Number of springs."""
         return len(self.each) if isinstance(self.each, tuple) else 1 if self.count is None else self.count
 
     @property

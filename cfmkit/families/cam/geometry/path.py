@@ -37,17 +37,10 @@ CAMS_KEPT = 8  # cams that are remembered: whoever builds other parts around one
 
 
 class RollerPath:
-    """The roller-centre path y(x) from (x0, 0), by the closed form, a quadrature or the paper's ODE.
+    """The roller-centre path y(x) from (x0, 0) up to an x of `end` [m], by the closed form, a quadrature or the ODE.
 
-    Parameters
-    ----------
-    law : SlopeLaw
-        The slope.
-    end : float
-        The largest x that will be needed [m].
-    method : {"quadrature", "ode"}
-        "quadrature" (default) integrates the slope over x by Gauss-Legendre panels;
-        "ode" integrates [SS, eq. 2] over y with scipy's DOP853.
+    "quadrature" integrates the slope over x by Gauss-Legendre panels where there is no closed form; "ode" integrates
+    [SS, eq. 2] over y with scipy's DOP853.
     """
 
     def __init__(self, law: SlopeLaw, end: float, method: Method = "quadrature") -> None:

@@ -131,24 +131,11 @@ def pivot_angle(slider: FloatArray, pivot: Pivot) -> FloatArray:
 
 
 class Track:
-    """The track of a roller's centre on a given cam.
+    """The track of a roller's centre on a given cam, with the roller and the brace built in [m].
 
-    Parameters
-    ----------
-    profile : CamProfile
-        The cam as cut.
-    roller_radius : float
-        Of the roller that runs on it [m].
-    brace_length : float
-        Of the brace built in [m].
-    offset : float
-        Material left on the flank beyond the profile, >= 0 [m]; it rounds a corner. Missing
-        material is not an offset: it is the cam cut for a larger roller (`flank_from_roller_path.cut`).
-
-    Raises
-    ------
-    NoTrack
-        If the roller cannot run on the cam.
+    Material left on the flank beyond the profile, an `offset` >= 0 [m], rounds a corner. Missing material is not an
+    offset: it is the cam cut for a larger roller (`flank_from_roller_path.cut_cam`). Raises NoTrack if the roller
+    cannot run on the cam.
     """
 
     def __init__(self, profile: CamProfile, roller_radius: float, brace_length: float, offset: float = 0.0) -> None:
