@@ -237,7 +237,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "pressure_angle_max": _quantity(
         "angle",
         "largest angle between the force of a brace and the motion of its roller, on the flank",
-        lambda solution: largest_of_each(solution.flank.pressure_angle),
+        lambda solution: solution.largest_angle_on_flank,
     ),
     "brace_angle_max": _quantity(
         "angle",
@@ -250,12 +250,12 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "ratio",
         "largest (up - down)/(up + down) on the flank: fixed by friction and geometry, no choice of the profile "
         "removes it",
-        lambda solution: solution.flank.half_gap,
+        lambda solution: solution.largest_half_gap,
     ),
     "contact_pressure_max": _quantity(
         "stress",
         "largest Hertzian pressure of the line contact on the flank, on the way up; in motion, of both sides",
-        lambda solution: solution.flank.largest_pressure[0],
+        lambda solution: solution.largest_pressure[0],
         lambda solution: solution.mechanism.contact is not None,
     ),
     **{

@@ -6,8 +6,8 @@ Values are computed when they are first read; figures, findings and results impo
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, partial, reduce
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -148,9 +148,45 @@ class Solution(ShortRepr):
         return corner_travel if self.count > 1 else float(corner_travel[0])
 
     @cached_property
-    def flank(self) -> FlankSamples:
-        """Contacts on the flank."""
-        return FlankSamples.from_solution(self)
+    def flank(self) -> tuple[FlankSamples, ...]:
+        """Contacts on the flank: those at the samples, and before them that with which the roller leaves the corner."""
+        corner, travel, states = np.atleast_1d(self.corner_travel), self.travel, self.states
+        leaves = (corner > 0) & (corner <= travel[..., -1:])
+        samples = FlankSamples(travel, ~states.on_corner & (~leaves | (travel > corner)), states, self.up, self.down)
+        if not leaves.any():
+            return (samples,)
+        (first, up), (_, down) = (self.evaluate_travel(corner, sign, flank=True) for sign in (1.0, -1.0))
+        return FlankSamples(corner, leaves, first, up, down), samples
+
+    @property
+    def largest_angle_on_flank(self) -> FloatArray:
+        """Largest angle between a brace's pull and its roller's motion on the flank, (..., 1) [rad]."""
+        return largest_of_each(*(np.where(at.there, at.states.pressure_angle, np.nan) for at in self.flank))
+
+    @property
+    def largest_half_gap(self) -> FloatArray:
+        """Largest (up - down)/(up + down) on the flank, (..., 1)."""
+
+        def half_gap(at: FlankSamples) -> FloatArray:
+            up, down = at.up.slider, at.down.slider
+            usable = at.there & np.isfinite(up) & np.isfinite(down) & (up + down > self.effort_error)
+            return np.where(usable, (up - down) / np.where(usable, up + down, 1.0), np.nan)
+
+        return largest_of_each(*map(half_gap, self.flank))
+
+    @cached_property
+    def largest_pressure(self) -> tuple[FloatArray, FloatArray]:
+        """Largest pressure on the flank on the way up [Pa], NaN without a contact, and about its place [m], (m, 1)."""
+
+        def pressure(states: TrackStates, up: Forces) -> FloatArray:
+            return flank_pressure(self.assembly, states, up.contact)
+
+        def evaluate(travel: FloatArray) -> FloatArray:
+            return pressure(*self.evaluate_travel(travel, 1.0, flank=True))
+
+        pressed = (np.where(at.there, pressure(at.states, at.up), np.nan) for at in self.flank)
+        travel, values = (reduce(_append_column, parts) for parts in ((at.travel for at in self.flank), pressed))
+        return extreme_next_to(evaluate, travel, values, self.count)
 
     # --- at any travel ----------------------------------------------------------------------------------------------
 
@@ -347,53 +383,15 @@ class Solution(ShortRepr):
         return StressRows(read, evaluate, self.column(np.nan if allowable is None else allowable))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class FlankSamples(ShortRepr):
-    """Contacts on the flank: the samples there, and before them the place at which the roller leaves the corner."""
+class FlankSamples(NamedTuple):
+    """Places of which some are on the flank, (..., n) each."""
 
-    solution: Solution  # the mechanisms
-    travel: FloatArray  # (..., n) increasing [m]
-    there: NDArray[np.bool_]  # (..., n) which of the places are on the flank
-    states: TrackStates  # where the rollers are, (..., n)
-    # up, down: on the way up and on the way down, (..., n) each
+    travel: FloatArray  # increasing [m]
+    there: NDArray[np.bool_]  # which of the places are on the flank
+    states: TrackStates
+    # up, down: on the way up and on the way down
     up: Forces
     down: Forces
-
-    @classmethod
-    def from_solution(cls, solution: Solution) -> FlankSamples:
-        """Return those of solved mechanisms."""
-        corner, travel, states = np.atleast_1d(solution.corner_travel), solution.travel, solution.states
-        leaves = (corner > 0) & (corner <= travel[..., -1:])
-        on_flank = ~states.on_corner & (~leaves | (travel > corner))
-        if not leaves.any():
-            return cls(solution, travel, on_flank, states, solution.up, solution.down)
-        first, _ = solution.evaluate_travel(corner, 1.0, flank=True)
-        states = first.combine(_append_column, states)
-        up, down = (solution.forces_at(states, sign) for sign in (1.0, -1.0))
-        return cls(solution, _append_column(corner, travel), _append_column(leaves, on_flank), states, up, down)
-
-    @property
-    def pressure_angle(self) -> FloatArray:
-        """Angle between the brace's pull and the roller's motion [rad]; NaN elsewhere."""
-        return np.where(self.there, self.states.pressure_angle, np.nan)
-
-    def pressure(self, travel: FloatArray) -> FloatArray:
-        """Return the pressure of the contact on the way up at travels [Pa]; NaN where there is none."""
-        states, contact_forces = self.solution.evaluate_travel(travel, 1.0, flank=True)
-        return flank_pressure(self.solution.assembly, states, contact_forces.contact)
-
-    @cached_property
-    def largest_pressure(self) -> tuple[FloatArray, FloatArray]:
-        """Largest pressure of the contact on the way up [Pa], NaN without one, and about where it is [m], (m, 1)."""
-        pressed = flank_pressure(self.solution.assembly, self.states, self.up.contact)
-        return extreme_next_to(self.pressure, self.travel, np.where(self.there, pressed, np.nan), len(self.solution))
-
-    @property
-    def half_gap(self) -> FloatArray:
-        """Largest (up - down)/(up + down), (..., 1)."""
-        up, down = self.up.slider, self.down.slider
-        usable = self.there & np.isfinite(up) & np.isfinite(down) & (up + down > self.solution.effort_error)
-        return largest_of_each(np.where(usable, (up - down) / np.where(usable, up + down, 1.0), np.nan))
 
 
 def _append_column(first: Any, rest: Any) -> Any:
