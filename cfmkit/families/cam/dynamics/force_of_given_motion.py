@@ -275,7 +275,7 @@ def _margins(machine: Machine, moment: tuple[FloatArray, FloatArray, FloatArray]
     """Return what must not be negative, by the name of the finding that says so, (n,) each."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         response = respond(machine, moment)  # type: ignore[arg-type]
-    radius, center = machine.constants.radius, response.at.center
+    radius, center = machine.parts.roller_radius, response.at.center
     touching = (center + 1j * radius * response.at.tangent).real
     return {
         "flanks_collide": touching.min(axis=0),

@@ -75,7 +75,7 @@ def contact_pressure(moved: MotionSolution) -> FloatArray:
     machine = moved.build.machine
     low, high = machine.span
     stances = machine.stances(np.clip(history.moment.position, low, high))
-    radius, bend = machine.constants.radius, np.array([stance.curvature for stance in stances])
+    radius, bend = machine.parts.roller_radius, np.array([stance.curvature for stance in stances])
     with np.errstate(divide="ignore", invalid="ignore"):
         curvature = 1.0 / (radius * (1.0 - bend * radius))
         pressed = pressure(history.contact, curvature, contact.material, contact.width).max(axis=0)
