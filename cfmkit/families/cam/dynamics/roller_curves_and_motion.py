@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SideParts:
-    """Dimensions and masses of a side, or of both as columns (2, 1), SI units; braces have their centre at mid-length."""
+    """Dimensions and masses of a side, or of both as columns (2, 1), SI units; braces balance at mid-length."""
 
     brace_length: Any
     brace_mass: Any
