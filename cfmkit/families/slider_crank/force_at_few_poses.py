@@ -8,10 +8,9 @@ import numpy as np
 
 from cfmkit.families.base import Sampled
 from cfmkit.families.findings import CannotBuild
-from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
-from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity
+from cfmkit.families.slider_crank.linkage import resolve
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import chain_of, elasticity
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
-from cfmkit.families.slider_crank.printed.model import chain_of
 from cfmkit.families.slider_crank.printed.solution import Solution
 
 if TYPE_CHECKING:
@@ -34,8 +33,7 @@ def sample_poses(
         return None
     try:
         spec = resolve(spec)
-        linkage = linkage_of(spec.mechanism)
-        chain = chain_of(spec, linkage, unloaded_angle(spec.mechanism, linkage))
+        chain = chain_of(spec)
     except CannotBuild:
         return None
     pressed = chain.press(places)

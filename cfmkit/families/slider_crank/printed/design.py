@@ -20,9 +20,9 @@ from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, mpa, newton, no_design, percent, refusals_answered
 from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.linkage import linkage_of, resolve
 from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge
-from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, elasticity, pins_of, travel_direction
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, elasticity, pins_of
 from cfmkit.families.slider_crank.printed.flexure_sizing import design_flexures
 from cfmkit.families.slider_crank.printed.model import analyze, slider_reach
 from cfmkit.families.slider_crank.printed.spec import StripSpec
@@ -44,7 +44,6 @@ from cfmkit.stock.material_and_part_spec import sheet_of
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
-    from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.printed.spec import StripDesign
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
@@ -77,23 +76,19 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         return Design(None, Status.INVALID, "a part that is pressed needs 'design.force'")
     try:
         spec = resolve(spec)
-        linkage = linkage_of(spec.mechanism)
-        unloaded = unloaded_angle(spec.mechanism, linkage)
-        if wanted.beam is None:
-            return design_flexures(spec, linkage, unloaded)
-        return _strip(spec, linkage, unloaded, run)
+        return design_flexures(spec) if wanted.beam is None else _strip(spec, run)
     except InputError as problem:
         return Design(None, Status.INVALID, str(problem))
 
 
-def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -> Design:
+def _strip(spec: SliderCrankSpec, run: Run) -> Design:
     wanted = spec.design.beam if spec.design else None
     assert wanted is not None
-    task = task_of(spec, linkage, unloaded)
-    form, ranges = form_of(spec, wanted, task, linkage, unloaded)
+    task = task_of(spec)
+    form, ranges = form_of(spec, wanted, task)
     if wanted.shape == "uniform" and task.goal != "stroke":
         return _design_uniform_strip(spec, wanted, task, ranges, run)
-    pins, allowed, limits = pins_of(spec.mechanism, linkage, unloaded), task.material.allowable_stress, _limits(spec)
+    pins, allowed, limits = pins_of(spec.mechanism), task.material.allowable_stress, _limits(spec)
     identity, clock = identity_of(spec, run.seed), Clock.from_budgets(run.time_budget)
     kept: Design | None = None
     for reserve in SEARCH_RESERVES:
@@ -206,7 +201,7 @@ def _one_thickness(strip: FoundStrip) -> float:
     return 0.0 if strip.uniform is None else 0.01 * float(strip.uniform.z[-1])
 
 
-def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTask:
+def task_of(spec: SliderCrankSpec) -> StripTask:
     """Return what the strip of a `design` block is to do, with its reserve.
 
     Raises InputError if the goal lacks its tolerance or its travel.
@@ -223,7 +218,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
         raise InputError("'design.target' must not be negative over 'design.travel': a strip is pressed, not pulled")
     if beam.goal != "stroke" and travel is None:
         raise InputError(f"the goal {beam.goal!r} needs 'design.travel', the travel over which the force is required")
-    reach = slider_reach(linkage, unloaded)
+    reach = slider_reach(spec.mechanism)
     start, stroke = travel if travel is not None else (beam.start, 0.2 * reach)
     if beam.goal != "rms" and start <= 0:
         raise InputError("'design.travel' must begin after the run-in, above 0: the force begins at zero there")
@@ -235,10 +230,9 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
     made_of = elasticity(spec.mechanism)
     limit = made_of.allowable_stress if beam.stressed else None
     limit = None if limit is None else limit * (1.0 - RESERVE_STRESS)
-    line = corners(spec.mechanism, spec.mechanism.beam, linkage, unloaded)
     return StripTask(
-        line,
-        travel_direction(linkage),
+        corners(spec.mechanism, spec.mechanism.beam),
+        linkage_of(spec.mechanism).travel_direction,
         replace(made_of, allowable_stress=limit),
         wanted.size / spec.mechanism.sets,
         float(start),
@@ -251,9 +245,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
     )
 
 
-def form_of(
-    spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, linkage: Linkage, unloaded: float
-) -> tuple[Form, Ranges]:
+def form_of(spec: SliderCrankSpec, wanted: StripDesign, task: StripTask) -> tuple[Form, Ranges]:
     """Return how the strip is described, and the ranges of its numbers."""
     beam = spec.mechanism.beam
     width = sheet_of(spec.mechanism.part) or wanted.width or (beam.width if beam is not None else DEFAULT_WIDTH)
