@@ -78,7 +78,7 @@ def main() -> None:
             wanted = spec.replace(changes)
             task = task_of(wanted)
             form, ranges = form_of(wanted, wanted.design.beam, task)
-            found = search(replace(task, longest=60e-3), form, replace(ranges, longest=60e-3), 1, Run())
+            found = search(replace(task, longest=60e-3), form, ranges, 1, Run())
             _, processor = best(lambda t=task, f=form, r=ranges: search(t, f, r, 1, Run()), max(1, count // 2))
             stroke = 1e3 * found.program.stroke(found.descent.z)
             row = f"{width:6.3f}{100 * ripple:7.1f}%{known:8.3f} mm{nodes:7d}{stroke:7.3f} mm"

@@ -40,7 +40,6 @@ from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
 )
 from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
-from cfmkit.families.slider_crank.printed.strip_thickness_search import Ranges
 from cfmkit.results import Status
 
 if TYPE_CHECKING:
@@ -557,10 +556,10 @@ def test_finished_starts_are_noted_and_a_second_run_begins_none(monkeypatch: pyt
             notes[key] = json.dumps(record)
 
     task = StripTask(corners(), np.pi, ABS, 1.5, 1 * MM, 15 * MM, 0.05, "stroke", 15 * MM)
-    wanted = task, Form(2, width=WIDTH), Ranges(np.tile([0.5, 2.0], (2, 1)), 15 * MM), 2, Run(notes=Recorder()), "x"
+    wanted = task, Form(2, width=WIDTH), np.tile([0.5, 2.0], (2, 1)), 2, Run(notes=Recorder()), "x"
     first = strip_thickness_search.search(*wanted)
     assert len(notes) == 2
-    monkeypatch.setattr(strip_thickness_search, "_climb", None)
+    monkeypatch.setattr(strip_thickness_search.StripSearch, "climb", None)
     again = strip_thickness_search.search(*wanted)
     assert isinstance(first, strip_thickness_search.FoundStrip)
     assert isinstance(again, strip_thickness_search.FoundStrip)

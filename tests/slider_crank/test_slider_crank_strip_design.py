@@ -19,7 +19,7 @@ from cfmkit.families.slider_crank.printed import design as printed
 from cfmkit.families.slider_crank.printed.audit import judge
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import joints
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
-from cfmkit.families.slider_crank.printed.strip_thickness_search import FoundStrip, Ranges, infeasible
+from cfmkit.families.slider_crank.printed.strip_thickness_search import FoundStrip, infeasible
 from cfmkit.results import Design, Status
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -34,7 +34,7 @@ def found(task: StripTask, z: list[float]) -> FoundStrip:
     """Return a strip of two thicknesses as where a search ended."""
     form = Form(2, width=WIDTH)
     end: Any = SimpleNamespace(z=np.array(z), feasible=True, ending=SimpleNamespace(value="ended"))
-    return FoundStrip(task, form, Ranges(np.tile([0.5, 2.0], (2, 1)), 40 * MM), StripProgram(task, form), end, None)
+    return FoundStrip(StripProgram(task, form), np.tile([0.5, 2.0], (2, 1)), end, None)
 
 
 # --- what is proposed ---------------------------------------------------------------------------------------------
@@ -80,7 +80,7 @@ def test_a_search_for_the_smallest_ripple_that_stops_on_its_way_has_a_strip(monk
         )
 
     monkeypatch.setattr(strip_thickness_search, "descend", stopped)
-    task, ranges = replace(TASK, goal="ripple"), Ranges(np.tile([0.5, 2.0], (2, 1)), 40 * MM)
+    task, ranges = replace(TASK, goal="ripple"), np.tile([0.5, 2.0], (2, 1))
     strip = strip_thickness_search.search(task, Form(2, width=WIDTH), ranges, 1, Run())
     assert isinstance(strip, FoundStrip)
     assert strip.descent.feasible

@@ -19,7 +19,7 @@ from cfmkit.designing.rounded_and_reported_values import search_values
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, no_design
 from cfmkit.families.rows import with_values
-from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.findings import finding, unreachable
 from cfmkit.families.slider_crank.linkage import unloaded_linkage
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
     FLEXURE_SHARE,
@@ -155,7 +155,7 @@ def design_flexures(spec: SliderCrankSpec) -> Design:
     if stubby is not None:
         text = f"the stress would allow a thickness of {mm(stubby.thickness)} on a length of {mm(stubby.length)}"
         cure = "make the flexures longer ('design.flexures.length'), or increase the stroke ('design.travel')"
-        return no_design(finding("target_unreachable", f"{text}: too stubby for a flexure; {cure}"))
+        return unreachable(f"{text}: too stubby for a flexure; {cure}")
     travel = np.linspace(0.1 * stroke, stroke, _N_POINTS)
     springs_force = rates @ curves_along_slider(linkage, unloaded, side, travel).effort[:3]
     kept = None if sheet is None else FixedWidth(tuple(lengths), stays)
@@ -171,10 +171,10 @@ def design_flexures(spec: SliderCrankSpec) -> Design:
         text = (
             f"flexures of {mm(max(lengths))} from a sheet of {mm(sheet)} have {sized.over:.4g} times the stress allowed"
         )
-        return no_design(finding("target_unreachable", text), {"design.flexures.length": longer})
+        return unreachable(text, {"design.flexures.length": longer})
     if (thinnest := min(min(flexure.thickness, flexure.width) for flexure in sized.flexures)) < 1.0 / PER_METRE:
         text = f"stress and force allow flexures of {mm(thinnest)} at most: less travel, or a stronger material"
-        return no_design(finding("target_unreachable", text))
+        return unreachable(text)
     factors: dict[str, tuple[float | None, str, str]] = {
         "closed_form_force": (sized.force_factor, "factor", f"force {FACTOR_PHRASES[0]}"),
         "closed_form_stress": (sized.stress_factor, "factor", f"largest stress {FACTOR_PHRASES[1]}"),
