@@ -296,9 +296,9 @@ class PrintedSize:
                 yield self._flexures(_window(self.request, start))
         if self._fits(self.width, THICKEST_TAPERED):
             for start in self.starts()[-1:]:
-                yield self._tapered(_window(self.request, start))
+                yield self._tapered_strip(_window(self.request, start))
 
-    def _tapered(self, travel: tuple[float, float]) -> Candidate:
+    def _tapered_strip(self, travel: tuple[float, float]) -> Candidate:
         """Return a strip of varying thickness, to be searched for the flattest force."""
         plain = self._strip("tapered strip", travel, self.width)
         thick = (max(self.request.thinnest, 0.005 * self.crank), THICKEST_TAPERED * self.crank)

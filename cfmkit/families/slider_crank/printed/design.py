@@ -80,7 +80,7 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         return Design(None, Status.INVALID, str(problem))
 
 
-def _asked(spec: SliderCrankSpec) -> tuple[CrankDesign, StripDesign]:
+def _strip_design(spec: SliderCrankSpec) -> tuple[CrankDesign, StripDesign]:
     """Return the block `design` of a strip, and its block `beam`."""
     assert spec.design is not None
     assert spec.design.beam is not None
@@ -88,7 +88,7 @@ def _asked(spec: SliderCrankSpec) -> tuple[CrankDesign, StripDesign]:
 
 
 def _strip(spec: SliderCrankSpec, run: Run) -> Design:
-    _, wanted = _asked(spec)
+    _, wanted = _strip_design(spec)
     task = task_of(spec)
     form, ranges = form_of(spec, task)
     if wanted.shape == "uniform" and task.goal != "stroke":
@@ -216,7 +216,7 @@ def task_of(spec: SliderCrankSpec) -> StripTask:
 
     Raises InputError if the goal lacks its tolerance or its travel.
     """
-    wanted, beam = _asked(spec)
+    wanted, beam = _strip_design(spec)
     ripple, travel = wanted.tolerance, wanted.travel
     if beam.goal == "stroke" and (ripple is None or travel is not None):
         raise InputError("the longest stroke needs 'design.tolerance', and no 'design.travel'; else set 'goal: ripple'")
@@ -258,7 +258,7 @@ def form_of(spec: SliderCrankSpec, task: StripTask) -> tuple[Form, FloatArray]:
 
     Raises InputError if the ranges do not fit the shape.
     """
-    (_, wanted), beam = _asked(spec), spec.mechanism.beam
+    (_, wanted), beam = _strip_design(spec), spec.mechanism.beam
     width = sheet_of(spec.mechanism.part) or wanted.width or (beam.width if beam is not None else DEFAULT_WIDTH)
     fixed = None if isinstance(width, tuple) else float(width)
     per_piece: tuple[int, ...] = ()
@@ -289,7 +289,7 @@ def form_of(spec: SliderCrankSpec, task: StripTask) -> tuple[Form, FloatArray]:
 
 def _limits(spec: SliderCrankSpec) -> tuple[float | None, float | None]:
     """Return the ripple and the stress that the finished strip is held to."""
-    wanted, beam = _asked(spec)
+    wanted, beam = _strip_design(spec)
     stress = elasticity(spec.mechanism).allowable_stress if beam.stressed else None
     return (wanted.tolerance if beam.goal == "stroke" else None), stress
 
@@ -299,7 +299,7 @@ def _design_uniform_strip(spec: SliderCrankSpec, task: StripTask, ranges: FloatA
 
     Where the width is stated, the thickness follows from the force.
     """
-    wanted = _asked(spec)[1].width
+    wanted = _strip_design(spec)[1].width
     fixed = sheet_of(spec.mechanism.part) or (None if isinstance(wanted, tuple) else wanted)
     if fixed is not None:
         return _design_of_width(spec, task, ranges, float(fixed), run)
