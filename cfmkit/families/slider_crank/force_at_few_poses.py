@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.printed.solution import ChainModel
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
@@ -39,7 +38,6 @@ def sample_poses(
     pressed = chain.press(places)
     if pressed.ending is not PressingEnd.COMPLETE:
         return None
-    model: ChainModel = "lumped" if spec.fidelity == "lumped" else "beam"
     ends = float(places[0]), float(places[-1])
-    solution = Solution(model, chain, pressed, elasticity(spec.mechanism), spec.mechanism.sets, ends, spec=spec)
+    solution = Solution(chain, pressed, elasticity(spec.mechanism), spec.mechanism.sets, ends, spec=spec)
     return Sampled({"load": np.asarray(solution.force)}, np.asarray(solution.stress)[None])

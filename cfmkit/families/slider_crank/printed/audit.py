@@ -64,7 +64,7 @@ def judge(
     pressed = chain.press(travel)
     if pressed.ending is not PressingEnd.COMPLETE:
         return None
-    solution = Solution("beam", chain, pressed, task.material, 1, (task.start, end))
+    solution = Solution(chain, pressed, task.material, 1, (task.start, end))
     ratio = solution.force / task.force - task.share(solution.travel)
     ripple, stress = limits
     stroke = min(end, _end_of_stroke(solution, ratio, ripple, stress))

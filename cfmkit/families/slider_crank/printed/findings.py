@@ -70,7 +70,7 @@ def _offset(solution: Solution) -> float:
     return abs(kink(solution.chain.pins))
 
 
-def _process_limits(solution: Solution) -> tuple[float, float]:
+def _made_sizes(solution: Solution) -> tuple[float, float]:
     """Return the resolution of the process in the plane, and its thinnest wall [m]; 0 if not stated."""
     position, thinnest = _mechanism(solution).resolved
     return position or 0.0, thinnest or 0.0
@@ -146,13 +146,13 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     ),
     FindingRule(
         "kink_too_small",
-        lambda solution: not _is_straight(solution) and _offset(solution) < _process_limits(solution)[0],
+        lambda solution: not _is_straight(solution) and _offset(solution) < _made_sizes(solution)[0],
         lambda solution: (
             f"the kink of {mm(_offset(solution))} that determines the buckling side is smaller than the process can "
-            f"make ({mm(_process_limits(solution)[0])}): the part may bend to the other side, with another force; 0.25 to "
+            f"make ({mm(_made_sizes(solution)[0])}): the part may bend to the other side, with another force; 0.25 to "
             "0.5 mm is safe",
         ),
-        lambda solution: f"kink of {mm(_offset(solution))}, {mm(_process_limits(solution)[0])} can be made",
+        lambda solution: f"kink of {mm(_offset(solution))}, {mm(_made_sizes(solution)[0])} can be made",
     ),
     FindingRule(
         "long_run_in",
@@ -164,9 +164,9 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     ),
     FindingRule(
         "too_thin",
-        lambda solution: solution.thinnest < _process_limits(solution)[1],
+        lambda solution: solution.thinnest < _made_sizes(solution)[1],
         lambda solution: (
-            f"the thinnest place is {mm(solution.thinnest)}, the process needs at least {mm(_process_limits(solution)[1])}",
+            f"the thinnest place is {mm(solution.thinnest)}, the process needs at least {mm(_made_sizes(solution)[1])}",
         ),
     ),
     FindingRule(

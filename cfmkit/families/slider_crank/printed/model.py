@@ -21,6 +21,7 @@ from cfmkit.families.slider_crank.linkage import resolve, unloaded_linkage
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import chain_of, elasticity
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd, kept_clear
 from cfmkit.families.slider_crank.printed.findings import FINDING_RULES
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import taper_of
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_QUANTITIES
 from cfmkit.families.slider_crank.printed.solution import Solution
 from cfmkit.results import Result, Status
@@ -79,7 +80,6 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     whole = (float(pressed.travel[0]), min(float(pressed.travel[-1]), stops.free_end))
     window = whole if spec.analysis.window is None else window_places(spec.analysis.window, (low, high))
     solution = Solution(
-        "lumped" if spec.fidelity == "lumped" else "beam",
         chain,
         pressed,
         elasticity(spec.mechanism),
@@ -113,10 +113,8 @@ def _interpolate(solution: Solution) -> BetweenPoints | None:
 
 def _thickness(chain: Chain) -> float:
     """Return the mean thickness of both ends of a chain [m]."""
-    beams = list(chain.build(chain.points).beams.values())
-    thicknesses = [beam.section.thickness for beam in (beams[0], beams[-1])]
-    first, last = ([thickness] if isinstance(thickness, float) else thickness.values for thickness in thicknesses)
-    return 0.5 * (float(first[0]) + float(last[-1]))
+    tapers = [taper_of(beam.section) for beam in chain.build(chain.points).beams.values()]
+    return 0.5 * float(tapers[0].values[0] + tapers[-1].values[-1])
 
 
 def slider_reach(mechanism: Mechanism) -> float:

@@ -17,7 +17,7 @@ from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.posed_part import PosedBody, PosedPart
 from cfmkit.families.slider_crank.linkage import linkage_of
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, flexures_of, strip_of
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, STRIP_BEAM
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, STRIP_BEAM, taper_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -190,11 +190,8 @@ def bodies(spec: SliderCrankSpec, solution: Solution, points: NDArray[Any]) -> t
         if pieces:
             link = np.stack([pieces[-1].core[:, -1], line[:, 0]], axis=1)
             pieces.append(PosedBody.line("link", "free", link, leg.widest))
-        place, thickness = path.places(name), beam.section.thickness
-        if isinstance(thickness, float):
-            half: FloatArray = np.full(len(place), 0.5 * thickness)
-        else:
-            half = 0.5 * np.interp(place, thickness.stations, np.real(thickness.values))
+        taper = taper_of(beam.section)
+        half = 0.5 * np.interp(path.places(name), taper.stations, taper.values)
         pieces.append(PosedBody.line("flexure", "free", line, half))
     ground, slider = leg.pads
     angle = linkage_of(spec.mechanism).travel_direction
