@@ -75,7 +75,7 @@ def test_a_command_does_not_import_what_it_does_not_need(tmp_path, arguments, fo
         ("vcfm_ding2022", ("vcfm.design", "vcfm.model")),
         (
             "slider_crank_li2019",
-            ("slider_crank.springs.design", "slider_crank.springs.model"),
+            ("slider_crank.design", "slider_crank.springs.design", "slider_crank.springs.model"),
         ),
         ("beam_lan2010", ("beam.design", "beam.shaping.design")),
     ],
