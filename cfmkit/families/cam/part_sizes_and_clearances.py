@@ -17,7 +17,8 @@ from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS
 from cfmkit.families.findings import mm
 from cfmkit.results import Quantity
-from cfmkit.stock.springs.offers import extension_spring
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.offers import slimmest_spring
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -73,7 +74,7 @@ def wire_and_coil(
     """Return the wire's diameter and the mean one of the coil of each spring [m], as `coil_diameter` has them."""
     if springs.wound is not None:
         return springs.wound.wire, springs.wound.coil
-    made = extension_spring(springs.total / count_of(springs), stretch, 2.0 * half_width, safety)
+    made = slimmest_spring(ExtensionSpring, springs.total / count_of(springs), stretch, 2.0 * half_width, safety)
     return None if made is None else (made.wire, made.coil)
 
 

@@ -18,6 +18,7 @@ from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values, or_na
 from cfmkit.results import Quantity
 from cfmkit.specs.evaluable_target_curve import TargetCurve
 from cfmkit.specs.units import window_places
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
@@ -288,7 +289,7 @@ def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
     )
     for row, (least, largest) in enumerate(zip(*loads, strict=True)):
         wire, life = row_of((springs.wound, springs.life), row)
-        wound = None if wire is None else wire.to_wound("extension")
+        wound = None if wire is None else wire.to_wound(ExtensionSpring)
         fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
         yield wire_quantities([SpringInUse(wound, least, largest, fatigue, life)])
 

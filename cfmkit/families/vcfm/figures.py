@@ -262,7 +262,7 @@ def mechanism(result: Result) -> Figure:
 def hangs(solution: Solution) -> bool:
     """Return True if the spring hangs above the shuttle."""
     springs = solution.spec.mechanism.springs
-    return springs is not None and springs.kind == "extension"
+    return springs is not None and springs.hang
 
 
 def _pushed_at(shown: Sequence[PosedBody], pose: int) -> parts.Point:

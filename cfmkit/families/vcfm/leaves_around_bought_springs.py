@@ -35,6 +35,7 @@ from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.families.vcfm.leaves.v_beam import MAX_LEAF_ANGLE, VBeam, onset_and_exit
 from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
+from cfmkit.stock.springs.kinds import PRESSED_FIRST
 from cfmkit.stock.springs.offers import Miss, guide_rod_for, nearest
 from cfmkit.stock.springs.spec import offers, support_of, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse
@@ -150,14 +151,14 @@ def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings
         if stated is not None:
             yield stated, None
         return
-    kinds = (stated.kind,) if stated is not None else ("compression", "extension")
-    for offer in offers(target.catalogue, *kinds):
+    spring_types = PRESSED_FIRST if stated is None else (stated.spring_type,)
+    for offer in offers(target.catalogue, *spring_types):
         for count in offer.counts:
             about = {
-                "kind": offer.kind,
+                "kind": offer.spring_type.kind,
                 "stiffness": offer.rate,
                 "count": count,
-                "initial_tension": offer.initial_tension if offer.kind == "extension" else 0.0,
+                "initial_tension": offer.initial_tension,
                 "max_elongation": offer.largest,
                 "free_length": offer.free_length,
                 "body_length": None if offer.wound is not None else offer.body_length,
