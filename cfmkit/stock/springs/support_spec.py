@@ -14,6 +14,7 @@ from cfmkit.specs.units import Length, format_short
 from cfmkit.stock.springs.helical_spring_formulas import Seats
 from cfmkit.stock.springs.kinds import HELICAL_KINDS, list_kinds
 from cfmkit.stock.springs.offers import guide_rod_for
+from cfmkit.stock.springs.stress_and_life import SpringInUse
 
 if TYPE_CHECKING:
     from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
@@ -92,6 +93,11 @@ class BuiltInSpring(SpringSupport):
         """Deflection up to which it does not buckle without a guide [m]; infinite if it never does."""
         outer = getattr(self, "outer_diameter", None)
         return float(self.spring_type.unguided_deflection(self.free_length, self.coil, outer, self.seats))
+
+    def put_under(self: Any, least: float, largest: float) -> SpringInUse:
+        """Return one between two loads [N or N m]."""
+        fatigue = None if self.wound is None or self.wound.fatigue is None else self.wound.fatigue.law
+        return SpringInUse(self.coil, least, largest, fatigue, self.life)
 
 
 def guide_words(support: SpringSupport) -> list[str]:
