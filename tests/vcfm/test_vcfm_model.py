@@ -15,7 +15,6 @@ from cfmkit import api
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.families import family
-from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.vcfm.curves_in_rows import Preloaded
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring, parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
@@ -42,8 +41,10 @@ def test_what_all_preloads_share_is_what_each_has_alone(name):
     solution = cfmkit.analyze(spec).state
     grid = np.linspace(0.0, spec.travel, spec.analysis.points)
     preloads = tuple(spec.analysis.preloads)
-    alone = [rests_of(Preloaded(solution.sampler, np.array([[one]]), NO_STOPS), grid)[0] for one in preloads]
-    together = rests_of(Preloaded(solution.sampler, np.array(preloads)[:, None], NO_STOPS), grid)
+    alone = [
+        rests_of(Preloaded(solution.sampler, np.array([[one]]), solution.curves.stops), grid)[0] for one in preloads
+    ]
+    together = rests_of(Preloaded(solution.sampler, np.array(preloads)[:, None], solution.curves.stops), grid)
     assert together == pytest.approx(alone, rel=1e-13, nan_ok=True)
     windows = np.transpose(solution.curves.flat_parts(spec.analysis.flatness))
     for row, (push, window) in enumerate(zip(solution.pushes, windows, strict=True)):

@@ -181,11 +181,11 @@ def _kind(spec: VcfmSpec) -> Hashable | None:
 
 def _solve_kind(specs: Sequence[VcfmSpec]) -> Solution:
     """Return mechanisms of one kind as rows."""
-    each, count = [parts(spec) for spec in specs], len(specs[0].analysis.preloads)
+    row_laws, count = [parts(spec) for spec in specs], len(specs[0].analysis.preloads)
     made = LeafLaws(
-        stack_laws([laws.leaf for laws in each]),
-        stack([laws.spring for laws in each]),
-        stack([laws.half_beams for laws in each]),
+        stack_laws([laws.leaf for laws in row_laws]),
+        stack([laws.spring for laws in row_laws]),
+        stack([laws.half_beams for laws in row_laws]),
     )
     preloads = np.concatenate([spec.analysis.preloads for spec in specs])
     mechanism_of_row = np.repeat(np.arange(len(specs)), count)
@@ -388,26 +388,26 @@ class DenseCurve(ShortRepr):
         """Return the force at travels of any shape [N]."""
         if places is self.places or (places.base is self.places and places.size == self.places.size):
             return self._known.reshape(places.shape)
-        return _at_any_shape(self.solution.nominal.force_at, places)
+        return _evaluate_at(self.solution.nominal.force_at, places)
 
     @cached_property
     def _known(self) -> FloatArray:
         """The force at all of `places`, which each metric begins with [N]."""
-        return _at_any_shape(self.solution.nominal.force_at, self.places)
+        return _evaluate_at(self.solution.nominal.force_at, self.places)
 
     def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress of leaves and spring at travels of any shape, of all preloads there [Pa]."""
-        return _at_any_shape(self.solution.stress, places)
+        return _evaluate_at(self.solution.stress, places)
 
     def own_stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress of leaves and spring at travels of any shape, of the nominal preload [Pa]."""
-        return _at_any_shape(partial(self.solution.stress, alone=True), places)
+        return _evaluate_at(partial(self.solution.stress, alone=True), places)
 
     def part_efforts(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest force of one leaf, or of one spring, at travels of any shape [N]."""
-        return _at_any_shape(self.solution.part_efforts, places)
+        return _evaluate_at(self.solution.part_efforts, places)
 
 
-def _at_any_shape(law: Callable[[FloatArray], FloatArray], places: FloatArray) -> FloatArray:
+def _evaluate_at(law: Callable[[FloatArray], FloatArray], places: FloatArray) -> FloatArray:
     """Return a law of places (1, n) at places of any shape."""
     return law(np.reshape(places, (1, -1))).reshape(np.shape(places))
