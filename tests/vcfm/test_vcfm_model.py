@@ -40,12 +40,9 @@ def test_what_all_preloads_share_is_what_each_has_alone(name):
     spec = cfmkit.load(CONFIGS / f"{name}.yaml").replace({"analysis.preloads": ["0 mm", "1 mm", "3 mm", "-0.5 mm"]})
     solution = cfmkit.analyze(spec).state
     grid = np.linspace(0.0, spec.travel, spec.analysis.points)
-    preloads = tuple(spec.analysis.preloads)
-    alone = [
-        rests_of(Preloaded(solution.sampler, np.array([[one]]), solution.curves.stops), grid)[0] for one in preloads
-    ]
-    together = rests_of(Preloaded(solution.sampler, np.array(preloads)[:, None], solution.curves.stops), grid)
-    assert together == pytest.approx(alone, rel=1e-13, nan_ok=True)
+    together = Preloaded(solution.sampler, np.array(spec.analysis.preloads)[:, None], solution.curves.stops)
+    alone = [rests_of(replace(together, preload=one[None]), grid)[0] for one in together.preload]
+    assert rests_of(together, grid) == pytest.approx(alone, rel=1e-13, nan_ok=True)
     windows = np.transpose(solution.curves.flat_parts(spec.analysis.flatness))
     for row, (push, window) in enumerate(zip(solution.pushes, windows, strict=True)):
         one = solution.curves.select_rows(np.array([row]))

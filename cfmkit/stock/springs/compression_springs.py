@@ -12,9 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.helical_spring_formulas import (
-    LENGTH_RTOL,
     SEAT_FACTORS,
     SHEAR_MODULUS,
     YOUNGS_MODULUS,
@@ -54,25 +52,6 @@ class CompressionSpring(HelicalSpring):
     def deflection_until_closed(cls, free_length: float | None, body_length: float | None) -> float:
         """Return the deflection at which its turns touch [m]; infinite if a length is unknown."""
         return math.inf if free_length is None or body_length is None else free_length - body_length
-
-    @classmethod
-    def find_length_fault(
-        cls,
-        free_length: float | None,
-        body_length: float | None,
-        largest: float | None,
-        wound: HelicalSpring | None,
-    ) -> str:
-        """Return what is wrong with one whose turns have no room, or less than its deflection takes; else empty."""
-        if free_length is None:
-            return ""
-        if free_length <= (body_length or (0.0 if wound is None else wound.body_length)):
-            return "'free_length' of a compression spring must be larger than its 'body_length' with the turns closed"
-        least = 0.0 if wound is None else wound.turns * wound.wire * (1 - LENGTH_RTOL)
-        room = free_length - (body_length or least)
-        if wound is None or largest is None or largest <= room * (1 + 1e-9):
-            return ""
-        return f"'max_elongation' is more than 'free_length' leaves: {format_short(room, 'length')}"
 
     def free_length_for(self, largest: Any) -> Any:
         """Return the relaxed length of one whose turns touch only beyond its largest deflection [m]."""

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cfmkit.specs.units import format_short
-from cfmkit.stock.springs.helical_spring_formulas import LENGTH_RTOL, HelicalSpring, inner_curvature
+from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring, inner_curvature
 
 
 class ExtensionSpring(HelicalSpring):
@@ -20,20 +19,6 @@ class ExtensionSpring(HelicalSpring):
     kind = "extension"
     lengthening = 1.0
     has_initial_tension = True
-
-    @classmethod
-    def find_length_fault(
-        cls,
-        free_length: float | None,
-        _body_length: float | None,
-        _largest: float | None,
-        wound: HelicalSpring | None,
-    ) -> str:
-        """Return what is wrong with one that is shorter than its turns; empty if nothing is."""
-        least = 0.0 if wound is None else wound.turns * wound.wire
-        if free_length is None or free_length >= least * (1 - LENGTH_RTOL):
-            return ""
-        return f"'free_length' is less than the turns on each other: {format_short(least, 'length')}"
 
     def free_length_for(self, _largest: Any) -> Any:
         """Return the relaxed length with both loops, which are as high as the inside of the coil [m]."""

@@ -49,7 +49,6 @@ SMALL_HOLE, SMALL_HOLE_CLEARANCE, ROD_CLEARANCE = 0.013, 0.10, 0.05
 MAX_GUIDE_CLEARANCE = 0.20
 """Largest clearance of a guide, in diameters of the inside (rod) or outside (tube): twice that of [Norton], assumed. A
 spring in a looser guide bows as far as the clearance lets it."""
-LENGTH_RTOL = 0.1  # a stated length may be below that of the turns on each other by so much: makers' tolerance
 
 
 @dataclass(frozen=True)
@@ -95,18 +94,6 @@ class HelicalSpring(ABC):
     def deflection_until_closed(cls, _free_length: float | None, _body_length: float | None) -> float:
         """Return the deflection at which its turns touch [m]; infinite if they never do, or if a length is unknown."""
         return math.inf
-
-    @classmethod
-    def find_length_fault(
-        cls,
-        # free_length, body_length, largest: as stated, the last of its deflection [m]; None if they are not
-        _free_length: float | None,
-        _body_length: float | None,
-        _largest: float | None,
-        _wound: HelicalSpring | None,
-    ) -> str:
-        """Return what is wrong with stated lengths that no spring of this kind has; empty if nothing is."""
-        return ""
 
     def free_length_for(self, _largest: Any) -> Any:
         """Return the relaxed length with usual ends of one that is deflected so far at most [m]."""

@@ -18,7 +18,6 @@ from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness,
 from cfmkit.specs.units.table import is_unit
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
-from cfmkit.stock.springs.helical_spring_formulas import LENGTH_RTOL
 from cfmkit.stock.springs.kinds import HELICAL_KINDS, list_kinds
 from cfmkit.stock.springs.offers import GENERIC_SERIES, Offer, generic
 from cfmkit.stock.springs.support_spec import SpringSupport
@@ -36,6 +35,7 @@ else:
     KindName = Literal[tuple(HELICAL_KINDS)]
 
 Positive = Field(gt=0)
+LENGTH_RTOL = 0.1  # a stated length may be below that of the turns on each other by so much: makers' tolerance
 RATE_RTOL = 0.1  # a stated rate may be off by so much from that of wire, coil and turns: makers' tolerance
 MAX_TENSION_RATIO = 3.0
 """Largest initial tension over the upper end of what is easily wound: springs that are wound on a bench have more, but
@@ -252,24 +252,33 @@ class CatalogueSpring(WireLimits, SpringSupport):
         if stated is None and wound is None:
             raise ValueError(f"needs {rate_key!r}, or 'wire', 'coil' and 'turns', from which it follows")
         check_initial_tension(self.spring_type, wound, self.initial_tension)
-        if wound is not None:
-            self._check_sizes(wound)
-        lengths = self.free_length, self.body_length, self.max_elongation
-        if fault := self.spring_type.find_length_fault(*lengths, wound):
-            raise ValueError(fault)
+        self._check_sizes(wound)
         self.check_guide(self.spring_type, wound, self.outer_diameter)
         if stated is not None and wound is not None:
             check_rate(wound, stated)
         return self
 
-    def _check_sizes(self, wound: HelicalSpring) -> None:
-        """Raise `ValueError` for sizes that no coil of this wire has."""
-        outer, least = self.outer_diameter, wound.turns * wound.wire
-        if outer is not None and abs(outer - wound.outer_diameter) > MIDDLE_OF_WIRE * wound.wire:
+    def _check_sizes(self, wound: HelicalSpring | None) -> None:
+        """Raise `ValueError` for sizes that no spring of this kind has, or no coil of this wire."""
+        outer, free, body = self.outer_diameter, self.free_length, self.body_length
+        if wound is not None and outer is not None and abs(outer - wound.outer_diameter) > MIDDLE_OF_WIRE * wound.wire:
             reported = format_short(wound.outer_diameter, "length")
             raise ValueError(f"'outer_diameter' must be 'coil', the mean diameter, and one wire: {reported}")
-        if self.body_length is not None and self.body_length < least * (1 - LENGTH_RTOL):
-            raise ValueError(f"'body_length' is less than the turns on each other: {format_short(least, 'length')}")
+        closed = body or (None if wound is None else wound.body_length)
+        if self.spring_type.deflection_until_closed(free, closed) <= 0.0:
+            raise ValueError(
+                f"'free_length' of a {self.kind} spring must be larger than its 'body_length' with the turns closed"
+            )
+        if wound is None:
+            return
+        stacked = wound.turns * wound.wire
+        least = stacked * (1 - LENGTH_RTOL)
+        for key, length in (("body_length", body), ("free_length", free)):
+            if length is not None and length < least:
+                raise ValueError(f"{key!r} is less than the turns on each other: {format_short(stacked, 'length')}")
+        room = self.spring_type.deflection_until_closed(free, body or least)
+        if self.max_elongation is not None and self.max_elongation > room * (1 + 1e-9):
+            raise ValueError(f"'max_elongation' is more than 'free_length' leaves: {format_short(room, 'length')}")
 
     @classmethod
     def from_offer(cls, offer: Offer) -> Self:
