@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
     KindName = str
+    Head = tuple[str, str | None] | None  # name and unit of a column of a file; None for one that is not read
 else:
     KindName = Literal[tuple(HELICAL_KINDS)]
 
@@ -419,34 +420,32 @@ def _read_file(source: DataSource) -> list[CatalogueSpring]:
     lines = _lines(source)
     separator = max(";\t|,", key=lines[0].count) if lines else ","
     rows = csv.reader(lines, delimiter=separator, strict=True)
+    springs: list[CatalogueSpring] = []
     try:
         heads = _heads(next(rows, []), source)
-        springs: list[CatalogueSpring] = []
-        for cells in rows:
-            if not any(cell.strip() for cell in cells):
-                continue
-            if len(cells) != len(heads):
-                raise DataError(f"{source}:{rows.line_num}: has {len(cells)} cells, but the header has {len(heads)}")
-            block = {
-                head[0]: _cell(head[0], cell.strip(), head[1], separator)
-                for head, cell in zip(heads, cells, strict=True)
-                if head and cell.strip()
-            }
-            try:
-                springs.append(CatalogueSpring.model_validate(block))
-                check_names(springs)
-            except ValidationError as error:
-                first = error.errors()[0]
-                place = ".".join(str(part) for part in first["loc"]) or str(block.get("name", ""))
-                reported = "missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
-                raise DataError(f"{source}:{rows.line_num}: {place}: {reported}") from None
-            except ValueError as error:
-                raise DataError(f"{source}:{rows.line_num}: {error}") from None
-    except csv.Error as error:
+        for cells in filter(any, ([cell.strip() for cell in row] for row in rows)):
+            springs.append(_spring_of_row(heads, cells, separator))
+            check_names(springs)
+    except (csv.Error, ValueError) as error:
         raise DataError(f"{source}:{rows.line_num}: {error}") from None
     if not springs:
         raise DataError(f"{source}: lists no spring; a header and one line per spring are needed")
     return springs
+
+
+def _spring_of_row(heads: Sequence[Head], cells: Sequence[str], separator: str) -> CatalogueSpring:
+    """Return the spring of one line of a file; `ValueError` for what is wrong with it."""
+    if len(cells) != len(heads):
+        raise ValueError(f"has {len(cells)} cells, but the header has {len(heads)}")
+    named_cells = ((*head, cell) for head, cell in zip(heads, cells, strict=True) if head and cell)
+    block = {name: _cell(name, cell, unit, separator) for name, unit, cell in named_cells}
+    try:
+        return CatalogueSpring.model_validate(block)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"]) or str(block.get("name", ""))
+        reported = "missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
+        raise ValueError(f"{place}: {reported}") from None
 
 
 def _lines(source: DataSource) -> list[str]:
@@ -458,10 +457,10 @@ def _lines(source: DataSource) -> list[str]:
     return "\n".join(lines_of(text)).lstrip("\n ;,|\t\ufeff").splitlines(keepends=True)
 
 
-def _heads(cells: Sequence[str], source: DataSource) -> list[tuple[str, str | None] | None]:
+def _heads(cells: Sequence[str], source: DataSource) -> list[Head]:
     """Return name and unit of each column; None for a remark, such as a price, which is not read."""
     allowed = [name for name in CatalogueSpring.model_fields if name != "fatigue"]  # a block, which no cell holds
-    columns: list[tuple[str, str | None] | None] = []
+    columns: list[Head] = []
     for cell in cells:
         title, unit = split_header(cell)
         name = title.strip().lower().replace(" ", "_")
