@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.arrays import LazySequence, ShortRepr, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import NO_STOPS
-from cfmkit.families.rows import SolvedRows, findings_of_one, rows_of, stack, valid, values_of_one, with_values
+from cfmkit.families.rows import SolvedRows, findings_of_one, rows_of, valid, values_of_one, with_values
 from cfmkit.families.vcfm.curves_in_rows import (
     LEAST_POINTS,
     Characteristics,
@@ -26,7 +26,7 @@ from cfmkit.families.vcfm.curves_in_rows import (
     Rows,
 )
 from cfmkit.families.vcfm.findings import FINDING_RULES, closed_spring, finding, is_closed
-from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws, parts, spring_room
+from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
 from cfmkit.families.vcfm.leaves.kinds import stack_laws
 from cfmkit.families.vcfm.quantities import ROW_COLUMNS, SCALAR_QUANTITIES, adjustability, readings
 from cfmkit.families.vcfm.solution import Solution, target_of
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from cfmkit.families.end_stops import EndStops
     from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.curves_in_rows import Push
+    from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Finding
 
@@ -181,12 +182,7 @@ def _kind(spec: VcfmSpec) -> Hashable | None:
 
 def _solve_kind(specs: Sequence[VcfmSpec]) -> Solution:
     """Return mechanisms of one kind as rows."""
-    row_laws, count = [parts(spec) for spec in specs], len(specs[0].analysis.preloads)
-    made = LeafLaws(
-        stack_laws([laws.leaf for laws in row_laws]),
-        stack([laws.spring for laws in row_laws]),
-        stack([laws.half_beams for laws in row_laws]),
-    )
+    made, count = stack_laws([parts(spec) for spec in specs]), len(specs[0].analysis.preloads)
     preloads = np.concatenate([spec.analysis.preloads for spec in specs])
     mechanism_of_row = np.repeat(np.arange(len(specs)), count)
     grid, room = np.stack([travel_grid(spec) for spec in specs]), np.array([spring_room(spec) for spec in specs])

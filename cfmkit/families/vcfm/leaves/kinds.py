@@ -3,19 +3,18 @@
 A kind is a subclass of `LeafLaw` or `LeafSpring` and a record `LeafKind` or `SpringKind`, both in one file of this
 folder; the record is listed in `leaves_spec`. Specification, findings, figures, drawings, models and
 proposals read the record and the law: none of them compares names. Laws of several leaves stand as one law, one leaf a
-row: numbers that differ become columns (r, 1), and travels are (r, n).
+row: numbers become columns (r, 1), and travels are (r, n).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from cfmkit.families.rows import stack
 from cfmkit.families.vcfm.leaves.s_form import bent_leaf
 
 if TYPE_CHECKING:
@@ -269,13 +268,29 @@ class SpringKind(StructureKind):
     drawing_note: str = ""  # on the drawing of the whole spring
 
 
-def stack_laws(laws: Sequence[LeafLaw]) -> LeafLaw:
-    """Return laws of one kind as one law for rows of travels; one alone is returned as it is."""
-    if len(laws) == 1 or not laws[0].one_by_one:
-        return stack(laws)
-    column = np.empty((len(laws), 1), dtype=object)  # their tables and searches are not arrays over leaves
-    column[:, 0] = laws
-    return LawsOneByOne(column)  # type: ignore[return-value]
+LawT = TypeVar("LawT")
+
+
+def stack_laws(laws: Sequence[LawT]) -> LawT:
+    """Return laws of one kind as one law with a row for each; one alone is returned as it is, with plain numbers.
+
+    Examples
+    --------
+    >>> from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
+    >>> stack_laws([Coils(100.0), Coils(200.0)]).force(0.1).tolist()
+    [[10.0], [20.0]]
+    """
+    first: Any = laws[0]
+    if len(laws) == 1:
+        return laws[0]
+    if getattr(first, "one_by_one", False):  # its tables and searches are not arrays over leaves
+        column = np.empty((len(laws), 1), dtype=object)
+        column[:, 0] = laws
+        return LawsOneByOne(column)  # type: ignore[return-value]
+    if not is_dataclass(first):
+        return np.array(laws, dtype=float)[:, None]  # type: ignore[return-value]
+    columns = {item.name: stack_laws([getattr(law, item.name) for law in laws]) for item in fields(first)}
+    return type(laws[0])(**columns)
 
 
 @dataclass(frozen=True)
@@ -293,7 +308,7 @@ class LawsOneByOne:
     @cached_property
     def strip(self) -> Any:
         """The leaves' dimensions, a row each."""
-        return stack([law.strip for law in self.laws])
+        return stack_laws([law.strip for law in self.laws])
 
     def force(self, travel: FloatArray) -> FloatArray:
         """Return the force of each leaf along the motion [N]."""

@@ -162,8 +162,7 @@ class VBeam(LeafLaw):
         if not bent.any():
             return line
         places = np.atleast_2d(np.linspace(0.3, 1.1, 161) * strip.rise)
-        force = np.atleast_2d(self.s_force(places))
-        falls = [-np.gradient(*row).min() for row in zip(force, np.broadcast_to(places, force.shape), strict=True)]
+        falls = [-np.gradient(*row).min() for row in zip(np.atleast_2d(self.s_force(places)), places, strict=True)]
         steepest = np.maximum(falls, 0.0).reshape(np.shape(line))
         return np.where(strip.slenderness > LINEAR_ABOVE, line, steepest)
 
@@ -183,7 +182,7 @@ class VBeam(LeafLaw):
     @cached_property
     def linear(self) -> tuple[Any, Any]:
         """Range in which the leaf is buckled, from and to [m]: where the two laws cross; NaN where it never is."""
-        first, last, _ = np.broadcast_arrays(*onset_and_exit(self.strip), self.strip.bending)
+        first, last = onset_and_exit(self.strip)
         span = last - first
         start, end = self._crossing(np.stack([first, last]), np.stack([-0.1 * span, 0.1 * span]))
         return start, end
