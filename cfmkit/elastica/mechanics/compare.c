@@ -133,7 +133,7 @@ int compare(const Model *models, Int designs, const Model *shapes, const double 
         Model fine;
         const Int same = n_ends(m);
         void *room = raise_model(m, shapes, laws, powers, &fine);
-        Work *w = room ? work_open(&fine) : NULL;
+        Work *w = room ? work_open(&fine, 0) : NULL;
         double *state = w ? malloc((size_t)(3 * fine.size + fine.free) * sizeof(double)) : NULL;
         int good = state != NULL;
         for (Int k = 0; good && k < count; k++, z += m->size, ends += same, found += N_COMPARED) {

@@ -277,26 +277,32 @@ class CompiledEquations(NumpyEquations):
         quick: bool = False,
     ) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
-        x, at, rate, outcome = np.array(free, float), np.array([way], float), np.empty(len(free)), np.empty(2)
-        row = NO_NUMBERS if border is None else np.ascontiguousarray(border, float)
-        force = NO_NUMBERS if push is None else np.ascontiguousarray(push, float)
-        if self.code.solve(self.row, x, at, row, force, rate, outcome, level, tolerance, quick):
+        solved = self._newton(free[None], [way], border, level, push, tolerance, quick)
+        x, at, rate, (code, told, effort) = (values[0] for values in solved)
+        if code:
             return None
-        (way,), (unstable, effort) = at.tolist(), outcome.tolist()
-        return PathEquilibrium(x, way, rate, self._unstable(x, way, int(unstable)), effort)
+        return PathEquilibrium(x, float(at), rate, self._unstable(x, float(at), int(told)), float(effort))
 
     def solve_each(
         self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses."""
-        x, ways = np.array(free, float, order="C"), np.array(way, float)
-        rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
-        if self.code.solve_each(self.row, x, ways, rate, outcomes, tolerance, quick):
-            raise MemoryError
+        x, ways, rate, outcomes = self._newton(free, way, None, 0.0, None, tolerance, quick)
         converged, unstable = outcomes[:, 0] == 0, outcomes[:, 1].astype(np.int64)
         for k in np.flatnonzero(converged & (unstable < 0)):
             unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
         return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
+
+    def _newton(
+        self, free: Any, way: Any, border: FloatArray | None, level: float, push: FloatArray | None, *rest: float
+    ) -> tuple[FloatArray, ...]:
+        """Return unknowns, places of the way, slopes, and codes, counts and efforts (k, 3), from k guesses."""
+        x, ways = np.array(free, float, order="C"), np.array(way, float)
+        rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
+        row, force = (NO_NUMBERS if given is None else np.ascontiguousarray(given, float) for given in (border, push))
+        if self.code.solve(self.row, x, ways, row, force, rate, outcomes, level, *rest):
+            raise MemoryError
+        return x, ways, rate, outcomes
 
     def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
         """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""

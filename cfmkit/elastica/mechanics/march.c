@@ -100,7 +100,7 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
     double *memory = calloc((size_t)(8 * n + 1), sizeof(double));
     double *guess = memory, *next = memory + n, *scratch = memory + 2 * n;
     Known at[N_PREDICTING] = {{x, rate, *way}, {memory + 4 * n, memory + 5 * n, 0.0}, {memory + 6 * n, memory + 7 * n, 0.0}};
-    Work *w = work_open(m);
+    Work *w = work_open(m, 0);
     if (!w || !memory) { code = NO_START; goto end; }
     if (before && before[2 * n] != *way) {
         memcpy(at[1].x, before, bytes); memcpy(at[1].rate, before + n, bytes);
