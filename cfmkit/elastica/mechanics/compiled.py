@@ -16,7 +16,6 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.edges import find_circle, find_leading, half_thickness_of
 from cfmkit.elastica.mechanics.compiled_module import (
     ADDRESS_FIELDS,
-    COUNT_FIELDS,
     MAX_DEGREE,
     N_LAW,
     find_module,
@@ -160,20 +159,12 @@ class CompiledEquations(NumpyEquations):
             counts |= {"moved": moved, "coefficients": wide - N_LAW}
         return counts
 
-    def stiffen(self, mesh: Discretisation) -> CompiledEquations:
-        """Return the equations of the same network with another flexibility along its beams."""
-        return self._exchange(mesh, {"axial": np.ascontiguousarray(mesh.elements.axial, float)})
-
     def refill(self, elements: Any, tables: Mapping[str, Any]) -> None:
         """Replace the tables of some elements, in place: only of equations whose arrays are their own."""
         super().refill(elements, tables)
         for name, values in tables.items():
             self.arrays[name][elements] = values
         self.arrays["bend"][elements] = (tables["weight"] * tables["rigidity"]) @ slope_products(self.mesh.degree)
-
-    def rebase(self, base: FloatArray) -> CompiledEquations:
-        """Return the equations with other values of the unknowns that are held, (size,)."""
-        return self._exchange(replace(self.mesh, base=base), {"base": np.ascontiguousarray(base, float)})
 
     def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
         """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
@@ -188,20 +179,10 @@ class CompiledEquations(NumpyEquations):
             if contacts:
                 arrays[name] = self.arrays[name].copy()
                 arrays[name][:, column] = [-1 if contact.closed is None else contact.closed for contact in contacts]
-        exchanged = self._exchange(mesh, arrays)
-        object.__setattr__(exchanged, "unit", unit)
-        exchanged.row[COUNT_FIELDS.index("free")] = len(mesh.free)
-        exchanged.row[COUNT_FIELDS.index("presses")] = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
-        return exchanged
-
-    def _exchange(self, mesh: Discretisation, arrays: Mapping[str, Any]) -> CompiledEquations:
-        """Return the equations of a mesh that differs in some arrays."""
+        presses = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
+        row = make_row(arrays, {"free": len(mesh.free), "presses": presses}, self.row)
         exchanged = copy(self)
-        object.__setattr__(exchanged, "mesh", mesh)
-        object.__setattr__(exchanged, "arrays", {**self.arrays, **arrays})
-        object.__setattr__(exchanged, "row", self.row.copy())
-        for name, array in arrays.items():
-            self.code.place(exchanged.row, len(COUNT_FIELDS) + ADDRESS_FIELDS.index(name), (array,))
+        vars(exchanged).update(mesh=mesh, unit=unit, arrays={**self.arrays, **arrays}, row=row)
         return exchanged
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:

@@ -11,7 +11,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -136,14 +136,6 @@ class NumpyEquations:
     def __post_init__(self) -> None:
         """Set the units."""
         object.__setattr__(self, "unit", force_units(self.mesh))
-
-    def rebase(self, base: FloatArray) -> NumpyEquations:
-        """Return the equations with other values of the unknowns that are held, (size,)."""
-        return replace(self, mesh=replace(self.mesh, base=base))
-
-    def stiffen(self, mesh: Discretisation) -> NumpyEquations:
-        """Return the equations of the same network with another flexibility along its beams."""
-        return replace(self, mesh=mesh)
 
     def exchange_contacts(self, mesh: Discretisation) -> NumpyEquations | None:
         """Return the equations of the same network with other contacts closed; None if they must be made anew."""

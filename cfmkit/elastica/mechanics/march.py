@@ -27,8 +27,6 @@ from cfmkit.elastica.mechanics.moving_elements import copy_moved_tables
 from cfmkit.elastica.model.network import LineSpring, PointLoad, SlideSpring, TorsionSpring
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.numerics.continuation.problem import PathEquilibrium
@@ -83,8 +81,9 @@ class CompiledSides(CompiledEquations):
         """Return whether some side lies on its obstacle in states (..., n)."""
         return np.rint(free[..., self._flags]).any(axis=-1)
 
-    def _exchange(self, mesh: Discretisation, arrays: Mapping[str, Any]) -> CompiledEquations:
-        exchanged = super()._exchange(mesh, arrays)
+    def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
+        """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
+        exchanged = super().exchange_contacts(mesh)
         for name in ("reference", "_flags"):
             vars(exchanged).pop(name, None)
         return exchanged

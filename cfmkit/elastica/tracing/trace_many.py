@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -282,59 +282,27 @@ def trace_many(
     workers : int
         Processes to use.
     """
-    one = partial(_outcomes, drive=drive, control=control or Control(), collect=collect)
+    trace_chunk = partial(_outcomes, drive=drive, control=control or Control(), collect=collect)
+    source = iter(networks)
+    chunks = iter(lambda: list(islice(source, _CHUNK_SIZE)), [])
     if workers <= 1:
-        for chunk in _chunks(networks):
-            yield from one(chunk)
+        yield from chain.from_iterable(map(trace_chunk, chunks))
         return
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        waiting: deque[Future[_Packed]] = deque()
-        for chunk in _chunks(networks):
-            waiting.append(pool.submit(_pack, chunk, one))
+        waiting: deque[Future[list[NetworkOutcome]]] = deque()
+        for chunk in chunks:
+            waiting.append(pool.submit(_list_outcomes, trace_chunk, chunk))
             if len(waiting) > _CHUNKS_PER_PROCESS * workers:
-                yield from waiting.popleft().result().outcomes()
+                yield from waiting.popleft().result()
         while waiting:
-            yield from waiting.popleft().result().outcomes()
+            yield from waiting.popleft().result()
 
 
-def _chunks(networks: Iterable[Network | Callable[[], Network]]) -> Iterator[list[Network | Callable[[], Network]]]:
-    """Yield the networks in lists of at most `_CHUNK_SIZE`."""
-    source = iter(networks)
-    while chunk := list(islice(source, _CHUNK_SIZE)):
-        yield chunk
-
-
-@dataclass(frozen=True)
-class _Packed:
-    """Outcomes on their way from a process: `Requested` as rows of three arrays for all, which are quicker to send."""
-
-    said: list[tuple[str, str]]
-    values: list[Any]
-    arrays: tuple[FloatArray, FloatArray, Any] | None
-
-    def outcomes(self) -> Iterator[NetworkOutcome]:
-        """Yield the outcomes."""
-        end = 0
-        for (status, message), value in zip(self.said, self.values, strict=True):
-            if self.arrays is not None and value is not None:
-                begin, end = end, end + value
-                value = Requested(*(array[begin:end] for array in self.arrays))
-            yield NetworkOutcome(status, message, value)
-
-
-def _pack(networks: list[Any], outcomes: Callable[[list[Any]], Iterator[NetworkOutcome]]) -> _Packed:
-    found = list(outcomes(networks))
-    said, values = [(each.status, each.message) for each in found], [each.value for each in found]
-    rows = [value for value in values if value is not None]
-    if not rows or not all(type(row) is Requested for row in rows):
-        return _Packed(said, values, None)
-    all_rows = zip(*((row.drive, row.effort, row.stable) for row in rows), strict=True)
-    drive, effort, stable = (np.concatenate(same) for same in all_rows)
-    lengths = [None if value is None else len(value.drive) for value in values]
-    return _Packed(said, lengths, (drive, effort, stable))
+def _list_outcomes(trace_chunk: Callable[[list[Any]], Iterator[NetworkOutcome]], chunk: list[Any]) -> Any:
+    return list(trace_chunk(chunk))
 
 
 def _outcomes(
