@@ -128,7 +128,7 @@ static double largest_force(const Model *m, const double *z) {
  * of those unknowns. */
 int compare(const Model *models, Int designs, const Model *shapes, const double *laws, Int powers, const double *z,
             const double *drive, Int count, double tolerance, double *ends, double *found) {
-    const Goal goal = {NULL, 0.0, NULL, tolerance, 1};
+    const Goal goal = {NULL, 0.0, tolerance, 1};
     for (const Model *m = models; m < models + designs; laws += m->elements * (powers + 2), m++) {
         Model fine;
         const Int same = n_ends(m);

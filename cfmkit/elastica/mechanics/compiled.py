@@ -253,12 +253,11 @@ class CompiledEquations(NumpyEquations):
         way: float,
         border: FloatArray | None = None,
         level: float = 0.0,
-        push: FloatArray | None = None,
         tolerance: float = 1e-10,
         quick: bool = False,
     ) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
-        solved = self._newton(free[None], [way], border, level, push, tolerance, quick)
+        solved = self._newton(free[None], [way], border, level, tolerance, quick)
         x, at, rate, (code, told, effort) = (values[0] for values in solved)
         if code:
             return None
@@ -268,20 +267,18 @@ class CompiledEquations(NumpyEquations):
         self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses."""
-        x, ways, rate, outcomes = self._newton(free, way, None, 0.0, None, tolerance, quick)
+        x, ways, rate, outcomes = self._newton(free, way, None, 0.0, tolerance, quick)
         converged, unstable = outcomes[:, 0] == 0, outcomes[:, 1].astype(np.int64)
         for k in np.flatnonzero(converged & (unstable < 0)):
             unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
         return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
 
-    def _newton(
-        self, free: Any, way: Any, border: FloatArray | None, level: float, push: FloatArray | None, *rest: float
-    ) -> tuple[FloatArray, ...]:
+    def _newton(self, free: Any, way: Any, border: FloatArray | None, *numbers: float) -> tuple[FloatArray, ...]:
         """Return unknowns, places of the way, slopes, and codes, counts and efforts (k, 3), from k guesses."""
         x, ways = np.array(free, float, order="C"), np.array(way, float)
         rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
-        row, force = (NO_NUMBERS if given is None else np.ascontiguousarray(given, float) for given in (border, push))
-        if self.code.solve(self.row, x, ways, row, force, rate, outcomes, level, *rest):
+        row = NO_NUMBERS if border is None else np.ascontiguousarray(border, float)
+        if self.code.solve(self.row, x, ways, row, rate, outcomes, *numbers):
             raise MemoryError
         return x, ways, rate, outcomes
 

@@ -139,6 +139,11 @@ class Discretisation:
         return self.numbering.nodes
 
     @property
+    def acting(self) -> tuple[Attached | ContactAt, ...]:
+        """What acts on attachments."""
+        return (*self.springs, *self.loads, *self.contacts)
+
+    @property
     def axial(self) -> FloatArray:
         """1/EA of the elements, (e, q); with contacts at places of several states those of the first."""
         return np.asarray(self.elements.axial.reshape(-1, *self.elements.axial.shape[-2:])[0])

@@ -14,6 +14,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.terms import contact_contribution
+from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
@@ -23,8 +24,7 @@ from cfmkit.numerics.dual_array import DualArray, chain, cos_sin, plain, stack
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
+    from cfmkit.elastica.mechanics.discretise import Attached, BeamElements, Discretisation
     from cfmkit.elastica.mechanics.terms import Contribution
 
 SINGULAR_SHIFT = 1e-13  # added to the stiffness of the motions where it is singular to rounding
@@ -142,7 +142,7 @@ def line_load(mesh: Discretisation, drive: Any, share: Any = 1.0) -> Any:
 def gradient(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the gradient of the functional by all unknowns, (size,); complex where z or the arrays are."""
     own, kind = element_gradients(mesh, z, drive, share)
-    parts = list(_contributions(mesh, z, drive, share))
+    parts = [term(mesh, acting, z, drive, share) for acting in mesh.acting]
     total = np.zeros(mesh.size, np.result_type(kind, *(part.gradient for part in parts)))
     np.add.at(total, mesh.elements.unknowns, own)
     for part in parts:
@@ -150,11 +150,11 @@ def gradient(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     return total
 
 
-def _contributions(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[Contribution]:
-    for attached in (*mesh.springs, *mesh.loads):
-        yield ENERGY_TERMS[type(attached.item)](mesh, attached, z, share, drive)
-    for contact in mesh.contacts:
-        yield contact_contribution(mesh, contact, z)
+def term(mesh: Discretisation, acting: Attached | ContactAt, z: Any, drive: Any, share: Any = 1.0) -> Contribution:
+    """Return the term of a spring, a load or a contact in one state."""
+    if isinstance(acting, ContactAt):
+        return contact_contribution(mesh, acting, z)
+    return ENERGY_TERMS[type(acting.item)](mesh, acting, z, share, drive)
 
 
 def _end_poses(mesh: Discretisation, z: Any) -> tuple[AttachmentPoses, AttachmentPoses]:
@@ -218,7 +218,8 @@ def hessian(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     own[:, 6, 6] -= (last * end.arm).sum(axis=1)
     total = np.zeros((mesh.size, mesh.size))
     np.add.at(total, (e.unknowns[:, :, None], e.unknowns[:, None, :]), own)
-    for part in _contributions(mesh, z, drive, share):
+    for acting in mesh.acting:
+        part = term(mesh, acting, z, drive, share)
         np.add.at(total, (part.unknowns[:, None], part.unknowns), part.hessian)
     return total
 
@@ -229,17 +230,6 @@ def values(mesh: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> Any
     z = z.astype(np.result_type(z, free))
     z[mesh.free] = free
     return z
-
-
-def strain_energy(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
-    """Return the energy of beams and springs."""
-    e, at = mesh.elements, fields(mesh, z, drive, share)
-    strain = e.axial * at.normal**2 + e.shear * at.shear**2
-    beams = e.weight * (2 * bending(e, at.curvature).energy + strain)
-    springs = (ENERGY_TERMS[type(spring.item)](mesh, spring, z, share, drive).energy for spring in mesh.springs)
-    return (
-        beams.sum() / 2 + sum(springs) + sum(contact_contribution(mesh, contact, z).energy for contact in mesh.contacts)
-    )
 
 
 def count_unstable(mesh: Discretisation, tangent: Any) -> int:

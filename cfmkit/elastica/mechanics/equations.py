@@ -214,7 +214,6 @@ class NumpyEquations:
         place: float,
         border: FloatArray | None = None,
         level: float = 0.0,
-        push: FloatArray | None = None,
         tolerance: float = 1e-10,
         quick: bool = False,
     ) -> PathEquilibrium | None:
@@ -226,8 +225,6 @@ class NumpyEquations:
             First guess.
         border, level : (n + 1,) array, float, optional
             What is held instead of the way, and where.
-        push : (n,) array, optional
-            Added force.
         tolerance : float
             Of corrections, relative to the largest motion and force.
         quick : bool
@@ -237,9 +234,8 @@ class NumpyEquations:
         moves, size = np.isinf(self.unit), np.zeros(len(free))
         for _ in range(MAX_ROUNDS):
             at = self.linearise(free, place)
-            residual = at.residual if push is None else at.residual - push
             try:
-                step, rate = np.linalg.solve(at.tangent, -np.stack([residual, at.change], axis=1)).T
+                step, rate = np.linalg.solve(at.tangent, -np.stack([at.residual, at.change], axis=1)).T
             except np.linalg.LinAlgError:
                 return None
             along = 0.0
@@ -432,8 +428,3 @@ def _march(equations: NumpyEquations, start: PathEquilibrium, targets: FloatArra
         if rejected > MAX_REJECTED or step < SHORTEST_STEP * plan.span:
             return end(MarchCode.STEPS_FAIL)
     return end(MarchCode.DONE if passed == len(targets) else MarchCode.FULL)
-
-
-def begin(equations: NumpyEquations, free: FloatArray | None = None, place: float = 0.0) -> PathEquilibrium | None:
-    """Return the equilibrium at the start of a way: at rest, unless near some free unknowns."""
-    return equations.solve(np.zeros(equations.n) if free is None else free, place)

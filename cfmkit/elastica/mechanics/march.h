@@ -142,7 +142,6 @@ typedef struct {
 typedef struct {
     const double *border; /* (n + 1): border . (x, way) = level instead of a given way; NULL if none */
     double level;
-    const double *push;   /* (n): added force; NULL if none */
     double tolerance;
     int quick; /* accept when the next correction would be below the tolerance */
 } Goal;

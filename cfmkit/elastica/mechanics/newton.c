@@ -228,7 +228,7 @@ int newton(const Model *m, Work *w, double *x, double *way, const Goal *goal, Fo
         for (Int i = 0; i < m->size; i++)
             if (m->slot[i] >= 0) {
                 const Int a = m->slot[i];
-                w->step[a] = (goal->push ? goal->push[a] : 0.0) - w->gradient[i];
+                w->step[a] = -w->gradient[i];
                 w->slope[a] = -w->change[a];
             }
         found->unstable = unstable_of(m, w);
