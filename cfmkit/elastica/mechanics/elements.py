@@ -173,6 +173,10 @@ class MovingCuts(NamedTuple):
     shares: FloatArray  # (r, 2, k)
     places: Any  # (k,) unknowns
 
+    def evaluate(self, places: Any) -> Any:
+        """Return where these elements begin and end with contacts at some places (..., k), (..., r, 2)."""
+        return self.fixed + np.einsum("rck,...k->...rc", self.shares, places)
+
 
 def find_cuts(beam: Beam, fits: BeamFits, name: str, pieces: int, tension: Mapping[str, float]) -> list[float]:
     """Return the parameters between which the elements of a beam lie."""
