@@ -19,7 +19,8 @@ import numpy as np
 
 from cfmkit.elastica.mechanics import energy
 from cfmkit.numerics.continuation.path import MarchedSteps
-from cfmkit.numerics.continuation.problem import PathEquilibrium
+from cfmkit.numerics.continuation.problem import PathEquilibrium, largest_motion
+from cfmkit.numerics.continuation.steps import judge
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
@@ -147,6 +148,11 @@ class NumpyEquations:
             getattr(self.mesh.elements, name)[elements] = values
 
     @property
+    def motions(self) -> Any:
+        """Which free unknowns are motions, or say where and how contacts touch."""
+        return np.isinf(self.unit)
+
+    @property
     def n(self) -> int:
         """Number of free unknowns."""
         return len(self.mesh.free)
@@ -231,7 +237,7 @@ class NumpyEquations:
             Accept when the next correction would be below the tolerance.
         """
         free, last = np.array(free, float), np.inf
-        moves, size = np.isinf(self.unit), np.zeros(len(free))
+        moves, size = self.motions, np.zeros(len(free))
         for _ in range(MAX_ROUNDS):
             at = self.linearise(free, place)
             try:
@@ -326,13 +332,6 @@ def force_units(mesh: Discretisation) -> FloatArray:
 
 
 # -- natural march -----------------------------------------------------------------------------------------------------
-class _Judgement(NamedTuple):
-    moved: float  # largest change of a motion
-    missed: float  # what the prediction missed of it
-    force: float  # change of section forces over the allowed one
-    agrees: bool  # the chord with the slopes at its ends: else it is another path
-
-
 def predict(states: Sequence[PathEquilibrium], goal: float) -> FloatArray:
     """Return Hermite's polynomial through up to three states and their slopes at a place of the way.
 
@@ -348,21 +347,6 @@ def predict(states: Sequence[PathEquilibrium], goal: float) -> FloatArray:
     return np.asarray(total)
 
 
-def _judge(equations: NumpyEquations, current: PathEquilibrium, new: PathEquilibrium, guess: FloatArray) -> _Judgement:
-    moves = np.isinf(equations.unit)
-    chord = new.x - current.x
-    forces, ahead = ~moves, new.drive - current.drive
-    allowed = FORCE_CHANGE * equations.unit[forces] + 0.5 * np.abs(current.x[forces])
-    force = float((np.abs(chord[forces]) / allowed).max(initial=0.0))
-    chord, old, rate = chord[moves], current.rate[moves], new.rate[moves]
-    moved = float(np.abs(chord).max(initial=0.0))
-    missed = float(np.abs(new.x - guess)[moves].max(initial=0.0))
-    bend = float(np.abs(chord - 0.5 * ahead * (old + rate)).max(initial=0.0))
-    sense, size = np.sign(ahead), np.linalg.norm(chord)
-    along = all(sense * (chord @ t) >= 0.5 * size * np.linalg.norm(t) for t in (old, rate))
-    return _Judgement(moved, missed, force, bool(along and bend <= 0.25 * moved + SAME_EQUILIBRIUM))
-
-
 def _leads_back(
     equations: NumpyEquations, current: PathEquilibrium, new: PathEquilibrium, moved: float, tolerance: float
 ) -> bool:
@@ -371,8 +355,7 @@ def _leads_back(
     back = equations.solve(guess, current.drive, tolerance=tolerance, quick=True)
     if back is None:
         return False
-    apart = np.abs(back.x - current.x)[np.isinf(equations.unit)].max(initial=0.0)
-    return bool(apart < SAME_EQUILIBRIUM + 1e-3 * moved)
+    return largest_motion(equations, back.x - current.x) < SAME_EQUILIBRIUM + 1e-3 * moved
 
 
 def _march(equations: NumpyEquations, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
@@ -399,28 +382,25 @@ def _march(equations: NumpyEquations, start: PathEquilibrium, targets: FloatArra
             earlier = []
         guess = predict((current, *earlier), goal)
         new = equations.solve(guess, goal, tolerance=plan.tolerance, quick=True)
-        seen = _Judgement(0.0, 0.0, 0.0, True) if new is None else _judge(equations, current, new, guess)
-        same = new is not None and new.unstable == start.unstable
-        wide = seen.moved > plan.largest_turn or seen.missed > 0.4 * seen.moved + SAME_EQUILIBRIUM
-        if new is not None and seen.force > 1 and seen.moved <= plan.largest_turn:
-            step = abs(ahead) * max(0.7 / seen.force, 1e-4)  # too long for the forces: no sign of trouble
-        elif new is None or wide or (same and seen.moved > SAME_EQUILIBRIUM and not seen.agrees):
+        trial = judge(equations, current, new, guess, (plan.largest_turn, FORCE_CHANGE))
+        if trial.excess > 1:
+            step = abs(ahead) * max(0.7 / trial.excess, 1e-4)  # too long for the forces: no sign of trouble
+        elif trial.new is None:
             step, rejected = 0.5 * abs(ahead), rejected + 2
         else:
-            rejected = max(0, rejected - 1)
-            if not same:
+            new, rejected = trial.new, max(0, rejected - 1)
+            if new.unstable != start.unstable:
                 return end(MarchCode.STABILITY_CHANGES)
-            if plan.branch and not _leads_back(equations, current, new, seen.moved, plan.tolerance):
+            if plan.branch and not _leads_back(equations, current, new, trial.motion, plan.tolerance):
                 return end(MarchCode.BRANCH_ENDS)
             earlier = [current, *earlier[: N_PREDICTING - 2]]
             current = new
             states.append(new)
             at_targets.append(passed if lands else -1)
             passed += lands
-            quality = seen.missed / (seen.moved + 1e-8)
-            if quality < 0.1:
+            if trial.misfit < 0.1:
                 step = min(plan.span, 1.6 * (step if lands else max(step, abs(ahead))))
-            elif quality > 0.25:
+            elif trial.misfit > 0.25:
                 step = 0.8 * abs(ahead)
             continue
         if earlier and step < 0.25 * abs(current.drive - earlier[0].drive):
