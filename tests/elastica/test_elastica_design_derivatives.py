@@ -7,17 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from varied_networks import LAN, lan
+from varied_networks import LAN, lan_pushed
 
 import cfmkit.elastica as el
 from cfmkit.elastica.mechanics.designs import design_of, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 
 COMPLEX_STEP = 1e-30  # nothing is subtracted: its square vanishes beside one
-
-
-def lan_pushed(x: Any) -> Any:
-    return lan(x), el.Displacement("n5", -np.pi / 2, np.array([2e-3, 6e-3]))
 
 
 def hooked(x: Any) -> Any:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from varied_networks import KINDS, X, loaded, pushed, turned
+from varied_networks import BUILDERS, KINDS, X, pushed
 
 import cfmkit.elastica as el
 from cfmkit.errors import InputError
@@ -55,13 +55,13 @@ def slopes(g: Any) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize("build", [pushed, turned, loaded])
-def test_derivatives_of_all_outputs_are_those_of_differences(build: Any) -> None:
-    exact = slopes(el.gradient(el.trace(*build(X), FINE), build, X))
+@pytest.mark.parametrize(("build", "x"), BUILDERS, ids=[build.__name__ for build, _ in BUILDERS])
+def test_derivatives_of_all_outputs_are_those_of_differences(build: Any, x: Any) -> None:
+    exact = slopes(el.gradient(el.trace(*build(x), FINE), build, x))
     rng = np.random.default_rng(5)
     for _ in range(2):
-        way = X * rng.uniform(0.5, 1.0, len(X)) * rng.choice([-1.0, 1.0], len(X))
-        values = [outputs(el.trace(*build(X + step * 1e-3 * way), FINE)) for step in (-2, -1, 1, 2)]
+        way = x * rng.uniform(0.5, 1.0, len(x)) * rng.choice([-1.0, 1.0], len(x))
+        values = [outputs(el.trace(*build(x + step * 1e-3 * way), FINE)) for step in (-2, -1, 1, 2)]
         for name, slope in exact.items():
             a, b, c, d = (one[name] for one in values)
             want = (a - 8 * b + 8 * c - d) / 12e-3
