@@ -285,11 +285,12 @@ class CompiledEquations(NumpyEquations):
     def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
         """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""
         mesh, bundle = self.mesh, self.mesh.fits.bundle
-        special = _has_more_unknowns(mesh) or bundle.others or self.follows or degree > MAX_DEGREE
+        special = _has_more_unknowns(mesh) or bundle.others or degree > MAX_DEGREE
         if special or np.count_nonzero(mesh.elements.line):
             return None
         laws = angle_laws(bundle.coefficients[mesh.fits.number], mesh)
-        return compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+        compared = compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+        return None if (compared.unstable < 0).any() else compared  # under loads that follow C may know a parity only
 
     def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode."""
