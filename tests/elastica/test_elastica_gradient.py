@@ -25,7 +25,7 @@ def test_force_is_proportional_to_the_modulus_and_the_gradient_knows() -> None:
     path = trace(lan(LAN), Displacement("n5", -np.pi / 2, np.array([5e-3])), FINE)
     found = gradient(path, lan, LAN)
     assert found.effort[0, 13] * LAN[13] == pytest.approx(path.effort[-1], rel=1e-9)
-    np.testing.assert_allclose(found.motion["n3"][:, :, 13], 0, atol=1e-12)
+    np.testing.assert_allclose(found.motion("n3")[:, :, 13], 0, atol=1e-12)
 
 
 def test_efforts_are_the_same_with_all_unknowns_and_without_them() -> None:

@@ -40,9 +40,9 @@ def slopes(g: Any) -> dict[str, Any]:
     """The derivatives of the same."""
     found = {"effort": g.effort, "energy": g.energy}
     for node in g.path.network.nodes:
-        found[f"motion {node}"] = g.motion[node]
+        found[f"motion {node}"] = g.motion(node)
     for node in g.path.mesh.bodies:
-        found[f"reaction {node}"] = g.reaction[node]
+        found[f"reaction {node}"] = g.reaction(node)
     for beam in g.path.network.beams:
         found[f"start force {beam}"] = g.end_force(beam, 0)
         found[f"end force {beam}"] = g.end_force(beam, 1)
@@ -85,7 +85,7 @@ def test_each_of_the_rarer_variables_has_its_own_derivative(name: str) -> None:
     values = [el.trace(*pushed(X + step * way), FINE) for step in (-2, -1, 1, 2)]
     for slope, output in (
         (found.effort[:, kind], lambda p: p.effort[p.at_requested]),
-        (found.reaction["c"][:, :, kind], lambda p: p.reaction("c")[p.at_requested]),
+        (found.reaction("c")[:, :, kind], lambda p: p.reaction("c")[p.at_requested]),
     ):
         a, b, c, d = (output(p) for p in values)
         want = (a - 8 * b + 8 * c - d) / (12 * way[kind])

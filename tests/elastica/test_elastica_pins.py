@@ -79,4 +79,4 @@ def test_no_support_acts_on_a_node_that_a_link_moves() -> None:
     with pytest.raises(InputError, match="'q' is not a node; nodes: a, b, p, c"):
         path.reaction("q")
     with pytest.raises(InputError, match="moved by a link"):
-        el.gradient(path, pinned, np.array([0.0, 0.05])).reaction["p"]
+        el.gradient(path, pinned, np.array([0.0, 0.05])).reaction("p")
