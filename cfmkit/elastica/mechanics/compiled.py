@@ -46,8 +46,9 @@ from cfmkit.elastica.mechanics.equations import (
     SideData,
     SolvedStates,
 )
-from cfmkit.elastica.model.beam_fits import coefficients_of, has_polynomial_angle
-from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, NodeOnBeam, NodeOnObstacle, Stop
+from cfmkit.elastica.mechanics.numbering import number_free
+from cfmkit.elastica.model.beam_fits import coefficients_of
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.elastica.model.network import LineSpring, SlideSpring
 from cfmkit.numerics.continuation.problem import PathEquilibrium
 
@@ -61,20 +62,6 @@ if TYPE_CHECKING:
 CLOSED_SIDE = 5  # column of `side_at`
 IN_PLACE = ("angle", "weight", "rigidity", "ahead", "length", "bend", "rest", "curl")
 """Arrays of a `Model` that `sides.c` changes where elements move."""
-
-
-def are_sides_compiled(mesh: Discretisation) -> bool:
-    """Return True if `sides.c` has all contacts: those of uniform beams at points, and of nodes without friction."""
-    follows = any(load.item.follows for load in mesh.loads)
-    kinds = {type(contact.item) for contact in mesh.contacts}
-    beams = {mesh.elements.beam[number] for number in mesh.moving.elements} if mesh.moving is not None else set()
-    return (
-        not follows
-        and kinds <= {Stop, NodeOnObstacle, BeamOnObstacle, NodeOnBeam, BeamOnBeam}
-        and all(contact.rub < 0 and not contact.laid for contact in mesh.contacts)
-        and all(has_polynomial_angle(mesh.fits.network.beams[beam]) for beam in beams)
-        and not any(mesh.fits.network.beams[beam].section.shear for beam in beams)
-    )
 
 
 def side_arrays(mesh: Discretisation, first_part: int) -> tuple[dict[str, Any], Any]:
@@ -168,8 +155,7 @@ class CompiledEquations(NumpyEquations):
 
     def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
         """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
-        slot, kept = np.full(mesh.size, -1, np.int64), np.searchsorted(self.mesh.free, mesh.free)
-        slot[mesh.free] = np.arange(len(mesh.free))
+        slot, kept = number_free(mesh.free, mesh.size), np.searchsorted(self.mesh.free, mesh.free)
         unit, nodes = self.unit[kept], node_contacts(mesh)
         arrays = {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
         for name, column, contacts in (
@@ -373,7 +359,7 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
         if rows:
             arrays |= {f"{name}_at": [at for at, _ in rows], name: [values for _, values in rows]}
     if _has_more_unknowns(mesh):
-        arrays |= free_arrays(mesh)
+        arrays |= {"slot": number_free(mesh.free, mesh.size), "leaves": last_elements(mesh)[mesh.free]}
     if mesh.contacts:
         arrays |= contact_arrays(mesh)
     if mesh.moving is not None:
@@ -390,13 +376,6 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
 def _has_more_unknowns(mesh: Discretisation) -> bool:
     """Return True if there are unknowns of contacts, which may all be open."""
     return mesh.size != mesh.numbering.size
-
-
-def free_arrays(mesh: Discretisation) -> dict[str, Any]:
-    """Return the number of each unknown among the free ones, (size,), and the last element that holds it, (n,)."""
-    slot = np.full(mesh.size, -1, np.int64)
-    slot[mesh.free] = np.arange(len(mesh.free))
-    return {"slot": slot, "leaves": last_elements(mesh)[mesh.free]}
 
 
 def spring_row(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:

@@ -13,9 +13,9 @@ import numpy as np
 
 from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
 from cfmkit.elastica.contact.sliding import SlidingEquations
-from cfmkit.elastica.mechanics.compiled import CompiledEquations, are_sides_compiled
+from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.compiled_module import MAX_DEGREE, load_compiled
-from cfmkit.elastica.mechanics.contact_arrays import are_compiled, side_contacts
+from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.equations import (
     LinearEquations,
     MarchPlan,
@@ -24,6 +24,7 @@ from cfmkit.elastica.mechanics.equations import (
     SolvedStates,
 )
 from cfmkit.elastica.mechanics.moving_elements import copy_moved_tables
+from cfmkit.elastica.model.beam_fits import has_polynomial_angle
 from cfmkit.elastica.model.network import LineSpring, PointLoad, SlideSpring, TorsionSpring
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
-COMPILED_TERMS = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
+COMPILED_TERMS = {LineSpring, SlideSpring, TorsionSpring, PointLoad}
 """Springs and loads that march.c has; networks with others run on numpy."""
 
 
@@ -47,19 +48,34 @@ def equations(
     """Return the equations of a network, compiled if they can be."""
     key = equations, ramp, load_compiled() is not None
     if key not in mesh.known:
-        kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
-        plain = kinds <= set(COMPILED_TERMS) and mesh.degree <= MAX_DEGREE
-        if mesh.moving is not None and plain and key[2] and are_sides_compiled(mesh):
+        compiled = key[2] and _is_compiled(mesh)
+        if mesh.moving is not None and compiled:
             mesh.known[key] = CompiledSides(copy_moved_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
         elif mesh.moving is not None:
             mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
-        elif plain and key[2] and are_compiled(mesh):
+        elif compiled:
             mesh.known[key] = CompiledEquations(mesh, ramp)
         elif mesh.contacts:
             mesh.known[key] = ContactEquations(mesh, ramp, plain=equations(open_all_contacts(mesh), ramp))
         else:
             mesh.known[key] = NumpyEquations(mesh, ramp)
     return mesh.known[key]  # type: ignore[no-any-return]
+
+
+def _is_compiled(mesh: Discretisation) -> bool:
+    """Return True if C has everything of a network.
+
+    With contacts: they do not rub, no load follows, and sides of beams, which are uniform, touch at points.
+    """
+    acting, contacts = (*mesh.springs, *mesh.loads), mesh.contacts
+    if not {type(attached.item) for attached in acting} <= COMPILED_TERMS or mesh.degree > MAX_DEGREE:
+        return False
+    follows = any(load.item.follows for load in mesh.loads)
+    if contacts and (follows or any(contact.rub >= 0 or contact.laid for contact in contacts)):
+        return False
+    moving = () if mesh.moving is None else mesh.moving.elements
+    beams = [mesh.fits.network.beams[mesh.elements.beam[number]] for number in moving]
+    return all(has_polynomial_angle(beam) and not beam.section.shear for beam in beams)
 
 
 @dataclass(frozen=True, eq=False)
