@@ -139,7 +139,7 @@ class Discretisation:
 
     @property
     def acting(self) -> tuple[Attached | ContactAt, ...]:
-        """What acts on attachments."""
+        """Springs, loads and contacts: all that acts on attachments."""
         return (*self.springs, *self.loads, *self.contacts)
 
     @property

@@ -34,7 +34,7 @@ class LinearisedProblem(Protocol):
 
 
 class ScaledUnknowns(Protocol):
-    """What n unknowns are: motions, which are of size one, and forces."""
+    """Sizes and kinds of n unknowns: motions, which are of size one, and forces."""
 
     @property
     def unit(self) -> FloatArray:
