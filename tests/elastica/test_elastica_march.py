@@ -14,7 +14,6 @@ from typing import Any
 import beam_networks
 import numpy as np
 import pytest
-from batch_networks import two_leaves
 from buckling_structures import cantilever
 from contact_layouts import with_pads
 from network_cases import from_json, read_cases
@@ -300,16 +299,6 @@ def test_a_batch_has_the_efforts_of_single_marches() -> None:
         march = own.march(at_rest(own), goals, MarchPlan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
         known = march.effort[march.target >= 0] * own.effort_unit
         assert row == pytest.approx(known, rel=1e-7)
-
-
-@needs_c
-def test_a_batch_of_several_beams_has_the_efforts_of_single_marches() -> None:
-    pairs = [(two_leaves(bend=bend), el.Displacement("d", np.pi, TARGETS)) for bend in (0.8, 1.0, 1.3)]
-    efforts, codes, _ = CompiledBatch(set_up(discretise(*pairs[0], 16), pairs[0], pairs)).march(TARGETS)
-    assert (codes == MarchCode.DONE).all()
-    for pair, row in zip(pairs, efforts, strict=True):
-        path = el.trace(*pair, el.Control(tolerance=1e-8))
-        assert row == pytest.approx(path.effort[path.at_requested], rel=1e-6)
 
 
 @needs_c
