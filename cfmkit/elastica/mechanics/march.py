@@ -17,7 +17,6 @@ from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.compiled_module import MAX_DEGREE, load_compiled
 from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.equations import (
-    LinearEquations,
     MarchPlan,
     NaturalMarch,
     NumpyEquations,
@@ -78,6 +77,11 @@ def _is_compiled(mesh: Discretisation) -> bool:
     return all(has_polynomial_angle(beam) and not beam.section.shear for beam in beams)
 
 
+def _in_numpy(name: str) -> Any:
+    """Return a method of `CompiledSides` that is that of the same equations in numpy."""
+    return lambda own, *given, **named: getattr(own.reference, name)(*given, **named)
+
+
 @dataclass(frozen=True, eq=False)
 class CompiledSides(CompiledEquations):
     """Equations with sides of beams on obstacles in compiled code; states in which some lie there are left to numpy."""
@@ -97,6 +101,9 @@ class CompiledSides(CompiledEquations):
         """Return whether some side lies on its obstacle in states (..., n)."""
         return np.rint(free[..., self._flags]).any(axis=-1)
 
+    def _any_lies(self, z: FloatArray) -> bool:
+        return bool(self._lies(z[:, self.mesh.free]).any())
+
     def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
         """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
         exchanged = super().exchange_contacts(mesh)
@@ -104,54 +111,33 @@ class CompiledSides(CompiledEquations):
             vars(exchanged).pop(name, None)
         return exchanged
 
-    def gradient(self, free: Any, place: Any) -> Any:
-        """Return the gradient by all unknowns, (size,)."""
-        return self.reference.gradient(free, place)
+    gradient = _in_numpy("gradient")
+    evaluate = _in_numpy("evaluate")
+    linearise = _in_numpy("linearise")
+    count_unstable = _in_numpy("count_unstable")
+    resolve = _in_numpy("resolve")
+    soften = _in_numpy("soften")
 
     def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
         """Return the curvatures of gaps at contacts of sides in n states, (sides, n); None where something lies."""
         curvatures, states = np.empty((len(side_contacts(self.mesh)), len(z))), np.ascontiguousarray(z, float)
-        lies = self._lies(z[:, self.mesh.free]).any()
-        return None if lies or not self.code.side_curvatures(self.row, states, curvatures) else curvatures
+        return None if self._any_lies(z) or not self.code.side_curvatures(self.row, states, curvatures) else curvatures
 
     def search_sides(self, z: FloatArray, *rest: Any, **named: Any) -> FloatArray | None:
         """Return the least gaps of sides in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().search_sides(z, *rest, **named)
+        return None if self._any_lies(z) else super().search_sides(z, *rest, **named)
 
     def locate(self, z: FloatArray, *rest: Any) -> FloatArray | None:
         """Return places and rotations in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().locate(z, *rest)
+        return None if self._any_lies(z) else super().locate(z, *rest)
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""
-        lies = self._lies(z[:, self.mesh.free])
-        return self.reference.gradients(z, drive) if lies.any() else super().gradients(z, drive)
-
-    def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
-        """Return gradient (size,) and Hessian (size, size) by all unknowns."""
-        return self.reference.evaluate(z, drive, share)
-
-    def linearise(self, free: FloatArray, place: float) -> LinearEquations:
-        """Return the equations linearised at some unknowns."""
-        return self.reference.linearise(free, place)
-
-    def count_unstable(self, at: LinearEquations) -> int:
-        """Return the number of unstable directions at a held drive."""
-        return self.reference.count_unstable(at)
-
-    def resolve(self, free: FloatArray, place: float, right: FloatArray) -> tuple[FloatArray, int]:
-        """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable ones."""
-        return self.reference.resolve(free, place, right)
-
-    def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
-        """Return flexibility and shape of the softest mode."""
-        return self.reference.soften(free, place, vector, rounds)
+        return self.reference.gradients(z, drive) if self._any_lies(z) else super().gradients(z, drive)
 
     def solve(self, free: FloatArray, *rest: Any, **named: Any) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does."""
-        if self._lies(free):
-            return self.reference.solve(free, *rest, **named)
-        return super().solve(free, *rest, **named)
+        return self.reference.solve(free, *rest, **named) if self._lies(free) else super().solve(free, *rest, **named)
 
     def solve_each(
         self, free: FloatArray, places: FloatArray, tolerance: float = 1e-10, quick: bool = False
@@ -167,6 +153,5 @@ class CompiledSides(CompiledEquations):
 
     def march(self, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
-        if self._lies(start.x):
-            return self.reference.march(start, targets, plan)
-        return super().march(start, targets, plan)
+        lies = self._lies(start.x)
+        return self.reference.march(start, targets, plan) if lies else super().march(start, targets, plan)
