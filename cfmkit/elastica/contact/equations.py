@@ -121,14 +121,6 @@ class ContactEquations(NumpyEquations):
         object.__setattr__(self, "slots", number_free_unknowns(self.mesh))
         object.__setattr__(self, "watched", GapBounds(self.mesh))
 
-    def rebase(self, base: FloatArray) -> ContactEquations:
-        """Return the equations with other values of the unknowns that are held, (size,)."""
-        return ContactEquations(replace(self.mesh, base=base), self.ramp, plain=self.plain.rebase(base))
-
-    def stiffen(self, mesh: Discretisation) -> ContactEquations:
-        """Return the equations of the same network with another flexibility along its beams."""
-        return ContactEquations(mesh, self.ramp, plain=self.plain.stiffen(open_all_contacts(mesh)))
-
     def gradient(self, free: Any, way: Any) -> Any:
         """Return the gradient by all unknowns, (size,)."""
         if np.iscomplexobj(free) or np.iscomplexobj(way) or self.ramp:

@@ -99,10 +99,6 @@ class SlidingEquations(NumpyEquations):
         mesh = copy_moved_tables(mesh)
         return cls(mesh, ramp, plain=make(replace(open_all_contacts(mesh), moving=None), ramp))
 
-    def rebase(self, base: FloatArray) -> SlidingEquations:
-        """Return the equations with other values of the unknowns that are held, (size,)."""
-        return SlidingEquations(replace(self.mesh, base=base), self.ramp, plain=self.plain.rebase(base))
-
     # -- places --------------------------------------------------------------------------------------------------------
     @property
     def _sides(self) -> list[ContactAt]:
