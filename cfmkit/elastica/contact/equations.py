@@ -16,11 +16,12 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.terms import contact_contribution, gaps
+from cfmkit.elastica.contact.line_tangent import raise_pad
+from cfmkit.elastica.contact.terms import contact_contribution, gaps, measure
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations, SolvedStates
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.contact import FrictionState
@@ -77,14 +78,13 @@ class GapBounds:
 
     def __init__(self, mesh: Discretisation) -> None:
         self.mesh = mesh
-        places = [contact.place for contact in mesh.contacts]
-        self.places = np.array(places)
-        self.forces = np.array([contact.unknown for contact in mesh.contacts])
-        self.turning = np.array([contact.item.turns for contact in mesh.contacts])
-        self.turns = mesh.attachments.unknowns[places, 3]
-        self.judged = np.array([contact.closed is None for contact in mesh.contacts])
-        self.at = np.zeros((len(places), 2))  # where each gap was measured: place, or rotation
-        self.gap = np.full(len(places), -np.inf)
+        self.places = np.array([contact.place for contact in mesh.contacts], np.int64)
+        self.forces = np.array([contact.unknown for contact in mesh.contacts], np.int64)
+        self.turning = np.array([contact.item.turns for contact in mesh.contacts], bool)
+        self.turns = mesh.attachments.unknowns[self.places, 3]
+        self.judged = np.array([contact.closed is None for contact in mesh.contacts], bool)
+        self.at = np.zeros((len(self.places), 2))  # where each gap was measured: place, or rotation
+        self.gap = np.full(len(self.places), -np.inf)
 
     def are_open(self, z: FloatArray) -> Any:
         """Return which contacts without a force are certainly open, (contacts,)."""
@@ -101,16 +101,17 @@ class GapBounds:
         return far
 
 
-def number_free_unknowns(mesh: Discretisation) -> Any:
-    """Return the number of every unknown among the free ones, (size,); -1 where it is held."""
-    slots = np.full(mesh.size, -1)
-    slots[mesh.free] = np.arange(len(mesh.free))
-    return slots
+class SymmetricRow(NamedTuple):
+    """A row of a condition in the symmetric matrix that stability is counted from."""
+
+    unknowns: Any  # (k,) among the free ones
+    values: FloatArray  # (k,)
+    pivot: float
 
 
 @dataclass(frozen=True, eq=False)
-class ContactEquations(NumpyEquations):
-    """Equations of a network with contacts for its free unknowns."""
+class EquationsWithNodes(NumpyEquations):
+    """Equations of a network with contacts, as far as pads and stops of nodes go."""
 
     plain: NumpyEquations = field(kw_only=True)  # without contacts; its free unknowns are the first of these
     watched: GapBounds = field(init=False)
@@ -118,16 +119,58 @@ class ContactEquations(NumpyEquations):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "slots", number_free_unknowns(self.mesh))
-        object.__setattr__(self, "watched", GapBounds(self.mesh))
+        slots = np.full(self.mesh.size, -1)
+        slots[self.mesh.free] = np.arange(len(self.mesh.free))
+        object.__setattr__(self, "slots", slots)
+        nodes = tuple(contact for contact in self.mesh.contacts if contact.slide < 0)
+        object.__setattr__(self, "watched", GapBounds(replace(self.mesh, contacts=nodes)))
 
-    def rebase(self, base: FloatArray) -> ContactEquations:
+    def rebase(self, base: FloatArray) -> EquationsWithNodes:
         """Return the equations with other values of the unknowns that are held, (size,)."""
-        return ContactEquations(replace(self.mesh, base=base), self.ramp, plain=self.plain.rebase(base))
+        return replace(self, mesh=replace(self.mesh, base=base), plain=self.plain.rebase(base))
 
-    def stiffen(self, mesh: Discretisation) -> ContactEquations:
+    def stiffen(self, mesh: Discretisation) -> EquationsWithNodes:
         """Return the equations of the same network with another flexibility along its beams."""
-        return ContactEquations(mesh, self.ramp, plain=self.plain.stiffen(open_all_contacts(mesh)))
+        return replace(self, mesh=mesh, plain=self.plain.stiffen(open_all_contacts(mesh)))
+
+    def place_among_all(self, at: LinearEquations) -> LinearEquations:
+        """Return the equations without contacts among those of all unknowns, the others zero."""
+        n, count = self.n, self.plain.n
+        tangent, residual, change = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+        tangent[:count, :count], residual[:count], change[:count] = at.tangent, at.residual, at.change
+        return LinearEquations(residual, tangent, change)
+
+    def add_nodes(self, z: FloatArray, at: LinearEquations) -> list[SymmetricRow]:
+        """Add the contacts of nodes to the equations at a state; return their rows of the symmetric matrix."""
+        moved, rows = self.mesh.base if self.ramp else self.mesh.rate, list[SymmetricRow]()
+        far = self.watched.are_open(z)
+        for number, contact in enumerate(self.watched.mesh.contacts):
+            if far[number] or contact.closed is False:
+                own = self.slots[list(contact.own_unknowns)]
+                own = own[own >= 0]
+                at.tangent[own, own] = -1.0
+                forces = own[:2]  # flag and anchor of one with friction stay
+                at.residual[forces] = -z[self.mesh.free[forces]]
+                continue
+            if contact.closed is None and (lowered := raise_pad(self.mesh, contact, z[None])[0]):
+                contact = contact._replace(
+                    closed=bool(z[contact.unknown] > measure(self.mesh, contact, z).value + lowered)
+                )
+            term = contact_contribution(self.mesh, contact, z)
+            slots = self.slots[term.unknowns]
+            inside = slots >= 0
+            pushed, slot = slots[inside], self.slots[contact.unknown]
+            at.residual[pushed] += term.gradient[inside]
+            at.tangent[np.ix_(pushed, pushed)] += term.hessian[np.ix_(inside, inside)]
+            at.change[pushed] += term.hessian[inside] @ moved[term.unknowns]
+            rows.append(
+                SymmetricRow(pushed[pushed != slot], term.hessian[-1, :-1][inside[:-1]], float(term.hessian[-1, -1]))
+            )
+        return rows
+
+
+class ContactEquations(EquationsWithNodes):
+    """Equations of a network with pads and stops of nodes for its free unknowns."""
 
     def gradient(self, free: Any, way: Any) -> Any:
         """Return the gradient by all unknowns, (size,)."""
@@ -182,24 +225,6 @@ class ContactEquations(NumpyEquations):
 
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
-        mesh, count = self.mesh, self.plain.n
-        at = self.plain.linearise(free[:count], way)
-        residual, change, tangent = np.zeros(self.n), np.zeros(self.n), np.zeros((self.n, self.n))
-        residual[:count], change[:count], tangent[:count, :count] = at.residual, at.change, at.tangent
-        z, moved = np.asarray(self.values(free, way)), mesh.base if self.ramp else mesh.rate
-        far = self.watched.are_open(z)
-        for number, contact in enumerate(mesh.contacts):
-            if far[number] or contact.closed is False:
-                own = self.slots[list(contact.own_unknowns)]
-                held = own[own >= 0]
-                tangent[held, held] = -1.0
-                residual[held[:2]] = -free[held[:2]]  # flag and anchor of one with friction stay
-                continue
-            term = contact_contribution(mesh, contact, z)
-            slots = self.slots[term.unknowns]
-            inside = slots >= 0
-            rows = slots[inside]
-            residual[rows] += term.gradient[inside]
-            tangent[np.ix_(rows, rows)] += term.hessian[np.ix_(inside, inside)]
-            change[rows] += term.hessian[inside] @ moved[term.unknowns]
-        return LinearEquations(residual, tangent, change)
+        at = self.place_among_all(self.plain.linearise(free[: self.plain.n], way))
+        self.add_nodes(np.asarray(self.values(free, way)), at)
+        return at
