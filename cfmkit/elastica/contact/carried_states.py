@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.side_gaps import find_line_tables, side_states
+from cfmkit.elastica.contact.side_gaps import find_line_tables, find_lines
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import cuts_at
@@ -104,6 +104,6 @@ def _locate(mesh: Discretisation, z: FloatArray, stage: LoadStage, numbers: Any,
     result = np.empty((len(numbers), 4))
     for number in np.unique(numbers).tolist():
         rows = numbers == number
-        seen = side_states(mesh, z[None], stage, np.array([number]), fractions[rows])
+        seen = find_lines(mesh, z[None], stage, np.array([number])).evaluate(fractions[rows])
         result[rows, :2], result[rows, 2], result[rows, 3] = seen.place[0, 0], seen.turn[0, 0], seen.ahead[0, 0]
     return result

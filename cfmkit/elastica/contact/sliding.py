@@ -321,9 +321,7 @@ class SlidingEquations(EquationsWithNodes):
         gradient = energy.gradient(moved, z[: mesh.size], *self.factors(place))
         return np.asarray(gradient[mesh.free].imag / COMPLEX_STEP)
 
-    def _frozen(
-        self, tangent: FloatArray, rows: list[SymmetricRow], laid: list[LaidPart], z: FloatArray
-    ) -> FloatArray:
+    def _frozen(self, tangent: FloatArray, rows: list[SymmetricRow], laid: list[LaidPart], z: FloatArray) -> FloatArray:
         """Return the symmetric matrix of motions, section forces and conditions with all places held.
 
         Of an element that lies on an obstacle there is its length, a constraint.
