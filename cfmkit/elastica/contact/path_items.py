@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.contact.changes import PieceOfPath
-    from cfmkit.elastica.contact.side_conditions import SideCondition
+    from cfmkit.elastica.contact.conditions import Condition
+    from cfmkit.elastica.contact.piece import PieceOfPath
     from cfmkit.elastica.mechanics.problem import NetworkProblem
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
@@ -37,9 +37,18 @@ class ContactChange(NamedTuple):
     before: int
     after: int
     contact: int = -1  # in `Network.contacts`
-    condition: SideCondition | None = None  # on the side of a beam, that is met
+    condition: Condition | None = None  # on the side of a beam, that is met
     piece: PieceOfPath | None = None  # whose unknowns `at` has; None: that of the piece before
     states: int = 1  # of friction that are possible behind it
+
+
+class BeyondChange(NamedTuple):
+    """A piece behind a change, where it begins, and the sense of the drive there."""
+
+    piece: PieceOfPath
+    at: PathEquilibrium
+    sense: float
+    n_states: int = 1  # of friction that can go on that way
 
 
 class Remeshed(NamedTuple):
