@@ -28,7 +28,7 @@ from cfmkit.elastica.contact.side_changes import enter_side_change
 from cfmkit.elastica.model.contact import FrictionState
 from cfmkit.numerics.continuation.arc import follow_arc, unit_tangent
 from cfmkit.numerics.continuation.by_arc import pass_fold
-from cfmkit.numerics.continuation.follow import LOCKED_MESSAGE, each_point, follow, follow_on
+from cfmkit.numerics.continuation.follow import LOCKED_MESSAGE, each_point, follow, follow_on, limit_points
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def follow_in_contact(
     if any(contact.rub >= 0 for contact in problem.mesh.contacts) and not problem.ramp:
         part = part.stick_all(start)  # constant loads have come on without friction
         start = part.grow(part.shrink(start))
-    yield from _limit_points(_follow(part, start, targets, branch), options)
+    yield from limit_points(_follow(part, start, targets, branch), options.most_points)
 
 
 def _find_turns(problem: NetworkProblem, start: float, targets: FloatArray) -> list[int]:
@@ -185,18 +185,6 @@ def _find_turns(problem: NetworkProblem, start: float, targets: FloatArray) -> l
     moving = np.flatnonzero(ways)
     turns = moving[1:][ways[moving[1:]] != ways[moving[:-1]]]
     return [*turns.tolist(), len(targets)]
-
-
-def _limit_points(items: Iterator[PathItem], options: Options) -> Iterator[PathItem]:
-    """Yield the items of a path, at most as many points as are allowed."""
-    between = 0
-    for item in items:
-        yield item
-        between += isinstance(item, Point) and item.target < 0
-        if between > options.most_points:
-            assert isinstance(item, Point)
-            yield PathStop(WhyStopped.FULL, item.at.drive, "more points than allowed at {place}")
-            return
 
 
 def _follow(

@@ -244,7 +244,7 @@ class PieceOfPath:
         values = self.values(at.x[None], np.array([at.drive]))[:, 0]
         for row in self.conditions.rows_of("slip"):
             values[row] = self.row_value(at, row, 1.0 if travel >= 0 else -1.0)
-        return bool((values < -roundings).any())
+        return not (values >= -roundings).all()
 
     def roundings_of_force(self, at: PathEquilibrium) -> float:
         """Return which force of a contact is rounding at an equilibrium."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.numerics.continuation.arc import step_along, unit_tangent
+from cfmkit.numerics.continuation.path import PathEvent
 from cfmkit.numerics.continuation.problem import Border, arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import correct, hermite, predict
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.arc import ArcMove
-    from cfmkit.numerics.continuation.path import PathEvent, Walk
+    from cfmkit.numerics.continuation.path import Walk
     from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
 CLOSE_TO_BIFURCATION, CLOSE_TO_FOLD = 1e-6, 3e-4
@@ -41,6 +42,10 @@ class Located(NamedTuple):
     share: float  # of the way between the first two
     within: tuple[PathEquilibrium, PathEquilibrium]  # the first two
     rounded: bool = False  # whether an imperfection rounds a bifurcation so that they lie on two paths
+
+    def as_bifurcation(self, before: int, after: int, modes: Any = None) -> PathEvent:
+        """Return the event between two numbers of unstable directions."""
+        return PathEvent("bifurcation", self.drive, before, after, self.near, modes, self.within)
 
 
 class _Sample(NamedTuple):

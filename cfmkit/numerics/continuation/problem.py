@@ -74,6 +74,10 @@ class PathEquilibrium(NamedTuple):
     effort: float = math.nan  # what works with the drive, if the problem says so
     stiffness: float = math.nan  # derivative of the effort along the path, if the problem says so
 
+    def extrapolate(self, drive: float) -> FloatArray:
+        """Return the unknowns at a drive by the slope here."""
+        return self.x + (drive - self.drive) * self.rate
+
 
 class Border(NamedTuple):
     """A linear condition in place of a held drive: row . (x, drive) = level."""

@@ -129,7 +129,7 @@ def predict(walk: Walk, goal: float) -> FloatArray:
     if guess is not None:
         return guess
     if before is None or before.drive == here.drive:
-        return here.x + (goal - here.drive) * here.rate
+        return here.extrapolate(goal)
     return hermite(before, here, goal)
 
 
