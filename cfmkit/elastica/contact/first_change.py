@@ -42,8 +42,6 @@ def find_change_before_end(
 def find_change(piece: PieceOfPath, first: PathEquilibrium, last: PathEquilibrium) -> ContactChange | PathStop | None:
     """Return the first change of a contact between two points of a piece; None if there is none."""
     step = StepBetween(piece, first, last)
-    if step.is_far:
-        return None
     dips = (step.values < -step.roundings[:, None])[:, 1:]
     if not dips.any():
         return None

@@ -45,7 +45,6 @@ class PieceOfPath:
     closed: frozenset[int]
     options: Options
     friction: Mapping[int, FrictionState] = field(default_factory=dict)  # of closed contacts that rub
-    siblings: dict[frozenset[int], PieceOfPath] = field(default_factory=dict)  # of the same arrays, by what is closed
     seen_between: dict[tuple[float, float], FloatArray] = field(init=False, default_factory=dict)  # values by drives
 
     @cached_property
@@ -112,13 +111,7 @@ class PieceOfPath:
     def with_closed(self, closed: frozenset[int]) -> PieceOfPath:
         """Return the problem with another set of closed contacts; what friction does at a new one is left open."""
         friction = {number: state for number, state in self.friction.items() if number in closed}
-        if friction:
-            return PieceOfPath(self.whole, closed, self.options, friction, self.siblings)
-        if not self.friction:
-            self.siblings.setdefault(self.closed, self)
-        if closed not in self.siblings:
-            self.siblings[closed] = PieceOfPath(self.whole, closed, self.options, siblings=self.siblings)
-        return self.siblings[closed]
+        return PieceOfPath(self.whole, closed, self.options, friction)
 
     def say(self, row: int) -> str:
         """Return what the contact of a row of `values` is called: of a contact its number is its row."""
@@ -263,16 +256,6 @@ class PieceOfPath:
         return calm & dense & steps.are_smooth
 
     @cached_property
-    def seen_unknowns(self) -> Any:
-        """Free unknowns of the whole that `values` depends on: all if sides may touch, else those of nodes that do."""
-        mesh = self.whole.mesh
-        if self.conditions.rows_of("touch"):
-            return slice(None)
-        unknowns = [*mesh.attachments.unknowns[[contact.place for contact in mesh.contacts]].ravel().tolist()]
-        unknowns += [unknown for contact in mesh.contacts for unknown in contact.own_unknowns]
-        return np.flatnonzero(np.isin(mesh.free, unknowns))
-
-    @cached_property
     def smallest_radius(self) -> float:
         """Smallest radius of a pad and the obstacle that it may pass, or half the beam [m]."""
         beams, items = self.whole.mesh.fits.network.beams, self.whole.mesh.fits.network.contacts
@@ -331,15 +314,12 @@ class StepsOfPiece:
 
     def values(self, shares: FloatArray) -> FloatArray:
         """Return the values of all conditions at shares of each step, from 0 to 1, (rows, m, shares)."""
-        piece, some = self.piece, self.piece.seen_unknowns
-        x, rate, width = self.x[:, some], self.rate[:, some], np.diff(self.drive)[:, None]
-        s = shares[:, None, None]
-        between = np.zeros((len(shares), len(width), self.x.shape[1]))
-        smooth = self.are_smooth[:, None]
-        between[..., some] = x[:-1] + np.where(smooth, s * s * (3 - 2 * s), s) * np.diff(x, axis=0)
-        between[..., some] += smooth * width * (s * (1 - s) ** 2 * rate[:-1] + s * s * (s - 1) * rate[1:])
+        piece, x, rate, width = self.piece, self.x, self.rate, np.diff(self.drive)[:, None]
+        s, smooth = shares[:, None, None], self.are_smooth[:, None]
+        between = x[:-1] + np.where(smooth, s * s * (3 - 2 * s), s) * np.diff(x, axis=0)
+        between += smooth * width * (s * (1 - s) ** 2 * rate[:-1] + s * s * (s - 1) * rate[1:])
         drives = self.drive[:-1] + s[:, :, 0] * width[:, 0]
-        between[-1][:, some], drives[-1] = x[1:], self.drive[1:]
+        between[-1], drives[-1] = x[1:], self.drive[1:]
         values = piece.values(between.reshape(-1, between.shape[-1]), drives.ravel())
         values = values.reshape(len(values), len(shares), -1).swapaxes(1, 2)
         for row in piece.conditions.rows_of("slip"):

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 MAX_SAMPLES = 400  # of a step
-OPEN_GAP_STEPS = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
 MAX_HALVINGS = 30  # halvings of a step, in which it is looked for where a contact still sticks
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
@@ -47,16 +46,6 @@ class StepBetween:
         """Places at which gaps and forces are looked at, from 0 to 1: so dense that no obstacle is passed."""
         wanted = np.ceil(self._steps.wanted_samples[0])
         return np.linspace(0.0, 1.0, int(np.clip(wanted, FEWEST_SAMPLES, MAX_SAMPLES)) + 1)
-
-    @property
-    def is_far(self) -> bool:
-        """True if every contact is open and its gap is more than the step can close."""
-        if self.part.closed:
-            return False
-        mesh, ends = self.part.whole.mesh, self.part.values(self._steps.x, self._steps.drive)
-        arms = np.hypot(*mesh.attachments.arm[[contact.place for contact in mesh.contacts]].T)
-        reach = np.append(1.0 + arms, np.full(len(ends) - len(arms), 2.0))
-        return bool((ends > OPEN_GAP_STEPS * self.moved * reach[:, None]).all())
 
     @cached_property
     def values(self) -> FloatArray:
