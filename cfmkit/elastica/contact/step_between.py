@@ -119,8 +119,7 @@ class StepBetween:
             return float((at.drive - self.first.drive) / (self.last.drive - self.first.drive))
         at = at if piece is None else piece.carry(at, self.part)
         weights = arc_weights(self.part.whole, self.part.options.span)
-        start = np.append(self.first.x, self.first.drive)
-        chord, way = np.append(self.last.x, self.last.drive) - start, np.append(at.x, at.drive) - start
+        chord, way = self.last.place - self.first.place, at.place - self.first.place
         finite = np.isfinite(weights)
         return float((weights * chord)[finite] @ way[finite] / ((weights * chord)[finite] @ chord[finite]))
 

@@ -6,6 +6,7 @@ Behind a limit point of the drive, too, the path is followed by its arc length u
 from __future__ import annotations
 
 import itertools
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +16,7 @@ from cfmkit.numerics.continuation.branches import find_beside, find_joined_path
 from cfmkit.numerics.continuation.events import locate_fold, locate_stability_change_on_arc
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import PathEquilibrium, largest_motion
-from cfmkit.numerics.continuation.steps import correct, correct_each
+from cfmkit.numerics.continuation.steps import correct
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -113,10 +114,9 @@ def _pass_values(walk: Walk, run: range, step: ArcMove, fold: Located | None) ->
     for side, (low, high) in enumerate(itertools.pairwise(turns)):
         inside = np.flatnonzero(((targets - low) * (targets - high) <= 0) & (targets != low))
         inside = inside[np.abs(targets[inside] - low).argsort(kind="stable")]
-        goals = targets[inside].tolist()
-        guesses = [_guess(step, fold, side, goal) for goal in goals]
-        found = zip((run.start + inside).tolist(), correct_each(walk.problem, guesses, goals), guesses, strict=True)
-        for number, at, guess in found:
+        for number, goal in zip((run.start + inside).tolist(), targets[inside].tolist(), strict=True):
+            guess = _guess(step, fold, side, goal)
+            at = correct(walk.problem, guess, goal)
             if at is not None and largest_motion(walk.problem, at.x - guess) <= room:
                 yield Point(at, number, walk.branch)
                 if number == run[-1]:
@@ -153,9 +153,7 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
         if move.new.unstable > move.old.unstable:  # a bifurcation: by the drive it is located
             step = 0.5 * abs(move.new.drive - move.old.drive)
             return walk.restart(move.old, step, same_piece=True) if count > 1 else None
-        passed = yield from walk.deliver_values(
-            move.new.drive, lambda goal, move=move: correct(problem, move.interpolate(goal), goal)
-        )
+        passed = yield from walk.deliver_values(move.new.drive, partial(_solve_within, problem, move))
         if passed is None:
             return None
         yield Point(move.new, -1, walk.branch)
@@ -174,6 +172,10 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
         if count > MAX_STEPS:
             return None
     return None
+
+
+def _solve_within(problem: ContinuationProblem, move: ArcMove, goal: float) -> PathEquilibrium | None:
+    return correct(problem, move.interpolate(goal), goal)
 
 
 def _end_at_fold(

@@ -203,10 +203,9 @@ def relocate(
     """
     if event.kind == "limit point" and event.near is not None:
         near = event.near._replace(x=lift(event.near.x), rate=lift(event.near.rate))
-        weights = arc_weights(problem, span)
-        place, along = np.append(near.x, near.drive), np.append(near.rate, 1.0)
-        row = weights * along / np.linalg.norm(along)
-        found = correct(problem, near.x, near.drive, Border(row, float(row @ place)))
+        along = np.append(near.rate, 1.0)
+        row = arc_weights(problem, span) * along / np.linalg.norm(along)
+        found = correct(problem, near.x, near.drive, Border(row, float(row @ near.place)))
         return None if found is None else event.drive + found.drive - near.drive
     if event.within is None:
         return None
@@ -222,7 +221,7 @@ def relocate(
 
 def locate_stability_change_on_arc(problem: ContinuationProblem, move: ArcMove, span: float) -> Located | None:
     """Return the change of stability within a step along the arc."""
-    first, last = np.append(move.old.x, move.old.drive), np.append(move.new.x, move.new.drive)
+    first, last = move.old.place, move.new.place
     row = arc_weights(problem, span) * (last - first)
     row /= np.linalg.norm(row)
 
