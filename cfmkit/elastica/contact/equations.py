@@ -144,15 +144,6 @@ class ContactEquations(EquationsWithNodes):
                 whole_gradients[number, term.unknowns] += term.gradient
         return whole_gradients
 
-    def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
-        """Return gradient (size,) and Hessian (size, size) by all unknowns."""
-        gradient, hessian = self.plain.evaluate(z, drive, share)
-        for contact in self.mesh.contacts:
-            term = contact_contribution(self.mesh, contact, z)
-            gradient[term.unknowns] += term.gradient
-            hessian[np.ix_(term.unknowns, term.unknowns)] += term.hessian
-        return gradient, hessian
-
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
         at = self.place_among_all(self.plain.linearise(free[: self.plain.n], way))
