@@ -21,7 +21,7 @@ def list_elements(mesh: Discretisation, beam: str) -> list[int]:
     return [number for number, name in enumerate(mesh.elements.beam) if name == beam]
 
 
-class BeamEnd(NamedTuple):
+class LoadedBeamEnd(NamedTuple):
     """An end of a beam in states (..., size)."""
 
     element: int
@@ -29,12 +29,12 @@ class BeamEnd(NamedTuple):
     place: Any  # (..., 2)
 
 
-def find_end(mesh: Discretisation, beam: str, last: bool, z: FloatArray) -> BeamEnd:
+def find_end(mesh: Discretisation, beam: str, last: bool, z: FloatArray) -> LoadedBeamEnd:
     """Return the first or the last end of a beam."""
     element, side, e = list_elements(mesh, beam)[-1 if last else 0], int(last), mesh.elements
     unloaded = float(np.real(mesh.fits[beam].angle(float(side), float(e.cuts[element].mean()))))
     place = poses(mesh.attachments, z, [int(e.ends[element, side])]).place[..., 0, :]
-    return BeamEnd(element, unloaded + z[..., e.unknowns[element, 3 + 4 * side]], place)
+    return LoadedBeamEnd(element, unloaded + z[..., e.unknowns[element, 3 + 4 * side]], place)
 
 
 def measure_bend(mesh: Discretisation, z: FloatArray, element: int, end: int) -> Any:

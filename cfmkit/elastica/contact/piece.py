@@ -56,7 +56,7 @@ class PieceOfPath:
 
     @cached_property
     def conditions(self) -> Conditions:
-        """What must not become negative on this piece."""
+        """Conditions, none of which may become negative on this piece."""
         return Conditions(self.whole.mesh, self.closed, self.friction)
 
     @property
