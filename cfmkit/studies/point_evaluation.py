@@ -33,7 +33,7 @@ from cfmkit.metrics import (
     window_of,
     windows_judged,
 )
-from cfmkit.metrics.spread import STATIC_BALANCE
+from cfmkit.metrics.window_metrics import STATIC_BALANCE
 from cfmkit.results import Result, Status
 from cfmkit.specs.data_file_paths import list_data_files
 from cfmkit.specs.units import to_border

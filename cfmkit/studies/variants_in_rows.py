@@ -10,10 +10,9 @@ import numpy as np
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.rows import Variants, valid
-from cfmkit.metrics import split_name
+from cfmkit.metrics import CycleRows, metric_of_rows, split_name
 from cfmkit.metrics.branches import WINDOW_RTOL
 from cfmkit.metrics.metric_values import worst_branch
-from cfmkit.metrics.metrics_of_rows import CycleRows, metric_of_rows
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.specs.units import TravelShare, window_places
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gather_rows
@@ -128,8 +127,7 @@ class SolvedVariants:
         if own is not None:
             return {"": own}
         if over not in self._cycles:
-            window, curves = self._window(over), self.solved.branches
-            self._cycles[over] = CycleRows({name: rows.restrict_to_window(window) for name, rows in curves.items()})
+            self._cycles[over] = CycleRows.from_curves(self.solved.branches, self._window(over))
         cycle = self._cycles[over]
         if alone is not None:
             cycle = CycleRows({name: rows for name, rows in cycle.branches.items() if name == alone})
@@ -146,7 +144,7 @@ class SolvedVariants:
         """True if rows have every column of the study."""
         names = {split_name(name)[0] for name, _ in self._asked}
         definitions = self._definitions
-        return all(name in self.solved.quantities or definitions[name].of_rows is not None for name in names)
+        return all(name in self.solved.quantities or definitions[name].is_known_in_rows for name in names)
 
     @cached_property
     def _definitions(self) -> Mapping[str, Definition]:

@@ -27,7 +27,7 @@ from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
 from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES, spread
 from cfmkit.families.vcfm.range_and_flatness_findings import extreme_sums
-from cfmkit.metrics import evaluate
+from cfmkit.metrics import CycleRows, evaluate
 from cfmkit.results import Status
 from cfmkit.studies import are_solved_together
 
@@ -575,7 +575,7 @@ def test_the_ends_of_a_window_have_the_force_of_the_model(points):
     spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"analysis.points": points})
     solution = cfmkit.analyze(spec).state
     low, high = 0.61e-3, 3.33e-3
-    inside = solution.branches["load"].restrict_to_window((np.array([low]), np.array([high]))).inside.values[0]
+    inside = CycleRows.from_curves(solution.branches, (np.array([low]), np.array([high]))).first.inside.values[0]
     wanted = solution.sampler.leaf_force(np.array([low, high])) + solution.sampler.spring(np.array([low, high]))[0]
     assert inside[[0, -1]] == pytest.approx(wanted, rel=1e-14)
     assert np.isnan(solution.nominal.evaluate_within_ends(np.array([[-1e-3, 1.0]]))).all()

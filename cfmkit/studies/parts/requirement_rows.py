@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
-    from cfmkit.metrics.metrics_of_rows import CurveRows
+    from cfmkit.metrics.curve_rows import CurveRows
     from cfmkit.results import Result
     from cfmkit.specs.spec import Requirement, Spec
     from cfmkit.studies.point_evaluation import Metric
