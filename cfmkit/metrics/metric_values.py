@@ -32,7 +32,7 @@ from cfmkit.results import WINDOW_OUTSIDE, Finding, Quantity, Status
 from cfmkit.specs.units import TravelShare, border_unit, to_border, window_places
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -422,16 +422,22 @@ def gaps(result: Result) -> tuple[UncoveredWindow, ...]:
     """Return each window of the specification that some branch of the nominal curve does not cover."""
     if not result.curves or not len(result.curves[0]):
         return ()
-    extents = [trace.extent for trace in traces(result.curves[0])]
+    windows = ((path, window_of(result, ends)) for path, ends in result.spec.windows())
+    return find_uncovered(windows, [trace.extent for trace in traces(result.curves[0])], result.curves[0].kind)
+
+
+def find_uncovered(
+    windows: Iterable[tuple[Sequence[Any], Window | None]],  # path in the specification, and the window in places
+    extents: Sequence[tuple[float, float]],  # of the branches of a curve
+    kind: Kind,  # of the curve
+) -> tuple[UncoveredWindow, ...]:
+    """Return each window that some branch of a curve does not cover."""
     paths: dict[Window, list[str]] = {}
-    for path, ends in result.spec.windows():
-        window = window_of(result, ends)
+    for path, window in windows:
         if window is not None and not all(covers(extent, window) for extent in extents):
             paths.setdefault(window, []).append(".".join(map(str, path)))
     common = max(low for low, _ in extents), min(high for _, high in extents)
-    return tuple(
-        UncoveredWindow(window, tuple(where), common, result.curves[0].kind) for window, where in paths.items()
-    )
+    return tuple(UncoveredWindow(window, tuple(where), common, kind) for window, where in paths.items())
 
 
 def windows_judged(result: Result) -> Result:

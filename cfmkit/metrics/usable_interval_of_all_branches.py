@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -251,7 +251,7 @@ def _excess(samples: RowSamples, heights: FloatArray) -> list[Interval]:
 
 
 @np.errstate(all="ignore")
-def metric_of_rows(definition: Definition, cycle: CycleRows) -> Mapping[str, FloatArray]:
+def metric_of_rows(definition: Definition, cycle: CycleRows, time: float | None = None) -> Mapping[str, FloatArray]:
     """Return a metric of curves by branch, (d,) each [SI]; NaN where it has no value.
 
     Parameters
@@ -260,6 +260,8 @@ def metric_of_rows(definition: Definition, cycle: CycleRows) -> Mapping[str, Flo
         The metric.
     cycle : CycleRows
         The branches of the curves over the window of the metric.
+    time : float, optional
+        That in its brackets, where it is one of a time [s].
 
     Returns
     -------
@@ -267,14 +269,16 @@ def metric_of_rows(definition: Definition, cycle: CycleRows) -> Mapping[str, Flo
         What is no matter of one branch stands under the name "" alone.
     """
     function, branches = definition.function, cycle.branches
-    if function is None or not branches:
+    if function is None or not branches or (definition.argument and time is None):
         return {}
+    if time is not None:
+        function = partial(function, time=time)
     if definition.scope != "branch":
         return {"": _values_or_nan(function, cycle, len(cycle.first))}
     values = {name: _values_or_nan(function, rows, len(rows)) for name, rows in branches.items()}
-    if not definition.windowed:
+    if not definition.windowed or len(cycle.first) == 1:  # one row by itself has said already whether it is known
         return values
-    return {name: np.where(_is_known(rows), values[name], np.nan) for name, rows in branches.items()}
+    return {name: np.where(rows.is_known, values[name], np.nan) for name, rows in branches.items()}
 
 
 def _values_or_nan(function: Callable[..., FloatArray], subject: object, count: int) -> FloatArray:
@@ -282,7 +286,3 @@ def _values_or_nan(function: Callable[..., FloatArray], subject: object, count: 
         return function(subject)
     except Undefined:
         return np.full(count, np.nan)
-
-
-def _is_known(rows: RowsInWindow) -> NDArray[np.bool_]:
-    return np.array([False]) if len(rows) == 1 and not rows.covered[0] else rows.is_known

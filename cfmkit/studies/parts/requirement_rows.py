@@ -394,7 +394,8 @@ def _numbers_in_rows(
                 continue
             numbers = _looked_up(solved.branches, rows, variants)
             if numbers is not None:
-                good = variants.usable & np.isfinite(numbers).all(axis=1)
+                good = solved.complete & np.isfinite(numbers).all(axis=1)
+                good[list(variants.rows().odd)] = False
                 is_reached = _get_to(solved.branches, rows, reached)
                 numbers_by_part |= {
                     int(members[row]): numbers[row] if is_reached[row] else None for row in np.flatnonzero(good)
