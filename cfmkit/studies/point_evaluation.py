@@ -1,4 +1,4 @@
-"""Study of a specification (sweep, sensitivity, manufactured parts): the solution of each point, and what is noted of it.
+"""Study of a specification (sweep, sensitivity, parts): how a point is solved, and what is noted of it.
 
 A `Study` holds everything that decides the row of a point but the varied values. It notes the metrics that are
 requested, or all that the mechanism can have.
