@@ -40,7 +40,7 @@ from cfmkit.experiment.recorded_values import (
 )  # fmt: skip
 from cfmkit.experiment.reversal_transitions import remove_transitions
 from cfmkit.metrics import Definition, MeasuringFrame, Window, measure, metrics_by_name
-from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.branches import span_text
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
 from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.results import Finding, Quantity

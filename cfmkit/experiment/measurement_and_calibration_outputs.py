@@ -17,7 +17,7 @@ from cfmkit.experiment.corrections_and_low_pass import raw_zeros, words_of
 from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
 from cfmkit.experiment.recorded_values import hole_finding, number_of
 from cfmkit.metrics import flat_metrics, metrics_json, split_name
-from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.branches import span_text
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
 from cfmkit.results import Status
 from cfmkit.specs.units import border_unit, format_short, to_border

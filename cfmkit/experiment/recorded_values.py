@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
-from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.branches import span_text
 from cfmkit.metrics.metric_definitions import split_name
 from cfmkit.numerics.holes_in_samples import HOLE_STEP_RATIO, MAX_HOLE_SHARE, holes_between
 from cfmkit.results import Finding, Quantity
