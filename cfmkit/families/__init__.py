@@ -21,7 +21,7 @@ from cfmkit.specs import further_metrics
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.families.base import DesignMethod, ElasticParts, Family, Pictures, ResultNames, function_named
+    from cfmkit.families.base import DesignMethod, ElasticParts, Family, Pictures, ResultNames
     from cfmkit.families.findings import CannotBuild, Finder, Infeasible
     from cfmkit.families.hardware import PIN_STRENGTH, PartStrength
     from cfmkit.families.proposals import Candidate, FamilyOffer, Request
@@ -201,7 +201,7 @@ def origins() -> dict[str, dict[str, str]]:
 __getattr__, _OFFERED_NAMES = lazy_names(
     __name__,
     {
-        "base": "DesignMethod ElasticParts Family Pictures ResultNames function_named",
+        "base": "DesignMethod ElasticParts Family Pictures ResultNames",
         "findings": "Finder CannotBuild Infeasible",
         "hardware": "PIN_STRENGTH PartStrength",
         "rows": "FindingRule ScalarQuantity SolvedRows Variants",

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import partial
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit.arrays import LazyMapping
@@ -79,23 +77,6 @@ class Outliner(Protocol):
 
     def __call__(self, spec: Any, tolerance: float = ..., /) -> Drawing:
         """Return contours; edges that are not `Smooth` lie within the tolerance [m] of the exact ones."""
-
-
-def function_named(name: str) -> Any:
-    """Return the function that ``"module:function"`` names; the module is imported for it.
-
-    ``"module:function:word"`` names the function with that word as its first argument.
-
-    Examples
-    --------
-    >>> function_named("math:hypot")(3.0, 4.0)
-    5.0
-    >>> function_named("operator:add:a")("b")
-    'ab'
-    """
-    module, function, *words = name.split(":")
-    chosen = getattr(import_module(module), function)
-    return partial(chosen, *words) if words else chosen
 
 
 _VOWEL_SOUND_LETTERS = "aefhilmnorsx"  # letters whose names begin with a vowel

@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
+from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -133,11 +134,10 @@ def _clash(offer: InstalledFamily, taken: Iterable[str]) -> str:
 @lru_cache(maxsize=64)
 def _import_record(offer: InstalledFamily) -> Family | str:
     """Return the record, or why there is none: whatever the package raises when it is imported or looked at."""
-    from cfmkit.families.base import function_named
-
     try:
         with redirect_stdout(sys.stderr), _distinguish_ctrl_c():  # standard output is for results
-            record = function_named(offer.target)
+            module, _, name = offer.target.partition(":")
+            record = getattr(import_module(module), name)
             return _fault_of(record, offer) or record
     except _Interrupted:
         raise KeyboardInterrupt from None

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
@@ -45,6 +45,13 @@ what published mechanisms of printed plastic are bent to. The stress of what com
 STOP_MARGIN_SHARE = 0.03
 """Free way behind the travel, over the travel, at which an end stop stands: so far off may it be made and not shorten
 the travel. For parts of a few millimetres that is a tenth of one, the usual tolerance of a cut length."""
+
+
+class Refinement(Protocol):
+    """A function that makes one specification of another for a request."""
+
+    def __call__(self, spec: Any, request: Request, /) -> Spec:
+        """Return the specification; raises CfmError if there is none."""
 
 
 @dataclass(frozen=True)
@@ -128,17 +135,14 @@ class Candidate:
     variant: str  # which of the family's, in a few words
     spec: Spec  # complete, or with a block `design` that the family's own design completes
     design: bool = False  # whether it is to be designed
-    # ``"module:function"``, ``function(spec, request) -> spec``: what makes the designed one the one that is judged,
-    # its window and travel written out; ``"module:function:word"``, ``function(word, spec, request)``. Empty: nothing
-    # has to be done
-    finish: str = ""
+    # makes the designed one the one that is judged, its window and travel written out; None if nothing has to be done
+    finish: Refinement | None = None
     promise: float = 0.0  # the smaller, the sooner it is worth a try
     # paths of values of one that is not designed, which may move where made parts miss a yield
     free: tuple[str, ...] = ()
-    # ``"module:function"``, ``function(spec, request) -> spec``: solves the part by the finest model of the family and
-    # returns it with that model, its window, thicknesses and widths corrected by what was found. Empty: it is judged by
-    # that model as it is
-    correct: str = ""
+    # solves the part by the finest model of the family and returns it with that model, its window, thicknesses and
+    # widths corrected by what was found; None if it is judged by that model as it is
+    correct: Refinement | None = None
     reserve: float = 1.0  # `Request.reserve` that it was proposed for, and is designed with
     springs: Springs | None = None  # that it is put together with; None if it needs none
     doubtful: bool = False  # whether its laws say that it probably does not fit: it comes after those that do

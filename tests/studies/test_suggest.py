@@ -18,7 +18,7 @@ from cfmkit.families import FamilyOffer, family
 from cfmkit.results import Status
 from cfmkit.specs.units import TravelShare
 from cfmkit.studies.serial_and_cluster_executors import Lost
-from cfmkit.studies.suggest import figures, proposal_making_and_judging, relaxed_requests, search, yield_of_proposal
+from cfmkit.studies.suggest import figures, relaxed_requests, search, yield_of_proposal
 from cfmkit.studies.suggest.file_of_proposal import add_screws
 from cfmkit.studies.suggest.outcome_of_search import Suggestions
 from cfmkit.studies.suggest.proposal_making_and_judging import (
@@ -94,11 +94,9 @@ def test_a_bug_costs_its_own_candidate_only_and_keeps_its_traceback(monkeypatch,
         return FamilyOffer((candidate,)) if where == "candidate" else broken()
 
     candidate = offered("cam")[1][0]
-    finish = "oh" if where == "candidate" else None
-    candidate = replace(candidate, finish=finish)
+    candidate = replace(candidate, finish=broken if where == "candidate" else None)
     monkeypatch.setattr(search, "names", lambda: ("cam",))
     monkeypatch.setattr(search, "family", lambda name: replace(family(name), propose=offer))
-    monkeypatch.setattr(proposal_making_and_judging, "function_named", lambda _: broken)
     monkeypatch.setattr(search, "_with_nearest", lambda answers, *_: (answers, True))
     found = suggest(request(), Run())
     reasons = [*found.failed.get("cam", ()), *(one.offer.reason for one in found.answers if one.offer.reason)]

@@ -14,7 +14,7 @@ from suggest_support import POM, candidate_named, proposal_of, propose, request,
 import cfmkit
 from cfmkit import Run, api
 from cfmkit.errors import SpecError
-from cfmkit.families import family, function_named
+from cfmkit.families import family
 from cfmkit.metrics import values_of_family
 from cfmkit.results import Quantity
 from cfmkit.stock.springs import WIRES_BY_NAME, ExtensionSpring
@@ -112,8 +112,7 @@ def test_a_part_is_corrected_and_judged_until_the_finest_model_finds_nothing(bea
 
     monkeypatch.setattr(judging, "judge_proposal", judge)
     correct = {judging.FIDELITY_KEY: "solid"}
-    monkeypatch.setattr(judging, "function_named", lambda _: lambda spec, _request: spec.replace(correct))
-    candidate = replace(first("beam", asked), correct="it:is")
+    candidate = replace(first("beam", asked), correct=lambda spec, _request: spec.replace(correct))
     found = proposal_of("beam", candidate, asked, 0, near=near)
     assert found.good
     assert asked_for == ["solid", "solid"]
@@ -141,7 +140,7 @@ def test_the_springs_of_a_proposed_cam_are_stated_and_bear_their_load():
     asked = request(force="50 N", travel="100 mm", envelope="[250 mm, 350 mm, 80 mm]", material="steel-s235")
     candidate = first("cam", asked, "2 springs")
     plain = cfmkit.design(candidate.spec).spec
-    spec = function_named(candidate.finish)(plain, asked)
+    spec = candidate.finish(plain, asked)
     wire = spec.mechanism.springs.wound
     springs = spec.mechanism.springs
     assert wire.to_wound(ExtensionSpring).rate * springs.count == pytest.approx(springs.total, rel=1e-12)

@@ -9,7 +9,7 @@ from vcfm_support import CONFIGS, MM, TABLE_I
 
 import cfmkit
 from cfmkit import Run, api
-from cfmkit.families import family, function_named
+from cfmkit.families import family
 from cfmkit.families.vcfm import proposals
 from cfmkit.families.vcfm.design import closed_form, fit_widths
 from cfmkit.results import Status
@@ -164,7 +164,7 @@ def test_a_proposal_with_another_structure_is_adjusted_by_preloads_of_its_own_sp
     candidates = proposals.propose(request, Run()).candidates
     chosen = next(one for one in candidates if one.variant.startswith(words))
     made = family("vcfm").design.make(chosen.spec.replace({"design.refine": False}), Run()).spec
-    finished = function_named(chosen.finish)(made, request)
+    finished = chosen.finish(made, request)
     found = cfmkit.analyze(finished)
     change = next(one.values for one in found.tables["adjustability"]().columns if one.name == "force_change")
     assert list(change) == pytest.approx([0.0, 2.0, -2.0], abs=0.025)

@@ -214,9 +214,8 @@ def _size_section(
     promise += mechanism.layers - 1.0  # one layer is easier to make than two
     promise += WIDE_LAST * is_too_wide(request, wide, thicker * thin, strain)
     variant = name_variant(f"shape {kept.name}", request, block)
-    module = "cfmkit.families.beam.proposals"
     free = "mechanism.thickness", "mechanism.width"
-    return Candidate(variant, spec, False, f"{module}:finish", promise, free, f"{module}:correct")
+    return Candidate(variant, spec, False, finish, promise, free, correct)
 
 
 def _width(request: Request, kept: Kept, size: float, stiffer: float, thicker: float, force: float) -> float:

@@ -310,7 +310,7 @@ def _from_catalogue(made: Candidate, request: Request) -> Candidate:
         made,
         variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant),
         spec=spec,
-        finish=f"{__name__}:widen_plate",
+        finish=widen_plate,
         springs="catalogue",
     )
 
@@ -352,7 +352,7 @@ def _write_candidate(
     area = size["width"] * size["height"] / (request.envelope[0] * request.envelope[1])
     variant = name_variant(f"{count} spring{'s' if count > 1 else ''}", request, material)
     promise = area + size["ripple"] / request.ripple
-    return Candidate(variant, spec, design=True, finish=f"{__name__}:with_wire", promise=promise, springs="custom")
+    return Candidate(variant, spec, design=True, finish=with_wire, promise=promise, springs="custom")
 
 
 def _explain_no_offer(request: Request, sizes: dict[str, Any]) -> FamilyOffer:

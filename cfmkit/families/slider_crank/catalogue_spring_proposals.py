@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 def with_catalogue_springs(made: Candidate) -> Candidate:
     """Return the same linkage for a force, to be given springs of the generic series."""
-    return replace(made, variant="catalogue springs at pins", finish=f"{__name__}:finish", springs="catalogue")
+    return replace(made, variant="catalogue springs at pins", finish=finish, springs="catalogue")
 
 
 def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:

@@ -71,9 +71,6 @@ FLEXURE_LENGTH_RATIO = 0.2  # length of a flexure, over the crank's length, as i
 MAX_THICKNESS_RATIOS, THICKEST_TAPERED = 0.1, 0.05
 """Largest thickness of a strip, and of a tapered one, over the crank's length: thicker ones hardly bend as lines do."""
 MAX_PROPOSALS = 24
-MODULE_NAME = "cfmkit.families.slider_crank.proposals"
-PART_FUNCTION, CORRECTION_FUNCTION = f"{MODULE_NAME}:part", f"{MODULE_NAME}:correct"
-"""What finishes the parts of one piece, and what corrects them by their solids."""
 TRAVEL_EXTENSION = 1.1  # how far a solid is followed, over its travel, to look for a flatter window
 FOLLOWED_TRAVEL_RATIO = 1.02
 """Travel up to which parts of one piece are followed, over the reach of their proportions: nothing ends there."""
@@ -264,9 +261,9 @@ class PrintedSize:
             name_variant(kind, request, self.material),
             SliderCrankSpec.model_validate(data),
             True,
-            PART_FUNCTION,
+            finish,
             largest_first(self.crank, request),
-            correct=CORRECTION_FUNCTION,
+            correct=correct,
         )
 
     def _strip(self, kind: str, travel: tuple[float, float], width: float) -> Candidate:
@@ -380,7 +377,7 @@ def _scale_sections(spec: SliderCrankSpec, thinner: float, wider: float) -> dict
     return thicknesses | {f"mechanism.flexures.{name}.width": wider * size.width for name, size in sizes.items()}
 
 
-def part(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
+def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     """Return a designed part whose widths, in which force is linear, give exactly the mean that is required."""
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.printed.model import analyze

@@ -89,7 +89,6 @@ SLIDING_FRICTION = 0.1
 ACROSS_SHARE = 0.6  # load across the guide over the force along it, about: the coupler is inclined
 PIN_IN_COIL = 0.9
 """Largest diameter of a pin over the inner one of a torsion spring around it, wound up: makers leave a tenth."""
-FINISH_FUNCTION = "cfmkit.families.slider_crank.sprung_linkage_proposals:finish"
 """What finishes linkages with springs at their pins."""
 
 
@@ -161,7 +160,7 @@ def _offer_turned(request: Request, share: float, linkage: tuple[float, float, f
     return Candidate(
         "springs at pins",
         spec,
-        finish=FINISH_FUNCTION,
+        finish=finish,
         promise=-min(most / request.target, MAX_TORQUE_RATIO),
         springs="custom",
     )
@@ -441,9 +440,7 @@ def pushed_linkage(request: Request, lengths: Proportions, crank: float, first: 
             break
     else:
         return most
-    return Candidate(
-        "springs at pins", spec, finish=FINISH_FUNCTION, promise=largest_first(crank, request), springs="custom"
-    )
+    return Candidate("springs at pins", spec, finish=finish, promise=largest_first(crank, request), springs="custom")
 
 
 def pushed_analysis(travel: tuple[float, float]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ family's own design.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import chain, product
 from math import pi, sin, sqrt
 from typing import TYPE_CHECKING, Any
@@ -27,7 +28,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
-from cfmkit.families.vcfm.proposal_sizes import fit_best_window, lengthen, open_corners, preloads_for, widen
+from cfmkit.families.vcfm.proposal_sizes import correct, fit_best_window, lengthen, open_corners, preloads_for, widen
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
@@ -72,9 +73,6 @@ WIDE_LAST = 100.0  # promise of designs whose leaves are too wide to curl: they 
 TRAVEL_OVER_LINEAR_REGION = 1.2  # end of the travel over that of the linear region: the flattest window may lie farther
 SPRING_CLEARANCE_RATIO = 1.2  # room across that a helical spring takes, over its diameter: as they are drawn
 MAX_PROPOSALS = 28
-FINISH_FUNCTION = "cfmkit.families.vcfm.proposals:finish"
-FINISH_WITH = "cfmkit.families.vcfm.proposals:finish_with"
-CORRECTION_FUNCTION = "cfmkit.families.vcfm.proposal_sizes:correct"
 """What finishes what the family's design has made, and what corrects it by its solids."""
 
 
@@ -98,9 +96,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
                 thick = min(sizes.leaf.thickness, sizes.spring_leaf.thickness)
                 promise = over["across"] * over["along"] if request.good_parts is None else -thick
                 promise += WIDE_LAST * _is_too_wide(request, block, sizes)
-                candidates.append(
-                    Candidate(variant, spec, True, FINISH_FUNCTION, float(promise), correct=CORRECTION_FUNCTION)
-                )
+                candidates.append(Candidate(variant, spec, True, finish, float(promise), correct=correct))
             if (coiled := _offer_coiled(request, block, spec, sizes)) is not None:
                 candidates.append(coiled)
     if candidates:
@@ -263,9 +259,7 @@ def _offer_coiled(request: Request, block: MaterialBlock, spec: VcfmSpec, sizes:
     # the spring decides how wide the leaves are: of those for which there is a place, one whose leaves fit the depth
     listed = spec.replace({"design.catalogue": tuple(springs), "design.max_width": request.depth})
     variant = name_variant("2 Vs, catalogue springs", request, block)
-    return Candidate(
-        variant, listed, True, FINISH_FUNCTION, float(promise), correct=CORRECTION_FUNCTION, springs="catalogue"
-    )
+    return Candidate(variant, listed, True, finish, float(promise), correct=correct, springs="catalogue")
 
 
 def _springs_beside(request: Request, spec: VcfmSpec, travel: float, place: float) -> Iterator[CatalogueSpring]:
@@ -301,7 +295,9 @@ def _with_structures(candidates: list[Candidate]) -> Iterator[Candidate]:
     for name, (_, structure) in STRUCTURE_BLOCKS.items():
         for candidate in chosen:
             yield replace(
-                candidate, variant=candidate.variant.replace("2 Vs", structure.variant), finish=f"{FINISH_WITH}:{name}"
+                candidate,
+                variant=candidate.variant.replace("2 Vs", structure.variant),
+                finish=partial(finish_with, name),
             )
 
 

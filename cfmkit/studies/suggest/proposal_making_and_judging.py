@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.families.base import ENVELOPE_METRICS, add_size, function_named
+from cfmkit.families.base import ENVELOPE_METRICS, add_size
 from cfmkit.families.hardware import SAFETY_METRICS
 from cfmkit.families.proposals import stiffening
 from cfmkit.families.run_control import Run
@@ -208,9 +208,8 @@ def _design_candidate(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]
         spec = design.spec
     if clock.late():
         return None, OUT_OF_TIME
-    if job.candidate.finish:
-        request = replace(job.request, reserve=job.candidate.reserve)
-        spec = function_named(job.candidate.finish)(spec, request)
+    if job.candidate.finish is not None:
+        spec = job.candidate.finish(spec, replace(job.request, reserve=job.candidate.reserve))
     return spec, ""
 
 
@@ -243,7 +242,7 @@ def _judge_by_finest_model(job: ProposalJob, near: Proposal, clock: Clock) -> Pr
     for _ in range(MAX_CORRECTIONS if correct else 1):
         if clock.late():
             break
-        made = function_named(correct)(spec, aimed) if correct else spec.replace({FIDELITY_KEY: near.pending})
+        made = correct(spec, aimed) if correct else spec.replace({FIDELITY_KEY: near.pending})
         if clock.late():
             break
         found = judge_proposal(job.family, near.variant, made, job.request, job.seed, clock, near)

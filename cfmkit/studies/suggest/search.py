@@ -15,7 +15,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -338,12 +338,20 @@ def _key(job: ProposalJob) -> str:
     """Return by what a proposal is found again: all that decides it, the code included, but not the time left."""
     candidate = job.candidate
     content = {
-        "family": job.family, "variant": candidate.variant, "design": candidate.design, "finish": candidate.finish,
+        "family": job.family, "variant": candidate.variant, "design": candidate.design,
+        "finish": _name_refinement(candidate.finish), "correct": _name_refinement(candidate.correct),
         "spec": candidate.spec.model_dump(mode="json"), "suggest": repr(job.request), "seed": job.seed,
         "code": code_stamp(),
-        "again": job.near and job.near.text, "correct": candidate.correct, "reserve": candidate.reserve,
+        "again": job.near and job.near.text, "reserve": candidate.reserve,
     }  # fmt: skip
     return stable_hash(content)[:32]
+
+
+def _name_refinement(function: Any) -> str:
+    """Return the name of a function, with the arguments that are bound to it."""
+    if isinstance(function, partial):
+        return f"{_name_refinement(function.func)}{function.args}"
+    return f"{function.__module__}.{function.__qualname__}" if function else ""
 
 
 def distinct(proposals: Sequence[Proposal]) -> list[Proposal]:
