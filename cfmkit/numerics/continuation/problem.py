@@ -78,6 +78,17 @@ class PathEquilibrium(NamedTuple):
     effort: float = math.nan  # what works with the drive, if the problem says so
     stiffness: float = math.nan  # derivative of the effort along the path, if the problem says so
 
+    @property
+    def place(self) -> FloatArray:
+        """Unknowns and drive, (n + 1,)."""
+        place = np.empty(len(self.x) + 1)
+        place[:-1], place[-1] = self.x, self.drive
+        return place
+
+    def extrapolate(self, drive: float) -> FloatArray:
+        """Return the unknowns at a drive by the slope here."""
+        return self.x + (drive - self.drive) * self.rate
+
 
 class Border(NamedTuple):
     """A linear condition in place of a held drive: row . (x, drive) = level."""

@@ -18,8 +18,6 @@ import numpy as np
 from cfmkit.numerics.continuation.problem import Border, PathEquilibrium, force_change, largest_motion
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.path import Walk
     from cfmkit.numerics.continuation.problem import ContinuationProblem, ScaledUnknowns
@@ -78,16 +76,6 @@ def correct(
     return None
 
 
-def correct_each(
-    problem: ContinuationProblem, guesses: Sequence[FloatArray], drives: Sequence[float]
-) -> list[PathEquilibrium | None]:
-    """Return the equilibria near guesses at their drives; a problem may have a method `solve_each` for that."""
-    own = getattr(problem, "solve_each", None)
-    if own is not None and len(drives) > 1:
-        return own(guesses, drives)  # type: ignore[no-any-return]
-    return [correct(problem, *pair) for pair in zip(guesses, drives, strict=True)]
-
-
 def _drive_change(border: Border, x: FloatArray, drive: float, rate: FloatArray) -> float:
     row = border.row
     return float((border.level - row[:-1] @ x - row[-1] * drive) / (row[-1] + row[:-1] @ rate))
@@ -130,7 +118,7 @@ def predict(walk: Walk, goal: float) -> FloatArray:
     if guess is not None:
         return guess
     if before is None or before.drive == here.drive:
-        return here.x + (goal - here.drive) * here.rate
+        return here.extrapolate(goal)
     return hermite(before, here, goal)
 
 
