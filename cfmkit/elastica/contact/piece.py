@@ -21,7 +21,7 @@ from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.model.contact import BeamOnBeam, FrictionState, NodeOnBeam, NodeOnObstacle, describe
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
-from cfmkit.numerics.continuation.problem import PathEquilibrium
+from cfmkit.numerics.continuation.problem import Border, PathEquilibrium
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -193,7 +193,7 @@ class PieceOfPath:
         near = self.shrink(begin)
         border = np.zeros(len(near.x) + 1)
         border[list(row)] = list(row.values())
-        state = self.own.equations.solve(near.x, near.drive, border, level)
+        state = self.own.solve(near.x, near.drive, Border(border, level))
         return state if state is not None and np.isfinite(state.rate).all() else None
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
+    from cfmkit.numerics.continuation.problem import Border
 
 
 CLOSED_SIDE = 5  # column of `side_at`
@@ -234,16 +235,10 @@ class CompiledEquations(NumpyEquations):
         return told if told >= 0 else self.count_unstable(self.linearise(free, place))
 
     def solve(
-        self,
-        free: FloatArray,
-        way: float,
-        border: FloatArray | None = None,
-        level: float = 0.0,
-        tolerance: float = 1e-10,
-        quick: bool = False,
+        self, free: FloatArray, way: float, border: Border | None = None, tolerance: float = 1e-10, quick: bool = False
     ) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
-        solved = self._newton(free[None], [way], border, level, tolerance, quick)
+        solved = self._newton(free[None], [way], border, tolerance, quick)
         x, at, rate, (code, told, effort) = (values[0] for values in solved)
         if code:
             return None
@@ -253,18 +248,18 @@ class CompiledEquations(NumpyEquations):
         self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses."""
-        x, ways, rate, outcomes = self._newton(free, way, None, 0.0, tolerance, quick)
+        x, ways, rate, outcomes = self._newton(free, way, None, tolerance, quick)
         converged, unstable = outcomes[:, 0] == 0, outcomes[:, 1].astype(np.int64)
         for k in np.flatnonzero(converged & (unstable < 0)):
             unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
         return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
 
-    def _newton(self, free: Any, way: Any, border: FloatArray | None, *numbers: float) -> tuple[FloatArray, ...]:
+    def _newton(self, free: Any, way: Any, border: Border | None, *numbers: float) -> tuple[FloatArray, ...]:
         """Return unknowns, places of the way, slopes, and codes, counts and efforts (k, 3), from k guesses."""
         x, ways = np.array(free, float, order="C"), np.array(way, float)
         rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
-        row = NO_NUMBERS if border is None else np.ascontiguousarray(border, float)
-        if self.code.solve(self.row, x, ways, row, rate, outcomes, *numbers):
+        row, level = (NO_NUMBERS, 0.0) if border is None else (np.ascontiguousarray(border.row, float), border.level)
+        if self.code.solve(self.row, x, ways, row, rate, outcomes, level, *numbers):
             raise MemoryError
         return x, ways, rate, outcomes
 

@@ -75,8 +75,7 @@ class NetworkProblem:
 
     def solve(self, x: FloatArray, drive: float, border: Border | None = None) -> PathEquilibrium | None:
         """Return the equilibrium near a guess: Newton's method of the protocol, in compiled code."""
-        row, level = (None, 0.0) if border is None else border
-        return self.equations.solve(x, drive, row, level)
+        return self.equations.solve(x, drive, border)
 
     def solve_each(self, guesses: Sequence[FloatArray], drives: Sequence[float]) -> list[PathEquilibrium | None]:
         """Return the equilibria near guesses at their drives, in compiled code."""

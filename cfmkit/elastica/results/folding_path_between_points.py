@@ -23,6 +23,7 @@ from cfmkit.elastica.results.between_points import (
     MIN_STRAY_DISTANCE,
     N_EXTREME_ROUNDS,
 )
+from cfmkit.numerics.continuation.problem import Border
 from cfmkit.numerics.interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ class AlongTheWay:
             step = self._places[at + 1] - self._places[at]
             border = step * self._metric
             goal = float(border @ (self._places[at] + share[number] * step))
-            spot = own.solve(y[number], float(drive[number]), border, goal)
+            spot = own.solve(y[number], float(drive[number]), Border(border, goal))
             if spot is None or spot.unstable not in path.unstable[at : at + 2].tolist():
                 continue
             moved = _largest(path, spot.x - y[number])
