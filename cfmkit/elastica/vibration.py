@@ -31,7 +31,7 @@ from numpy.polynomial import legendre
 
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.derived_arrays import embed, raise_degree
+from cfmkit.elastica.mechanics.discretise import Discretisation, embed, raise_degree
 from cfmkit.elastica.mechanics.polynomials import basis, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.drive import Loading
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.results.path import EquilibriumPath
 
 DEGREE_OF_FIRST, DEGREE_PER_MODE = 9, 1.5

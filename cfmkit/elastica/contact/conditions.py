@@ -50,8 +50,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
     from cfmkit.elastica.mechanics.equations import SideData
     from cfmkit.elastica.model.contact import Contact, Distance, FrictionState
 

@@ -17,8 +17,7 @@ from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
     from cfmkit.elastica.model.contact import BeamSide
     from cfmkit.elastica.model.section import Section
 

@@ -17,7 +17,7 @@ from cfmkit.elastica.contact.conditions import FORCE_ROUNDING, Conditions
 from cfmkit.elastica.contact.equations import with_closed
 from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.contact.terms import measure, slip_way
-from cfmkit.elastica.mechanics.discretise import FlankPlace
+from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation, FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.model.contact import BeamOnBeam, FrictionState, NodeOnBeam, NodeOnObstacle, describe
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathEvent, Walk
 
 FEWEST_SAMPLES = 16  # of a step between whose ends a gap may close and open again

@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
     from cfmkit.elastica.mechanics.equations import NumpyEquations
 
 SMALLEST_ELEMENT = 1e-9  # of a beam: shorter ones have no equations

@@ -32,7 +32,7 @@ from cfmkit.elastica.mechanics.contact_arrays import (
     node_contacts,
     side_contacts,
 )
-from cfmkit.elastica.mechanics.discretise import BeamElements
+from cfmkit.elastica.mechanics.discretise import Attached, BeamElements, Discretisation
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
     N_POWERS,
@@ -56,7 +56,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
     from cfmkit.numerics.continuation.problem import Border
 
 

@@ -13,8 +13,7 @@ from cfmkit.elastica.model.contact import NodeOnObstacle, ObstacleEdge
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
 
 CLOSED_NODE = 3  # column of `contact_at`
 ROTATION_STOP, MOTION_STOP, NODE_PAD = range(3)

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.terms import contact_contribution
-from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
+from cfmkit.elastica.mechanics.discretise import Attached, BeamElements, ContactAt, Discretisation
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
@@ -24,7 +24,6 @@ from cfmkit.numerics.dual_array import DualArray, chain, cos_sin, plain, stack
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.elastica.mechanics.discretise import Attached, BeamElements, Discretisation
     from cfmkit.elastica.mechanics.terms import Contribution
 
 SINGULAR_SHIFT = 1e-13  # added to the stiffness of the motions where it is singular to rounding

@@ -18,8 +18,7 @@ from cfmkit.numerics.dual_array import COMPLEX_STEP
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
+    from cfmkit.elastica.mechanics.discretise import BeamElements, ContactAt, Discretisation
 
 
 MOVED_TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "rest", "curl", "hindrance")

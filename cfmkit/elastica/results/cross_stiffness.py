@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.mechanics.derived_arrays import make_inextensible
+from cfmkit.elastica.mechanics.discretise import make_inextensible
 from cfmkit.elastica.mechanics.march import equations
 
 if TYPE_CHECKING:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.mechanics.derived_arrays import make_inextensible
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-from cfmkit.elastica.mechanics.discretise import discretise
+from cfmkit.elastica.mechanics.discretise import discretise, make_inextensible
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.path import PathStatus
