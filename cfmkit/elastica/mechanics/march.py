@@ -6,7 +6,7 @@ Both give the same to rounding (tests/elastica/test_elastica_march.py).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,9 +77,14 @@ def _is_compiled(mesh: Discretisation) -> bool:
     return all(has_polynomial_angle(beam) and not beam.section.shear for beam in beams)
 
 
-def _in_numpy(name: str) -> Any:
+def _delegate(name: str) -> Any:
     """Return a method of `CompiledSides` that is that of the same equations in numpy."""
-    return lambda own, *given, **named: getattr(own.reference, name)(*given, **named)
+
+    @wraps(getattr(NumpyEquations, name))
+    def method(equations: CompiledSides, *arguments: Any, **options: Any) -> Any:
+        return getattr(equations.reference, name)(*arguments, **options)
+
+    return method
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,12 +116,12 @@ class CompiledSides(CompiledEquations):
             vars(exchanged).pop(name, None)
         return exchanged
 
-    gradient = _in_numpy("gradient")
-    evaluate = _in_numpy("evaluate")
-    linearise = _in_numpy("linearise")
-    count_unstable = _in_numpy("count_unstable")
-    resolve = _in_numpy("resolve")
-    soften = _in_numpy("soften")
+    gradient = _delegate("gradient")
+    evaluate = _delegate("evaluate")
+    linearise = _delegate("linearise")
+    count_unstable = _delegate("count_unstable")
+    resolve = _delegate("resolve")
+    soften = _delegate("soften")
 
     def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
         """Return the curvatures of gaps at contacts of sides in n states, (sides, n); None where something lies."""
