@@ -62,26 +62,11 @@ def follow(
     options: Options,
     branch: PathBranch | None = None,
 ) -> Iterator[Point | PathEvent | PathStop]:
-    """Yield the points and events of a path in order, and its ending at last.
+    """Yield the points of a path from a start, at requested values of the drive (k,) and between, and its events.
 
-    Parameters
-    ----------
-    problem : ContinuationProblem
-        The structure. If it has a method `march`, of a `Walk`, to `MarchedSteps`, it takes steps by itself where
-        nothing happens, in compiled code, say; if it has `march_whole`, too, all of them where nothing happens at all.
-    start : PathEquilibrium
-        Where the path begins.
-    targets : (k,) array
-        Values of the drive to be reached in order; they may turn back.
-    options : Options
-        Range of the drive, branches, steps.
-    branch : PathBranch, optional
-        On which the path begins.
-
-    Yields
-    ------
-    Point, PathEvent or PathStop
-        Points at requested values and between them. A path that ends early ends with an `PathStop` that says why.
+    Values may turn back. At last comes a `PathStop`, which says why if the path ends early. If a problem has a method
+    `march`, of a `Walk`, to `MarchedSteps`, it takes steps by itself where nothing happens, in compiled code, say; if
+    it has `march_whole`, too, all of them where nothing happens at all.
     """
     items = each_point(follow_together(problem, start, targets, options, branch))
     return mark_corners(items, options) if options.corner else items
