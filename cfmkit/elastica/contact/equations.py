@@ -91,14 +91,6 @@ class EquationsWithNodes(NumpyEquations):
         slots[self.mesh.free] = np.arange(len(self.mesh.free))
         object.__setattr__(self, "slots", slots)
 
-    def rebase(self, base: FloatArray) -> EquationsWithNodes:
-        """Return the equations with other values of the unknowns that are held, (size,)."""
-        return replace(self, mesh=replace(self.mesh, base=base), plain=self.plain.rebase(base))
-
-    def stiffen(self, mesh: Discretisation) -> EquationsWithNodes:
-        """Return the equations of the same network with another flexibility along its beams."""
-        return replace(self, mesh=mesh, plain=self.plain.stiffen(open_all_contacts(mesh)))
-
     def place_among_all(self, at: LinearEquations) -> LinearEquations:
         """Return the equations without contacts among those of all unknowns, the others zero."""
         n, count = self.n, self.plain.n

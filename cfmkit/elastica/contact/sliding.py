@@ -87,10 +87,6 @@ class SlidingEquations(EquationsWithNodes):
         mesh = copy_moved_tables(mesh)
         return cls(mesh, ramp, plain=make(replace(open_all_contacts(mesh), moving=None), ramp))
 
-    def stiffen(self, mesh: Discretisation) -> EquationsWithNodes:
-        """Return the equations of the same network with another flexibility along its beams."""
-        return super().stiffen(copy_moved_tables(mesh))
-
     # -- places --------------------------------------------------------------------------------------------------------
     def move_to(self, places: FloatArray) -> bool:
         """Move the elements of the equations without contacts to places; return False where one would vanish."""

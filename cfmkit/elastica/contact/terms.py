@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
 
-class ContactMeasure(NamedTuple):
+class MeasuredGap(NamedTuple):
     """Gap of a contact, or the way that it has slipped, with its derivatives by the n unknowns that change it."""
 
     value: Any
@@ -25,15 +25,13 @@ class ContactMeasure(NamedTuple):
     hessian: Any  # (n, n)
 
 
-def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> ContactMeasure:
+def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> MeasuredGap:
     """Return the gap of a contact at the values of all unknowns (size,)."""
     item, length = contact.item, mesh.scales.length
     at = poses(mesh.attachments, z, [contact.place])
     if isinstance(item, Stop) and item.turns:
         turn = at.unknowns[0, 3]
-        return ContactMeasure(
-            item.gap - item.sense * z[turn], np.array([turn]), np.array([-item.sense]), np.zeros((1, 1))
-        )
+        return MeasuredGap(item.gap - item.sense * z[turn], np.array([turn]), np.array([-item.sense]), np.zeros((1, 1)))
     arm, jacobian = at.arm[0], at.jacobian[0]
     if isinstance(item, Stop):
         normal = -_direction(item)
@@ -46,7 +44,7 @@ def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> ContactMeasure:
         across = np.array([normal[1], -normal[0]]) @ jacobian
         hessian = found.curvature * length * np.outer(across, across)
     hessian[2, 2] -= normal @ arm
-    return ContactMeasure(value, at.unknowns[0, :3], normal @ jacobian, hessian)
+    return MeasuredGap(value, at.unknowns[0, :3], normal @ jacobian, hessian)
 
 
 def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
@@ -61,7 +59,7 @@ def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
     return (item.outline.distance(place * length).value - item.radius) / length
 
 
-def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | None = None) -> ContactMeasure:
+def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | None = None) -> MeasuredGap:
     """Return how far the point of a pad that touches has come along an obstacle or a stop, rolling counted.
 
     The sense is that of the normal turned by -90 deg. Around a closed obstacle it is what is nearest to `near`.
@@ -88,7 +86,7 @@ def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | Non
     if unknowns[2] == unknowns[3]:  # the node turns with its body
         gradient, hessian, unknowns = gradient[:3], hessian[:3, :3], unknowns[:3]
         gradient[2] += radius
-    return ContactMeasure(value + radius * z[at.unknowns[0, 3]], unknowns, gradient, hessian)
+    return MeasuredGap(value + radius * z[at.unknowns[0, 3]], unknowns, gradient, hessian)
 
 
 def rub_values(mesh: Discretisation, contact: ContactAt, state: FrictionState, z: FloatArray) -> FloatArray:

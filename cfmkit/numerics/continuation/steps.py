@@ -20,7 +20,7 @@ from cfmkit.numerics.continuation.problem import Border, PathEquilibrium, force_
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.path import Walk
-    from cfmkit.numerics.continuation.problem import ContinuationProblem
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, ScaledUnknowns
 
 
 STEP_TOLERANCE = 1e-10  # of a step: of motions, and of forces over their size or ten units
@@ -94,6 +94,7 @@ class Trial(NamedTuple):
     new: PathEquilibrium | None  # None if it is rejected
     misfit: float = np.inf  # error of the prediction as a share of the step
     excess: float = 0.0  # by how much a rejected step changes forces too much, if that is all
+    motion: float = 0.0  # largest one
 
 
 def hermite(a: PathEquilibrium, b: PathEquilibrium, drive: float) -> FloatArray:
@@ -123,28 +124,38 @@ def predict(walk: Walk, goal: float) -> FloatArray:
 
 def advance(walk: Walk, goal: float) -> Trial:
     """Try a step by the drive to a goal."""
-    problem, here, options = walk.problem, walk.here, walk.options
-    guess = predict(walk, goal)
-    new = correct(problem, guess, goal)
+    guess, options = predict(walk, goal), walk.options
+    new = correct(walk.problem, guess, goal)
+    return judge(walk.problem, walk.here, new, guess, (options.largest_motion, options.largest_force))
+
+
+def judge(
+    problem: ScaledUnknowns,
+    here: PathEquilibrium,
+    new: PathEquilibrium | None,
+    guess: FloatArray,
+    limits: tuple[float, float],  # largest motion, and largest change of a force, in its unit besides half of it
+) -> Trial:
+    """Return a step from one equilibrium to another, which is near a guess, with what is to be said of it."""
     if new is None:
         return Trial(None)
-    moved, missed = walk.measure_motion(new), largest_motion(problem, new.x - guess)
-    if moved > options.largest_motion:
+    moved, missed = (largest_motion(problem, new.x - near) for near in (here.x, guess))
+    if moved > limits[0]:
         return Trial(None)
-    excess = force_change(problem, here.x, new.x, options.largest_force, FORCE_SHARE)
+    excess = force_change(problem, here.x, new.x, limits[1], FORCE_SHARE)
     if excess > 1:
         return Trial(None, excess=excess)
-    if missed > MISSED_SHARE * moved + MOTION_ROUNDING or not _keeps_direction(walk, new, moved):
+    if missed > MISSED_SHARE * moved + MOTION_ROUNDING or not _keeps_direction(problem, here, new, moved):
         return Trial(None)
-    return Trial(new, missed / (moved + 1e-8))
+    return Trial(new, missed / (moved + 1e-8), motion=moved)
 
 
-def _keeps_direction(walk: Walk, new: PathEquilibrium, moved: float) -> bool:
+def _keeps_direction(problem: ScaledUnknowns, here: PathEquilibrium, new: PathEquilibrium, moved: float) -> bool:
     """Return True if the chord of a step agrees with the slopes at its ends, in direction and length.
 
     Without the second a step hops from the end of a branch onto the path that it joins, unnoticed.
     """
-    here, motions = walk.here, walk.problem.motions
+    motions = problem.motions
     if moved <= MOTION_ROUNDING or new.unstable != here.unstable:
         return True
     change = new.drive - here.drive
