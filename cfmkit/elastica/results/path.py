@@ -129,13 +129,15 @@ class EquilibriumPath(ShortRepr):
     def append(self, other: EquilibriumPath) -> EquilibriumPath:
         """Return the points of this path, then those of another of the same network, as one."""
         z, drive = np.vstack([self.at.z, other.at.z]), np.concatenate([self.at.drive, other.at.drive])
-        pairs = {name: (column, other._columns[name]) for name, column in self._columns.items()}
-        columns = {name: read_only(column := np.concatenate(pair), column.dtype) for name, pair in pairs.items()}
+        columns: dict[str, Any] = {}
+        for name, own in self._columns.items():
+            column = np.concatenate([own, other._columns[name]])
+            columns[name] = read_only(column, column.dtype)
         return replace(self, at=Equilibria(self.mesh, z, drive), **columns)
 
     @property
     def _columns(self) -> dict[str, Any]:
-        """What every point has besides its equilibrium."""
+        """Values that every point has besides its equilibrium."""
         names = ("unstable", "requested", "branch", "accurate")
         return {name: getattr(self, name) for name in names} | {"at_contact": self.changes_contact}
 
