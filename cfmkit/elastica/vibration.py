@@ -62,17 +62,10 @@ N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
 
 @dataclass(frozen=True)
 class NetworkMasses:
-    """Masses of a network.
+    """Masses of a network, by names."""
 
-    Parameters
-    ----------
-    density : mapping
-        Of every beam, by its name [kg/m^3].
-    nodes : mapping
-        Mass [kg] and moment of inertia [kg m^2] of what is fixed to nodes, by their names.
-    """
-
-    density: Mapping[str, float]
+    density: Mapping[str, float]  # of every beam [kg/m^3]
+    # mass [kg] and moment of inertia [kg m^2] of what is fixed to nodes
     nodes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -25,6 +25,7 @@ from cfmkit.elastica.contact.laid_elements import LaidPart, compute_laid_rows
 from cfmkit.elastica.contact.line_tangent import line_leaves_normal, measure_compliances, measure_line_tangent
 from cfmkit.elastica.contact.terms import contact_contribution
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.equations import LinearEquations
 from cfmkit.elastica.mechanics.moving_elements import (
     MOVED_TABLES,
@@ -86,10 +87,6 @@ class SlidingEquations(EquationsWithNodes):
         return cls(mesh, ramp, plain=make(replace(open_all_contacts(mesh), moving=None), ramp))
 
     # -- places --------------------------------------------------------------------------------------------------------
-    @property
-    def _sides(self) -> list[ContactAt]:
-        return [contact for contact in self.mesh.contacts if contact.slide >= 0]
-
     def move_to(self, places: FloatArray) -> bool:
         """Move the elements of the equations without contacts to places; return False where one would vanish."""
         assert self.mesh.moving is not None
@@ -103,7 +100,7 @@ class SlidingEquations(EquationsWithNodes):
     def find_laid_parts(self, z: FloatArray) -> list[LaidPart]:
         """Return the elements that lie on obstacles; the elements stand at their places."""
         edge = []
-        for contact in self._sides:
+        for contact in side_contacts(self.mesh):
             side = contact.laid if contact.closed is not None else int(np.rint(z[contact.flag]))
             if not side:
                 continue
@@ -192,7 +189,7 @@ class SlidingEquations(EquationsWithNodes):
         mesh, count, slots = self.mesh, self.plain.n, self.slots
         n, z = self.n, np.asarray(self.values(free, way))
         moved = mesh.base if self.ramp else mesh.rate
-        sides = self._sides
+        sides = side_contacts(self.mesh)
         places = z[[contact.slide for contact in sides]]
         if not self.move_to(places):
             nowhere = LinearisedSides(np.full(n, np.nan), np.eye(n), np.zeros(n))
@@ -247,7 +244,7 @@ class SlidingEquations(EquationsWithNodes):
 
     def _couple_places(self, pivots: FloatArray, pressing: dict[int, tuple[SideAt, int]], z: FloatArray) -> None:
         """Put the mixed curvature of the gap of two beams, by both places, among the pivots of conditions."""
-        for contact in self._sides:
+        for contact in side_contacts(self.mesh):
             leading = find_leading(self.mesh, contact)
             if leading is not contact and contact.unknown in pressing:
                 (side, row), (partner, row_of_leading) = pressing[contact.unknown], pressing[leading.unknown]
@@ -279,11 +276,11 @@ class SlidingEquations(EquationsWithNodes):
         """Return the change of the residuals without contacts with one of the places."""
         if self._is_plain and not laid:
             return self._differentiate_plain(way, z, number)
-        sides, unknown = [], self._sides[number].slide
+        sides, unknown = [], side_contacts(self.mesh)[number].slide
         for step in (PLACE_STEP, -PLACE_STEP):
             beside = z.copy()
             beside[unknown] += step
-            if not self.move_to(beside[[contact.slide for contact in self._sides]]):
+            if not self.move_to(beside[[contact.slide for contact in side_contacts(self.mesh)]]):
                 return np.full(len(free), np.nan)
             self._lay(laid)
             residual = np.array(self.plain.linearise(free, way).residual)
@@ -373,7 +370,7 @@ class SlidingEquations(EquationsWithNodes):
 
     def evaluate_gradient(self, z: FloatArray, drive: float, share: float = 1.0) -> FloatArray:
         """Return the gradient of one state by all unknowns; that by places is zero."""
-        self.move_to(z[[contact.slide for contact in self._sides]])
+        self.move_to(z[[contact.slide for contact in side_contacts(self.mesh)]])
         laid = self.find_laid_parts(z)
         self._lay(laid)
         total = np.array(self.plain.evaluate(self._drop_tension(z, laid), drive, share)[0])
