@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.contact.beam_lines import list_elements
-from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.moving_elements import lengths_at
 from cfmkit.elastica.model.section import Taper
 
@@ -78,7 +77,7 @@ def raise_pad(mesh: Discretisation, pad: ContactAt, z: FloatArray) -> FloatArray
     In truth what is beyond the force is parallel to the edge there.
     """
     total, beams = np.zeros(len(z)), mesh.fits.network.beams
-    for contact in side_contacts(mesh):
+    for contact in mesh.side_contacts:
         side: Any = contact.item
         beam, elements = beams[side.beam], list_elements(mesh, side.beam)
         if side.name != pad.item.name or not beam.section.shear:

@@ -10,7 +10,6 @@ import numpy as np
 from cfmkit.elastica.contact.edges import half_thickness_of
 from cfmkit.elastica.contact.line_tangent import measure_compliances
 from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps, find_lines, interpolate_line
-from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.moving_elements import cuts_at
 from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam
 
@@ -43,7 +42,7 @@ class PairGaps(SideGaps):
         assert isinstance(item, BeamOnBeam)
         beam, kinks = mesh.fits.network.beams[item.beam], np.zeros((len(z), len(numbers), 2))
         shear = sum(measure_compliances(mesh, name, 0.5)[1] for name in (item.beam, item.partner))
-        for contact in side_contacts(mesh):
+        for contact in mesh.side_contacts:
             own: Any = contact.item
             if own.name != item.name:
                 continue

@@ -14,7 +14,7 @@ from cfmkit.elastica.contact.beam_lines import list_elements
 from cfmkit.elastica.contact.edges import half_thickness_of, measure_distance
 from cfmkit.elastica.contact.line_tangent import find_reach, line_leaves_normal, round_off
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.contact_arrays import edge_rows, side_contacts
+from cfmkit.elastica.mechanics.contact_arrays import edge_rows
 from cfmkit.elastica.mechanics.equations import LineTables, SideData
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, cuts_at, with_places
@@ -271,7 +271,7 @@ class SideGaps:
 
     def find_kinks(self, lines: ElementLines) -> FloatArray:
         """Return how steeply the gap falls from contacts at both ends of elements in n states, (n, m, 2)."""
-        numbers, sides = lines.elements, side_contacts(self.mesh)
+        numbers, sides = lines.elements, self.mesh.side_contacts
         own: list[Any] = [contact for contact in sides if contact.item.name == self.item.name]
         pressed = [contact.element for contact in own if contact.item.beam == self.item.beam]
         gap, slope, _ = self._measure_line(lines, np.array([0.0, 1.0]))

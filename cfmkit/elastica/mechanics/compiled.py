@@ -29,8 +29,6 @@ from cfmkit.elastica.mechanics.contact_arrays import (
     contact_arrays,
     edge_rows,
     last_elements,
-    node_contacts,
-    side_contacts,
 )
 from cfmkit.elastica.mechanics.discretise import Attached, BeamElements, Discretisation
 from cfmkit.elastica.mechanics.equations import (
@@ -66,7 +64,7 @@ IN_PLACE = ("angle", "weight", "rigidity", "ahead", "length", "bend", "rest", "c
 
 def side_arrays(mesh: Discretisation, first_part: int) -> tuple[dict[str, Any], Any]:
     """Return the arrays of contacts of sides in a `Model`, and the parts of their outlines, which begin at a row."""
-    moving, sides = mesh.moving, side_contacts(mesh)
+    moving, sides = mesh.moving, mesh.side_contacts
     assert moving is not None
     length, numbers = mesh.scales.length, np.asarray(moving.elements).tolist()
     rows, values, parts = [], [], [np.empty((0, 6))]
@@ -138,7 +136,7 @@ class CompiledEquations(NumpyEquations):
         if _has_more_unknowns(mesh):
             counts |= {"size": mesh.size, "free": len(mesh.free)}
         if mesh.contacts:
-            nodes, sides = node_contacts(mesh), side_contacts(mesh)
+            nodes, sides = mesh.node_contacts, mesh.side_contacts
             presses = len({at.unknown for at in nodes}.intersection(mesh.free.tolist()))
             counts |= {"contacts": len(nodes), "presses": presses, "sides": len(sides)}
         if "moved_law" in arrays:
@@ -156,11 +154,11 @@ class CompiledEquations(NumpyEquations):
     def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
         """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
         slot, kept = number_free(mesh.free, mesh.size), np.searchsorted(self.mesh.free, mesh.free)
-        unit, nodes = self.unit[kept], node_contacts(mesh)
+        unit, nodes = self.unit[kept], mesh.node_contacts
         arrays = {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
         for name, column, contacts in (
             ("contact_at", CLOSED_NODE, nodes),
-            ("side_at", CLOSED_SIDE, side_contacts(mesh)),
+            ("side_at", CLOSED_SIDE, mesh.side_contacts),
         ):
             if contacts:
                 arrays[name] = self.arrays[name].copy()
@@ -186,7 +184,7 @@ class CompiledEquations(NumpyEquations):
 
     def measure_nodes(self, z: FloatArray) -> FloatArray | None:
         """Return the gaps of all contacts of nodes in states (n, size), (contacts, n)."""
-        gaps = np.empty((len(node_contacts(self.mesh)), len(z)))
+        gaps = np.empty((len(self.mesh.node_contacts), len(z)))
         self.code.contact_gaps(self.row, np.ascontiguousarray(z, float), gaps)
         return gaps
 

@@ -19,23 +19,13 @@ CLOSED_NODE = 3  # column of `contact_at`
 ROTATION_STOP, MOTION_STOP, NODE_PAD = range(3)
 
 
-def node_contacts(mesh: Discretisation) -> list[ContactAt]:
-    """Return the contacts of nodes."""
-    return [contact for contact in mesh.contacts if contact.slide < 0]
-
-
-def side_contacts(mesh: Discretisation) -> list[ContactAt]:
-    """Return the contacts of sides of beams."""
-    return [contact for contact in mesh.contacts if contact.slide >= 0]
-
-
 def contact_arrays(mesh: Discretisation) -> dict[str, Any]:
     """Return the arrays of the contacts of nodes in a `Model`: (contacts, 8), (contacts, 6), (parts, 6)."""
     rows: list[tuple[int, ...]] = []
     values: list[tuple[float, ...]] = []
     parts: list[FloatArray] = []
     first = 0
-    for contact in node_contacts(mesh):
+    for contact in mesh.node_contacts:
         kind, numbers = _describe(mesh, contact)
         edge = contact.item.outline if isinstance(contact.item, NodeOnObstacle) else None
         counts = (len(edge.length), len(edge.radius), int(edge.closed)) if edge else (0, 0, 0)

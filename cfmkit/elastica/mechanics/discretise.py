@@ -170,6 +170,16 @@ class Discretisation:
         return (*self.springs, *self.loads, *self.contacts)
 
     @property
+    def node_contacts(self) -> list[ContactAt]:
+        """Contacts of nodes."""
+        return [contact for contact in self.contacts if contact.slide < 0]
+
+    @property
+    def side_contacts(self) -> list[ContactAt]:
+        """Contacts of sides of beams."""
+        return [contact for contact in self.contacts if contact.slide >= 0]
+
+    @property
     def axial(self) -> FloatArray:
         """1/EA of the elements, (e, q); with contacts at places of several states those of the first."""
         return np.asarray(self.elements.axial.reshape(-1, *self.elements.axial.shape[-2:])[0])
