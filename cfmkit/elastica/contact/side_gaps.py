@@ -14,9 +14,9 @@ from cfmkit.elastica.contact.beam_lines import list_elements
 from cfmkit.elastica.contact.edges import half_thickness_of, measure_distance
 from cfmkit.elastica.contact.line_tangent import find_reach, line_leaves_normal, round_off
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.contact_arrays import edge_rows
 from cfmkit.elastica.mechanics.equations import LineTables, SideData
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.model_arrays import edge_rows
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, cuts_at, with_places
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
