@@ -31,8 +31,7 @@ from cfmkit.elastica.mechanics.march import engine, equations
 from cfmkit.elastica.model.beam_fits import is_plain
 from cfmkit.elastica.tracing.accuracy import DEGREES_MORE, NEXT_CORRECTION, compare_states
 from cfmkit.elastica.tracing.trace_many import CompiledBatch
-from cfmkit.numerics.continuation import PathBranch
-from cfmkit.numerics.continuation.problem import Border
+from cfmkit.numerics.continuation import Border, PathBranch
 
 ROOT = Path(__file__).parents[2]
 needs_c = pytest.mark.skipif(load_compiled() is None, reason="the compiled module was not built")
