@@ -238,13 +238,7 @@ def _follow(
             return
         if turned:
             yield PathEvent("limit point", place, change.before, at.unstable, at)
-        # where a contact moves or parts its first place is a little further on: what is requested until there
-        while not walk.done and _lies_between(float(walk.targets[walk.number]), place, at.drive):
-            reached = part.own.solve(part.shrink(at).x, float(walk.targets[walk.number]))
-            if reached is None:
-                break
-            yield Point(part.grow(reached), walk.number, walk.branch)
-            walk = walk._replace(number=walk.number + 1)
+        walk = yield from _deliver_before(part, walk, place, at)
         items, previous = (
             iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense),
             at,
@@ -268,9 +262,16 @@ def _change_friction(
             yield ContactChange(kind, number, at, at.unstable, chosen.at.unstable, contact, states=chosen.n_states)
 
 
-def _lies_between(target: float, first: float, last: float) -> bool:
-    """Return True if a requested value lies between two that differ."""
-    return first != last and min(first, last) <= target <= max(first, last)
+def _deliver_before(part: PieceOfPath, walk: Walk, place: float, at: PathEquilibrium) -> Generator[Point, None, Walk]:
+    """Yield what is requested between a change and the first place of a contact that moves or parts."""
+    low, high = sorted((place, at.drive))
+    while not walk.done and low != high and low <= walk.targets[walk.number] <= high:
+        reached = part.own.solve(part.shrink(at).x, float(walk.targets[walk.number]))
+        if reached is None:
+            break
+        yield Point(part.grow(reached), walk.number, walk.branch)
+        walk = walk._replace(number=walk.number + 1)
+    return walk
 
 
 def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> Iterator[Point | PathEvent | PathStop]:

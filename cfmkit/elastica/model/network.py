@@ -230,8 +230,6 @@ class Network(ShortRepr):
                     raise InputError(f"the links through {link.node!r} form a loop")
                 seen.add(at)
                 at = self.links[moved.index(at)].master
-            if at == link.node:
-                raise InputError(f"the links through {link.node!r} form a loop")
             support = self.nodes[link.node].support
             if support.along or support.across or support.rotation:
                 raise InputError(f"node {link.node!r} is moved by a link and cannot have a support")
