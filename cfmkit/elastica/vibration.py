@@ -31,7 +31,7 @@ from numpy.polynomial import legendre
 
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.derived_arrays import embed, raise_degree
+from cfmkit.elastica.mechanics.discretise import Discretisation, embed, raise_degree
 from cfmkit.elastica.mechanics.polynomials import basis, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.drive import Loading
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.results.path import EquilibriumPath
 
 DEGREE_OF_FIRST, DEGREE_PER_MODE = 9, 1.5
@@ -63,17 +62,10 @@ N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
 
 @dataclass(frozen=True)
 class NetworkMasses:
-    """Masses of a network.
+    """Masses of a network, by names."""
 
-    Parameters
-    ----------
-    density : mapping
-        Of every beam, by its name [kg/m^3].
-    nodes : mapping
-        Mass [kg] and moment of inertia [kg m^2] of what is fixed to nodes, by their names.
-    """
-
-    density: Mapping[str, float]
+    density: Mapping[str, float]  # of every beam [kg/m^3]
+    # mass [kg] and moment of inertia [kg m^2] of what is fixed to nodes
     nodes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

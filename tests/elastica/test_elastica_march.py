@@ -31,7 +31,7 @@ from cfmkit.elastica.mechanics.march import engine, equations
 from cfmkit.elastica.model.beam_fits import is_plain
 from cfmkit.elastica.tracing.accuracy import DEGREES_MORE, NEXT_CORRECTION, compare_states
 from cfmkit.elastica.tracing.trace_many import CompiledBatch
-from cfmkit.numerics.continuation import PathBranch
+from cfmkit.numerics.continuation import Border, PathBranch
 
 ROOT = Path(__file__).parents[2]
 needs_c = pytest.mark.skipif(load_compiled() is None, reason="the compiled module was not built")
@@ -256,7 +256,7 @@ def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
     own = kind(discretise(net, el.Loading((el.PointLoad("t", fy=1.0),), np.array([1.0])), 8))
     border = np.zeros(own.n + 1)
     border[np.flatnonzero(own.mesh.free == own.mesh.bodies["t"][2])] = 1.0
-    state = own.solve(np.zeros(own.n), 0.0, border, 0.8)
+    state = own.solve(np.zeros(own.n), 0.0, Border(border, 0.8))
     assert state.x @ border[:-1] == pytest.approx(0.8, rel=1e-9)
     again = own.solve(state.x, state.drive)
     assert again.x == pytest.approx(state.x, rel=1e-8, abs=1e-8)

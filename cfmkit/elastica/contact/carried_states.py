@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.contact.beam_lines import list_elements
 from cfmkit.elastica.contact.side_gaps import ElementLines, find_line_tables, find_lines
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.march import equations
@@ -38,8 +39,8 @@ def carry(
         fresh[:, new.moving.elements] = new.moving.fixed + np.einsum("rck,nk->nrc", new.moving.shares, places)
     rule, columns, bubbles = basis(new.degree), energy.rotation_columns(new.degree), _bubble_matrix(new.degree)
     for beam in new.fits:
-        before = np.array([k for k, name in enumerate(old.elements.beam) if name == beam])
-        after = np.array([k for k, name in enumerate(new.elements.beam) if name == beam])
+        before = np.array(list_elements(old, beam))
+        after = np.array(list_elements(new, beam))
         for k, side in ((0, 0), (-1, 1)):
             ends = old.elements.ends[before[k], side], new.elements.ends[after[k], side]
             values[:, new.attachments.unknowns[ends[1]]] = z[:, old.attachments.unknowns[ends[0]]]
@@ -92,7 +93,7 @@ def _sample(
     result = equations(mesh).locate(z, stages, places, find_line_tables(mesh.degree))
     if result is None:
         whole = find_lines(mesh, z, stage, np.arange(len(mesh.elements.beam)))
-        seen = ElementLines(*(table[states, numbers] for table in whole)).evaluate(fractions[..., None])
+        seen = ElementLines(*whole[:3], *(table[states, numbers] for table in whole[3:])).evaluate(fractions[..., None])
         result = np.concatenate([seen.place[:, :, 0], seen.turn, seen.ahead], axis=-1)
     result = result.reshape(*at.shape, 4)
     last = numbers.reshape(at.shape)[..., -1]

@@ -36,7 +36,6 @@ from cfmkit.elastica.contact.line_tangent import (
 from cfmkit.elastica.contact.pair_gaps import make_gaps
 from cfmkit.elastica.contact.side_gaps import join_sides, search_sides
 from cfmkit.elastica.contact.terms import gaps, rub_values
-from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.elements import smooth_marks
 from cfmkit.elastica.mechanics.energy import line_load
 from cfmkit.elastica.mechanics.march import equations
@@ -50,8 +49,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
     from cfmkit.elastica.mechanics.equations import SideData
     from cfmkit.elastica.model.contact import Contact, Distance, FrictionState
 
@@ -314,7 +312,7 @@ class Conditions:
         mesh, item = self.mesh, contact.item
         curvatures = equations(mesh).measure_curvatures(z)
         if curvatures is not None:
-            return np.asarray(curvatures[side_contacts(mesh).index(contact)])
+            return np.asarray(curvatures[mesh.side_contacts.index(contact)])
         beam: Any = item.beam  # type: ignore[union-attr]
         both = measure_bend(mesh, z, contact.element, 1) + measure_bend(mesh, z, contact.element + 1, 0)
         parameter, inside = z[:, contact.slide], float(mesh.elements.cuts[contact.element].mean())

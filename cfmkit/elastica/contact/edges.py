@@ -11,8 +11,7 @@ from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, Distance, 
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
     from cfmkit.elastica.model.contact import BeamSide
 
 

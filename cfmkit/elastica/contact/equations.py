@@ -22,8 +22,8 @@ import numpy as np
 
 from cfmkit.elastica.contact.line_tangent import raise_pad
 from cfmkit.elastica.contact.terms import contact_contribution, measure
-from cfmkit.elastica.mechanics.contact_arrays import node_contacts
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
+from cfmkit.elastica.mechanics.numbering import number_free
 from cfmkit.elastica.model.contact import FrictionState
 
 if TYPE_CHECKING:
@@ -87,9 +87,7 @@ class EquationsWithNodes(NumpyEquations):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        slots = np.full(self.mesh.size, -1)
-        slots[self.mesh.free] = np.arange(len(self.mesh.free))
-        object.__setattr__(self, "slots", slots)
+        object.__setattr__(self, "slots", number_free(self.mesh.free, self.mesh.size))
 
     def place_among_all(self, at: LinearEquations) -> LinearEquations:
         """Return the equations without contacts among those of all unknowns, the others zero."""
@@ -101,7 +99,7 @@ class EquationsWithNodes(NumpyEquations):
     def add_nodes(self, z: FloatArray, at: LinearEquations) -> list[SymmetricRow]:
         """Add the contacts of nodes to the equations at a state; return their rows of the symmetric matrix."""
         moved, rows = self.mesh.base if self.ramp else self.mesh.rate, list[SymmetricRow]()
-        for contact in node_contacts(self.mesh):
+        for contact in self.mesh.node_contacts:
             if contact.closed is None and (lowered := raise_pad(self.mesh, contact, z[None])[0]):
                 contact = contact._replace(
                     closed=bool(z[contact.unknown] > measure(self.mesh, contact, z).value + lowered)

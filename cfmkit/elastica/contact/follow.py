@@ -199,9 +199,11 @@ def _follow(
         outcome = yield from _follow_part(part, items, walk, previous)
         if isinstance(outcome, EndOfPiece) and outcome.stop.end is WhyStopped.COMPLETE and turns[1:]:
             at, sense = outcome.at, float(np.sign(targets[turns[0]] - outcome.at.drive))
-            chosen = yield from _turn_back(part, at, sense)
+            chosen = choose_friction(part, at, (sense,), turns=True)
             if chosen is None:
+                yield PathStop(WhyStopped.LOST, at.drive, NO_FRICTION_STATE.format(names=part.say_rubbing()))
                 return
+            yield from _change_friction(chosen, part.friction, at)
             step = options.first_step * options.span
             walk = outcome.walk._replace(targets=targets[: turns[1]], number=turns[0], step=step)
             part, previous, turns = chosen.piece, chosen.at, turns[1:]
@@ -225,7 +227,7 @@ def _follow(
         changed, before = change.piece or part, part.friction
         turned, part, at, sense = after.sense != sense, after.piece, after.at, after.sense
         yield change._replace(after=at.unstable, states=after.n_states)
-        yield from _change_others(after._replace(n_states=1), before, change.number)
+        yield from _change_friction(after._replace(n_states=1), before, at, change.number)
         if part.whole.mesh is not mesh:
             yield Remeshed(part.whole)
         if turned and not options.through_folds:
@@ -236,13 +238,7 @@ def _follow(
             return
         if turned:
             yield PathEvent("limit point", place, change.before, at.unstable, at)
-        # where a contact moves or parts its first place is a little further on: what is requested until there
-        while not walk.done and _lies_between(float(walk.targets[walk.number]), place, at.drive):
-            reached = part.own.solve(part.shrink(at).x, float(walk.targets[walk.number]))
-            if reached is None:
-                break
-            yield Point(part.grow(reached), walk.number, walk.branch)
-            walk = walk._replace(number=walk.number + 1)
+        walk = yield from _deliver_before(part, walk, place, at)
         items, previous = (
             iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense),
             at,
@@ -255,37 +251,27 @@ def _stop_at_change(end: WhyStopped, message: str, changed: PieceOfPath, change:
     return PathStop(end, change.at.drive, text)
 
 
-def _turn_back(
-    part: PieceOfPath, at: PathEquilibrium, sense: float
-) -> Generator[ContactChange | PathStop, None, BeyondChange | None]:
-    """Yield what changes where the drive turns back, and return what goes on: what slips sticks from there on."""
-    chosen = choose_friction(part, at, (sense,), turns=True)
-    if chosen is None:
-        yield PathStop(WhyStopped.LOST, at.drive, NO_FRICTION_STATE.format(names=part.say_rubbing()))
-        return None
-    for number, state in chosen.piece.friction.items():
-        if state.sense != part.friction[number].sense:
-            yield _change_friction(chosen, number, at)
-    return chosen
-
-
-def _change_others(chosen: BeyondChange, before: Mapping[int, FrictionState], changed: int) -> Iterator[ContactChange]:
-    """Yield what friction of other contacts changes with that of one, by which their rates change."""
+def _change_friction(
+    chosen: BeyondChange, before: Mapping[int, FrictionState], at: PathEquilibrium, changed: int | None = None
+) -> Iterator[ContactChange]:
+    """Yield what begins to stick or to slip where the drive turns, or with the contact that is changed."""
     for number, state in chosen.piece.friction.items():
         if number in before and number != changed and before[number].sense != state.sense:
-            yield _change_friction(chosen, number, chosen.at)
+            contact = chosen.piece.whole.mesh.contacts[number].number
+            kind: Literal["slips", "sticks"] = "slips" if state.sense else "sticks"
+            yield ContactChange(kind, number, at, at.unstable, chosen.at.unstable, contact, states=chosen.n_states)
 
 
-def _change_friction(chosen: BeyondChange, number: int, at: PathEquilibrium) -> ContactChange:
-    """Return the change of a contact that begins to stick or to slip with another one, or where the drive turns."""
-    kind: Literal["slips", "sticks"] = "slips" if chosen.piece.friction[number].sense else "sticks"
-    contact = chosen.piece.whole.mesh.contacts[number].number
-    return ContactChange(kind, number, at, at.unstable, chosen.at.unstable, contact, states=chosen.n_states)
-
-
-def _lies_between(target: float, first: float, last: float) -> bool:
-    """Return True if a requested value lies between two that differ."""
-    return first != last and min(first, last) <= target <= max(first, last)
+def _deliver_before(part: PieceOfPath, walk: Walk, place: float, at: PathEquilibrium) -> Generator[Point, None, Walk]:
+    """Yield what is requested between a change and the first place of a contact that moves or parts."""
+    low, high = sorted((place, at.drive))
+    while not walk.done and low != high and low <= walk.targets[walk.number] <= high:
+        reached = part.own.solve(part.shrink(at).x, float(walk.targets[walk.number]))
+        if reached is None:
+            break
+        yield Point(part.grow(reached), walk.number, walk.branch)
+        walk = walk._replace(number=walk.number + 1)
+    return walk
 
 
 def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> Iterator[Point | PathEvent | PathStop]:

@@ -11,8 +11,7 @@ from cfmkit.elastica.mechanics.poses import poses
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
 
 
 class LaidPart(NamedTuple):

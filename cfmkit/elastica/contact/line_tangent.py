@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cfmkit.elastica.contact.beam_lines import list_elements
 from cfmkit.elastica.mechanics.moving_elements import lengths_at
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
     from cfmkit.elastica.model.contact import BeamSide
     from cfmkit.elastica.model.section import Section
 
@@ -64,7 +64,7 @@ def round_off(gap: Any, slope: Any, behind: Any, ahead: Any, kinks: FloatArray, 
 def find_reach(mesh: Discretisation, item: BeamSide, elements: Any) -> FloatArray:
     """Return how far from kinks at ends of elements these are taken off, (m, 1): all of it up to an end with a pad."""
     network = mesh.fits.network
-    beam, own = network.beams[item.beam], [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
+    beam, own = network.beams[item.beam], list_elements(mesh, item.beam)
     pads = [getattr(contact, "node", "") for contact in network.contacts if contact.name == item.name]
     loose = [k for k, node in ((own[0], beam.start), (own[-1], beam.end)) if node in pads]
     reach = KINK_REACH * beam.section.thinnest / mesh.scales.length
@@ -77,16 +77,15 @@ def raise_pad(mesh: Discretisation, pad: ContactAt, z: FloatArray) -> FloatArray
     In truth what is beyond the force is parallel to the edge there.
     """
     total, beams = np.zeros(len(z)), mesh.fits.network.beams
-    for contact in mesh.contacts:
-        if contact.slide < 0 or contact.item.name != pad.item.name:
+    for contact in mesh.side_contacts:
+        side: Any = contact.item
+        beam, elements = beams[side.beam], list_elements(mesh, side.beam)
+        if side.name != pad.item.name or not beam.section.shear:
             continue
-        beam: Any = contact.item.beam  # type: ignore[union-attr]
-        elements = [k for k, name in enumerate(mesh.elements.beam) if name == beam]
-        ends = (contact.element == elements[0], elements[0], beams[beam].start), (
-            contact.element + 1 == elements[-1], elements[-1], beams[beam].end)  # fmt: skip
-        for is_last, element, node in ends:
-            if beams[beam].section.shear and is_last and node == getattr(pad.item, "node", None):
-                shear = measure_compliances(mesh, beam, float(mesh.elements.cuts[contact.element, 1])).shear
+        ends = (contact.element, elements[0], beam.start), (contact.element + 1, elements[-1], beam.end)
+        for beside, element, node in ends:
+            if beside == element and node == getattr(pad.item, "node", None):
+                shear = measure_compliances(mesh, side.beam, float(mesh.elements.cuts[contact.element, 1])).shear
                 total += 0.5 * shear * z[:, contact.unknown] * lengths_at(mesh, z, element) * (1 + FLAT_END_MARGIN)
     return total
 

@@ -36,16 +36,16 @@ class Feet(NamedTuple):
 class PairGaps(SideGaps):
     """Gaps of the side of one beam to another beam, which has round ends."""
 
-    def find_kinks(self, z: FloatArray, stage: LoadStage, elements: Any) -> FloatArray:
+    def find_kinks(self, lines: ElementLines) -> FloatArray:
         """Return how steeply the gap falls, by the kinks of both lines, from ends of elements, (n, m, 2)."""
-        mesh, item, numbers = self.mesh, self.item, np.asarray(elements)
+        mesh, item, z, numbers = self.mesh, self.item, lines.z, lines.elements
         assert isinstance(item, BeamOnBeam)
         beam, kinks = mesh.fits.network.beams[item.beam], np.zeros((len(z), len(numbers), 2))
         shear = sum(measure_compliances(mesh, name, 0.5)[1] for name in (item.beam, item.partner))
-        for contact in mesh.contacts:
-            if contact.slide < 0 or contact.item.name != item.name:
-                continue
+        for contact in mesh.side_contacts:
             own: Any = contact.item
+            if own.name != item.name:
+                continue
             ends = [(contact.element, 1), (contact.element + 1, 0)] if own.beam == item.beam else []
             node = own.node if isinstance(own, NodeOnBeam) else None
             ends += [(self.elements[0], 0)] * (node == beam.start) + [(self.elements[-1], 1)] * (node == beam.end)

@@ -14,7 +14,6 @@ import numpy as np
 
 from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.side_gaps import LoadStage
-from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace
 from cfmkit.elastica.mechanics.elements import smooth_marks
 from cfmkit.elastica.mechanics.march import equations
@@ -96,14 +95,14 @@ def join_pieces(
     used = [_match_slots(_slots_of(piece.mesh), slots) for piece in pieces]
     places = np.full((ends[-1], len(slots)), np.nan)
     for piece, some, numbers in zip(pieces, rows, used, strict=True):
-        for contact, slot in zip(side_contacts(piece.mesh), numbers, strict=True):
+        for contact, slot in zip(piece.mesh.side_contacts, numbers, strict=True):
             places[some, slot] = piece.z[:, contact.slide]
     places = _fill_places(pieces[0].mesh, places, slots)
     mesh = remesh(tuple(FlankPlace(slot.number, place) for slot, place in zip(slots, places[0].tolist(), strict=True)))
-    states, sides = np.zeros((ends[-1], mesh.size)), side_contacts(mesh)
+    states, sides = np.zeros((ends[-1], mesh.size)), mesh.side_contacts
     for piece, some, numbers in zip(pieces, rows, used, strict=True):
         states[some] = carry(piece.mesh, piece.z, LoadStage(piece.drive), mesh, places[some])
-        for contact, slot in zip(side_contacts(piece.mesh), numbers, strict=True):
+        for contact, slot in zip(piece.mesh.side_contacts, numbers, strict=True):
             states[some, sides[slot].unknown] = np.maximum(piece.z[:, contact.unknown], 0.0)
             states[some, sides[slot].flag] = contact.laid
     return mesh, _correct_states(mesh, states, np.concatenate([piece.drive for piece in pieces]))
@@ -122,7 +121,7 @@ def _correct_states(mesh: Discretisation, states: FloatArray, drives: FloatArray
 
 def _slots_of(mesh: Discretisation) -> list[_Slot]:
     slots, names = list[_Slot](), list(mesh.fits.network.beams)
-    for contact in side_contacts(mesh):
+    for contact in mesh.side_contacts:
         beam: str = contact.item.beam  # type: ignore[union-attr]
         marks = smooth_marks(mesh.fits.network.beams[beam], mesh.fits[beam])
         part = int(np.searchsorted(marks, mesh.elements.cuts[contact.element, 1]))

@@ -17,18 +17,16 @@ from cfmkit.elastica.contact.conditions import FORCE_ROUNDING, Conditions
 from cfmkit.elastica.contact.equations import with_closed
 from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.contact.terms import measure, slip_way
-from cfmkit.elastica.mechanics.discretise import FlankPlace
+from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation, FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.model.contact import BeamOnBeam, FrictionState, NodeOnBeam, NodeOnObstacle, describe
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
-from cfmkit.numerics.continuation.problem import PathEquilibrium
+from cfmkit.numerics.continuation.problem import Border, PathEquilibrium
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathEvent, Walk
 
 FEWEST_SAMPLES = 16  # of a step between whose ends a gap may close and open again
@@ -193,7 +191,7 @@ class PieceOfPath:
         near = self.shrink(begin)
         border = np.zeros(len(near.x) + 1)
         border[list(row)] = list(row.values())
-        state = self.own.equations.solve(near.x, near.drive, border, level)
+        state = self.own.solve(near.x, near.drive, Border(border, level))
         return state if state is not None and np.isfinite(state.rate).all() else None
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:

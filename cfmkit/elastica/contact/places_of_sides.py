@@ -13,7 +13,7 @@ from cfmkit.elastica.contact.conditions import NEW_PLACE, PAD_OF_SIDE, ROUNDING_
 from cfmkit.elastica.contact.edges import find_mate
 from cfmkit.elastica.contact.pair_gaps import PairGaps
 from cfmkit.elastica.contact.side_gaps import LoadStage
-from cfmkit.elastica.mechanics.discretise import FlankPlace
+from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
 from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, NodeOnBeam
 from cfmkit.elastica.model.section import Taper
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.contact.conditions import Condition
     from cfmkit.elastica.contact.piece import PieceOfPath
-    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.contact import BeamSide
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.contact.beam_lines import list_elements
 from cfmkit.elastica.contact.edges import half_thickness_of, measure_distance
 from cfmkit.elastica.contact.line_tangent import find_reach, line_leaves_normal, round_off
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.contact_arrays import edge_rows
 from cfmkit.elastica.mechanics.equations import LineTables, SideData
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.model_arrays import edge_rows
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, cuts_at, with_places
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
@@ -79,6 +80,9 @@ class LoadStage(NamedTuple):
 class ElementLines(NamedTuple):
     """Lines of m elements in n states, from which states at any of their places are evaluated; q Gauss points."""
 
+    z: FloatArray  # (n, size)
+    stage: LoadStage
+    elements: Any  # (m,)
     start: FloatArray  # (n, m, 2)
     slope: FloatArray  # (n, m, q, 2) of the middle line, by the place along the element
     speed: FloatArray  # (n, m, q) unloaded arc length by the place along the element
@@ -120,7 +124,7 @@ def find_lines(mesh: Discretisation, z: FloatArray, stage: LoadStage, elements: 
     rotation = z[:, whole.unknowns[elements]][..., energy.rotation_columns(mesh.degree)]
     start = poses(mesh.attachments, z, whole.ends[elements, 0]).place
     cuts = whole.cuts if whole.moved_cuts is None else whole.moved_cuts
-    return ElementLines(start, slope, speed, pick(whole.angle), rotation, pick(cuts))
+    return ElementLines(z, stage, elements, start, slope, speed, pick(whole.angle), rotation, pick(cuts))
 
 
 class _RowsAtPlaces(NamedTuple):
@@ -212,7 +216,7 @@ class SideGaps:
     @cached_property
     def elements(self) -> Any:
         """Elements of the beam, (m,)."""
-        return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == self.item.beam])
+        return np.array(list_elements(self.mesh, self.item.beam))
 
     @property
     def section(self) -> Section:
@@ -245,43 +249,32 @@ class SideGaps:
         sides = [self.half_thickness(parameter + step, element) for step in (PLACE_STEP, -PLACE_STEP)]
         return (sides[0] - sides[1]) / (2 * PLACE_STEP) / (fitted.speed(parameter, inside) / mesh.scales.length)
 
-    def measure(self, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray) -> MeasuredGaps:
-        """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
-        return self._measure(find_lines(self.mesh, z, stage, elements), z, stage, elements, fractions)
-
-    def _measure(
-        self, lines: ElementLines, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray
-    ) -> MeasuredGaps:
-        gap, slope, seen = self._measure_line(lines, z, stage, elements, fractions)
+    def measure(self, lines: ElementLines, fractions: FloatArray) -> MeasuredGaps:
+        """Return gaps and their slopes along the beam (by arc length) at fractions of elements, (n, m, k) each."""
+        gap, slope, seen = self._measure_line(lines, fractions)
         if self.section.shear:
-            kinks = self.find_kinks(z, stage, elements)
-            reach = find_reach(self.mesh, self.item, elements)
+            kinks, reach = self.find_kinks(lines), find_reach(self.mesh, self.item, lines.elements)
             gap, slope = round_off(gap, slope, seen.behind, seen.ahead, kinks, reach)
         return gap, slope, seen
 
-    def _measure_line(
-        self, lines: ElementLines, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray
-    ) -> MeasuredGaps:
+    def _measure_line(self, lines: ElementLines, fractions: FloatArray) -> MeasuredGaps:
         """Return the same with the kinks of beams that shear."""
         seen = lines.evaluate(fractions)
-        value, normal = self.distance(seen.place, z, stage)
-        half = [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)]
+        value, normal = self.distance(seen.place, lines.z, lines.stage)
         if line_leaves_normal(self.section):
             slope = (normal * seen.slope).sum(axis=-1)
         else:
             slope = normal[..., 0] * np.cos(seen.angle) + normal[..., 1] * np.sin(seen.angle)
-        taper = [self._taper(seen.parameter[:, k], number) for k, number in enumerate(elements)]
-        return value - np.stack(half, axis=1), slope - np.stack(taper, axis=1), seen
+        places = [(seen.parameter[:, k], number) for k, number in enumerate(lines.elements)]
+        half, taper = (np.stack([law(*at) for at in places], axis=1) for law in (self.half_thickness, self._taper))
+        return value - half, slope - taper, seen
 
-    def find_kinks(self, z: FloatArray, stage: LoadStage, elements: Any) -> FloatArray:
+    def find_kinks(self, lines: ElementLines) -> FloatArray:
         """Return how steeply the gap falls from contacts at both ends of elements in n states, (n, m, 2)."""
-        numbers = np.asarray(elements)
-        sides = [
-            contact for contact in self.mesh.contacts if contact.slide >= 0 and contact.item.name == self.item.name
-        ]
-        pressed = [contact.element for contact in sides if contact.item.beam == self.item.beam]  # type: ignore[union-attr]
-        lines = find_lines(self.mesh, z, stage, numbers)
-        gap, slope, _ = self._measure_line(lines, z, stage, numbers, np.array([0.0, 1.0]))
+        numbers, sides = lines.elements, self.mesh.side_contacts
+        own: list[Any] = [contact for contact in sides if contact.item.name == self.item.name]
+        pressed = [contact.element for contact in own if contact.item.beam == self.item.beam]
+        gap, slope, _ = self._measure_line(lines, np.array([0.0, 1.0]))
         at_pad = np.isin(numbers, self.touched)[:, None] & (np.abs(gap) < BESIDE_CONTACT)
         ends = np.stack([np.isin(numbers - 1, pressed), np.isin(numbers, pressed)], axis=1) | at_pad
         return np.where(ends, np.maximum(slope * (-1.0, 1.0), 0.0), 0.0)
@@ -352,12 +345,12 @@ class SideGaps:
     @cached_property
     def partner_elements(self) -> Any:
         """Elements of the other beam that the side may touch, (m,)."""
-        partner = self.item.partner if isinstance(self.item, BeamOnBeam) else None
-        return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == partner], np.int64)
+        partner = self.item.partner if isinstance(self.item, BeamOnBeam) else ""
+        return np.array(list_elements(self.mesh, partner), np.int64)
 
     def _find_dips(self, z: FloatArray, stage: LoadStage) -> tuple[Any, _Dips]:
         """Return gaps at places of elements in n states, and between which of them lies a least one that is near."""
-        gap, slope, seen = self.measure(z, stage, self.elements, self.fractions)
+        gap, slope, seen = self.measure(find_lines(self.mesh, z, stage, self.elements), self.fractions)
         step = -np.diff(seen.ahead, axis=-1)
         low, high = slope[..., :-1] * step, slope[..., 1:] * step
         dips = (low < 0) & (high > 0)
@@ -377,11 +370,10 @@ class SideGaps:
         for row in np.unique(dips.row).tolist():
             indices = np.flatnonzero(dips.row == row)
             chosen = dips.state[indices]
-            states, of_states, element = z[chosen], stage.take(chosen), self.elements[[row]]
-            lines = find_lines(self.mesh, states, of_states, element)
+            lines = find_lines(self.mesh, z[chosen], stage.take(chosen), self.elements[[row]])
             for _ in range(N_ROUNDS):
                 middle = b[indices] - high[indices] * (b[indices] - a[indices]) / (high[indices] - low[indices])
-                gap, slope, _ = self._measure(lines, states, of_states, element, middle[:, None, None])
+                gap, slope, _ = self.measure(lines, middle[:, None, None])
                 value[indices], best[indices], slope = gap[:, 0, 0], middle, slope[:, 0, 0]
                 if np.abs(slope).max() < SLOPE_LEVEL:
                     break

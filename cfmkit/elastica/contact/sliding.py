@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
     from cfmkit.elastica.mechanics.equations import NumpyEquations
 
 SMALLEST_ELEMENT = 1e-9  # of a beam: shorter ones have no equations
@@ -87,10 +86,6 @@ class SlidingEquations(EquationsWithNodes):
         return cls(mesh, ramp, plain=make(replace(open_all_contacts(mesh), moving=None), ramp))
 
     # -- places --------------------------------------------------------------------------------------------------------
-    @property
-    def _sides(self) -> list[ContactAt]:
-        return [contact for contact in self.mesh.contacts if contact.slide >= 0]
-
     def move_to(self, places: FloatArray) -> bool:
         """Move the elements of the equations without contacts to places; return False where one would vanish."""
         assert self.mesh.moving is not None
@@ -104,7 +99,7 @@ class SlidingEquations(EquationsWithNodes):
     def find_laid_parts(self, z: FloatArray) -> list[LaidPart]:
         """Return the elements that lie on obstacles; the elements stand at their places."""
         edge = []
-        for contact in self._sides:
+        for contact in self.mesh.side_contacts:
             side = contact.laid if contact.closed is not None else int(np.rint(z[contact.flag]))
             if not side:
                 continue
@@ -193,7 +188,7 @@ class SlidingEquations(EquationsWithNodes):
         mesh, count, slots = self.mesh, self.plain.n, self.slots
         n, z = self.n, np.asarray(self.values(free, way))
         moved = mesh.base if self.ramp else mesh.rate
-        sides = self._sides
+        sides = self.mesh.side_contacts
         places = z[[contact.slide for contact in sides]]
         if not self.move_to(places):
             nowhere = LinearisedSides(np.full(n, np.nan), np.eye(n), np.zeros(n))
@@ -248,7 +243,7 @@ class SlidingEquations(EquationsWithNodes):
 
     def _couple_places(self, pivots: FloatArray, pressing: dict[int, tuple[SideAt, int]], z: FloatArray) -> None:
         """Put the mixed curvature of the gap of two beams, by both places, among the pivots of conditions."""
-        for contact in self._sides:
+        for contact in self.mesh.side_contacts:
             leading = find_leading(self.mesh, contact)
             if leading is not contact and contact.unknown in pressing:
                 (side, row), (partner, row_of_leading) = pressing[contact.unknown], pressing[leading.unknown]
@@ -280,11 +275,11 @@ class SlidingEquations(EquationsWithNodes):
         """Return the change of the residuals without contacts with one of the places."""
         if self._is_plain and not laid:
             return self._differentiate_plain(way, z, number)
-        sides, unknown = [], self._sides[number].slide
+        sides, unknown = [], self.mesh.side_contacts[number].slide
         for step in (PLACE_STEP, -PLACE_STEP):
             beside = z.copy()
             beside[unknown] += step
-            if not self.move_to(beside[[contact.slide for contact in self._sides]]):
+            if not self.move_to(beside[[contact.slide for contact in self.mesh.side_contacts]]):
                 return np.full(len(free), np.nan)
             self._lay(laid)
             residual = np.array(self.plain.linearise(free, way).residual)
@@ -344,14 +339,9 @@ class SlidingEquations(EquationsWithNodes):
 
     def count_unstable(self, at: LinearEquations) -> int:
         """Return the number of unstable directions at a held drive, with places of contacts held."""
-        from scipy.linalg import lapack
-
         assert isinstance(at, LinearisedSides)
-        factors, pivots, _ = lapack.dsytrf(at.frozen, lower=1)
-        single = pivots > 0
-        negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
         forces = int((self.plain.mesh.free >= self.mesh.n_motions).sum()) - at.n_laid
-        return negative - forces - (len(at.frozen) - self.plain.n)
+        return energy.count_negative_pivots(at.frozen) - forces - (len(at.frozen) - self.plain.n)
 
     # -- gradients -----------------------------------------------------------------------------------------------------
     def gradient(self, free: Any, way: Any) -> Any:
@@ -374,7 +364,7 @@ class SlidingEquations(EquationsWithNodes):
 
     def evaluate_gradient(self, z: FloatArray, drive: float, share: float = 1.0) -> FloatArray:
         """Return the gradient of one state by all unknowns; that by places is zero."""
-        self.move_to(z[[contact.slide for contact in self._sides]])
+        self.move_to(z[[contact.slide for contact in self.mesh.side_contacts]])
         laid = self.find_laid_parts(z)
         self._lay(laid)
         total = np.array(self.plain.evaluate(self._drop_tension(z, laid), drive, share)[0])

@@ -12,8 +12,7 @@ from cfmkit.elastica.model.contact import FrictionState, NodeOnObstacle, Stop
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
 
 
 class MeasuredGap(NamedTuple):

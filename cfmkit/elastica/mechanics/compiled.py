@@ -1,4 +1,4 @@
-"""The equations of a network in compiled code, and the arrays that it takes (see `compiled_module`).
+"""The equations of a network in compiled code.
 
 Sides of beams that touch at points are in `sides.c`; what lies on an obstacle is in numpy, and `SlidingEquations` is
 the specification of both (tests/elastica/test_elastica_march.py).
@@ -13,9 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.edges import find_circle, find_leading, half_thickness_of
 from cfmkit.elastica.mechanics.compiled_module import (
-    ADDRESS_FIELDS,
     MAX_DEGREE,
     N_LAW,
     find_module,
@@ -24,15 +22,6 @@ from cfmkit.elastica.mechanics.compiled_module import (
     shape_row,
     slope_products,
 )
-from cfmkit.elastica.mechanics.contact_arrays import (
-    CLOSED_NODE,
-    contact_arrays,
-    edge_rows,
-    last_elements,
-    node_contacts,
-    side_contacts,
-)
-from cfmkit.elastica.mechanics.discretise import BeamElements
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
     N_POWERS,
@@ -46,72 +35,21 @@ from cfmkit.elastica.mechanics.equations import (
     SideData,
     SolvedStates,
 )
+from cfmkit.elastica.mechanics.model_arrays import CLOSED_NODE, has_more_unknowns, model_arrays
 from cfmkit.elastica.mechanics.numbering import number_free
-from cfmkit.elastica.model.beam_fits import coefficients_of
-from cfmkit.elastica.model.contact import BeamOnObstacle
-from cfmkit.elastica.model.network import LineSpring, SlideSpring
 from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.numerics.continuation.problem import Border
 
 
 CLOSED_SIDE = 5  # column of `side_at`
-IN_PLACE = ("angle", "weight", "rigidity", "ahead", "length", "bend", "rest", "curl")
-"""Arrays of a `Model` that `sides.c` changes where elements move."""
-
-
-def side_arrays(mesh: Discretisation, first_part: int) -> tuple[dict[str, Any], Any]:
-    """Return the arrays of contacts of sides in a `Model`, and the parts of their outlines, which begin at a row."""
-    moving, sides = mesh.moving, side_contacts(mesh)
-    assert moving is not None
-    length, numbers = mesh.scales.length, np.asarray(moving.elements).tolist()
-    rows, values, parts = [], [], [np.empty((0, 6))]
-    for contact in sides:
-        item: Any = contact.item
-        edge = item.outline if isinstance(item, BeamOnObstacle) else None
-        closed = -1 if contact.closed is None else int(contact.closed)
-        at = contact.element, contact.place, contact.unknown, contact.slide, contact.flag, closed
-        counts = (len(edge.length), len(edge.radius), int(edge.closed)) if edge else (0, 0, 0)
-        circle, radius = (-1, 0.0) if edge else find_circle(mesh, item)
-        row, leading = numbers.index(contact.element), sides.index(find_leading(mesh, contact))
-        rows.append((*at, first_part, circle, row, *counts, leading))
-        values.append((half_thickness_of(mesh, item.beam), length, radius))
-        if edge:
-            parts.append(edge_rows(edge))
-            first_part += len(parts[-1])
-    arrays = {
-        "side_at": np.array(rows), "side": np.array(values), "moved_at": numbers, "moved_fixed": moving.fixed,
-        "moved_shares": moving.shares, "moved_law": measure_laws(mesh),
-    }  # fmt: skip
-    return arrays, np.concatenate(parts)
-
-
-def measure_laws(mesh: Discretisation) -> FloatArray:
-    """Return length, rigidity and curling of the beam of each element that moves, and its angle, (moved, 3 + m)."""
-    length, force = mesh.scales.length, mesh.scales.force
-    laws: dict[str, FloatArray] = {}
-    names = [mesh.elements.beam[number] for number in mesh.moving.elements]  # type: ignore[union-attr]
-    beams = {name: mesh.fits.network.beams[name] for name in names}
-    angles = coefficients_of(list(beams.values())) + 0.0
-    for (name, beam), angle in zip(beams.items(), angles, strict=True):
-        section, fitted = beam.section, mesh.fits[name]
-        angle[0] += fitted.rotation
-        rigidity = float(np.ravel(section.rigidities(np.array([0.5]), 0.5)[0])[0])
-        curl = float(np.ravel(section.curling(section.thickness_at(0.5, 0.5))[0])[0])
-        laws[name] = np.array([fitted.length / length, rigidity / (force * length**2), curl / length**2, *angle])
-    return np.array([laws[name] for name in names])
-
-
 NO_NUMBERS = read_only([])
 N_COMPARED = 7  # as in compare.c
-OF_ELEMENTS = tuple(
-    name for name in BeamElements._fields if name in ADDRESS_FIELDS and name not in ("ends", "unknowns")
-)
-WHOLE_NUMBERS = frozenset(("slot", "leaves", "spring_at", "load_at", "contact_at", "side_at", "moved_at"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +64,7 @@ class CompiledEquations(NumpyEquations):
         """Collect the arrays."""
         super().__post_init__()
         mesh, arrays = self.mesh, model_arrays(self)
-        free = mesh.free[mesh.free < mesh.numbering.size] if _has_more_unknowns(mesh) else mesh.free
+        free = mesh.free[mesh.free < mesh.numbering.size] if has_more_unknowns(mesh) else mesh.free
         numbered, fixed = numbered_row(mesh.numbering, free.tobytes())
         row = make_row(arrays, self._counts(arrays), numbered)
         vars(self).update(arrays=fixed | arrays, row=row, code=find_module())
@@ -135,10 +73,10 @@ class CompiledEquations(NumpyEquations):
         """Return the counts of a `Model` that depend on more than topology."""
         mesh = self.mesh
         counts = {"springs": len(mesh.springs), "loads": len(mesh.loads), "ramp": self.ramp, "follows": self.follows}
-        if _has_more_unknowns(mesh):
+        if has_more_unknowns(mesh):
             counts |= {"size": mesh.size, "free": len(mesh.free)}
         if mesh.contacts:
-            nodes, sides = node_contacts(mesh), side_contacts(mesh)
+            nodes, sides = mesh.node_contacts, mesh.side_contacts
             presses = len({at.unknown for at in nodes}.intersection(mesh.free.tolist()))
             counts |= {"contacts": len(nodes), "presses": presses, "sides": len(sides)}
         if "moved_law" in arrays:
@@ -156,11 +94,11 @@ class CompiledEquations(NumpyEquations):
     def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
         """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
         slot, kept = number_free(mesh.free, mesh.size), np.searchsorted(self.mesh.free, mesh.free)
-        unit, nodes = self.unit[kept], node_contacts(mesh)
+        unit, nodes = self.unit[kept], mesh.node_contacts
         arrays = {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
         for name, column, contacts in (
             ("contact_at", CLOSED_NODE, nodes),
-            ("side_at", CLOSED_SIDE, side_contacts(mesh)),
+            ("side_at", CLOSED_SIDE, mesh.side_contacts),
         ):
             if contacts:
                 arrays[name] = self.arrays[name].copy()
@@ -186,7 +124,7 @@ class CompiledEquations(NumpyEquations):
 
     def measure_nodes(self, z: FloatArray) -> FloatArray | None:
         """Return the gaps of all contacts of nodes in states (n, size), (contacts, n)."""
-        gaps = np.empty((len(node_contacts(self.mesh)), len(z)))
+        gaps = np.empty((len(self.mesh.node_contacts), len(z)))
         self.code.contact_gaps(self.row, np.ascontiguousarray(z, float), gaps)
         return gaps
 
@@ -234,16 +172,10 @@ class CompiledEquations(NumpyEquations):
         return told if told >= 0 else self.count_unstable(self.linearise(free, place))
 
     def solve(
-        self,
-        free: FloatArray,
-        way: float,
-        border: FloatArray | None = None,
-        level: float = 0.0,
-        tolerance: float = 1e-10,
-        quick: bool = False,
+        self, free: FloatArray, way: float, border: Border | None = None, tolerance: float = 1e-10, quick: bool = False
     ) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
-        solved = self._newton(free[None], [way], border, level, tolerance, quick)
+        solved = self._newton(free[None], [way], border, tolerance, quick)
         x, at, rate, (code, told, effort) = (values[0] for values in solved)
         if code:
             return None
@@ -253,25 +185,25 @@ class CompiledEquations(NumpyEquations):
         self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses."""
-        x, ways, rate, outcomes = self._newton(free, way, None, 0.0, tolerance, quick)
+        x, ways, rate, outcomes = self._newton(free, way, None, tolerance, quick)
         converged, unstable = outcomes[:, 0] == 0, outcomes[:, 1].astype(np.int64)
         for k in np.flatnonzero(converged & (unstable < 0)):
             unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
         return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
 
-    def _newton(self, free: Any, way: Any, border: FloatArray | None, *numbers: float) -> tuple[FloatArray, ...]:
+    def _newton(self, free: Any, way: Any, border: Border | None, *numbers: float) -> tuple[FloatArray, ...]:
         """Return unknowns, places of the way, slopes, and codes, counts and efforts (k, 3), from k guesses."""
         x, ways = np.array(free, float, order="C"), np.array(way, float)
         rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
-        row = NO_NUMBERS if border is None else np.ascontiguousarray(border, float)
-        if self.code.solve(self.row, x, ways, row, rate, outcomes, *numbers):
+        row, level = (NO_NUMBERS, 0.0) if border is None else (np.ascontiguousarray(border.row, float), border.level)
+        if self.code.solve(self.row, x, ways, row, rate, outcomes, level, *numbers):
             raise MemoryError
         return x, ways, rate, outcomes
 
     def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
         """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""
         mesh, bundle = self.mesh, self.mesh.fits.bundle
-        special = _has_more_unknowns(mesh) or bundle.others or degree > MAX_DEGREE
+        special = has_more_unknowns(mesh) or bundle.others or degree > MAX_DEGREE
         if special or np.count_nonzero(mesh.elements.line):
             return None
         laws = angle_laws(bundle.coefficients[mesh.fits.number], mesh)
@@ -343,63 +275,3 @@ def plan_row_of(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
     on_branch = plan.branch is not None
     numbers = plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, on_branch, start
     return np.array((*numbers, N_POWERS, 0.0, 0.0), float)
-
-
-def model_arrays(of: NumpyEquations) -> dict[str, Any]:
-    """Return the arrays of a `Model` in C order, but for those that networks of one topology share."""
-    mesh = of.mesh
-    e, a = mesh.elements, mesh.attachments
-    arrays: dict[str, Any] = {name: getattr(e, name) for name in OF_ELEMENTS}
-    arrays |= {"arm": a.arm, "origin": a.origin, "frame": a.frame, "base": mesh.base, "rate": mesh.rate}
-    arrays |= {"bend": (e.weight * e.rigidity) @ slope_products(mesh.degree), "unit": of.unit}
-    for name, rows in (
-        ("spring", [spring_row(mesh, spring) for spring in mesh.springs]),
-        ("load", [load_row(mesh, load) for load in mesh.loads]),
-    ):
-        if rows:
-            arrays |= {f"{name}_at": [at for at, _ in rows], name: [values for _, values in rows]}
-    if _has_more_unknowns(mesh):
-        arrays |= {"slot": number_free(mesh.free, mesh.size), "leaves": last_elements(mesh)[mesh.free]}
-    if mesh.contacts:
-        arrays |= contact_arrays(mesh)
-    if mesh.moving is not None:
-        sides, parts = side_arrays(mesh, len(arrays["edge"]))
-        arrays |= sides | {"edge": np.concatenate([arrays["edge"], parts])}
-        arrays |= {name: np.array(arrays[name]) for name in IN_PLACE if arrays[name] is not None}  # which C changes
-    return {
-        name: np.ascontiguousarray(values, np.int64 if name in WHOLE_NUMBERS else np.float64)
-        for name, values in arrays.items()
-        if values is not None
-    }
-
-
-def _has_more_unknowns(mesh: Discretisation) -> bool:
-    """Return True if there are unknowns of contacts, which may all be open."""
-    return mesh.size != mesh.numbering.size
-
-
-def spring_row(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
-    """Return kind and places of a spring, and its stiffness and what else it needs."""
-    item, scales, attachments = attached.item, mesh.scales, mesh.attachments
-    rest = attachments.origin[list(attached.places)] + attachments.arm[list(attached.places)]
-    stiffness = item.stiffness * scales.length / scales.force
-    if isinstance(item, SlideSpring):
-        free = item.free_displacement / scales.length
-        values = (stiffness, free, np.cos(item.direction), np.sin(item.direction), *rest[0])
-        return (1, attached.places[0], -1), values
-    if isinstance(item, LineSpring):
-        ground = np.array(item.ground) / scales.length
-        length = float(np.hypot(*((rest[1] if item.end else ground) - rest[0])))
-        free = length if item.free_length is None else item.free_length / scales.length
-        end = attached.places[1] if item.end else -1
-        return (0, attached.places[0], end), (stiffness, length, free - length, *ground, 0.0)
-    start, end = attached.places if item.start is not None else (-1, attached.places[0])
-    return (2, start, end), (item.stiffness / scales.moment, item.free_angle, 0.0, 0.0, 0.0, 0.0)
-
-
-def load_row(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
-    """Return place of a load, whether it grows and follows, and force and moment."""
-    item, scales = attached.item, mesh.scales
-    unit = scales.drive if attached.grows else 1.0
-    values = (item.fx * unit / scales.force, item.fy * unit / scales.force, item.moment * unit / scales.moment)
-    return (attached.places[0], int(attached.grows), int(item.follows)), values

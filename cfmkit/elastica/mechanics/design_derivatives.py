@@ -25,8 +25,8 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.designs import design_of
+from cfmkit.elastica.mechanics.discretise import Attached, ContactAt, Discretisation
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.poses import poses
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.designs import NetworkDesigns
-    from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
 
 MAX_TOGETHER = 300_000  # numbers of a table of all designs at some points: 5 MB
 

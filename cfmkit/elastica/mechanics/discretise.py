@@ -10,17 +10,17 @@ too.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.elements import (
     CutLaw,
     MechanicsUnits,
     MovingCuts,
+    element_tables,
     find_cuts,
     find_moving_cuts,
     is_straight,
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.contact import Contact, FrictionState
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
 
@@ -96,6 +97,32 @@ class FlankPlace(NamedTuple):
     laid: int = 0  # -1 or 1: the side before or behind it, to the next contact or the end, lies on the obstacle
 
 
+class ContactAt(NamedTuple):
+    """A contact, where it acts, and the unknown that is its force; of the side of a beam also its place."""
+
+    item: Contact
+    place: int  # attachment
+    unknown: int
+    number: int  # in `Network.contacts`
+    closed: bool | None = None  # None: as force and gap say
+    slide: int = -1  # unknown that is the parameter of the beam's shape at which it touches; -1: a node touches
+    element: int = -1  # that ends there
+    laid: int = 0  # -1 or 1: the element before or behind it lies on the obstacle
+    # unknown that says the same of a state; of a node with friction: 0 where it sticks, the sense in which it slips
+    flag: int = -1
+    rub: int = -1  # unknown that is the tangential force; -1: there is no friction
+    anchor: int = -1  # unknown that is the place along the obstacle at which it sticks
+    friction: FrictionState | None = None  # None: as the state's flag says
+
+    @property
+    def own_unknowns(self) -> tuple[int, ...]:
+        """Unknowns of the contact of a node: its force, then with friction tangential force, flag and anchor."""
+        return (self.unknown,) if self.rub < 0 else (self.unknown, self.rub, self.flag, self.anchor)
+
+
+UNKNOWNS_OF_CONTACTS = ("unknown", "slide", "flag", "rub", "anchor")
+
+
 @dataclass(frozen=True, eq=False)
 class Discretisation:
     """All arrays of a network under a drive, and the names behind its unknowns."""
@@ -141,6 +168,16 @@ class Discretisation:
     def acting(self) -> tuple[Attached | ContactAt, ...]:
         """Springs, loads and contacts: all that acts on attachments."""
         return (*self.springs, *self.loads, *self.contacts)
+
+    @property
+    def node_contacts(self) -> list[ContactAt]:
+        """Contacts of nodes."""
+        return [contact for contact in self.contacts if contact.slide < 0]
+
+    @property
+    def side_contacts(self) -> list[ContactAt]:
+        """Contacts of sides of beams."""
+        return [contact for contact in self.contacts if contact.slide >= 0]
 
     @property
     def axial(self) -> FloatArray:
@@ -319,3 +356,53 @@ def _acts_on(item: Any) -> tuple[bool, bool]:
     if isinstance(item, Stop) and item.turns:  # alone it holds no rotation
         return False, False
     return True, isinstance(item, PointLoad) and bool(item.follows or item.moment != 0)
+
+
+def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
+    """Return a network with the same elements and a higher degree of their rotations, and with its floors."""
+    if degree == mesh.degree:
+        return mesh
+    e = mesh.elements
+    many = element_tables([mesh.fits], mesh.scales, degree, mesh.numbering.row, e.cuts)
+    tables = {name: table[0] for name, table in many.items()}
+    if np.any(mesh.floored):
+        tables["axial"] = tables["axial"] + mesh.floor[:, None]
+    coarse = mesh.numbering
+    numbering = number(coarse.topology._replace(degree=degree))
+    ends, ahead = coarse.n_ends, numbering.size - coarse.size
+    size = mesh.size + ahead
+    contacts = tuple(
+        one._replace(**{name: value + ahead for name in UNKNOWNS_OF_CONTACTS if (value := getattr(one, name)) >= 0})
+        for one in mesh.contacts
+    )
+    moving = mesh.moving
+    if moving is not None:
+        moving = moving._replace(places=[place + ahead for place in moving.places])
+    free = np.concatenate([mesh.free[mesh.free < ends], np.arange(ends, size)])
+    base, rate = np.zeros(size, mesh.base.dtype), np.zeros(size)
+    base[:ends], rate[:ends] = mesh.base[:ends], mesh.rate[:ends]
+    elements = e._replace(**tables, unknowns=numbering.unknowns, moved_cuts=None)
+    return replace(
+        mesh, degree=degree, elements=elements, numbering=numbering, size=size, free=free, base=base, rate=rate,
+        contacts=contacts, moving=moving,
+    )  # fmt: skip
+
+
+def embed(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
+    """Return a state (..., size) of a network in the unknowns of one of a higher degree: shapes are hierarchical."""
+    ends, old, new = mesh.numbering.n_ends, mesh.elements.unknowns, fine.elements.unknowns
+    found = np.zeros((*z.shape[:-1], fine.size), z.dtype)
+    found[..., :ends] = z[..., :ends]
+    found[..., new[:, 8 : mesh.degree + 7]] = z[..., old[:, 8 : mesh.degree + 7]]
+    found[..., new[:, -2:]] = z[..., old[:, -2:]]
+    behind = mesh.size - mesh.numbering.size
+    if behind:
+        found[..., -behind:] = z[..., -behind:]
+    return found
+
+
+def make_inextensible(mesh: Discretisation, elements: Any) -> Discretisation:
+    """Return the same arrays with elements that do not stretch at all."""
+    axial, floored = mesh.elements.axial.copy(), mesh.floored.copy()
+    axial[elements], floored[elements] = 0.0, False
+    return replace(mesh, elements=mesh.elements._replace(axial=axial), floored=floored)

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.terms import contact_contribution
-from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
+from cfmkit.elastica.mechanics.discretise import Attached, BeamElements, ContactAt, Discretisation
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
@@ -24,7 +24,6 @@ from cfmkit.numerics.dual_array import DualArray, chain, cos_sin, plain, stack
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.elastica.mechanics.discretise import Attached, BeamElements, Discretisation
     from cfmkit.elastica.mechanics.terms import Contribution
 
 SINGULAR_SHIFT = 1e-13  # added to the stiffness of the motions where it is singular to rounding
@@ -237,8 +236,6 @@ def count_unstable(mesh: Discretisation, tangent: Any) -> int:
     Where a contact slips the tangent is not symmetric: then 1 where the sign of its determinant says that it has
     passed a limit point, else 0.
     """
-    from scipy.linalg import lapack
-
     if any(_slips(mesh, contact, tangent) for contact in mesh.contacts if contact.rub >= 0):
         odd = int((mesh.free >= mesh.n_motions).sum()) % 2
         return int(np.linalg.slogdet(tangent)[0] * (-1) ** odd < 0)
@@ -246,10 +243,16 @@ def count_unstable(mesh: Discretisation, tangent: Any) -> int:
     if any(load.item.follows for load in mesh.loads):
         return int((motion_eigenvalues(mesh, tangent) < 0).sum())
 
-    factors, pivots, _ = lapack.dsytrf(tangent, lower=1)
+    return count_negative_pivots(tangent) - int((mesh.free >= mesh.n_motions).sum())
+
+
+def count_negative_pivots(matrix: Any) -> int:
+    """Return the number of negative pivots of L D L^T of a symmetric matrix."""
+    from scipy.linalg import lapack
+
+    factors, pivots, _ = lapack.dsytrf(matrix, lower=1)
     single = pivots > 0
-    negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
-    return negative - int((mesh.free >= mesh.n_motions).sum())
+    return int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
 
 
 def _slips(mesh: Discretisation, contact: ContactAt, tangent: Any) -> bool:

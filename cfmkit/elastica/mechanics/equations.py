@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.numerics.continuation.path import PathBranch
+    from cfmkit.numerics.continuation.problem import Border
 
 MAX_ROUNDS = 14  # of Newton's method
 LARGEST_CORRECTION = 50.0  # of a motion: beyond that Newton's method has left the path
@@ -216,26 +217,13 @@ class NumpyEquations:
 
     def solve(
         self,
-        free: FloatArray,
+        free: FloatArray,  # (n,) first guess
         place: float,
-        border: FloatArray | None = None,
-        level: float = 0.0,
-        tolerance: float = 1e-10,
-        quick: bool = False,
+        border: Border | None = None,  # what is held instead of the way
+        tolerance: float = 1e-10,  # of corrections, relative to the largest motion and force
+        quick: bool = False,  # accept when the next correction would be below the tolerance
     ) -> PathEquilibrium | None:
-        """Return the equilibrium at a place of the way, or where border . (free, way) = level; None if there is none.
-
-        Parameters
-        ----------
-        free, place : (n,) array, float
-            First guess.
-        border, level : (n + 1,) array, float, optional
-            What is held instead of the way, and where.
-        tolerance : float
-            Of corrections, relative to the largest motion and force.
-        quick : bool
-            Accept when the next correction would be below the tolerance.
-        """
+        """Return the equilibrium at a place of the way, or where a border is met; None if there is none."""
         free, last = np.array(free, float), np.inf
         moves, size = self.motions, np.zeros(len(free))
         for _ in range(MAX_ROUNDS):
@@ -244,10 +232,7 @@ class NumpyEquations:
                 step, rate = np.linalg.solve(at.tangent, -np.stack([at.residual, at.change], axis=1)).T
             except np.linalg.LinAlgError:
                 return None
-            along = 0.0
-            if border is not None:
-                left = level - border[:-1] @ (free + step) - border[-1] * place
-                along = float(left / (border[-1] + border[:-1] @ rate))
+            along = 0.0 if border is None else border.find_drive_change(free + step, place, rate)
             change = step + along * rate
             if not (np.isfinite(change).all() and np.abs(change[moves]).max(initial=0.0) <= LARGEST_CORRECTION):
                 return None

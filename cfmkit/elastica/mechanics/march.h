@@ -122,7 +122,7 @@ void factors_begin(Factors *f);
 int factors_add(Factors *f, const Int *at, Int count, const double *matrix);
 int factors_eliminate(Factors *f, const Int *leaves, Int element);
 int factors_finish(Factors *f);
-void factors_solve(const Factors *f, double *x);
+void factors_solve(const Factors *f, double *x, double *y);
 
 #define SAME_EQUILIBRIUM 1e-7 /* motions that differ by less are one */
 

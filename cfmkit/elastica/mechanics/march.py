@@ -15,7 +15,6 @@ from cfmkit.elastica.contact.equations import ContactEquations, open_all_contact
 from cfmkit.elastica.contact.sliding import SlidingEquations
 from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.compiled_module import MAX_DEGREE, load_compiled
-from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.equations import (
     MarchPlan,
     NaturalMarch,
@@ -99,7 +98,7 @@ class CompiledSides(CompiledEquations):
     @cached_property
     def _flags(self) -> Any:
         """Free unknowns that say whether a side lies on its obstacle."""
-        flags = [contact.flag for contact in side_contacts(self.mesh) if contact.closed is None]
+        flags = [contact.flag for contact in self.mesh.side_contacts if contact.closed is None]
         return np.searchsorted(self.mesh.free, flags)
 
     def _lies(self, free: FloatArray) -> Any:
@@ -125,7 +124,7 @@ class CompiledSides(CompiledEquations):
 
     def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
         """Return the curvatures of gaps at contacts of sides in n states, (sides, n); None where something lies."""
-        curvatures, states = np.empty((len(side_contacts(self.mesh)), len(z))), np.ascontiguousarray(z, float)
+        curvatures, states = np.empty((len(self.mesh.side_contacts), len(z))), np.ascontiguousarray(z, float)
         return None if self._any_lies(z) or not self.code.side_curvatures(self.row, states, curvatures) else curvatures
 
     def search_sides(self, z: FloatArray, *rest: Any, **named: Any) -> FloatArray | None:

@@ -16,10 +16,7 @@ from cfmkit.elastica.model.beam_fits import has_polynomial_angle
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
 
 
 MOVED_TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "rest", "curl", "hindrance")
@@ -51,7 +48,25 @@ def with_places(mesh: Discretisation, z: Any) -> Discretisation:
 
     The same arrays, if no element moves.
     """
-    return mesh if mesh.moving is None else replace(mesh, elements=move_elements(mesh, z))
+    e, moving = mesh.elements, mesh.moving
+    if moving is None:
+        return mesh
+    moved = compute_moved_tables(mesh, z[..., moving.places])
+    changed: dict[str, Any] = {}
+    for name, values in moved.items():
+        table_at_rest = e.cuts if name == "moved_cuts" else getattr(e, name)
+        rank = 1 if name == "length" else 2
+        first = table_at_rest.reshape(-1, *table_at_rest.shape[-rank:])[0]
+        whole = np.broadcast_to(first, (*z.shape[:-1], *first.shape)).copy()
+        whole[(..., moving.elements, *(slice(None),) * (rank - 1))] = values
+        changed[name] = whole
+    laid = np.zeros((*z.shape[:-1], len(e.beam)), bool)
+    for contact in mesh.contacts:
+        if contact.slide >= 0:
+            for side in (-1, 1):
+                laid[..., contact.element + (side > 0)] |= np.rint(z[..., contact.flag]) == side
+    changed["laid"] = laid if laid.any() else None
+    return replace(mesh, elements=e._replace(**changed))
 
 
 def cuts_at(mesh: Discretisation, z: Any) -> Any:
@@ -83,28 +98,6 @@ def copy_moved_tables(mesh: Discretisation) -> Discretisation:
     return replace(mesh, elements=e._replace(**copies, laid=None))
 
 
-def move_elements(mesh: Discretisation, z: Any) -> BeamElements:
-    """Return the elements with contacts at their places in states (..., size)."""
-    e, moving = mesh.elements, mesh.moving
-    assert moving is not None
-    moved = compute_moved_tables(mesh, z[..., moving.places])
-    changed: dict[str, Any] = {}
-    for name, values in moved.items():
-        table_at_rest = e.cuts if name == "moved_cuts" else getattr(e, name)
-        rank = 1 if name == "length" else 2
-        first = table_at_rest.reshape(-1, *table_at_rest.shape[-rank:])[0]
-        whole = np.broadcast_to(first, (*z.shape[:-1], *first.shape)).copy()
-        whole[(..., moving.elements, *(slice(None),) * (rank - 1))] = values
-        changed[name] = whole
-    laid = np.zeros((*z.shape[:-1], len(e.beam)), bool)
-    for contact in mesh.contacts:
-        if contact.slide >= 0:
-            for side in (-1, 1):
-                laid[..., contact.element + (side > 0)] |= np.rint(z[..., contact.flag]) == side
-    changed["laid"] = laid if laid.any() else None
-    return e._replace(**changed)
-
-
 def _parts(mesh: Discretisation) -> list[tuple[Any, str, float]]:
     """Return rows of `mesh.moving` in each smooth part of each beam, its name and a place inside the part."""
     if _parts not in mesh.known:
@@ -129,7 +122,8 @@ def unloaded_beam_at(
     beam, fitted = mesh.fits.network.beams[name], mesh.fits[name]
     inside, step, length = float(mesh.elements.cuts[contact.element].mean()), PLACE_STEP, mesh.scales.length
     if has_polynomial_angle(beam):
-        angle, turning = _value_and_slope(lambda t: fitted.angle(t, inside), parameter)
+        stepped = complex(fitted.angle(parameter + 1j * COMPLEX_STEP, inside))
+        angle, turning = stepped.real, stepped.imag / COMPLEX_STEP
         half, speed = 0.5 * float(beam.section.thickness_at(0.5, inside)) / length, fitted.length / length
         return (angle, turning, speed), turning / speed, half, 0.0
     t = np.array([parameter - step, parameter, parameter + step])
@@ -139,9 +133,3 @@ def unloaded_beam_at(
     half = 0.5 * (np.real(beam.section.thickness_at(*along)) + 0.0 * t) / length
     turning, tapering = (angle[2] - angle[0]) / (2 * step), float(half[2] - half[0]) / (2 * step)
     return (float(angle[1]), float(turning), speed), float(turning) / speed, float(half[1]), tapering / speed
-
-
-def _value_and_slope(function: Callable[[complex], Any], at: float) -> tuple[float, float]:
-    """Return an analytic function and its derivative at a place."""
-    value = complex(function(at + 1j * COMPLEX_STEP))
-    return value.real, value.imag / COMPLEX_STEP

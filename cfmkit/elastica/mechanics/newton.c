@@ -184,7 +184,8 @@ int resolve(const Model *m, const double *x, double way, double *right, Int coun
     if (w) {
         place(m, w, x, at);
         if (assemble(m, w, at, FACTORS)) {
-            for (Int k = 0; k < count; k++) factors_solve(&w->factors, right + k * m->free);
+            for (Int k = 0; k < count; k += 2) /* the slope is zero */
+                factors_solve(&w->factors, right + k * m->free, k + 1 < count ? right + (k + 1) * m->free : w->slope);
             *unstable = told_unstable(m, w);
             code = CONVERGED;
         }
@@ -233,8 +234,7 @@ int newton(const Model *m, Work *w, double *x, double *way, const Goal *goal, Fo
             }
         found->unstable = unstable_of(m, w);
         found->told = told_unstable(m, w);
-        factors_solve(&w->factors, w->step);
-        factors_solve(&w->factors, w->slope);
+        factors_solve(&w->factors, w->step, w->slope);
         double along = 0.0;
         if (border) {
             double left = goal->level - border[n] * *way, below = border[n];
@@ -295,7 +295,7 @@ double soften(const Model *m, const double *x, double way, Int rounds, double *v
         for (Int round = assemble(m, w, at, FACTORS) ? 0 : rounds; round < rounds; round++) {
             double before = 0.0, along = 0.0, after = 0.0;
             for (Int i = 0; i < m->free; i++) w->step[i] = m->unit[i] == HUGE_VAL ? vector[i] : 0.0;
-            factors_solve(&w->factors, w->step);
+            factors_solve(&w->factors, w->step, w->slope); /* which is zero */
             for (Int i = 0; i < m->free; i++)
                 if (m->unit[i] == HUGE_VAL) {
                     before += vector[i] * vector[i];

@@ -38,12 +38,6 @@ def basis(degree: int) -> Basis:
     return Basis(degree, read_only(places), read_only(weights / 2), read_only(values), read_only(slopes))
 
 
-@lru_cache(maxsize=64)
-def slopes_at_end(degree: int) -> FloatArray:
-    """Return the slopes of the shape functions at the end of the element, (degree + 1,)."""
-    return read_only(shape_functions(degree, np.ones(1))[1][0])
-
-
 def shape_functions(degree: int, places: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return values and slopes of the shape functions, each (n, degree + 1).
 

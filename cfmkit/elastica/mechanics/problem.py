@@ -13,7 +13,7 @@ from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.equations import N_POWERS, MarchCode, MarchPlan, NaturalMarch
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.polynomials import slopes_at_end
+from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
@@ -75,8 +75,7 @@ class NetworkProblem:
 
     def solve(self, x: FloatArray, drive: float, border: Border | None = None) -> PathEquilibrium | None:
         """Return the equilibrium near a guess: Newton's method of the protocol, in compiled code."""
-        row, level = (None, 0.0) if border is None else border
-        return self.equations.solve(x, drive, row, level)
+        return self.equations.solve(x, drive, border)
 
     def solve_each(self, guesses: Sequence[FloatArray], drives: Sequence[float]) -> list[PathEquilibrium | None]:
         """Return the equilibria near guesses at their drives, in compiled code."""
@@ -107,18 +106,16 @@ class NetworkProblem:
 
     def _march(self, walk: Walk, any_vector: FloatArray | None = None) -> NaturalMarch:
         left = walk.targets[walk.number :]
+        room = 2 * len(left) + N_SPARE_STATES
+        if self.mesh.contacts:
+            room = ROOM_IN_CONTACT if isinstance(self.equations, CompiledEquations) else ROOM_IN_NUMPY
         plan = MarchPlan(
             walk.step, walk.options.span, walk.before, walk.options.largest_motion, self.next_correction,
-            branch=walk.branch,
-            room=self._room_in_contact if self.mesh.contacts else 2 * len(left) + N_SPARE_STATES, any_vector=any_vector,
+            branch=walk.branch, room=room, any_vector=any_vector,
         )  # fmt: skip
         marched = self.equations.march(walk.here, left, plan)
         marched.target[marched.target >= 0] += walk.number
         return marched
-
-    @property
-    def _room_in_contact(self) -> int:
-        return ROOM_IN_CONTACT if isinstance(self.equations, CompiledEquations) else ROOM_IN_NUMPY
 
     # -- modes -----------------------------------------------------------------------------------------------------
     def modes(self, at: PathEquilibrium, count: int) -> tuple[FloatArray, FloatArray]:
@@ -200,7 +197,8 @@ class NetworkProblem:
         e = self.mesh.elements
         last = np.array([number for number, (_, right) in enumerate(e.cuts) if right == 1.0])
         unknowns = e.unknowns[last][:, energy.rotation_columns(self.mesh.degree)]
-        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes_at_end(self.mesh.degree), z[unknowns]))
+        _, slopes = shape_functions(self.mesh.degree, np.ones(1))
+        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
 
 
 @lru_cache(maxsize=64)

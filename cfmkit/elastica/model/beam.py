@@ -44,30 +44,17 @@ _JOINT_KINDS = ("rigid", "pin")
 class Beam:
     """A beam from node `start` to node `end`.
 
-    Parameters
-    ----------
-    start, end : str
-        Names of the nodes.
-    section : Section
-        Cross-section and material.
-    shape : Shape
-        Reference shape; straight unless given.
-    closure : {"rotscale", "raw"}
-        How the shape is fitted between its ends.
-    start_joint, end_joint : {"rigid", "pin"}
-        Whether the end turns with the node.
-    start_offset, end_offset : (float, float)
-        Rigid arms from the node to the beam's end [m], as they lie before any load; they turn with the node.
+    Offsets are rigid arms from a node to the beam's end, as they lie before any load; they turn with the node.
     """
 
     start: str
     end: str
     section: Section
     shape: Shape = STRAIGHT_SHAPE
-    closure: Closure = "rotscale"
-    start_joint: Joint = "rigid"
+    closure: Closure = "rotscale"  # how the shape is fitted between its ends
+    start_joint: Joint = "rigid"  # "pin": the end does not turn with the node
     end_joint: Joint = "rigid"
-    start_offset: tuple[float, float] = (0.0, 0.0)
+    start_offset: tuple[float, float] = (0.0, 0.0)  # [m]
     end_offset: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:

@@ -77,44 +77,26 @@ Drive = Displacement | Rotation | Loading
 
 @dataclass(frozen=True)
 class Control:
-    """Options of path following, and the accuracy of a path.
+    """Options of path following, and the accuracy of a path."""
 
-    Parameters
-    ----------
-    tolerance : float
-        Error of forces and positions allowed, relative to the largest of the path [1].
-    through_folds : bool
-        Follow the path through limit points of the drive, where it would end otherwise: from there on by its arc
-        length, until the drive leads on again. Until then it is unstable and stays on its curve, whatever `branch`
-        says; its bifurcations are reported. Requested values that are passed several times are delivered every time. It
-        ends where the last of them (the last before the points turn round) is passed first.
-    branch : {"stable", "primary", "stop"}
-        Where stability is lost leave for a stable branch, stay on the path and say so, or end the path there: the
-        quickest way to know that a design is no good. With `through_folds` the path stays on its curve also where no
-        stable branch begins.
-    sign : {1, -1}
-        Which of two mirror-image branches is taken, at every bifurcation anew: also where the points turn round and a
-        bifurcation is passed again.
-    largest_turn : float
-        Largest change of a rotation, or of a position in units of the mean beam length, in one step [rad].
-    first_step : float or None
-        First step as a fraction of the drive's range; found from the points unless given.
-    most_points : int
-        At most so many points besides those requested.
-    imperfection : float
-        Bend the unloaded beams, and move the nodes between them, by so much [m] in the form of the buckling mode at
-        the first bifurcation of the perfect path, to either side by its sign; 0: perfect. `Path.imperfection` names
-        what was done.
-    """
-
-    tolerance: float = 1e-7
+    tolerance: float = 1e-7  # error of forces and positions allowed, relative to the largest of the path [1]
     through_folds: bool = False
+    """Follow the path through limit points of the drive, where it would end otherwise: from there on by its arc length,
+    until the drive leads on again. Until then it is unstable and stays on its curve, whatever `branch` says; its
+    bifurcations are reported. Requested values that are passed several times are delivered every time. It ends where
+    the last of them (the last before the points turn round) is passed first."""
     branch: Literal["stable", "primary", "stop"] = "stable"
+    """Where stability is lost leave for a stable branch, stay on the path and say so, or end the path there: the
+    quickest way to know that a design is no good. With `through_folds` the path stays on its curve also where no stable
+    branch begins."""
+    # which of two mirror-image branches is taken, at every bifurcation anew, also where the points turn round
     sign: Literal[1, -1] = 1
-    largest_turn: float = 0.35
-    first_step: float | None = None
-    most_points: int = 2000
+    largest_turn: float = 0.35  # largest change in one step, of a rotation [rad], or of a position [mean beam length]
+    first_step: float | None = None  # as a fraction of the drive's range; found from the points unless given
+    most_points: int = 2000  # besides those requested
     imperfection: float = 0.0
+    """Bend the unloaded beams, and move the nodes between them, by so much [m] in the form of the buckling mode at the
+    first bifurcation of the perfect path, to either side by its sign. `Path.imperfection` names what was done."""
 
     def __post_init__(self) -> None:
         if not 1e-12 <= self.tolerance <= 0.1:

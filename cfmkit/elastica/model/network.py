@@ -29,22 +29,13 @@ _NO_DISPLACEMENT = (0.0, 0.0, 0.0)  # not displaced
 
 @dataclass(frozen=True)
 class Support:
-    """Which motions of a node are held, in a frame turned by `direction`.
+    """Which motions of a node are held, in a frame turned by `direction`."""
 
-    Parameters
-    ----------
-    along, across, rotation : bool
-        Whether the motion along the direction, across it (90 deg to its left) and the rotation are held.
-    direction : float
-        Angle of the frame [rad].
-    displacement : (float, float, float)
-        Where held motions are held: along [m], across [m], rotation [rad]; applied before anything else is.
-    """
-
-    along: bool = False
-    across: bool = False
+    along: bool = False  # the direction
+    across: bool = False  # 90 deg to its left
     rotation: bool = False
-    direction: float = 0.0
+    direction: float = 0.0  # [rad]
+    # where held motions are held: along [m], across [m], rotation [rad]; applied before anything else is
     displacement: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
@@ -161,10 +152,7 @@ LoadOn = PointLoad | LineLoad
 class Network(ShortRepr):
     """A network: everything about it, by name, and nothing about what is done to it.
 
-    Raises
-    ------
-    cfmkit.errors.InputError
-        If names do not match, or a linked node has a support of its own.
+    Raises InputError if names do not match, or a linked node has a support of its own.
     """
 
     nodes: Mapping[str, Node]
@@ -242,8 +230,6 @@ class Network(ShortRepr):
                     raise InputError(f"the links through {link.node!r} form a loop")
                 seen.add(at)
                 at = self.links[moved.index(at)].master
-            if at == link.node:
-                raise InputError(f"the links through {link.node!r} form a loop")
             support = self.nodes[link.node].support
             if support.along or support.across or support.rotation:
                 raise InputError(f"node {link.node!r} is moved by a link and cannot have a support")

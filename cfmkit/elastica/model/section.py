@@ -24,18 +24,10 @@ _N_SINE_SAMPLES = 64  # places of half a sine: the mean over it is smooth, and p
 
 @dataclass(frozen=True)
 class Taper:
-    """A thickness that is linear between stations along the beam.
+    """A thickness that is linear between stations along the beam; a station given twice is a step."""
 
-    Parameters
-    ----------
-    stations : (n,) array
-        Fractions of the arc length, from 0 to 1, not decreasing; a station given twice is a step.
-    values : (n,) array
-        Thickness there [m].
-    """
-
-    stations: FloatArray
-    values: FloatArray
+    stations: FloatArray  # (n,) fractions of the arc length, from 0 to 1, not decreasing
+    values: FloatArray  # (n,) thickness there [m]
 
     def __post_init__(self) -> None:
         for name in ("stations", "values"):
@@ -61,31 +53,16 @@ class Taper:
 class Section:
     """A rectangle: `thickness` in the plane of bending, `width` out of it.
 
-    Parameters
-    ----------
-    youngs_modulus : float
-        [Pa].
-    width : float
-        Out of the plane [m].
-    thickness : float or Taper
-        In the plane [m].
-    axial, shear : bool
-        Whether the beam stretches, and whether it shears.
-    poisson_ratio : float
-        For the shear modulus [1].
-    shear_factor : float
-        Share of the area that carries shear [1]; 5/6 for a rectangle.
-    wide : bool
-        Whether it stiffens as its curling across the width is hindered: see `cfmkit.elastica.mechanics.wide_strip`.
+    A `wide` one stiffens as its curling across the width is hindered: see `cfmkit.elastica.mechanics.wide_strip`.
     """
 
-    youngs_modulus: float
-    width: float
-    thickness: float | Taper
-    axial: bool = True
-    shear: bool = False
-    poisson_ratio: float = 0.3
-    shear_factor: float = 5.0 / 6.0
+    youngs_modulus: float  # [Pa]
+    width: float  # out of the plane [m]
+    thickness: float | Taper  # in the plane [m]
+    axial: bool = True  # whether the beam stretches
+    shear: bool = False  # whether it shears
+    poisson_ratio: float = 0.3  # for the shear modulus [1]
+    shear_factor: float = 5.0 / 6.0  # share of the area that carries shear [1]; 5/6 for a rectangle
     wide: bool = False
 
     def __post_init__(self) -> None:

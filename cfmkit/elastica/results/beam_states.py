@@ -96,23 +96,10 @@ def forces_of_elements(net: Network, at: Equilibria, elements: Sequence[int], fr
 def forces_of_designs(
     networks: Sequence[Network], meshes: Sequence[Discretisation], at: Equilibria, row: Any, fractions: Any
 ) -> tuple[BeamStates, Any]:
-    """Return section forces of some designs of one topology and degree at points of each, and widths at all places.
+    """Return section forces of some designs of one topology and degree, without x and y, and widths, (p, e k).
 
-    Parameters
-    ----------
-    networks, meshes : sequences
-        The designs and their arrays.
-    at : Equilibria
-        Points of all of them, (p, size), with the arrays of any.
-    row : (p,) int array
-        Which design each point is of.
-    fractions : (k,) array
-        Places on every element.
-
-    Returns
-    -------
-    states, widths : BeamStates, (p, e k) array
-        Without x and y; all of e elements one after the other.
+    `at` has points of all of them, with the arrays of any; `row` (p,) says which design each point is of. Places are at
+    the same fractions (k,) of e elements, one after the other.
     """
     places, elements = np.asarray(fractions, float), list(range(len(at.mesh.elements.length)))
     names = ("length", "line", *(name for name in ON_POINTS if getattr(at.mesh.elements, name) is not None))

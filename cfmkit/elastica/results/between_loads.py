@@ -13,6 +13,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.results.between_points import MIN_PATH_POINTS, PLACE_RTOL, BetweenPoints
+from cfmkit.numerics.continuation.problem import Border
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -47,9 +48,10 @@ class BetweenLoads(BetweenPoints):
         return self._equations.collect(each), ways
 
     def _spot(self, y: FloatArray, near: float, goal: float) -> PathEquilibrium | None:
-        first = self._equations.solve(y, near, self.row, goal)
+        border = Border(self.row, goal)
+        first = self._equations.solve(y, near, border)
         # the solver watches poses and forces: once more, so that the load is as exact as they are
-        return None if first is None else self._equations.solve(first.x, first.drive, self.row, goal)
+        return None if first is None else self._equations.solve(first.x, first.drive, border)
 
     def _counts(self, near: Any, left: Any) -> Any:
         return np.stack([self._unstable[left], self._unstable[left + 1]], axis=1)  # a largest load: two of each kind

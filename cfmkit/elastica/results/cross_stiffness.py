@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.mechanics.derived_arrays import make_inextensible
+from cfmkit.elastica.mechanics.discretise import make_inextensible
 from cfmkit.elastica.mechanics.march import equations
 
 if TYPE_CHECKING:
@@ -34,21 +34,8 @@ OPEN_FORCE = 1e-9  # dimensionless force that may be left where a force is open:
 def cross_stiffness(path: EquilibriumPath, node: str, direction: float, points: Any = None) -> FloatArray:
     """Return the force across a direction per displacement across it at a node, at points of a path, (p,) [N/m].
 
-    Parameters
-    ----------
-    path : EquilibriumPath
-        The equilibria, driven by a displacement of the node along the direction, or by loads.
-    node : str
-        A node that no link moves.
-    direction : float
-        [rad]; along it the node is held.
-    points : (p,) int array, optional
-        Indices of points of the path; all unless given.
-
-    Returns
-    -------
-    (p,) array
-        Negative where the node would leave sideways; nan where nothing gives way.
+    The path is driven by a displacement of the node, which no link moves, along the direction [rad], or by loads. The
+    stiffness is negative where the node would leave sideways, nan where nothing gives way.
     """
     chosen = slice(None) if points is None else np.asarray(points, dtype=np.int64)
     scales = path.mesh.scales

@@ -6,18 +6,16 @@ is less stable than the known one, counts as not found.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.mechanics.derived_arrays import make_inextensible
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-from cfmkit.elastica.mechanics.discretise import discretise
+from cfmkit.elastica.mechanics.discretise import discretise, make_inextensible
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
-from cfmkit.elastica.results.path import PathStatus
+from cfmkit.elastica.results.path import EquilibriumPath, PathStatus
 from cfmkit.errors import InputError
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
@@ -25,32 +23,17 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
-    from cfmkit.elastica.results.path import EquilibriumPath
 
 
 def solve_near_known_path(
     path: EquilibriumPath, network: Network, drive: Drive, largest_turn: float = 0.5
 ) -> EquilibriumPath:
-    """Return the equilibria of `network` nearest to those of a path, one for each point of the drive.
+    """Return the equilibria of `network` nearest to those of a path, on its elements, one for each point of the drive.
 
-    Raises InputError if the two networks are not of one kind, or the numbers of points differ.
-
-    Parameters
-    ----------
-    path : EquilibriumPath
-        Of a network with the same nodes, beams, corners and stations; its requested points correspond to those of
-        the drive, one by one.
-    network : Network
-        The other network.
-    drive : Displacement, Rotation or Loading
-        As many points as were requested and reached.
-    largest_turn : float
-        Largest change of a rotation, or of a position in mean beam lengths, from the known point [rad].
-
-    Returns
-    -------
-    EquilibriumPath
-        The points found, on the elements of the known path. LOST, with the first place, if any is missing.
+    The path is of a network with the same nodes, beams, corners and stations; its requested points are those of the
+    drive, one by one. A rotation changes by at most `largest_turn` [rad], a position by as many mean beam lengths. The
+    status is LOST, with the first place, if any is missing. Raises InputError if the networks are not of one kind, or
+    the numbers of points differ.
     """
     known, mesh = path.at_requested, path.mesh
     arrays = discretise(network, drive, mesh.degree, mesh.pieces, mesh.tension, mesh.scales)
@@ -73,22 +56,14 @@ def solve_near_known_path(
         status, message = PathStatus.LOST, f"no equilibrium near the known one at {drive.points[missing[0]]:.6g}"
     z: Any = arrays.base + wanted[kept, None] * arrays.rate
     z[:, arrays.free] = np.array(states).reshape(len(kept), len(arrays.free))
-    return replace(
-        path,
-        network=network,
-        load_case=drive,
-        at=Equilibria(arrays, z, wanted[kept]),
+    return EquilibriumPath(
+        network, drive, Equilibria(arrays, z, wanted[kept]),
         unstable=read_only(path.unstable[known[kept]], np.int64),
         requested=read_only(kept, np.int64),
         branch=read_only(np.repeat("neighbour", len(kept)), np.str_),
-        status=status,
-        message=message,
-        events=(),
-        contact_events=(),
-        at_contact=False,
+        status=status, message=message, events=(), error=path.error,
         accurate=read_only(np.ones(len(kept), dtype=bool), np.bool_),
-        imperfection="",
-    )
+    )  # fmt: skip
 
 
 def drive_slope(

@@ -23,6 +23,7 @@ from cfmkit.elastica.results.between_points import (
     MIN_STRAY_DISTANCE,
     N_EXTREME_ROUNDS,
 )
+from cfmkit.numerics.continuation.problem import Border
 from cfmkit.numerics.interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:
@@ -48,15 +49,11 @@ class AlongTheWay:
     def ways(self) -> FloatArray:
         """The points, and between them extremes of the motion, of the effort and of each beam's stress, increasing."""
         seen, points = self._seen, np.arange(float(len(self.path)))
-        found = {*points.tolist()}
-        for number in range(2):
-            found |= self._turns(number)
-        largest = seen.stress.max()
+        places = {*points.tolist(), *self._turns(0), *self._turns(1)}
         for values, _ in seen.stresses.values():
-            turns = inner_extremes(self.arc, values)
-            near = np.interp(turns, self.arc, points)
-            found |= {*near[np.interp(near, points, values) > 0.5 * largest].tolist()}
-        return read_only(sorted(found))
+            near = np.interp(inner_extremes(self.arc, values), self.arc, points)
+            places |= {*near[np.interp(near, points, values) > 0.5 * seen.stress.max()].tolist()}
+        return read_only(sorted(places))
 
     def _turns(self, which: int) -> set[float]:
         """Return where one of the states has extremes between points: of polynomials, with what is solved there."""
@@ -85,7 +82,7 @@ class AlongTheWay:
             rows = zip((seen.motion, seen.effort), self._states_at_points, strict=True)
             known = [np.where(there.accurate, new, np.interp(flat, points, own)) for new, own in rows]
             self._known[flat.tobytes()] = known
-        motion, effort = (one.reshape(np.shape(ways)) for one in known)
+        motion, effort = (values.reshape(np.shape(ways)) for values in known)
         return motion, effort
 
     @cached_property
@@ -104,27 +101,28 @@ class AlongTheWay:
 
     def solve_at(self, ways: FloatArray) -> EquilibriumPath:
         """Return the equilibria at places of the way (n,); `accurate` is False where none was found."""
-        path, known_y, known_drive = self.path, self.path.free, self.path.at.drive
-        own = equations(path.mesh)
+        path, places, own = self.path, self._places, equations(self.path.mesh)
         left = np.clip(ways.astype(np.int64), 0, len(path) - 2)
         share = ways - left
-        y, drive = self._guesses(left, share)
         near = np.where(share > 0.5, left + 1, left)
-        known = (share == 0.0) | (share == 1.0)
-        y[known], drive[known] = known_y[near[known]], known_drive[near[known]]
-        found = known.copy()
-        for number in np.flatnonzero(~known).tolist():
-            at = int(left[number])
-            step = self._places[at + 1] - self._places[at]
+        rows, solved = self._guess(left, share, near), (share == 0.0) | (share == 1.0)
+        rows[solved] = places[near[solved]]
+        for number in np.flatnonzero(~solved).tolist():
+            at, guess = int(left[number]), rows[number]
+            step = places[at + 1] - places[at]
             border = step * self._metric
-            goal = float(border @ (self._places[at] + share[number] * step))
-            spot = own.solve(y[number], float(drive[number]), border, goal)
+            goal = float(border @ (places[at] + share[number] * step))
+            spot = own.solve(guess[:-1], float(guess[-1]), Border(border, goal))
             if spot is None or spot.unstable not in path.unstable[at : at + 2].tolist():
                 continue
-            moved = _largest(path, spot.x - y[number])
-            if moved <= max(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * _largest(path, known_y[at + 1] - known_y[at])):
-                y[number], drive[number], found[number] = spot.x, spot.drive, True
-        return path.with_states(near, y, drive, found)
+            if self._measure(spot.place - guess) <= max(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * self._measure(step)):
+                rows[number], solved[number] = spot.place, True
+        return path.with_states(near, rows[:, :-1], rows[:, -1], solved)
+
+    def _measure(self, change: FloatArray) -> float:
+        """Return the largest change of positions and rotations in a change of unknowns and drive."""
+        mesh = self.path.mesh
+        return float(np.abs(change[:-1][mesh.free < mesh.n_motions]).max(initial=0.0))
 
     @cached_property
     def _places(self) -> FloatArray:
@@ -151,22 +149,14 @@ class AlongTheWay:
         branch = self.path.branch
         return np.cumsum(np.concatenate([[False], branch[1:] != branch[:-1]]))
 
-    def _guesses(self, left: Any, share: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _guess(self, left: Any, share: FloatArray, near: Any) -> FloatArray:
         """Return the polynomials through up to four points of the branch at shares of the way behind some points."""
-        near = np.where(share > 0.5, left + 1, left)
         arc = self.arc[left] + share * (self.arc[left + 1] - self.arc[left])
-        rows = self._places
-        found = np.empty((len(left), rows.shape[1]))
+        rows = np.empty((len(left), self._places.shape[1]))
         for number in distinct(self._stretch[near]).tolist():
             own, here = self._stretch == number, self._stretch[near] == number
-            found[here] = values_at(self.arc[own], rows[own], arc[here])
-        return found[:, :-1].copy(), found[:, -1].copy()
-
-
-def _largest(path: EquilibriumPath, change: FloatArray) -> float:
-    """Return the largest change of positions and rotations in a change of the unknowns."""
-    mesh = path.mesh
-    return float(np.abs(change[mesh.free < mesh.n_motions]).max(initial=0.0))
+            rows[here] = values_at(self.arc[own], self._places[own], arc[here])
+        return rows
 
 
 def interpolate_folding_path(

@@ -123,41 +123,28 @@ class EquilibriumPath(ShortRepr):
 
     def take(self, points: Any) -> EquilibriumPath:
         """Return some of the points: their indices, or True for each."""
-        return replace(
-            self,
-            at=Equilibria(self.mesh, self.at.z[points], self.at.drive[points]),
-            unstable=self.unstable[points],
-            requested=self.requested[points],
-            branch=self.branch[points],
-            accurate=self.accurate[points],
-            at_contact=self.changes_contact[points],
-        )
+        at = Equilibria(self.mesh, self.at.z[points], self.at.drive[points])
+        return replace(self, at=at, **{name: column[points] for name, column in self._columns.items()})
 
     def append(self, other: EquilibriumPath) -> EquilibriumPath:
         """Return the points of this path, then those of another of the same network, as one."""
-        return replace(
-            self,
-            at=Equilibria(
-                self.mesh, np.vstack([self.at.z, other.at.z]), np.concatenate([self.at.drive, other.at.drive])
-            ),
-            unstable=read_only(np.concatenate([self.unstable, other.unstable]), np.int64),
-            requested=read_only(np.concatenate([self.requested, other.requested]), np.int64),
-            branch=read_only(np.concatenate([self.branch, other.branch]), np.str_),
-            accurate=read_only(np.concatenate([self.accurate, other.accurate]), np.bool_),
-            at_contact=read_only(np.concatenate([self.changes_contact, other.changes_contact]), np.bool_),
-        )
+        z, drive = np.vstack([self.at.z, other.at.z]), np.concatenate([self.at.drive, other.at.drive])
+        columns: dict[str, Any] = {}
+        for name, own in self._columns.items():
+            column = np.concatenate([own, other._columns[name]])
+            columns[name] = read_only(column, column.dtype)
+        return replace(self, at=Equilibria(self.mesh, z, drive), **columns)
+
+    @property
+    def _columns(self) -> dict[str, Any]:
+        """Values that every point has besides its equilibrium."""
+        names = ("unstable", "requested", "branch", "accurate")
+        return {name: getattr(self, name) for name in names} | {"at_contact": self.changes_contact}
 
     def with_states(self, near: Any, free: FloatArray, drive: FloatArray, accurate: Any = True) -> EquilibriumPath:
         """Return other equilibria of the network as a path, none of them requested.
 
-        Parameters
-        ----------
-        near : (m,) int array
-            Points of this path whose branch and stability they share.
-        free, drive : (m, free) array, (m,) array
-            Unknowns and drive; dimensionless.
-        accurate : (m,) array of bool
-            False where there is no equilibrium.
+        They have unknowns (m, free) and drives (m,), dimensionless, and branch and stability of points `near`, (m,).
         """
         mesh = self.mesh
         z = mesh.base + drive[:, None] * mesh.rate
@@ -271,12 +258,8 @@ class EquilibriumPath(ShortRepr):
     def reaction(self, node: str) -> FloatArray:
         """Return force and moment that hold a node, (n, 3) [N, N, N m]: of its support and of a drive by a motion.
 
-        Loads are not among them, those of a drive neither.
-
-        Raises
-        ------
-        cfmkit.errors.InputError
-            If there is no such node, or a link moves it.
+        Loads are not among them, those of a drive neither. Raises InputError if there is no such node, or a link moves
+        it.
         """
         if node not in self.network.nodes:
             raise InputError(f"{node!r} is not a node; nodes: {', '.join(self.network.nodes)}")

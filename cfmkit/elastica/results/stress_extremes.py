@@ -73,21 +73,9 @@ def places(count: int) -> tuple[tuple[float, ...], Any]:
 
 
 def extremes(net: Network, at: Equilibria, beams: Sequence[str], signs: FloatArray) -> tuple[Any, Any, Any, Any]:
-    """Return the highest combinations of bending and axial stress along some beams.
+    """Return the highest of c combinations of bending and axial stress, with factors (c, 2), along b beams.
 
-    Parameters
-    ----------
-    net, at : Network, Equilibria
-        As of `states`.
-    beams : sequence of str
-        Their names, b.
-    signs : (c, 2) array
-        What bending and axial stress count for, in each of c combinations.
-
-    Returns
-    -------
-    value, place, element, fraction : (b, p, c) arrays
-        [Pa]; fraction of the arc length; number of the element on the beam, and place on it.
+    They are values [Pa], fractions of the arc length, numbers of elements on the beam, and places on these, (b, p, c).
     """
     own = [elements_of(at.mesh, beam) for beam in beams]
     elements = [number for numbers in own for number in numbers]

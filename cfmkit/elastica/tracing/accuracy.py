@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.derived_arrays import embed, raise_degree
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
+from cfmkit.elastica.mechanics.discretise import Discretisation, embed, raise_degree
 from cfmkit.elastica.mechanics.elements import TAUT_RATIO
 from cfmkit.elastica.mechanics.equations import ComparedStates
 from cfmkit.elastica.mechanics.march import equations
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import Discretisation
 
 
 DEGREES_MORE = 4

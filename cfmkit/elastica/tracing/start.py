@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.contact.path_items import ContactChange, Remeshed
-from cfmkit.elastica.mechanics.derived_arrays import make_inextensible
-from cfmkit.elastica.mechanics.discretise import FlankPlace
+from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, make_inextensible
 from cfmkit.elastica.mechanics.numbering import number_free
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.results.path import Event
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.contact.path_items import PathItem
-    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.drive import Control
     from cfmkit.numerics.continuation.path import MarchedSteps
     from cfmkit.numerics.continuation.problem import PathEquilibrium

@@ -12,9 +12,8 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece
-from cfmkit.elastica.mechanics.derived_arrays import embed, raise_degree
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
+from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise, embed, raise_degree
 from cfmkit.elastica.model.beam_fits import coils
 from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Control, Loading

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica import Displacement, PathStatus
-from cfmkit.elastica.mechanics.derived_arrays import make_inextensible
-from cfmkit.elastica.mechanics.discretise import discretise
+from cfmkit.elastica.mechanics.discretise import discretise, make_inextensible
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.families.beam.solution import node_at
 from cfmkit.specs.units import format_short

@@ -10,9 +10,10 @@ References
 """
 
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
-from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
+from cfmkit.numerics.continuation.problem import Border, ContinuationProblem, PathEquilibrium
 
 __all__ = [
+    "Border",
     "ContinuationProblem",
     "Options",
     "PathBranch",

@@ -62,26 +62,11 @@ def follow(
     options: Options,
     branch: PathBranch | None = None,
 ) -> Iterator[Point | PathEvent | PathStop]:
-    """Yield the points and events of a path in order, and its ending at last.
+    """Yield the points of a path from a start, at requested values of the drive (k,) and between, and its events.
 
-    Parameters
-    ----------
-    problem : ContinuationProblem
-        The structure. If it has a method `march`, of a `Walk`, to `MarchedSteps`, it takes steps by itself where
-        nothing happens, in compiled code, say; if it has `march_whole`, too, all of them where nothing happens at all.
-    start : PathEquilibrium
-        Where the path begins.
-    targets : (k,) array
-        Values of the drive to be reached in order; they may turn back.
-    options : Options
-        Range of the drive, branches, steps.
-    branch : PathBranch, optional
-        On which the path begins.
-
-    Yields
-    ------
-    Point, PathEvent or PathStop
-        Points at requested values and between them. A path that ends early ends with an `PathStop` that says why.
+    Values may turn back. At last comes a `PathStop`, which says why if the path ends early. If a problem has a method
+    `march`, of a `Walk`, to `MarchedSteps`, it takes steps by itself where nothing happens, in compiled code, say; if
+    it has `march_whole`, too, all of them where nothing happens at all.
     """
     items = each_point(follow_together(problem, start, targets, options, branch))
     return mark_corners(items, options) if options.corner else items
@@ -101,7 +86,10 @@ def follow_together(
     branch: PathBranch | None = None,
 ) -> Iterator[Item | MarchedSteps]:
     """Yield what `follow` does, but the points of every march together, and no corners that are rounded."""
-    yield from limit_points(_items(problem, start, targets, options, branch), options.most_points)
+    at_first = int(len(targets) > 0 and targets[0] == start.drive)
+    step, steepest = options.first_step * options.span, max(0.0, abs(start.stiffness))
+    walk = Walk(problem, options, targets, start, step, at_first, trail=(start,), branch=branch, steepest=steepest)
+    return limit_points(_items(walk), options.most_points)
 
 
 def limit_points(items: Iterable[Any], most: int) -> Iterator[Any]:
@@ -119,29 +107,21 @@ def limit_points(items: Iterable[Any], most: int) -> Iterator[Any]:
                 return
 
 
-def _items(
-    problem: ContinuationProblem,
-    start: PathEquilibrium,
-    targets: FloatArray,
-    options: Options,
-    branch: PathBranch | None,
-) -> Iterator[Item | MarchedSteps]:
-    at_first = int(len(targets) > 0 and targets[0] == start.drive)
-    step, steepest = options.first_step * options.span, max(0.0, abs(start.stiffness))
-    walk = Walk(problem, options, targets, start, step, at_first, trail=(start,), branch=branch, steepest=steepest)
+def _items(walk: Walk) -> Iterator[Item | MarchedSteps]:
+    problem, options, start = walk.problem, walk.options, walk.here
     march_whole = getattr(problem, "march_whole", None)
     if march_whole is not None and not walk.done and not start.unstable:
         marched = march_whole(walk, (CRITICAL_STIFFNESS, NEARLY_CRITICAL))
         if marched is not None:
-            yield Point(start, at_first - 1, branch)
+            yield Point(start, walk.number - 1, walk.branch)
             yield marched
             yield PathStop(WhyStopped.COMPLETE, float(marched.drive[-1]))
             return
     beyond = None if walk.done or options.branch == "primary" else start_critical(walk)
-    if beyond is not None:  # how many directions are unstable there is rounding
-        yield Point(start._replace(unstable=beyond.here.unstable), at_first - 1, branch)
-    else:
-        yield Point(start, at_first - 1, branch)
+    # at a critical start it is rounding how many directions are unstable
+    yield Point(
+        start if beyond is None else start._replace(unstable=beyond.here.unstable), walk.number - 1, walk.branch
+    )
     walk = beyond or walk
     if walk.here.drive != start.drive:
         yield Point(walk.here, -1, walk.branch)

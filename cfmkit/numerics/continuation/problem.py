@@ -96,6 +96,11 @@ class Border(NamedTuple):
     row: FloatArray  # (n + 1,)
     level: float
 
+    def find_drive_change(self, x: FloatArray, drive: float, rate: FloatArray) -> float:
+        """Return by how much the drive must change for this, while x does at a rate."""
+        row = self.row
+        return float((self.level - row[:-1] @ x - row[-1] * drive) / (row[-1] + row[:-1] @ rate))
+
 
 @lru_cache(maxsize=2)
 def arc_weights(problem: ContinuationProblem, span: float) -> FloatArray:

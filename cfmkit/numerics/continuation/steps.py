@@ -58,7 +58,7 @@ def correct(
             if columns is None or not np.isfinite(columns).all():
                 return None
             step, rate = columns.T
-            change = 0.0 if border is None else _drive_change(border, x + step, drive, rate)
+            change = 0.0 if border is None else border.find_drive_change(x + step, drive, rate)
             step = step + change * rate
             motion = largest_motion(problem, step)
             force = np.abs(step) / np.maximum(FORCE_UNITS * problem.unit, np.abs(x))
@@ -74,11 +74,6 @@ def correct(
                 return PathEquilibrium(x, float(drive), rate, here.unstable)
             last = largest
     return None
-
-
-def _drive_change(border: Border, x: FloatArray, drive: float, rate: FloatArray) -> float:
-    row = border.row
-    return float((border.level - row[:-1] @ x - row[-1] * drive) / (row[-1] + row[:-1] @ rate))
 
 
 FORCE_SHARE = 0.5  # of a force by which a step may change it, besides `Options.largest_force` units
