@@ -150,6 +150,11 @@ class HelicalSpring(ABC):
         return getattr(shares, self.wire_stress) * strength / self.stress(1.0)
 
     @property
+    def active_length(self) -> float:
+        """Length of the active turns on each other [m]: no body is shorter."""
+        return self.turns * self.wire
+
+    @property
     def body_length(self) -> float:
         """Length of the coil with its turns on each other [m]."""
         return (self.turns + self.idle_turns) * self.wire

@@ -272,11 +272,11 @@ class CatalogueSpring(WireLimits, SpringSupport):
             )
         if wound is None:
             return
-        stacked = wound.turns * wound.wire
-        least = stacked * (1 - LENGTH_RTOL)
+        least = wound.active_length * (1 - LENGTH_RTOL)
         for key, length in (("body_length", body), ("free_length", free)):
             if length is not None and length < least:
-                raise ValueError(f"{key!r} is less than the turns on each other: {format_short(stacked, 'length')}")
+                stacked = format_short(wound.active_length, "length")
+                raise ValueError(f"{key!r} is less than the turns on each other: {stacked}")
         room = self.spring_type.deflection_until_closed(free, body or least)
         if self.max_elongation is not None and self.max_elongation > room * (1 + 1e-9):
             raise ValueError(f"'max_elongation' is more than 'free_length' leaves: {format_short(room, 'length')}")
