@@ -28,9 +28,9 @@ from cfmkit.families.vcfm.model import rests_by_laws, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
 from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES, spread
 from cfmkit.families.vcfm.range_and_flatness_findings import extreme_sums
-from cfmkit.metrics import evaluate
+from cfmkit.metrics import CycleRows, evaluate
 from cfmkit.results import Status
-from cfmkit.studies import are_solved_together
+from cfmkit.studies import points_at_once
 
 # --- preloads together, and lines together ---------------------------------------------------------------------
 
@@ -218,7 +218,7 @@ def test_rows_have_the_numbers_and_warnings_of_their_points(model, window, prelo
         preloads=preloads,
     )  # fmt: skip
     study, plan = study_of(spec, draw_points(spec, ranges, 64), names)
-    assert are_solved_together(study, plan)
+    assert points_at_once(study, plan) > 1
     rows = assert_rows_equal_runs(study, plan, step=4)
     if ranges is WIDE:
         assert sum(mask.any() for mask in rows.warned.values()) > (2 if model == "truss" else 5)
@@ -575,7 +575,7 @@ def test_the_ends_of_a_window_have_the_force_of_the_model(points):
     spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"analysis.points": points})
     solution = cfmkit.analyze(spec).state
     low, high = 0.61e-3, 3.33e-3
-    inside = solution.branches["load"].restrict_to_window((np.array([low]), np.array([high]))).inside.values[0]
+    inside = CycleRows.from_curves(solution.branches, (np.array([low]), np.array([high]))).first.inside.values[0]
     wanted = solution.sampler.leaf_force(np.array([low, high])) + solution.sampler.spring(np.array([low, high]))[0]
     assert inside[[0, -1]] == pytest.approx(wanted, rel=1e-14)
     assert np.isnan(solution.nominal.evaluate_within_ends(np.array([[-1e-3, 1.0]]))).all()
@@ -606,7 +606,7 @@ def test_rows_take_windows_that_are_shares_of_the_travel():
         }
     )
     study, plan = study_of(spec, {"mechanism.bistable.width": (6e-3, 7e-3)}, ("force_mean",))
-    assert are_solved_together(study, plan)
+    assert points_at_once(study, plan) > 1
     assert_rows_equal_runs(study, plan)
 
 

@@ -80,11 +80,19 @@ class Springs(Model):
         return 0.0 if self.stiffness is None else self.stiffness
 
     @property
+    def rates(self) -> tuple[float, ...]:
+        """Stiffness of every one of the springs [N/m]."""
+        return self.each if isinstance(self.each, tuple) else (self.each,) * self.number
+
+    @property
+    def number(self) -> int:
+        """Number of springs."""
+        return len(self.each) if isinstance(self.each, tuple) else 1 if self.count is None else self.count
+
+    @property
     def total(self) -> float:
         """K, the sum of all parallel springs [N/m]."""
-        if isinstance(self.each, tuple):
-            return sum(self.each)
-        return self.each * (1 if self.count is None else self.count)
+        return sum(self.each) if isinstance(self.each, tuple) else self.each * self.number
 
     @property
     def stiffest(self) -> float:
@@ -96,8 +104,7 @@ class Springs(Model):
         """Elongation at which springs without initial tension would pull as hard as these when they open [m]."""
         if not np.any(self.initial_tension):
             return 0.0
-        count = len(self.each) if isinstance(self.each, tuple) else 1 if self.count is None else self.count
-        return count * self.initial_tension / self.total
+        return self.number * self.initial_tension / self.total
 
     def scaled_to(self, total: float) -> Springs:
         """Return springs of the same number whose stiffness adds up to `total` [N/m]: of another wire, if of any.

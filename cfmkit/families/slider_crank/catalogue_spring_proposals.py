@@ -40,7 +40,7 @@ def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     Raises SolutionError if no springs of the series that fit hold the force, or no links bear them.
     """
     from cfmkit.families.run_control import Run
-    from cfmkit.families.slider_crank.design import design
+    from cfmkit.families.slider_crank.springs.design import design
 
     first = float(spec.analysis.window[0])  # type: ignore[index]
     window = first, first + request.travel * (1.0 + 1e-6)
