@@ -238,12 +238,15 @@ class PartProcess(Model):
     least_feature: FromZero | None = Field(None, description="thinnest wall: a nozzle, a cutter, a wire")
     least_radius: FromZero | None = Field(None, description="smallest inside radius")
 
+    def _get_limit(self, key: Literal["least_radius", "least_feature"]) -> float | None:
+        """Return a limit of the process [m]; None if neither a name nor a value says it."""
+        stated: float | None = getattr(self, key)
+        return getattr(PROCESSES_BY_NAME[self.name], key) if stated is None and self.name else stated
+
     @property
     def smallest(self) -> float | None:
-        """Smallest inside radius [m]; None if neither a name nor a value says it."""
-        if self.least_radius is not None:
-            return self.least_radius
-        return PROCESSES_BY_NAME[self.name].least_radius if self.name else None
+        """Smallest inside radius [m]; None if it is not known."""
+        return self._get_limit("least_radius")
 
     @property
     def prints(self) -> bool:
@@ -252,10 +255,8 @@ class PartProcess(Model):
 
     @property
     def thinnest(self) -> float | None:
-        """Thinnest wall [m]; None if neither a name nor a value says it."""
-        if self.least_feature is not None:
-            return self.least_feature
-        return PROCESSES_BY_NAME[self.name].least_feature if self.name else None
+        """Thinnest wall [m]; None if it is not known."""
+        return self._get_limit("least_feature")
 
     def accuracy(self, usual: ProcessAccuracy) -> ProcessAccuracy:
         """Return what the process holds, and what the usual one does where it has no name."""

@@ -219,14 +219,12 @@ def hole_with_fit(diameter: float, grade: Literal[7, 8]) -> str:
 
 
 PIN_LENGTHS = _mm(2, 3, 4, 5, 6, 8, *range(10, 33, 2), *range(35, 101, 5), *range(120, 201, 20))
-PIN_RANGES: Mapping[float, tuple[float, float]] = dict(zip(
-    _mm(0.6, 0.8, 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 30, 40, 50),
-    zip(
-        _mm(2, 2, 4, 4, 4, 6, 6, 8, 8, 10, 12, 14, 18, 22, 26, 35, 50, 60, 80, 95),
-        _mm(6, 8, 10, 12, 16, 20, 24, 30, 40, 50, 60, 80, 95, 140, 180, 200, 200, 200, 200, 200), strict=True,
-    ), strict=True,
+PIN_RANGES = tuple(zip(
+    next(entry for entry in ALL_SERIES if entry.standard == "ISO 2338").sizes,
+    _mm(2, 2, 4, 4, 4, 6, 6, 8, 8, 10, 12, 14, 18, 22, 26, 35, 50, 60, 80, 95),
+    _mm(6, 8, 10, 12, 16, 20, 24, 30, 40, 50, 60, 80, 95, 140, 180, 200, 200, 200, 200, 200), strict=True,
 ))  # fmt: skip
-"""ISO 2338: lengths of pins, and the smallest and largest of each diameter [m] [data of the FreeCAD Fasteners
+"""ISO 2338: lengths of pins, and diameters with their smallest and largest [m] [data of the FreeCAD Fasteners
 workbench, iso2338length.csv and iso2338range.csv]."""
 
 
@@ -236,7 +234,7 @@ def pin_length(diameter: float, least: float) -> float | None:
     >>> pin_length(0.003, 0.0131), pin_length(0.001, 0.0131), pin_length(0.003, 0.006)
     (0.014, None, 0.008)
     """
-    ranges = (ends for size, ends in PIN_RANGES.items() if math.isclose(size, diameter, rel_tol=SIZE_RTOL))
+    ranges = (ends for size, *ends in PIN_RANGES if math.isclose(size, diameter, rel_tol=SIZE_RTOL))
     shortest, longest = next(ranges, (0.0, 0.0))
     least = max(least, shortest)
     return next((size for size in PIN_LENGTHS if least <= size * (1 + SIZE_RTOL) and size <= longest), None)

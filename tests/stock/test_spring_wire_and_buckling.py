@@ -136,6 +136,7 @@ def test_a_correct_line_of_a_catalogue_is_accepted(line):
         ({"outer_diameter": "10 mm"}, "'outer_diameter' must be 'coil'"),
         ({"body_length": "10 mm"}, "less than the turns on each other"),
         ({"free_length": "15 mm"}, "less than the turns on each other"),
+        ({"kind": "torsion", "stiffness": None, "free_length": "15 mm"}, "less than the turns on each other"),
         ({"material": "spring-steel"}, "Input should be 'music-wire'"),
         ({"kind": "compression", "free_length": "40 mm", "max_elongation": "30 mm"}, "more than 'free_length' leaves"),
         ({"kind": "compression", "guide_rod": "9.5 mm"}, "'guide_rod' must be thinner"),

@@ -17,6 +17,7 @@ from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.results import Status
 from cfmkit.stock.springs import CompressionSpring, generic
 
+FATIGUE = "mechanism.material.fatigue"
 CONFIG = Path(__file__).parents[2] / "configs" / "vcfm_bought_springs.yaml"
 
 
@@ -204,6 +205,14 @@ def test_where_none_fits_the_nearest_three_are_told(spec):
             {"mechanism.positive": {"length": "30 mm", "thickness": "1 mm", "width": "1 mm"}},
             "give either 'positive', a spring of leaves, or 'springs' that are bought",
         ),
+        (
+            {FATIGUE: {"ultimate_strength": "60 MPa", "points": [[1e3, "80 MPa"], [1e5, "35 MPa"]]}},
+            "above 'ultimate_strength'",
+        ),
+        (
+            {FATIGUE: {"ultimate_strength": "60 MPa", "points": [[1e3, "40 MPa"], [1e5, "35 MPa"]], "cycles": 1e6}},
+            "at which 'points' end",
+        ),
     ],
 )
 def test_what_contradicts_itself_is_refused(spec, changes, reported):
@@ -251,15 +260,3 @@ def test_leaves_that_relax_beside_springs_that_do_not_have_no_common_law(spec):
     leaf = {"length": "30 mm", "angle": "7 deg", "thickness": "1.5 mm", "width": "10 mm"}
     cut = spec.replace({"mechanism.springs": None, "mechanism.positive": leaf, "design": None})
     assert cut.replace(relaxing).durability.relaxation is not None
-
-
-@pytest.mark.parametrize(
-    ("changes", "reported"),
-    [
-        ({"points": [[1e3, "80 MPa"], [1e5, "35 MPa"]]}, "above 'ultimate_strength'"),
-        ({"points": [[1e3, "40 MPa"], [1e5, "35 MPa"]], "cycles": 1e6}, "at which 'points' end"),
-    ],
-)
-def test_what_fatigue_data_do_not_show_is_refused(spec, changes, reported):
-    with pytest.raises(SpecError, match=reported):
-        spec.replace({"mechanism.material.fatigue": {"ultimate_strength": "60 MPa"} | changes})

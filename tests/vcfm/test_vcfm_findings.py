@@ -515,6 +515,9 @@ def test_every_finding_is_explained_and_no_other_can_be_made():
         (["analysis.fidelity=truss", "mechanism.bistable.structure=cosine"], "truss laws are for"),
         (["mechanism.bistable.half_beams=0"], "1"),
         (["design={force: 1 N, adjustment: 1 N, stroke: 1 mm}"], "either 'preload' or 'rise'"),
+        (["design={force: 1 N, stroke: 1 mm, preload: 2 mm}"], "'preload' needs the 'adjustment'"),
+        (["analysis.fidelity=solid", *leaf(waviness="0.1 mm")], "does not support it: leaves are as drawn"),
+        (["analysis.fidelity=solid", "analysis.branch=primary"], "follows the stable branch only"),
     ],
 )
 def test_what_makes_no_sense_is_refused(changes, words):

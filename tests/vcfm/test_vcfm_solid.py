@@ -7,7 +7,6 @@ import pytest
 
 import cfmkit
 from cfmkit import api
-from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.vcfm.outline import sharp_corners
 from cfmkit.families.vcfm.part import solved_leaf, solved_spring
@@ -117,18 +116,6 @@ def test_what_is_solved_is_a_part_of_what_is_drawn(leaf, positive):
         assert len(own) >= 2
         for edge in own:
             assert np.abs(places - edge.center[0]).min() < 1e-9
-
-
-@pytest.mark.parametrize(
-    ("change", "reported"),
-    [
-        ("mechanism.bistable.waviness=0.1 mm", "does not support it: leaves are as drawn"),
-        ("analysis.branch=primary", "follows the stable branch only"),
-    ],
-)
-def test_what_a_solid_does_not_know_is_refused(change, reported):
-    with pytest.raises(SpecError, match=reported):
-        spec("ding2022", "analysis.fidelity=solid", change)
 
 
 def test_sharp_corners_are_told_and_a_mesh_that_is_too_large_for_the_machine_is_one_line(monkeypatch):

@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from cfmkit.specs.spec import Model, NonNegativeLength, PositiveLength
 from cfmkit.specs.units import Stiffness
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
-from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire, settle_rate, wire_of
+from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire, block_of, settle_rate
 
 if TYPE_CHECKING:
     from cfmkit.stock.springs.offers import Offer
@@ -63,16 +63,8 @@ class Springs(Model):
     @classmethod
     def from_offer(cls, offer: Offer, count: int) -> Self:
         """Return some springs of one that is on offer."""
-        about = {
-            "stiffness": offer.rate,
-            "count": count,
-            "initial_tension": offer.initial_tension or None,
-            "max_elongation": offer.largest,
-            "name": offer.name,
-            "wound": wire_of(offer),
-            "life": offer.life,
-        }
-        return cls.model_validate({key: value for key, value in about.items() if value is not None})
+        own = {"stiffness": offer.rate, "count": count, "max_elongation": offer.largest}
+        return cls.model_validate(block_of(offer, initial_tension=offer.initial_tension or None, **own))
 
     @property
     def each(self) -> float | tuple[float, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -59,6 +59,8 @@ class Characteristics:
 class PartSampler(ABC):
     """A model of leaves and spring: at travels of any shape of one mechanism, or (r, n) of r mechanisms."""
 
+    is_traced: ClassVar[bool] = False
+    """Whether it follows leaves along their branches: with their waviness, and a shuttle that turns."""
     problem: str = ""
     """Why a part could not be followed to the end; empty if all could."""
     accuracy: float = ROUND_OFF

@@ -120,6 +120,7 @@ class ExactSampler(PartSampler):
     pushed: Any
     pulled: Any
     sides: list[Any]  # of the spring, pushed and pulled
+    is_traced = True
     accuracy = COEFFICIENT_RTOL
     coils: Coils | None
     """The law of bought springs, which have no path; None if the spring is a structure of leaves."""

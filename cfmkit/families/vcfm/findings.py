@@ -50,7 +50,6 @@ if TYPE_CHECKING:
     Sentence = tuple[Any, ...]
 
 
-TRACED_MODELS = ("exact", "solid")  # models that follow leaves along their branches
 VCFM_FINDINGS = {
     "no_negative_stiffness": "the leaves are too thick for their rise: no negative stiffness anywhere",
     "no_linear_region": "the leaves do not buckle: their negative stiffness is not constant",
@@ -375,7 +374,7 @@ def _overstress_in_short(solution: Solution) -> str:
 
 
 def _turning_shuttle(solution: Solution) -> Sentence:
-    hint = "" if solution.fidelity in TRACED_MODELS else "; only 'analysis.fidelity: exact' shows it"
+    hint = "" if solution.sampler.is_traced else "; only 'analysis.fidelity: exact' shows it"
     return (
         f"the shuttle can turn, so the leaves buckle at {percent(TURNING_LOAD_RATIO)} of the load and their force "
         f"curve is no longer straight{hint}. Use two Vs at a distance, or a guide",
@@ -418,19 +417,19 @@ def _wide(name: str) -> FindingRule[Solution]:
 def _is_wavy(solution: Solution) -> Any:
     waviness = solution.column(lambda spec: spec.mechanism.bistable.waviness)
     share = waviness / solution.column(lambda spec: spec.mechanism.bistable.thickness)
-    return (share > MAX_WAVINESS_RATIO) | ((waviness > 0) & (solution.fidelity not in TRACED_MODELS))
+    return (share > MAX_WAVINESS_RATIO) | ((waviness > 0) & (not solution.sampler.is_traced))
 
 
 def _imperfection(solution: Solution) -> Sentence:
     about = solution.spec.mechanism.bistable
-    share, exact = about.waviness / about.thickness, solution.fidelity in TRACED_MODELS
+    share, exact = about.waviness / about.thickness, solution.sampler.is_traced
     reported = "is counted in" if exact else "is neglected: only 'analysis.fidelity: exact' includes it"
     effect = "; it rounds the peak and lowers the negative stiffness" if share > MAX_WAVINESS_RATIO else ""
     return (f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {reported}{effect}",)
 
 
 def _is_unstable(solution: Solution) -> Any:
-    if solution.fidelity not in TRACED_MODELS:
+    if not solution.sampler.is_traced:
         return False  # laws are those of stable branches
     return (~solution.nominal.leaves.stable & solution.nominal.there).any(axis=1)
 

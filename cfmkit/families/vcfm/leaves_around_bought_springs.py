@@ -40,7 +40,7 @@ from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
 from cfmkit.stock.springs.kinds import PRESSED_FIRST
 from cfmkit.stock.springs.offers import Miss, guide_rod_for, nearest
-from cfmkit.stock.springs.spec import offers, support_of, wire_of
+from cfmkit.stock.springs.spec import block_of, offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 from cfmkit.stock.springs.support_spec import guide_words
 
@@ -156,21 +156,18 @@ def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings
     spring_types = PRESSED_FIRST if stated is None else (stated.spring_type,)
     for offer in offers(target.catalogue, *spring_types):
         for count in offer.counts:
-            about = {
-                "kind": offer.spring_type.kind,
-                "stiffness": offer.rate,
-                "count": count,
-                "initial_tension": offer.initial_tension,
-                "max_elongation": offer.largest,
-                "free_length": offer.free_length,
-                "body_length": None if offer.wound is not None else offer.body_length,
-                "outer_diameter": offer.outer_diameter,
-                "name": offer.name,
-                "wound": wire_of(offer),
-                "life": offer.life,
-            } | support_of(offer)
-            fields = {key: value for key, value in about.items() if value is not None}
-            yield BoughtSprings.model_validate(fields), offer
+            block = block_of(
+                offer,
+                kind=offer.spring_type.kind,
+                stiffness=offer.rate,
+                count=count,
+                initial_tension=offer.initial_tension,
+                max_elongation=offer.largest,
+                free_length=offer.free_length,
+                body_length=None if offer.wound is not None else offer.body_length,
+                outer_diameter=offer.outer_diameter,
+            )
+            yield BoughtSprings.model_validate(block), offer
 
 
 def _design_around(

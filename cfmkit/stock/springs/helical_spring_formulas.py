@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireName, WireOutOfRange
+from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireOutOfRange
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -60,7 +60,7 @@ class HelicalSpring(ABC):
     turns: float  # active turns, which bend or twist
     shear_modulus: float = SHEAR_MODULUS  # of the wire [Pa]
     youngs_modulus: float = YOUNGS_MODULUS  # of the wire [Pa]
-    material: WireName | None = MUSIC_WIRE.name  # class of the wire, which its moduli may differ from; None: unknown
+    material: str | None = MUSIC_WIRE.name  # class of the wire, which its moduli may differ from; None: unknown
 
     # --- what a kind states -----------------------------------------------------------------------------------------
 
@@ -148,6 +148,11 @@ class HelicalSpring(ABC):
         """
         strength, shares = self.strength
         return getattr(shares, self.wire_stress) * strength / self.stress(1.0)
+
+    @property
+    def active_length(self) -> float:
+        """Length of the active turns on each other [m]: no body is shorter."""
+        return self.turns * self.wire
 
     @property
     def body_length(self) -> float:

@@ -21,7 +21,7 @@ from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.kinds import HELICAL_KINDS, list_kinds
 from cfmkit.stock.springs.offers import GENERIC_SERIES, Offer, generic
 from cfmkit.stock.springs.support_spec import SpringSupport
-from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireName, WireOutOfRange
+from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireOutOfRange
 from cfmkit.tables.lab_columns import split_header
 from cfmkit.tables.lab_file import decode_file, lines_of
 
@@ -31,9 +31,10 @@ if TYPE_CHECKING:
     from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
     KindName = str
+    WireName = str
     Head = tuple[str, str | None] | None  # name and unit of a column of a file; None for one that is not read
 else:
-    KindName = Literal[tuple(HELICAL_KINDS)]
+    KindName, WireName = Literal[tuple(HELICAL_KINDS)], Literal[tuple(WIRES_BY_NAME)]
 
 Positive = Field(gt=0)
 LENGTH_RTOL = 0.1  # a stated length may be below that of the turns on each other by so much: makers' tolerance
@@ -272,11 +273,11 @@ class CatalogueSpring(WireLimits, SpringSupport):
             )
         if wound is None:
             return
-        stacked = wound.turns * wound.wire
-        least = stacked * (1 - LENGTH_RTOL)
+        least = wound.active_length * (1 - LENGTH_RTOL)
         for key, length in (("body_length", body), ("free_length", free)):
             if length is not None and length < least:
-                raise ValueError(f"{key!r} is less than the turns on each other: {format_short(stacked, 'length')}")
+                stacked = format_short(wound.active_length, "length")
+                raise ValueError(f"{key!r} is less than the turns on each other: {stacked}")
         room = self.spring_type.deflection_until_closed(free, body or least)
         if self.max_elongation is not None and self.max_elongation > room * (1 + 1e-9):
             raise ValueError(f"'max_elongation' is more than 'free_length' leaves: {format_short(room, 'length')}")
@@ -390,6 +391,12 @@ def support_of(offer: Offer) -> dict[str, Any]:
     """Return how a compression spring on offer is held, by key; what is not stated is None."""
     seats = None if offer.seats == "fixed-fixed" else offer.seats
     return {"seats": seats, "guide_rod": offer.guide_rod, "guide_tube": offer.guide_tube}
+
+
+def block_of(offer: Offer, **own: Any) -> dict[str, Any]:
+    """Return the block of a spring on offer that is built in, with keys of its own; what is None is left out."""
+    common = {"name": offer.name, "wound": wire_of(offer), "life": offer.life} | support_of(offer)
+    return {key: value for key, value in (common | own).items() if value is not None}
 
 
 Catalogue = Annotated[tuple[CatalogueSpring, ...] | str, WrapValidator(_resolve_file)]

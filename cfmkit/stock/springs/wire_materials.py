@@ -16,24 +16,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-WireName = Literal[
-    "music-wire",
-    "hard-drawn",
-    "oil-tempered",
-    "chrome-vanadium",
-    "chrome-silicon",
-    "stainless-302",
-    "stainless-17-7ph",
-    "phosphor-bronze",
-    "beryllium-copper",
-]
 
 RANGE_RTOL = 1e-9  # diameters at the ends of a range are inside of it, whatever their rounding
 
@@ -75,7 +63,7 @@ STAINLESS_OR_NONFERROUS = YieldShares(0.35, 0.61, 0.55)
 class WireMaterial:
     """Class of spring wire."""
 
-    name: WireName
+    name: str
     words: str  # in words, with the standards that it is bought by
     youngs_modulus: float  # [Pa]
     shear_modulus: float  # [Pa]

@@ -25,7 +25,7 @@ from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.kinds import AXIAL_KINDS, TURNED_KINDS
 from cfmkit.stock.springs.offers import PIN_SHARE, Miss, Offer, guide_rod_for, nearest
-from cfmkit.stock.springs.spec import offers, support_of, wire_of
+from cfmkit.stock.springs.spec import block_of, offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse, orient_to_larger
 
 if TYPE_CHECKING:
@@ -71,17 +71,14 @@ class SpringOption:
     def written(self) -> Bought:
         """The same as a specification has it, with a rod where it would buckle."""
         offer = self.offer
-        about = {"wound": wire_of(offer), "life": offer.life}
+        own: dict[str, object] = {"at": JOINT_NAMES[self.joint], "count": self.count}
         if offer.spring_type.needs_guide:
-            about |= {"loaded": offer.spring_type.kind, "free_length": offer.free_length} | support_of(offer)
+            own |= {"loaded": offer.spring_type.kind, "free_length": offer.free_length}
             if offer.guide_tube is None and offer.wound is not None:
                 needed = self.deflection > offer.unguided
                 guides = offer.guide_rod is not None and offer.guide_rod >= offer.wound.thinnest_guide_rod
-                about["guide_rod"] = (offer.guide_rod if guides else guide_rod_for(offer.wound)) if needed else None
-        return Bought.model_validate(
-            {"at": JOINT_NAMES[self.joint], "name": self.offer.name, "count": self.count}
-            | {key: value for key, value in about.items() if value is not None}
-        )
+                own["guide_rod"] = (offer.guide_rod if guides else guide_rod_for(offer.wound)) if needed else None
+        return Bought.model_validate(block_of(offer, **own))
 
     @property
     def rate(self) -> float:
