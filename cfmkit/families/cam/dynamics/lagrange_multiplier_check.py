@@ -101,14 +101,9 @@ class FlankLine:
 
     def evaluate(self, u: Any) -> CurvePoints:
         """Return the points of the flank for path coordinates u [m]."""
-        path, turn = self.profile.path, cmath.exp(1j * self.angle)
-        slope, bend = path.law.slopes(u)
-        square = 1.0 + slope * slope
-        length = np.sqrt(square)
-        tangent, curvature = (1.0 + 1j * slope) / length, bend / (square * length)
-        stretch = 1.0 + self.distance * curvature
-        point = u + 1j * (path.height(u) - self.height) - 1j * self.distance * tangent
-        return CurvePoints(point * turn, tangent * turn, curvature / stretch, length * stretch)
+        line, turn = self.profile.parallel(u, self.distance), cmath.exp(1j * self.angle)
+        point, tangent = line.x + 1j * (line.y - self.height), (1.0 + 1j * line.slope) / line.length
+        return CurvePoints(point * turn, tangent * turn, line.curvature / line.stretch, line.length * line.stretch)
 
     def estimate(self, y: float) -> float:
         """Return a rough path coordinate of the point at height y [m]."""

@@ -397,14 +397,10 @@ class TurnedTrack(Track):
         return super()._slider(at.real, at.imag)
 
     def _evaluate_flank(self, u: Any) -> tuple[Any, Any]:
-        slope, bend = self.profile.path.law.slopes(u)
-        square = 1.0 + slope * slope
-        length = square**0.5
-        at = self.turn_about(u + self.shift * slope / length, self.profile.path.height(u) - self.shift / length)
+        line = self.profile.parallel(u, self.shift)
+        at, direction = self.turn_about(line.x, line.y), (1.0 + 1j * line.slope) * self.turn
         drop = ((self.brace_length - at.real) * (self.brace_length + at.real)) ** 0.5
-        direction = (1.0 + 1j * slope) * self.turn
-        rate = (direction.imag - direction.real * at.real / drop) * (1.0 + self.shift * bend / (square * length))
-        return at.imag + drop, rate
+        return at.imag + drop, (direction.imag - direction.real * at.real / drop) * line.stretch
 
     def _evaluate_corner(self, turn: float) -> tuple[Any, Any]:
         xc, yc = self._corner_point
@@ -420,13 +416,10 @@ class TurnedTrack(Track):
 
     def _flank_states(self, slider: FloatArray) -> TrackStates:
         u = self._flank_parameter(slider)
-        slope, bend = self.profile.path.law.slopes(u)
-        square = 1.0 + slope * slope
-        length = square**0.5
-        x, y = u + self.shift * slope / length, self.profile.path.height(u) - self.shift / length
-        tangent = brace_tangent(self.turn_about(x, y).real, self.brace_length)
-        bend = bend / (1.0 + self.shift * bend / (square * length))
-        return TrackStates(x, y, slope, tangent, np.zeros(slider.shape, dtype=bool), u, lambda: bend)
+        line = self.profile.parallel(u, self.shift)
+        tangent = brace_tangent(self.turn_about(line.x, line.y).real, self.brace_length)
+        bend, on_corner = line.curvature * line.length**3 / line.stretch, np.zeros(slider.shape, dtype=bool)
+        return TrackStates(line.x, line.y, line.slope, tangent, on_corner, u, lambda: bend)
 
     def _corner_states(self, slider: FloatArray, rows: Any = None) -> TrackStates:
         (xc, yc), corner = self._corner_point, self.turn_about(*self._corner_point)
