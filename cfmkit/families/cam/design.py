@@ -46,6 +46,7 @@ from cfmkit.families.findings import (
     refusals_answered,
 )
 from cfmkit.results import OVERWRITTEN_FINDING, Design, Finding, Status
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.offers import Miss, nearest
 from cfmkit.stock.springs.spec import offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse
@@ -246,7 +247,9 @@ def _from_constant(task: _Task) -> list[Choice]:
 def _from_catalogue(task: _Task) -> list[Choice]:
     """Return the springs and numbers within all limits, the one whose cam has the smallest two-way deviation first."""
     tried = [
-        _with_spring(task, item, count) for item in offers(task.target.catalogue, "extension") for count in item.counts
+        _with_spring(task, item, count)
+        for item in offers(task.target.catalogue, ExtensionSpring)
+        for count in item.counts
     ]
     fitting = [outcome for outcome in tried if not isinstance(outcome, Miss)]
     if fitting:

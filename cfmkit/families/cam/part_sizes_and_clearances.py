@@ -15,7 +15,8 @@ from cfmkit.export.contours import Arc, Line
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.outline import CutPlate
 from cfmkit.families.findings import mm
-from cfmkit.stock.springs.offers import extension_spring
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.offers import slimmest_spring
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,7 +51,7 @@ def wire_and_coil(
     """
     if springs.wound is not None:
         return springs.wound.wire, springs.wound.coil
-    made = extension_spring(springs.total / springs.number, stretch, 2.0 * half_width, safety)
+    made = slimmest_spring(ExtensionSpring, springs.total / springs.number, stretch, 2.0 * half_width, safety)
     return None if made is None else (made.wire, made.coil)
 
 

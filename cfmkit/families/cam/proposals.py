@@ -34,7 +34,8 @@ from cfmkit.families.run_control import Run
 from cfmkit.metrics import evaluate
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.springs.offers import as_stated, extension_spring
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.offers import as_stated, slimmest_spring
 from cfmkit.stock.stock_series import BALL_BEARINGS
 
 if TYPE_CHECKING:
@@ -264,7 +265,7 @@ def with_wire(spec: CamSpec, request: Request) -> CamSpec:
     if springs.wound is not None or solution is None:
         return with_bearings(spec, request)
     stretch, length = float(solution.elongation.max()), 2.0 * spec.mechanism.rest_half_width
-    coil = extension_spring(springs.total / springs.number, stretch, length, request.safety)
+    coil = slimmest_spring(ExtensionSpring, springs.total / springs.number, stretch, length, request.safety)
     if coil is None:
         return with_bearings(spec, request)
     stated = {"count": springs.count, "preload": springs.preload} if springs.preload else {"count": springs.count}

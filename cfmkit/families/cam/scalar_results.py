@@ -18,6 +18,7 @@ from cfmkit.families.cam.statics import Losses, constant_force, normal_turn
 from cfmkit.families.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.rows import ScalarQuantity, or_nan, quantity_of_each, row_of
 from cfmkit.specs.evaluable_target_curve import TargetCurve
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
     )
     for row, (least, largest) in enumerate(zip(*loads, strict=True)):
         wire, life = row_of((springs.wound, springs.life), row)
-        wound = None if wire is None else wire.to_wound("extension")
+        wound = None if wire is None else wire.to_wound(ExtensionSpring)
         fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
         yield wire_quantities([SpringInUse(wound, least, largest, fatigue, life)])
 

@@ -19,7 +19,7 @@ from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, Trac
 from cfmkit.families.cam.statics import TRAVEL_RTOL, Forces, forces, jams, target_force
 from cfmkit.families.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.rows import PlacesKept, is_column, row_of, rows_of
-from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
+from cfmkit.metrics.curve_rows import CurveRows, RowSamples, StressRows
 from cfmkit.results import ROUND_OFF
 from cfmkit.specs.units import window_places
 

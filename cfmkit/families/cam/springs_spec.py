@@ -10,6 +10,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.specs.spec import Model, NonNegativeLength, PositiveLength
 from cfmkit.specs.units import Stiffness
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire, settle_rate, wire_of
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class Springs(Model):
 
     @model_validator(mode="after")
     def _rate_is_known(self, info: ValidationInfo) -> Self:
-        settle_rate(self, "extension", info)
+        settle_rate(self, ExtensionSpring, info)
         return self
 
     @model_validator(mode="after")
