@@ -117,7 +117,7 @@ class MeasuredCam(ShortRepr):
 
     @cached_property
     def sides(self) -> Sides:
-        """Where the rollers are."""
+        """Both rollers at those travels."""
         (right_x, right), (left_x, left) = (track.interpolate(self.slider) for track in self.tracks)
         return Sides((right_x, left_x), (right, left))
 

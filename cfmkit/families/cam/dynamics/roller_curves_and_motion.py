@@ -68,7 +68,7 @@ class Machine:
 
     @cached_property
     def stances(self) -> PlacesKept[tuple[Stance, Stance]]:
-        """Where the right and the left roller are for slider positions within `span`, as a function of these [m]."""
+        """Stances of the right and the left roller as a function of slider positions within `span` [m]."""
         return PlacesKept(self._find_stances)
 
     def _find_stances(self, position: FloatArray) -> tuple[Stance, Stance]:

@@ -227,11 +227,11 @@ class Track:
         low, high = self.profile.start, self.profile.end
 
         def margin(u: Any) -> Any:
-            return self.brace_length * (1 - 1e-12) - self._across(u)
+            return self.brace_length * (1 - 1e-12) - self._axis_distance(u)
 
         return high if agree(margin(high) >= 0) else root_between(margin, low, high)
 
-    def _across(self, u: Any) -> Any:
+    def _axis_distance(self, u: Any) -> Any:
         """Return how far the roller's centre is from the slider's axis [m]."""
         return self.profile.offset_points(u, self.shift)[0]
 
@@ -389,7 +389,7 @@ class TurnedTrack(Track):
         """Return turned points as complex numbers x + iy [m]."""
         return (x + 1j * (y - self.height)) * self.turn + 1j * self.height
 
-    def _across(self, u: Any) -> Any:
+    def _axis_distance(self, u: Any) -> Any:
         return self.turn_about(*self.profile.offset_points(u, self.shift)).real
 
     def _slider(self, x: Any, y: Any) -> Any:
