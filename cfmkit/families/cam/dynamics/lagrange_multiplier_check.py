@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, Side
-    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, ParallelPoints
     from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw
 
     ComplexArray = NDArray[np.complex128]
@@ -71,19 +71,6 @@ class FlankPoint(NamedTuple):
     third: Any
 
 
-class CurvePoints(NamedTuple):
-    """Points of a curve for values of its parameter, each (n,).
-
-    `point` [m], unit `tangent`, `curvature` [1/m] (positive to the left of the tangent),
-    and `pace`, the length of curve per unit of the parameter.
-    """
-
-    point: ComplexArray
-    tangent: ComplexArray
-    curvature: FloatArray
-    pace: FloatArray
-
-
 @dataclass(frozen=True)
 class FlankLine:
     """The flank of a side as the paper needs it: its x as a function of its height y, with three derivatives.
@@ -99,34 +86,32 @@ class FlankLine:
     angle: float
     height: float
 
-    def evaluate(self, u: Any) -> CurvePoints:
-        """Return the points of the flank for path coordinates u [m]."""
+    def evaluate(self, u: Any) -> tuple[Any, Any, ParallelPoints]:
+        """Return points and tangents of the turned flank for path coordinates u [m], and those before it is turned."""
         line, turn = self.profile.parallel(u, self.distance), cmath.exp(1j * self.angle)
         point, tangent = line.x + 1j * (line.y - self.height), (1.0 + 1j * line.slope) / line.length
-        return CurvePoints(point * turn, tangent * turn, line.curvature / line.stretch, line.length * line.stretch)
+        return point * turn, tangent * turn, line
 
     def estimate(self, y: float) -> float:
         """Return a rough path coordinate of the point at height y [m]."""
         u = np.linspace(self.profile.start, self.profile.end, N_KNOTS)
-        return float(np.interp(y, self.evaluate(u).point.imag, u))
+        return float(np.interp(y, self.evaluate(u)[0].imag, u))
 
     def locate(self, y: Real, guess: Real) -> FlankPoint:
         """Return the points of the flank at heights y [m], starting the search at path coordinates `guess` [m]."""
-        law: SlopeLaw = self.profile.path.law
-        u: Any = guess
+        law, u = self.profile.path.law, guess
         for _ in range(NEWTON_STEPS):
-            at = self.evaluate(u)
-            step = (at.point.imag - y) / (at.pace * at.tangent.imag)
+            point, tangent, line = self.evaluate(u)
+            step = (point.imag - y) / (line.length * line.stretch * tangent.imag)
             u = u - step
             if np.max(np.abs(step)) <= 1e-16 + 4e-16 * law.brace_length:
                 break
-        at, (slope, bend) = self.evaluate(u), law.slopes(u)
-        square = 1.0 + slope * slope
-        change = (_slope_second_derivative(law, u) - 3.0 * slope * bend * bend / square) / (square * square)
-        change = change / (1.0 + self.distance * bend / (square * square**0.5)) ** 3
-        cosine, sine, curvature = at.tangent.real, at.tangent.imag, at.curvature
-        third = (3.0 * curvature * curvature * cosine / sine - change) / sine**4
-        return FlankPoint(u, at.point.real, cosine / sine, -curvature / sine**3, third)
+        point, tangent, line = self.evaluate(u)
+        bend, square = line.curvature * line.length**3, line.length * line.length
+        change = (_slope_second_derivative(law, u) - 3.0 * line.slope * bend * bend / square) / (square * square)
+        cosine, sine, curvature = tangent.real, tangent.imag, line.curvature / line.stretch
+        third = (3.0 * curvature * curvature * cosine / sine - change / line.stretch**3) / sine**4
+        return FlankPoint(u, point.real, cosine / sine, -curvature / sine**3, third)
 
 
 class Posture(NamedTuple):

@@ -282,12 +282,18 @@ class Track:
         *sides, start, dead_point, contact = lengths if rows is None else rows_of(lengths, rows)
         pivot = Pivot(*sides)
         first = (slider <= start) & (dead_point == start)
-        turn = np.where(first, pivot.low, pivot_angle(slider, pivot))
+        turn = np.where(first, pivot.low, self._turn_on_corner(slider, pivot))
         sin, cos = np.sin(turn), np.cos(turn)
         x, y = pivot.x + pivot.radius * sin, pivot.y - pivot.radius * cos
-        always, tangent = np.ones(slider.shape, dtype=bool), brace_tangent(x, pivot.brace)
+        always, tangent = np.ones(slider.shape, dtype=bool), self._brace_tangent(x, y, pivot.brace)
         contacts = np.broadcast_to(contact, slider.shape)
         return TrackStates(x, y, sin / cos, tangent, always, contacts, lambda: 1.0 / (pivot.radius * cos * cos * cos))
+
+    def _turn_on_corner(self, slider: FloatArray, pivot: Pivot) -> FloatArray:
+        return pivot_angle(slider, pivot)
+
+    def _brace_tangent(self, x: Any, _y: Any, brace_length: Any) -> Any:
+        return brace_tangent(x, brace_length)
 
     @property
     def pivot(self) -> Pivot:
@@ -417,21 +423,17 @@ class TurnedTrack(Track):
     def _flank_states(self, slider: FloatArray) -> TrackStates:
         u = self._flank_parameter(slider)
         line = self.profile.parallel(u, self.shift)
-        tangent = brace_tangent(self.turn_about(line.x, line.y).real, self.brace_length)
+        tangent = self._brace_tangent(line.x, line.y, self.brace_length)
         bend, on_corner = line.curvature * line.length**3 / line.stretch, np.zeros(slider.shape, dtype=bool)
         return TrackStates(line.x, line.y, line.slope, tangent, on_corner, u, lambda: bend)
 
-    def _corner_states(self, slider: FloatArray, rows: Any = None) -> TrackStates:
-        (xc, yc), corner = self._corner_point, self.turn_about(*self._corner_point)
-        ends = (angle + self.angle for angle in self._pivots)
-        pivot = Pivot(corner.real, corner.imag, self.radius, self.brace_length, *ends)
-        first = (slider <= self.start) & (self.dead_point == self.start)
-        turn = np.where(first, pivot.low, pivot_angle(slider, pivot)) - self.angle
-        sin, cos = np.sin(turn), np.cos(turn)
-        x, y = xc + self.radius * sin, yc - self.radius * cos
-        tangent = brace_tangent(self.turn_about(x, y).real, self.brace_length)
-        always, contacts = np.ones(slider.shape, dtype=bool), np.full(slider.shape, self.profile.start)
-        return TrackStates(x, y, sin / cos, tangent, always, contacts, lambda: 1.0 / (self.radius * cos * cos * cos))
+    def _turn_on_corner(self, slider: FloatArray, pivot: Pivot) -> FloatArray:
+        corner, ends = self.turn_about(pivot.x, pivot.y), (pivot.low + self.angle, pivot.high + self.angle)
+        turned = Pivot(corner.real, corner.imag, pivot.radius, pivot.brace, *ends)
+        return pivot_angle(slider, turned) - self.angle
+
+    def _brace_tangent(self, x: Any, y: Any, brace_length: Any) -> Any:
+        return brace_tangent(self.turn_about(x, y).real, brace_length)
 
 
 def track_of(profile: CamProfile, roller_radius: Any, brace_length: Any, offset: Any = 0.0) -> Track:
