@@ -144,14 +144,10 @@ def test_watch_and_crane_have_the_same_curve(scale):
 
 
 @pytest.mark.parametrize("points", [5, 6, 1000, 100_000])
-def test_any_number_of_points_gives_as_many_on_each_branch(points):
-    curve = analyze(cam(analysis__points=points)).curve
-    assert (curve.branch == "load").sum() == (curve.branch == "unload").sum() == points
-    assert curve.motion[0] == curve.motion[-1] == 0
-
-
-def test_the_curve_is_one_closed_loop_up_and_down():
-    curve = analyze(cam(rolling_friction=0.002)).curve
+def test_the_curve_is_one_closed_loop_up_and_down_with_any_number_of_points(points):
+    curve = analyze(cam(rolling_friction=0.002, analysis__points=points)).curve
     assert curve.branches == ("load", "unload")
+    assert (curve.branch == "load").sum() == (curve.branch == "unload").sum() == points
+    assert curve.motion[0] == 0
     np.testing.assert_array_equal(curve.motion, curve.motion[::-1])
-    assert (curve.select_branch("load").force[10:] > curve.select_branch("unload").force[::-1][10:]).all()
+    assert (curve.select_branch("load").force[2:] > curve.select_branch("unload").force[::-1][2:]).all()

@@ -11,6 +11,15 @@ from cfmkit.families import PIN_STRENGTH, family
 from cfmkit.families.cam.hardware import hardware
 
 
+def solved(*changes, name="cam"):
+    return cfmkit.analyze(cfmkit.load(f"configs/{name}.yaml", list(changes)))
+
+
+def listed(result):
+    """Return the rows of the parts list by place."""
+    return {row["place"]: row for row in table(result)}
+
+
 def bending_stress(moment: float, diameter: float) -> float:
     """Return the largest stress of a round bar [Pa]."""
     return 32.0 * moment / (math.pi * diameter**3)
@@ -18,13 +27,13 @@ def bending_stress(moment: float, diameter: float) -> float:
 
 @pytest.mark.parametrize("name", ["cam", "cam_friction"])
 def test_numbers_of_the_assembly_are_those_of_the_list(name):
-    result = cfmkit.analyze(cfmkit.load(f"configs/{name}.yaml"))
+    result = solved(name=name)
     assert_assembly_has_the_numbers_of_the_list(result, hardware(result.state))
 
 
 def test_the_parts_of_a_cam_bear_its_forces():
-    result = cfmkit.analyze(cfmkit.load("configs/cam_preloaded.yaml"))
-    rows = {row["place"]: row for row in table(result)}
+    result = solved(name="cam_preloaded")
+    rows = listed(result)
     pull = max(np.nanmax(np.abs(one.brace)) for one in (result.state.up, result.state.down))
     length, width, thick = (1e-3 * float(size) for size in rows["roller to slider"]["size"][:-3].split(" x "))
     pin = 1e-3 * float(rows["slider pin"]["size"].split(" x ")[0])
@@ -46,22 +55,19 @@ def test_a_stated_pin_that_is_too_thin_is_named_with_one_that_is_not():
 
 
 def test_holes_that_turn_on_pins_and_seat_bearings_have_a_fit():
-    rows = {
-        row["place"] + (row["name"] or ""): row
-        for row in table(cfmkit.analyze(cfmkit.load("configs/cam_friction.yaml")))
-    }
-    assert "between holes of 6 mm H8 (+0.018) and 8 mm H8 (+0.022)" in rows["roller to sliderbrace"]["data"]
-    assert "with a hole of 8 mm H8 (+0.022), presses" in rows["on the camroller"]["data"]
+    rows = listed(solved(name="cam_friction"))
+    assert "between holes of 6 mm H8 (+0.018) and 8 mm H8 (+0.022)" in rows["roller to slider"]["data"]
+    assert "with a hole of 8 mm H8 (+0.022), presses" in rows["on the cam"]["data"]
 
 
 def test_shafts_and_hook_bars_of_a_cam_bear_the_springs_beyond_the_braces():
     """Half of the press acts at each brace, the springs of a side beyond it and the slider; half above a bar's hole."""
-    result = cfmkit.analyze(cfmkit.load("configs/studies/cam_bought_parts.yaml"))
+    result = solved(name="studies/cam_bought_parts")
     mechanism = result.spec.mechanism
     springs, stretch = mechanism.springs, result.state.elongation.max()
     outer, side = springs.wound.coil + springs.wound.wire, 0.5 * springs.total * stretch
     press = np.nanmax(result.curve.extra["contact_force"].values)
-    rows = {row["place"]: row for row in table(result)}
+    rows = listed(result)
     slider = 1e-3 * float(rows["on its guide"]["size"].removesuffix(" mm").split(" x ")[2])
     bending = 0.5 * press * 8e-3 + side * (0.5 * (8e-3 + outer) + slider)
     assert bending_stress(bending, 8e-3) <= PIN_STRENGTH / 1.5
@@ -81,7 +87,7 @@ def test_shafts_and_hook_bars_of_a_cam_bear_the_springs_beyond_the_braces():
 
 def test_a_slider_has_walls_around_its_rods_which_leave_its_pin_free():
     """Rods of 2.5 mm ran through the pin of sliders that were 2 mm thick."""
-    result = cfmkit.analyze(cfmkit.load("configs/cam.yaml"))
+    result = solved()
     found = hardware(result.state)
     left, right = (body for body in found.bodies if body.name == "guide")
     (pin,) = (body for body in found.drawn if body.name == "slider pin")
@@ -91,30 +97,28 @@ def test_a_slider_has_walls_around_its_rods_which_leave_its_pin_free():
     # the pin moves over the plate: a half of the slider on either side of it, outside of the braces
     (slider,) = (row for row in table(result) if row["name"] == "slider")
     assert (slider["count"], slider["size"]) == (2, f"32 x 32 x {3e3 * left.reach:g} mm")
-    near = cfmkit.load("configs/cam.yaml", ["mechanism.pins={diameter: 20 mm}", "mechanism.rest_half_width=18 mm"])
-    (fault,) = [text for text in hardware(cfmkit.analyze(near).state).faults if text.startswith("guide of")]
+    near = solved("mechanism.pins={diameter: 20 mm}", "mechanism.rest_half_width=18 mm")
+    (fault,) = [text for text in hardware(near.state).faults if text.startswith("guide of")]
     assert "in the way of the rollers' shafts" in fault
 
 
 def test_loops_of_springs_go_over_the_ends_of_shafts_or_are_a_fault():
     """The list says how long a spring is inside its loops: the axes at rest, and the shaft inside the loops."""
-    loaded = cfmkit.load("configs/cam.yaml")
-    rest = 2e3 * loaded.mechanism.springs_rest
+    rest = 2e3 * cfmkit.load("configs/cam.yaml").mechanism.springs_rest
     wound = "mechanism.springs={{wound: {{wire: {wire}, coil: {coil}, turns: 100}}, count: 2}}"
     for wire, coil, end in (
         ("1 mm", "9 mm", ""),
         ("1 mm", "5 mm", "ends turned to 4 mm"),
         ("0.3 mm", "1 mm", "too weak"),
     ):
-        spec = cfmkit.load("configs/cam.yaml", [wound.format(wire=wire, coil=coil)])
-        result = cfmkit.analyze(spec)
-        rows = {row["place"]: row for row in table(result)}
+        result = solved(wound.format(wire=wire, coil=coil))
+        rows = listed(result)
         inside = float(coil[:-3]) - float(wire[:-3])
         shaft = float(rows["shafts of the rollers"]["size"].split()[0])
         seat = min(shaft, inside)
         assert f"({rest + seat:.6g} mm inside the loops)" in rows["between the rollers"]["data"]
         faults = [text for text in hardware(result.state).faults if "do not go over" in text]
-        pull = 0.5 * float(result.state.elongation.max()) * spec.mechanism.springs.total
+        pull = 0.5 * float(result.state.elongation.max()) * result.spec.mechanism.springs.total
         bends = bending_stress(pull * 0.5e-3 * (float(coil[:-3]) + float(wire[:-3])), 1e-3 * seat)
         assert bool(faults) == (bends > PIN_STRENGTH / 1.5) == (end == "too weak")
         if end.startswith("ends"):
@@ -123,7 +127,7 @@ def test_loops_of_springs_go_over_the_ends_of_shafts_or_are_a_fault():
 
 def test_ends_of_braces_and_loops_of_springs_are_in_the_box_of_a_cam():
     plain, wide, loops = (
-        family("cam").envelope(cfmkit.analyze(cfmkit.load("configs/cam.yaml", changes))).across
+        family("cam").envelope(solved(*changes)).across
         for changes in (
             [],
             ["mechanism.envelope={brace_width: 60 mm}"],
@@ -136,37 +140,30 @@ def test_ends_of_braces_and_loops_of_springs_are_in_the_box_of_a_cam():
 
 
 def test_heads_of_screws_count_in_the_depth_of_a_cam():
-    flat = cfmkit.load("configs/cam.yaml", ["mechanism.plate.hole_diameter=17.5 mm"])  # heads of M16 are 16 mm high
-    result = cfmkit.analyze(flat)
-    found = hardware(result.state)
-    assert found.screw_head_height == pytest.approx(16e-3)
-    plain = cfmkit.analyze(cfmkit.load("configs/cam.yaml"))
-    deep, less = (family("cam").part(one).depth for one in (result, plain))
+    result = solved("mechanism.plate.hole_diameter=17.5 mm")  # heads of M16 are 16 mm high
+    assert hardware(result.state).screw_head_height == pytest.approx(16e-3)
+    deep, less = (family("cam").part(each).depth for each in (result, solved()))
     assert deep == pytest.approx(max(less, 0.5 * less + 4e-3 + 16e-3))
 
 
 def test_rollers_without_ball_bearings_rub_on_their_shafts():
     """Cams 'met' a hysteresis whose rollers turned on plain shafts that were taken to rub nowhere."""
-    small = cfmkit.load("configs/cam.yaml", ["mechanism.roller_radius=5 mm"])  # no bearing fits
-    result = cfmkit.analyze(small)
-    assert set(hardware(result.state).rubbing) == {"pins", "guide", "bearings"}
-    assert set(hardware(cfmkit.analyze(cfmkit.load("configs/cam.yaml")).state).rubbing) == {"pins", "guide"}
+    small = solved("mechanism.roller_radius=5 mm")  # no bearing fits
+    assert set(hardware(small.state).rubbing) == {"pins", "guide", "bearings"}
+    assert set(hardware(solved().state).rubbing) == {"pins", "guide"}
     # a bearing is no wider than its roller: beside it there are the braces
-    thin = cfmkit.load("configs/cam.yaml", ["mechanism.contact.width=3 mm", "mechanism.plate.thickness=3 mm"])
-    assert "bearings" in hardware(cfmkit.analyze(thin).state).rubbing
-    plain = cfmkit.load("configs/cam.yaml", ["mechanism.bearings={bore: 5 mm, friction: 0.1, kind: plain}"])
-    assert not [row for row in table(cfmkit.analyze(plain)) if row["place"] == "in the rollers"]
+    thin = solved("mechanism.contact.width=3 mm", "mechanism.plate.thickness=3 mm")
+    assert "bearings" in hardware(thin.state).rubbing
+    assert "in the rollers" not in listed(solved("mechanism.bearings={bore: 5 mm, friction: 0.1, kind: plain}"))
     with pytest.raises(cfmkit.SpecError, match="of rolling bearings"):
         cfmkit.load("configs/cam.yaml", ["mechanism.bearings={bore: 5 mm, kind: plain, dynamic_rating: 1 kN}"])
-    weak = cfmkit.analyze(cfmkit.load("configs/cam.yaml", ["mechanism.bearings={bore: 1 mm}"]))
+    weak = solved("mechanism.bearings={bore: 1 mm}")
     assert any("too weak" in text and "bearings.bore" in text for text in hardware(weak.state).faults)
 
 
 def test_the_box_of_a_cam_contains_a_guide_as_long_as_stated():
     short, long = (
-        family("cam").envelope(
-            cfmkit.analyze(cfmkit.load("configs/cam_friction.yaml", [f"mechanism.guide.length={length}"]))
-        )
+        family("cam").envelope(solved(f"mechanism.guide.length={length}", name="cam_friction"))
         for length in ("40 mm", "60 mm")
     )
     assert long.along - short.along == pytest.approx(10e-3, abs=1e-9)

@@ -1,9 +1,6 @@
-"""One side of the mechanism in motion: how few evaluations of its curve it takes, and what a left side inherits."""
+"""One side of the mechanism in motion: where its roller is on a turned track, and what a left side inherits."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,24 +8,6 @@ from cam_motion import moving
 from cam_support import analyze
 
 from cfmkit.families.cam.dynamics.machine_from_spec import build
-
-
-@dataclass(frozen=True)
-class Counted:
-    """A piece of a curve that counts how often it is evaluated."""
-
-    piece: Any
-    calls: list[int] = field(default_factory=list)
-    on_corner = False
-
-    @property
-    def ends(self):
-        return self.piece.ends
-
-    def evaluate(self, parameter):
-        self.calls.append(np.size(parameter))
-        return self.piece.evaluate(parameter)
-
 
 TURNED = {
     "as designed": {},
@@ -40,20 +19,21 @@ TURNED = {
 }
 
 
+@pytest.mark.parametrize("position", ["220 mm", "188.5 mm"], ids=["flank", "corner"])
 @pytest.mark.parametrize("changes", TURNED.values(), ids=TURNED)
-def test_the_guide_is_so_good_that_each_position_needs_one_evaluation_of_the_curve(changes):
-    parts = build(moving(**changes))
-    slider = parts.motion.evaluate(parts.motion.times(201)).position
+def test_braces_join_rollers_on_turned_tracks_to_the_slider(changes, position):
+    """Their tangents and curvatures are those of differences along the track."""
+    parts = build(moving(**changes, analysis__dynamics__slider_position=position))
     for side in (parts.machine.right, parts.machine.left):
-        pieces = tuple(Counted(piece) for piece in side.pieces)
-        counting = replace(side, pieces=pieces)
-        counting.stance(slider[:1])  # builds the guide
-        for piece in pieces:
-            piece.calls.clear()
-        stance = counting.stance(slider)
-        assert [call for piece in pieces for call in piece.calls] == [201]
+        start = max(parts.motion.start, side.span[0] + 1e-5)
+        slider = start + np.array([1e-5, 2e-4, 0.1])[:, None] + 1e-7 * np.arange(-1, 2)
+        stance = side.stance(slider)
         drop = np.sqrt(side.parts.brace_length**2 - stance.center.real**2)
-        np.testing.assert_allclose(stance.center.imag + drop, slider, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(stance.center.imag + drop, slider, rtol=0, atol=4e-15)
+        steps = np.diff(stance.center[:, ::2], axis=1)
+        np.testing.assert_allclose(steps / np.abs(steps), stance.tangent[:, 1:2], rtol=0, atol=1e-5)
+        turns = np.angle(stance.tangent[:, 2:] / stance.tangent[:, :1])
+        np.testing.assert_allclose(turns / np.abs(steps), stance.curvature[:, 1:2], rtol=1e-3)
 
 
 def test_a_left_flank_without_a_stroke_is_cut_for_that_of_the_right_one():

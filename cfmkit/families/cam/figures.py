@@ -377,7 +377,7 @@ def shares(result: Result) -> Figure:
     ]
     if np.nanmax(np.abs(parts["rest"])) > 0:
         series.append(Series(parts["rest"], "rest length", SPRING_OCHRE, prefer=0.8))
-    over = built.travel + built.origin
+    over = built.displacement
     diagram = Diagram(over, Scale("displacement", "length"), Scale("force added to the design's", "force"), series)
     return diagram_figure(Heading.from_result(result, "where the force comes from"), [diagram])
 

@@ -7,22 +7,26 @@ force is not known (`MeasuredCam.unmeasured`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.families.cam.contact_pressure import flank_pressure, worst
+from cfmkit.families.cam.contact_pressure import flank_pressure, stress, worst
 from cfmkit.families.cam.findings import describe_overstretch, find_overstress, finding, is_overstretched
+from cfmkit.families.cam.geometry.flank_from_roller_path import DesignFlank
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
+from cfmkit.families.cam.mechanism_from_spec import displacement_origin
 from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS, integrate_between
+from cfmkit.families.cam.solution import BRANCH_DIRECTIONS
 from cfmkit.families.cam.statics import constant_force, levers, load_on_contact, load_on_slider
 from cfmkit.families.findings import mm
 from cfmkit.families.largest_next_to_samples import largest_of_each
 from cfmkit.families.rows import ScalarQuantity
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
+from cfmkit.numerics.rigid_point_registration import gaps_across
 from cfmkit.numerics.robust_statistics import neighbour_noise
 from cfmkit.specs.units import window_places
 
@@ -61,26 +65,125 @@ class Sides:
         return pull, contacts[0], contacts[1]
 
 
+@dataclass(frozen=True)
+class BuiltTrack:
+    """The track of a roller's centre on a built flank, mirrored to the right, over the slider's position."""
+
+    slider: FloatArray  # (n,) increasing: height of the slider above the path's first point [m]
+    # x, y, (n,): roller centre [m]
+    x: FloatArray
+    y: FloatArray
+    slope: FloatArray  # (n,) dy/dx of the track
+    contact: FloatArray  # (n,) arc length of the flank at which the roller touches it [m]
+    # slider positions between which the contact is where nothing was measured [m]
+    holes: tuple[tuple[float, float], ...] = ()
+
+    def interpolate(self, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return x [m] and slope of the track at slider positions; no slope is known in a hole."""
+        slope = np.interp(slider, self.slider, self.slope)
+        for low, high in self.holes:
+            slope = np.where((slider > low) & (slider < high), np.nan, slope)
+        return np.interp(slider, self.slider, self.x), slope
+
+
+def flanks_of(assembly: Assembly) -> tuple[DesignFlank, DesignFlank]:
+    """Return the right and the left flank of the design."""
+    return DesignFlank(assembly.profile, 1.0), DesignFlank(assembly.profile, -1.0)
+
+
 @dataclass(frozen=True, repr=False)
 class MeasuredCam(ShortRepr):
     """Solution of a mechanism whose cam profile was measured after manufacture."""
 
     assembly: Assembly  # the design and the loads
     registration: Registration  # of the right and the left flank
-    across: tuple[FloatArray, FloatArray]  # errors in x at the same y, positive outside [m]
+    tracks: tuple[BuiltTrack, BuiltTrack]  # of the right and the left roller
     travel: FloatArray  # (n,) from the start of the design's roller path [m]
-    sides: Sides  # where the rollers are
-    # parts of the force [N]: design, rest, profile, friction_up, friction_down, each (n,)
-    shares: dict[str, FloatArray]
-    origin: float  # what is added to the travel to give the displacement [m]
-    # travels between which a contact is where nothing was measured, of either flank [m]
-    holes: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def slider(self) -> FloatArray:
+        """Heights of the slider above the path's first point, (n,) [m]."""
+        return self.assembly.track.start + self.travel
+
+    @property
+    def origin(self) -> float:
+        """Length that is added to the travel to give the displacement [m]."""
+        return displacement_origin(self.assembly)
+
+    @property
+    def displacement(self) -> FloatArray:
+        """Displacements of the slider, (n,) [m]."""
+        return self.travel + self.origin
+
+    @cached_property
+    def sides(self) -> Sides:
+        """Both rollers at those travels."""
+        (right_x, right), (left_x, left) = (track.interpolate(self.slider) for track in self.tracks)
+        return Sides((right_x, left_x), (right, left))
+
+    @cached_property
+    def across(self) -> tuple[FloatArray, FloatArray]:
+        """Errors of both flanks in x at the same y, positive outside [m]."""
+        flanks = zip(flanks_of(self.assembly), self.registration.points, self.registration.parameters, strict=True)
+        right, left = (flank.side * gaps_across(flank, points, u) for flank, points, u in flanks)
+        return right, left
+
+    @cached_property
+    def shares(self) -> dict[str, FloatArray]:
+        """Parts of the force: that of the design, and what each deviation adds to it, (n,) each [N]."""
+        loads, mechanism, states = (
+            self.assembly.loads,
+            self.assembly.spec.mechanism,
+            self.assembly.track.states(self.slider),
+        )
+        designed, rest = Sides((states.x, states.x), (states.slope, states.slope)), loads.rest_half_width
+        ideal = designed.forces(loads, 0.0, mechanism.springs_rest_as_cut)[0]
+        longer = designed.forces(loads, 0.0, rest)[0]
+        smooth = self.sides.forces(loads, 0.0, rest)[0]
+        return {
+            "design": ideal,
+            "rest": longer - ideal,
+            "profile": smooth - longer,
+            "friction_up": self.forces(1.0)[0] - smooth,
+            "friction_down": self.forces(-1.0)[0] - smooth,
+        }
+
+    # --- between the points, as a `cfmkit.results.ClosedForm`: tracks are known between nodes ----------------------
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """Increasing displacements at which a side of the track bends [m]."""
+        travel, start = self.travel, self.assembly.track.start
+        nodes = np.concatenate([track.slider for track in self.tracks]) - start
+        inner = nodes[(nodes > travel[0]) & (nodes < travel[-1])]
+        return np.unique(np.concatenate([travel[[0, -1]], inner])) + self.origin
+
+    @property
+    def peaks(self) -> FloatArray:
+        """Each of them: an extreme of a cut edge may stand anywhere [m]."""
+        return self.places
+
+    def effort(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the force on the way up or down at displacements of any shape [N]."""
+        return np.asarray(self._move_to(places).forces(BRANCH_DIRECTIONS[branch])[0].reshape(np.shape(places)))
+
+    def stress(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the stress below the more loaded contact at displacements of any shape [Pa]."""
+        pressed = self._move_to(places).pressure(BRANCH_DIRECTIONS[branch])
+        return np.asarray(stress(pressed).reshape(np.shape(places)))
+
+    def _move_to(self, places: FloatArray) -> MeasuredCam:
+        """Return the mechanism at other displacements."""
+        return replace(self, travel=np.clip(np.ravel(places) - self.origin, self.travel[0], self.travel[-1]))
+
+    # --- how much was measured, and what of it counts --------------------------------------------------------------
 
     @property
     def unmeasured(self) -> tuple[tuple[float, float], ...]:
         """Travels between which the force is not known, in their order, those that overlap joined [m]."""
         joined: list[tuple[float, float]] = []
-        for low, high in sorted(self.holes):
+        start = self.assembly.track.start
+        for low, high in sorted((low - start, high - start) for track in self.tracks for low, high in track.holes):
             low, high = max(low, float(self.travel[0])), min(high, float(self.travel[-1]))
             if joined and low <= joined[-1][1]:
                 joined[-1] = joined[-1][0], max(joined[-1][1], high)
@@ -122,7 +225,7 @@ class MeasuredCam(ShortRepr):
     @property
     def in_window(self) -> NDArray[np.bool_]:
         """Which travels lie in the window, (n,); all if it holds fewer than 3."""
-        (low, high), places = self.window, self.travel + self.origin
+        (low, high), places = self.window, self.displacement
         inside: NDArray[np.bool_] = (places >= low) & (places <= high)
         return inside if inside.sum() > 2 else np.ones(len(places), dtype=bool)
 
@@ -184,7 +287,7 @@ def _loop_area_per_friction(built: MeasuredCam) -> float:
         return np.nan
     loads, small = built.assembly.loads, 1e-6
     up, down = (built.sides.forces(loads, direction * small, loads.rest_half_width)[0] for direction in (1.0, -1.0))
-    return float(integrate_between(built.travel + built.origin, up - down, *built.window)[0]) / small
+    return float(integrate_between(built.displacement, up - down, *built.window)[0]) / small
 
 
 def _quantity(dimension: str, definition: str, function: Callable[[MeasuredCam], Any]) -> ScalarQuantity[MeasuredCam]:

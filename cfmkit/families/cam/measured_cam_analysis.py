@@ -16,13 +16,11 @@ direction of its track is perpendicular to the contact's normal.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
@@ -30,17 +28,17 @@ from cfmkit.families.cam.findings import finding, left_out, rubbing_left_out
 from cfmkit.families.cam.geometry.flank_from_roller_path import BuiltFlank, DesignFlank, arc_lengths
 from cfmkit.families.cam.measured_cam import (
     MEASURED_QUANTITIES,
+    BuiltTrack,
     MeasuredCam,
-    Sides,
     describe_unmeasured,
     findings_of_built,
+    flanks_of,
 )
 from cfmkit.families.cam.mechanism_from_spec import (
     assemble,
     check_first_pose,
     check_springs,
     count_before_overlap,
-    displacement_origin,
 )
 from cfmkit.families.cam.scalar_results import curve_cut_for
 from cfmkit.families.cam.statics import Assembly, target_force
@@ -51,7 +49,6 @@ from cfmkit.numerics.rigid_point_registration import (
     CurveFrame,
     Registration,
     feet,
-    gaps_across,
     register,
     registered_where_it_is,
 )
@@ -85,7 +82,7 @@ def analyze_built(spec: CamSpec) -> Result:
         registration = register_cam(assembly)
         tracks = _tracks(assembly, registration)
         travel, ended = _travel(assembly, tracks)
-        built = _solve_cam(assembly, registration, tracks, travel)
+        built = MeasuredCam(assembly, registration, tracks, travel)
         check_springs(built.elongation, built.forces(1.0)[1], assembly.loads.rest_half_width)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
@@ -99,7 +96,7 @@ def analyze_built(spec: CamSpec) -> Result:
         status=Status.PARTIAL if short else Status.COMPLETE,
         message=short,
         curves=(_curve(built),),
-        closed=LoopAsBuilt(built, tracks),
+        closed=built,
         values=values_of_one(MEASURED_QUANTITIES, built),
         warnings=(
             *warnings,
@@ -170,11 +167,6 @@ def _check_fit(registration: Registration, name: str) -> None:
         )
 
 
-def flanks_of(assembly: Assembly) -> tuple[DesignFlank, DesignFlank]:
-    """Return the right and the left flank of the design."""
-    return DesignFlank(assembly.profile, 1.0), DesignFlank(assembly.profile, -1.0)
-
-
 def _tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack, BuiltTrack]:
     mechanism, design = assembly.spec.mechanism, flanks_of(assembly)[0]
     noise = float(mechanism.profile.noise or 0.0)
@@ -228,97 +220,6 @@ def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[
     return travel[:count], overlap or short
 
 
-def _solve_cam(
-    assembly: Assembly, registration: Registration, tracks: tuple[BuiltTrack, BuiltTrack], travel: FloatArray
-) -> MeasuredCam:
-    slider = assembly.track.start + travel
-    states = assembly.track.states(slider)
-    sides = sides_at(tracks, slider)
-    designed = Sides((states.x, states.x), (states.slope, states.slope))
-    return MeasuredCam(
-        assembly,
-        registration,
-        errors_across(assembly, registration),
-        travel,
-        sides,
-        shares_of(assembly, designed, sides),
-        displacement_origin(assembly),
-        tuple(
-            (low - assembly.track.start, high - assembly.track.start) for track in tracks for low, high in track.holes
-        ),
-    )
-
-
-def sides_at(tracks: tuple[BuiltTrack, BuiltTrack], slider: FloatArray) -> Sides:
-    """Return where both rollers are at slider positions, (n,)."""
-    (right_x, right), (left_x, left) = (track.interpolate(slider) for track in tracks)
-    return Sides((right_x, left_x), (right, left))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LoopAsBuilt(ShortRepr):
-    """The loop of a measured cam at every place (a `cfmkit.results.ClosedForm`): its tracks are known between nodes."""
-
-    built: MeasuredCam
-    tracks: tuple[BuiltTrack, BuiltTrack]
-
-    @cached_property
-    def places(self) -> FloatArray:
-        """Increasing displacements at which a side of the track bends [m]."""
-        travel, start = self.built.travel, self.built.assembly.track.start
-        nodes = np.concatenate([track.slider for track in self.tracks]) - start
-        inner = nodes[(nodes > travel[0]) & (nodes < travel[-1])]
-        return np.unique(np.concatenate([travel[[0, -1]], inner])) + self.built.origin
-
-    @property
-    def peaks(self) -> FloatArray:
-        """Each of them: an extreme of a cut edge may stand anywhere [m]."""
-        return self.places
-
-    def effort(self, branch: str, places: FloatArray) -> FloatArray:
-        """Return the force on the way up or down at displacements of any shape [N]."""
-        return np.asarray(self._move_to(places).forces(_get_sign(branch))[0].reshape(np.shape(places)))
-
-    def stress(self, branch: str, places: FloatArray) -> FloatArray:
-        """Return the stress below the more loaded contact at displacements of any shape [Pa]."""
-        return np.asarray(stress(self._move_to(places).pressure(_get_sign(branch))).reshape(np.shape(places)))
-
-    def _move_to(self, places: FloatArray) -> MeasuredCam:
-        """Return the mechanism at other displacements."""
-        built = self.built
-        travel = np.clip(np.ravel(places) - built.origin, built.travel[0], built.travel[-1])
-        sides = sides_at(self.tracks, built.assembly.track.start + travel)
-        return replace(built, travel=travel, sides=sides, shares={})
-
-
-def _get_sign(branch: str) -> float:
-    return 1.0 if branch == "load" else -1.0
-
-
-def errors_across(assembly: Assembly, registration: Registration) -> tuple[FloatArray, FloatArray]:
-    """Return the errors of both flanks in x at the same y, positive outside [m]."""
-    sides = zip(flanks_of(assembly), registration.points, registration.parameters, strict=True)
-    right, left = (flank.side * gaps_across(flank, points, u) for flank, points, u in sides)
-    return right, left
-
-
-def shares_of(assembly: Assembly, designed: Sides, sides: Sides) -> dict[str, FloatArray]:
-    """Return the parts of the force: what the design gives, and what each deviation adds to it [N]."""
-    loads, mechanism = assembly.loads, assembly.spec.mechanism
-    rest, drawn = loads.rest_half_width, mechanism.springs_rest_as_cut
-    ideal = designed.forces(loads, 0.0, drawn)[0]
-    longer = designed.forces(loads, 0.0, rest)[0]
-    smooth = sides.forces(loads, 0.0, rest)[0]
-    friction = mechanism.rolling_friction
-    return {
-        "design": ideal,
-        "rest": longer - ideal,
-        "profile": smooth - longer,
-        "friction_up": sides.forces(loads, friction, rest)[0] - smooth,
-        "friction_down": sides.forces(loads, -friction, rest)[0] - smooth,
-    }
-
-
 def _curve(built: MeasuredCam) -> Curve:
     """Return the closed loop with the parts of the force."""
     up, down = built.forces(1.0), built.forces(-1.0)
@@ -344,32 +245,11 @@ def _curve(built: MeasuredCam) -> Curve:
     with np.errstate(invalid="ignore"):
         stable = (loop(up[1], down[1]) > 0) & (loop(up[2], down[2]) > 0)
     branch = np.repeat(["load", "unload"], len(built.travel))
-    return Curve(loop(built.travel) + built.origin, loop(up[0], down[0]), branch, stable, extra)
+    return Curve(loop(built.displacement), loop(up[0], down[0]), branch, stable, extra)
 
 
 PLACE_STEP = 5e-5  # distance of the places that are computed [m]
 CONTACT_REACH = 2e-3  # how far along the flank, beside the place where the design touches, contact is sought [m]
-
-
-@dataclass(frozen=True)
-class BuiltTrack:
-    """The track of a roller's centre on a built flank, mirrored to the right, over the slider's position."""
-
-    slider: FloatArray  # (n,) increasing: height of the slider above the path's first point [m]
-    # x, y, (n,): roller centre [m]
-    x: FloatArray
-    y: FloatArray
-    slope: FloatArray  # (n,) dy/dx of the track
-    contact: FloatArray  # (n,) arc length of the flank at which the roller touches it [m]
-    # slider positions between which the contact is where nothing was measured [m]
-    holes: tuple[tuple[float, float], ...] = ()
-
-    def interpolate(self, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return x [m] and slope of the track at slider positions; no slope is known in a hole."""
-        slope = np.interp(slider, self.slider, self.slope)
-        for low, high in self.holes:
-            slope = np.where((slider > low) & (slider < high), np.nan, slope)
-        return np.interp(slider, self.slider, self.x), slope
 
 
 def built_flank(design: DesignFlank, points: FloatArray, errors: FloatArray, noise: float) -> BuiltFlank:

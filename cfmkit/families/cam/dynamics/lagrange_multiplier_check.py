@@ -26,13 +26,13 @@ Everything works for one vector of coordinates and for many, (..., 9).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import cmath
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cfmkit.families.cam.dynamics.axis_springs import AxisGap
-from cfmkit.families.cam.dynamics.roller_curves_and_motion import Flank
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.roller_curves_and_motion import CurvePoints, Cycloid, Machine, Side
+    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, Side
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, ParallelPoints
     from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw
 
     ComplexArray = NDArray[np.complex128]
@@ -79,35 +80,38 @@ class FlankLine:
     that belongs to y needs Newton's method. The corner of an undercut cam cannot be described so.
     """
 
-    side: Side
-    flank: Flank  # at the flank's distance from the roller path, before it is turned with its side
+    profile: CamProfile
+    distance: float  # from the roller path to the flank, negative inwards [m]
+    # angle, height: as of a `Side`
+    angle: float
+    height: float
 
-    def evaluate(self, u: Any) -> CurvePoints:
-        """Return the points of the flank for path coordinates u [m]."""
-        return self.side.rotate(self.flank.evaluate(u))
+    def evaluate(self, u: Any) -> tuple[Any, Any, ParallelPoints]:
+        """Return points and tangents of the turned flank for path coordinates u [m], and those before it is turned."""
+        line, turn = self.profile.parallel(u, self.distance), cmath.exp(1j * self.angle)
+        point, tangent = line.x + 1j * (line.y - self.height), (1.0 + 1j * line.slope) / line.length
+        return point * turn, tangent * turn, line
 
     def estimate(self, y: float) -> float:
         """Return a rough path coordinate of the point at height y [m]."""
-        u = np.linspace(*self.flank.ends, N_KNOTS)
-        return float(np.interp(y, self.evaluate(u).point.imag, u))
+        u = np.linspace(self.profile.start, self.profile.end, N_KNOTS)
+        return float(np.interp(y, self.evaluate(u)[0].imag, u))
 
     def locate(self, y: Real, guess: Real) -> FlankPoint:
         """Return the points of the flank at heights y [m], starting the search at path coordinates `guess` [m]."""
-        law: SlopeLaw = self.flank.profile.path.law
-        u: Any = guess
+        law, u = self.profile.path.law, guess
         for _ in range(NEWTON_STEPS):
-            at = self.evaluate(u)
-            step = (at.point.imag - y) / (at.pace * at.tangent.imag)
+            point, tangent, line = self.evaluate(u)
+            step = (point.imag - y) / (line.length * line.stretch * tangent.imag)
             u = u - step
             if np.max(np.abs(step)) <= 1e-16 + 4e-16 * law.brace_length:
                 break
-        at, (slope, bend) = self.evaluate(u), law.slopes(u)
-        square = 1.0 + slope * slope
-        change = (_slope_second_derivative(law, u) - 3.0 * slope * bend * bend / square) / (square * square)
-        change = change / (1.0 + self.flank.shift * bend / (square * square**0.5)) ** 3
-        cosine, sine, curvature = at.tangent.real, at.tangent.imag, at.curvature
-        third = (3.0 * curvature * curvature * cosine / sine - change) / sine**4
-        return FlankPoint(u, at.point.real, cosine / sine, -curvature / sine**3, third)
+        point, tangent, line = self.evaluate(u)
+        bend, square = line.curvature * line.length**3, line.length * line.length
+        change = (_slope_second_derivative(law, u) - 3.0 * line.slope * bend * bend / square) / (square * square)
+        cosine, sine, curvature = tangent.real, tangent.imag, line.curvature / line.stretch
+        third = (3.0 * curvature * curvature * cosine / sine - change / line.stretch**3) / sine**4
+        return FlankPoint(u, point.real, cosine / sine, -curvature / sine**3, third)
 
 
 class Posture(NamedTuple):
@@ -394,10 +398,8 @@ class NineCoordinates:
 
 
 def _chain(side: Side, hand: float) -> SideChain:
-    flank = side.pieces[-1]
-    if not isinstance(flank, Flank):
-        raise TypeError("the last piece of a roller's curve must run along the flank")
-    line = FlankLine(side, replace(flank, shift=flank.shift - side.parts.roller_radius))
+    distance = side.track.shift - side.parts.roller_radius
+    line = FlankLine(side.track.profile, distance, side.angle, side.height)
     return SideChain(hand, side.parts.brace_length, side.parts.roller_radius, line)
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.families.cam.dynamics.axis_springs import AxisSprings
-from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, NoRise, Side, SideParts, pieces_of
+from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, Side, SideParts
 from cfmkit.families.cam.dynamics.solution import Build
 from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack
 from cfmkit.families.cam.mechanism_from_spec import assemble_sides, cam_start_height, directions
 from cfmkit.families.cam.statics import STANDARD_GRAVITY
 
@@ -43,14 +44,13 @@ def stated_motion(spec: CamSpec) -> Dynamics:
 def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Machine:
     mechanism, masses = spec.mechanism, spec.mechanism.masses
     right, left = sides
-    pieces = pieces_of(right.track)
     errors = _angles(mechanism.errors)
     along, right_share, _ = directions(mechanism.mounting)
     return Machine(
-        right=Side(parts_of(right.spec.mechanism, masses), pieces, errors[0], lift),
+        right=Side(parts_of(right.spec.mechanism, masses), right.track, errors[0], lift),
         left=Side(
             parts_of(left.spec.mechanism, masses, mechanism.left.masses if mechanism.left else None),
-            pieces if left is right else pieces_of(left.track),
+            left.track,
             errors[1],
             lift,
         ),
@@ -102,7 +102,7 @@ def solid_cylinder(mass: float, radius: float) -> float:
 def _check(name: str, side: Side) -> None:
     try:
         _ = side.span
-    except NoRise:
+    except NoTrack:
         raise finding.cannot_build(
             "dead_point",
             f"on the {name} side the slider does not rise as the roller moves out: the flank is turned too far "

@@ -16,7 +16,7 @@ or whose force follows a curve may be curved more elsewhere: `mechanism_from_spe
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from cfmkit.numerics.rigid_point_registration import CurveFrame
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.path import RollerPath
@@ -62,6 +61,15 @@ class CamProfile:
         nx, ny = self.normal(x)
         return x + offset * nx, self.path.height(x) + offset * ny
 
+    def parallel(self, u: Any, distance: float) -> ParallelPoints:
+        """Return the line at a distance [m] from the path, towards the roller, with its slope and curvature."""
+        slope, bend = self.path.law.slopes(u)
+        square = 1.0 + slope * slope
+        length = square**0.5
+        curvature = bend / (square * length)
+        x, y = u + distance * slope / length, self.path.height(u) - distance / length
+        return ParallelPoints(x, y, slope, length, 1.0 + distance * curvature, curvature)
+
     def flank(self, x: Real) -> tuple[Real, Real]:
         """Return the flank's points for path coordinates x; part of the cam only from `start` on."""
         return self.offset_points(x, -self.roller_radius)
@@ -70,6 +78,18 @@ class CamProfile:
     def start(self) -> float:
         """Path coordinate of the first point of the flank that is part of the cam [m]."""
         return self.corner.first_contact if self.corner else self.path.law.rest_half_width
+
+
+class ParallelPoints(NamedTuple):
+    """Points of the line at a distance from a roller path, for path coordinates."""
+
+    # x, y [m]
+    x: Any
+    y: Any
+    slope: Any  # dy/dx, of the path and of the line
+    length: Any  # sqrt(1 + slope^2)
+    stretch: Any  # length of the line over that of the path
+    curvature: Any  # of the path [1/m]
 
 
 class WholeCamUndercut(ValueError):
@@ -120,16 +140,13 @@ class DesignFlank:
 
     def frame(self, parameter: FloatArray) -> CurveFrame:
         """Return the flank at path coordinates: the path's parallel at one roller radius."""
-        law, radius = self.profile.path.law, self.profile.roller_radius
-        slope, bend = law.slope(parameter), law.curvature_radius(parameter)
-        length = np.hypot(1.0, slope)
-        x, y = self.profile.flank(parameter)
+        at = self.profile.parallel(parameter, -self.profile.roller_radius)
         return CurveFrame(
-            np.column_stack([self.side * x, y]),
-            np.column_stack([self.side / length, slope / length]),
-            np.column_stack([self.side * slope / length, -1.0 / length]),
-            length * (1.0 - radius / bend),
-            1.0 / (bend - radius),
+            np.column_stack([self.side * at.x, at.y]),
+            np.column_stack([self.side / at.length, at.slope / at.length]),
+            np.column_stack([self.side * at.slope / at.length, -1.0 / at.length]),
+            at.length * at.stretch,
+            at.curvature / at.stretch,
         )
 
 

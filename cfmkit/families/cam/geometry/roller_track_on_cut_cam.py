@@ -11,6 +11,7 @@ A `Track` finds its ends when it is made; its formulas take numbers, or columns:
 
 from __future__ import annotations
 
+import cmath
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -138,6 +139,9 @@ class Track:
     cannot run on the cam.
     """
 
+    is_turned = False  # whether the flank is not where it was to be cut
+    n_guide_knots = 65
+
     def __init__(self, profile: CamProfile, roller_radius: float, brace_length: float, offset: float = 0.0) -> None:
         """Find the ends of the track."""
         self.profile, self.brace_length = profile, brace_length
@@ -153,7 +157,7 @@ class Track:
             raise NoTrack("brace", max(x_first, begins))
         law, self._begins = profile.path.law, begins
         self._is_shifted = agree(np.not_equal(self.shift, 0.0))
-        self._follows_law = not self._is_shifted and agree(np.equal(brace_length, law.brace_length))
+        self._follows_law = not (self._is_shifted or self.is_turned) and agree(np.equal(brace_length, law.brace_length))
         self._is_ideal = self._follows_law and law.is_ideal
         self._limits(x_first)
 
@@ -223,9 +227,13 @@ class Track:
         low, high = self.profile.start, self.profile.end
 
         def margin(u: Any) -> Any:
-            return self.brace_length * (1 - 1e-12) - self.profile.offset_points(u, self.shift)[0]
+            return self.brace_length * (1 - 1e-12) - self._axis_distance(u)
 
         return high if agree(margin(high) >= 0) else root_between(margin, low, high)
+
+    def _axis_distance(self, u: Any) -> Any:
+        """Return how far the roller's centre is from the slider's axis [m]."""
+        return self.profile.offset_points(u, self.shift)[0]
 
     def _slider(self, x: Real, y: Real | float) -> Real:
         return y + ((self.brace_length - x) * (self.brace_length + x)) ** 0.5
@@ -274,12 +282,18 @@ class Track:
         *sides, start, dead_point, contact = lengths if rows is None else rows_of(lengths, rows)
         pivot = Pivot(*sides)
         first = (slider <= start) & (dead_point == start)
-        turn = np.where(first, pivot.low, pivot_angle(slider, pivot))
+        turn = np.where(first, pivot.low, self._turn_on_corner(slider, pivot))
         sin, cos = np.sin(turn), np.cos(turn)
         x, y = pivot.x + pivot.radius * sin, pivot.y - pivot.radius * cos
-        always, tangent = np.ones(slider.shape, dtype=bool), brace_tangent(x, pivot.brace)
+        always, tangent = np.ones(slider.shape, dtype=bool), self._brace_tangent(x, y, pivot.brace)
         contacts = np.broadcast_to(contact, slider.shape)
         return TrackStates(x, y, sin / cos, tangent, always, contacts, lambda: 1.0 / (pivot.radius * cos * cos * cos))
+
+    def _turn_on_corner(self, slider: FloatArray, pivot: Pivot) -> FloatArray:
+        return pivot_angle(slider, pivot)
+
+    def _brace_tangent(self, x: Any, _y: Any, brace_length: Any) -> Any:
+        return brace_tangent(x, brace_length)
 
     @property
     def pivot(self) -> Pivot:
@@ -357,11 +371,69 @@ class Track:
         The difference from the ideal profile is smooth and small, so that straight lines do.
         """
         low, high = self.flank_range
-        knots = low + (high - low) * np.linspace(0.0, 1.0, N_KNOTS)
+        knots = low + (high - low) * np.linspace(0.0, 1.0, self.n_guide_knots)
         slider = self._evaluate_flank(knots)[0]
         zero = np.minimum(self.start, slider[..., :1])
         root = np.sqrt(np.maximum(slider - zero, 0.0))
         return zero, root, knots - self.profile.path.law.position(root * root)
+
+
+class TurnedTrack(Track):
+    """The track on a flank that is turned by an angle [rad] about a point of the axis at a height [m].
+
+    States are those in the frame of the flank as it was to be cut; slider positions are along the axis.
+    """
+
+    is_turned, n_guide_knots = True, 1025
+
+    def __init__(self, track: Track, angle: float, height: float) -> None:
+        """Find the ends of the track."""
+        self.angle, self.turn, self.height = angle, cmath.exp(1j * angle), height
+        super().__init__(track.profile, track.radius, track.brace_length)
+
+    def turn_about(self, x: Any, y: Any) -> Any:
+        """Return turned points as complex numbers x + iy [m]."""
+        return (x + 1j * (y - self.height)) * self.turn + 1j * self.height
+
+    def _axis_distance(self, u: Any) -> Any:
+        return self.turn_about(*self.profile.offset_points(u, self.shift)).real
+
+    def _slider(self, x: Any, y: Any) -> Any:
+        at = self.turn_about(x, y)
+        return super()._slider(at.real, at.imag)
+
+    def _evaluate_flank(self, u: Any) -> tuple[Any, Any]:
+        line = self.profile.parallel(u, self.shift)
+        at, direction = self.turn_about(line.x, line.y), (1.0 + 1j * line.slope) * self.turn
+        drop = ((self.brace_length - at.real) * (self.brace_length + at.real)) ** 0.5
+        return at.imag + drop, (direction.imag - direction.real * at.real / drop) * line.stretch
+
+    def _evaluate_corner(self, turn: float) -> tuple[Any, Any]:
+        xc, yc = self._corner_point
+        at = self.turn_about(xc + self.radius * np.sin(turn), yc - self.radius * np.cos(turn))
+        direction = cmath.exp(1j * turn) * self.turn
+        rate = direction.imag - direction.real * brace_tangent(at.real, self.brace_length)
+        return super()._slider(at.real, at.imag), rate
+
+    def _collinear(self) -> Any:
+        corner = self.turn_about(*self._corner_point)
+        across = self.brace_length - self.radius
+        return corner.imag + ((across - corner.real) * (across + corner.real)) ** 0.5
+
+    def _flank_states(self, slider: FloatArray) -> TrackStates:
+        u = self._flank_parameter(slider)
+        line = self.profile.parallel(u, self.shift)
+        tangent = self._brace_tangent(line.x, line.y, self.brace_length)
+        bend, on_corner = line.curvature * line.length**3 / line.stretch, np.zeros(slider.shape, dtype=bool)
+        return TrackStates(line.x, line.y, line.slope, tangent, on_corner, u, lambda: bend)
+
+    def _turn_on_corner(self, slider: FloatArray, pivot: Pivot) -> FloatArray:
+        corner, ends = self.turn_about(pivot.x, pivot.y), (pivot.low + self.angle, pivot.high + self.angle)
+        turned = Pivot(corner.real, corner.imag, pivot.radius, pivot.brace, *ends)
+        return pivot_angle(slider, turned) - self.angle
+
+    def _brace_tangent(self, x: Any, y: Any, brace_length: Any) -> Any:
+        return brace_tangent(self.turn_about(x, y).real, brace_length)
 
 
 def track_of(profile: CamProfile, roller_radius: Any, brace_length: Any, offset: Any = 0.0) -> Track:
