@@ -112,9 +112,16 @@ class Conditions:
             if condition.kind == kind and condition.item is item and last in (None, condition.last)
         )  # fmt: skip
 
-    def rows_of(self, *kinds: str) -> list[int]:
-        """Return the numbers of the conditions of some kinds."""
-        return [row for row, condition in enumerate(self.all) if condition.kind in kinds]
+    def rows_of(self, kind: str) -> list[int]:
+        """Return the numbers of the conditions of a kind."""
+        return self._rows.get(kind, [])
+
+    @cached_property
+    def _rows(self) -> dict[str, list[int]]:
+        rows: dict[str, list[int]] = {}
+        for row, condition in enumerate(self.all):
+            rows.setdefault(condition.kind, []).append(row)
+        return rows
 
     def _find_on_sides(self) -> Iterator[Condition]:
         mesh, network = self.mesh, self.mesh.fits.network
@@ -207,9 +214,15 @@ class Conditions:
     def roundings(self, values: FloatArray) -> FloatArray:
         """Return by how much the values of conditions (rows, ..., shares) may be negative, (rows, ...)."""
         largest = np.abs(values[list(self.closed)]).max(axis=(0, -1), initial=1.0)
-        return np.stack([
-            np.broadcast_to(ROUNDING_OF_KIND.get(condition.kind, FORCE_ROUNDING * largest), largest.shape)
-            for condition in self.all
+        fixed, shares = (column.reshape(-1, *(1,) * largest.ndim) for column in self._roundings)
+        return np.asarray(fixed + shares * largest)
+
+    @cached_property
+    def _roundings(self) -> FloatArray:
+        """By how much each condition may be negative, and by what share of the largest force, (2, rows)."""
+        forces = [condition.kind not in ROUNDING_OF_KIND for condition in self.all]
+        return np.array([
+            [ROUNDING_OF_KIND.get(condition.kind, 0.0) for condition in self.all], FORCE_ROUNDING * np.array(forces)
         ])  # fmt: skip
 
     def values(self, z: FloatArray, stage: LoadStage) -> FloatArray:

@@ -43,6 +43,7 @@ class PieceOfPath:
     closed: frozenset[int]
     options: Options
     friction: Mapping[int, FrictionState] = field(default_factory=dict)  # of closed contacts that rub
+    siblings: dict[frozenset[int], PieceOfPath] = field(default_factory=dict)  # of the same arrays, by what is closed
     seen_between: dict[tuple[float, float], FloatArray] = field(init=False, default_factory=dict)  # values by drives
 
     @cached_property
@@ -109,7 +110,13 @@ class PieceOfPath:
     def with_closed(self, closed: frozenset[int]) -> PieceOfPath:
         """Return the problem with another set of closed contacts; what friction does at a new one is left open."""
         friction = {number: state for number, state in self.friction.items() if number in closed}
-        return PieceOfPath(self.whole, closed, self.options, friction)
+        if friction:
+            return PieceOfPath(self.whole, closed, self.options, friction, self.siblings)
+        if not self.friction:
+            self.siblings.setdefault(self.closed, self)
+        if closed not in self.siblings:
+            self.siblings[closed] = PieceOfPath(self.whole, closed, self.options, siblings=self.siblings)
+        return self.siblings[closed]
 
     def say(self, row: int) -> str:
         """Return what the contact of a row of `values` is called: of a contact its number is its row."""
