@@ -187,6 +187,10 @@ class Network(ShortRepr):
         for spring in self.springs:
             for end in spring_ends(spring):
                 self._require_node(end, "a spring")
+            if isinstance(spring, LineSpring):
+                end_place = self._place(spring.end) if spring.end is not None else spring.ground
+                if self._place(spring.start) == end_place:
+                    raise InputError(f"the line spring at {spring.start!r} begins and ends at one place: no direction")
         for load in self.loads:
             self.check_load(load)
         for contact in self.contacts:
@@ -225,6 +229,9 @@ class Network(ShortRepr):
             if link.node == node and link.turns:
                 return self.body_of(link.master)
         return node
+
+    def _place(self, node: str) -> tuple[float, float]:
+        return self.nodes[node].x, self.nodes[node].y
 
     def _require_node(self, node: str, what: str) -> None:
         if node not in self.nodes:
