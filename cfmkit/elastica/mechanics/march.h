@@ -125,6 +125,7 @@ int factors_finish(Factors *f, int unsymmetric);
 void factors_solve_two(const Factors *f, int unsymmetric, double *x, double *y);
 void factors_solve(const Factors *f, int unsymmetric, double *x);
 
+#define GAP_ROUNDING 1e-13 /* of a gap, mean beam lengths; as in contact/terms.py */
 #define SAME_EQUILIBRIUM 1e-7 /* motions that differ by less are one */
 
 enum { CONVERGED, DIVERGED, SINGULAR_OR_FAR };
