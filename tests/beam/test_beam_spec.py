@@ -31,6 +31,7 @@ SLIDE = (
     "  springs: {s: {kind: slide, node: to, direction: 0 deg, stiffness: 1 N/mm}}"
 )
 LOOSE = "beams:\n    beam: {start: root, end: tip}\n  springs: {s: {kind: line, start: tip, stiffness: 1 N/mm}}"
+KNOT = LOOSE.replace("start: tip", "start: tip, ground: [400 mm, 0 mm]")
 FORMULA = "points: 21\n  surface: {profile: {kind: formula, height: x+, length: 1 mm}, preload: 0 mm}"
 FILE = "points: 21\n  surface: {profile: {kind: file, file: no.csv}, preload: 0 mm}"
 RESCALE = "design: {rescale: {force: 1 N, free: width, width: 2 mm}}\nanalysis:"
@@ -44,6 +45,8 @@ MORE = "beams:\n    beam: {start: root, end: tip}"
         ("end: tip", "end: top", "mechanism.beams.beam.end", "there is no node 'top'; nodes are root, tip"),
         ("end: tip", "end: root", "mechanism.beams.beam.end", "a beam needs two different nodes, not 'root' twice"),
         ("[400 mm, 0 mm]", "[0 mm, 0 mm]", "mechanism.beams.beam.end", "at the same place"),
+        ("end: tip}", "end: tip, end_offset: [-400 mm, 1e-14 m]}", "mechanism.beams.beam.end", "at the same place"),
+        (MORE, KNOT, "mechanism.springs.s.ground", "begins and ends at the place of 'tip': it has no direction"),
         ("node: tip", "node: root", "mechanism.drive.node", "'root' cannot move: its support is 'clamped'"),
         ("node: tip", "node: tipp", "mechanism.drive.node", "there is no node 'tipp'"),
         ("travel: 100 mm", "force: 1 N", "analysis.force", "does not go with a drive of kind 'displacement'"),

@@ -259,3 +259,23 @@ def test_constant_loads_beyond_a_limit_point_say_at_which_share() -> None:
     path = el.trace(heavy, load("t", [0.1]))
     assert path.status is el.PathStatus.NO_START
     assert "lost at 0.4 of the constant loads" in path.message
+
+
+def test_a_spring_without_free_length_is_tightened_as_any_other() -> None:
+    """Its force is the stiffness times its vector, as that of two slide springs relaxed at its other end."""
+    nodes = {
+        "foot": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "knee": el.Node(0.02, 0.01),
+        "top": el.Node(0, 0.03, el.slider_support(np.pi / 2)),
+    }
+    beams = {
+        "lower": el.Beam("foot", "knee", STIFF_STRIP, el.arc(-np.pi / 3)),
+        "upper": el.Beam("knee", "top", STIFF_STRIP),
+    }
+    slides = (el.SlideSpring("knee", 0.0, 1e3, -0.02), el.SlideSpring("knee", np.pi / 2, 1e3, -0.01))
+    zero = el.Network(nodes, beams, springs=(el.LineSpring("foot", "knee", 1e3, 0.0),))
+    push = el.Displacement("top", -np.pi / 2, np.array([1e-3, 5e-3]))
+    pair = el.trace(el.Network(nodes, beams, springs=slides), push)
+    for outcome in el.trace_many(3 * [zero], push):
+        assert outcome.status == "COMPLETE"
+        assert outcome.value.effort == pytest.approx(pair.effort[pair.at_requested], rel=1e-6)

@@ -256,6 +256,15 @@ def test_the_tangent_with_contacts_is_the_derivative_of_the_residual():
     assert at.tangent == pytest.approx(at.tangent.T, abs=1e-13)
 
 
+def test_of_two_equal_stops_one_bears_the_force():
+    """The gap of the other one is zero but for rounding, below which it must not close, too: both are one condition."""
+    stop = el.Stop("s", "tip", 0.03, DOWN + 0.3)
+    drive = el.Loading(TIP_LOAD, np.linspace(0, 2, 9))
+    alone, both = (el.trace(cantilever(*stops, nodes=3), drive, EXACT) for stops in ([stop], [stop, stop]))
+    assert both.status is el.PathStatus.COMPLETE, both.message
+    assert both.contact_force(0) + both.contact_force(1) == pytest.approx(alone.contact_force(0), abs=1e-9)
+
+
 @pytest.mark.parametrize("closed", [False, True])
 def test_the_distance_from_a_polyline_has_its_derivatives(closed):
     points = [(0.0, 0.0), (1.0, 0.0), (1.0, -1.0), (2.0, -1.0), (2.0, -2.0)]

@@ -194,6 +194,7 @@ def test_shapes_by_points_approach_the_exact_arc() -> None:
             lambda: el.Network({"z": el.Node(0, 0)}, {"x": el.Beam("a", "z", el.Section(1, 1, 1))}),
             "'a', which is not a node",
         ),
+        (lambda: dataclasses.replace(frame(), springs=(el.LineSpring("d", "d", 1.0),)), "ends at one place"),
         (lambda: el.Beam("a", "b", el.Section(1, 1, 1), start_joint="hinge"), "got 'hinge'"),
         (lambda: el.Beam("a", "b", el.Section(1, 1, 1), end_joint="hinge"), "got 'hinge'"),
         (lambda: el.Support(True, True, displacement=np.array([0.0, 0.0, 1.0])), "rotation is given"),

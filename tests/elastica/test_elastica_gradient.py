@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 from varied_networks import LAN, lan
 
-from cfmkit.elastica import (
-    Control,
-    Displacement,
-    gradient,
-    trace,
-)
+import cfmkit.elastica as el
+from cfmkit.elastica import Control, Displacement, gradient, trace
 from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.equations import NumpyEquations, SolvedStates
 from cfmkit.errors import InputError
@@ -55,6 +51,38 @@ def test_a_singular_tangent_is_told_where_a_derivative_is_asked_for(
         monkeypatch.setattr(kind, "resolve", singular)
     with pytest.raises(InputError, match="singular"):
         getattr(found, output)
+
+
+def hinged(x: Any, offset: Any = (0.0, 0.0)) -> el.Network:
+    """Return two beams that meet at a hinge, whose pin is moved away from its node by x [m]."""
+    section = el.Section(2e9, 8e-3, 1e-3, axial=False)
+    nodes = {
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "b": el.Node(0.05, 0.03),
+        "pin": el.Node(0.05 + x[0], 0.03 + x[1]),
+        "c": el.Node(0.1, 0, el.CLAMPED_SUPPORT),
+    }
+    beams = {
+        "ab": el.Beam("a", "b", section, el.arc(1.0)),
+        "pc": el.Beam("pin", "c", section, el.arc(0.7), start_offset=offset),
+    }
+    springs = (el.TorsionSpring("b", "pin", 0.05),)
+    return el.Network(nodes, beams, (el.Link("b", "pin", turns=False),), springs)
+
+
+def test_a_pin_may_be_moved_away_from_its_node() -> None:
+    """Its arm turns with the node, not with the pin: efforts of neighbours by central differences."""
+    drive, step = el.Rotation("b", np.array([0.2])), 1e-5
+    slopes = gradient(trace(hinged(np.zeros(2)), drive, FINE), hinged, np.zeros(2)).effort[0]
+    for k, shift in enumerate(step * np.eye(2)):
+        ahead, behind = (trace(hinged(sign * shift), drive, FINE).effort[-1] for sign in (1, -1))
+        assert slopes[k] == pytest.approx((ahead - behind) / (2 * step), rel=1e-6)
+
+
+def test_a_pin_with_an_offset_cannot_be_moved_away_from_its_node() -> None:
+    path = trace(hinged(np.zeros(2), (0.002, 0.0)), el.Rotation("b", np.array([0.2])))
+    with pytest.raises(InputError, match="make-up"):
+        gradient(path, lambda x: hinged(x, (0.002, 0.0)), np.zeros(2))
 
 
 def nowhere(_: Any, free: Any, way: Any, **options: Any) -> SolvedStates:

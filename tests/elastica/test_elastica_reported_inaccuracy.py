@@ -99,3 +99,17 @@ def test_true_errors_are_below_the_reported_ones_in_95_of_100_paths(every: int) 
             below.append(true <= path.error + exact.error)
     assert len(below) > 800 / every
     assert np.mean(below) >= 0.95
+
+
+def test_a_path_on_which_nothing_moves_is_accurate() -> None:
+    """Its forces and motions are rounding, of which no share is an error."""
+    section = el.Section(2e9, 1e-2, 1e-3, axial=False)
+    nodes = {
+        "base": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "knee": el.Node(0.02, 0.01),
+        "top": el.Node(0, 0.03, el.slider_support(np.pi / 2)),
+    }
+    beams = {"a": el.Beam("base", "knee", section, el.arc(-np.pi / 3)), "b": el.Beam("knee", "top", section)}
+    path = el.trace(el.Network(nodes, beams), el.Loading((el.PointLoad("base", fy=1.0),), np.linspace(0.2, 1.0, 5)))
+    assert path.status is el.PathStatus.COMPLETE, path.message
+    assert path.error < 1e-7

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
 
+GAP_ROUNDING = 1e-13
+"""Of a gap, mean beam lengths: an open contact whose gap another one keeps at zero must not close, too."""
+
 
 class MeasuredGap(NamedTuple):
     """Gap of a contact, or the way that it has slipped, with its derivatives by the n unknowns that change it."""
@@ -120,7 +123,7 @@ def is_closed(contact: ContactAt, z: Any, gap: Any) -> bool:
     """Return True if a contact counts as closed: as it was set, or as its force and its gap say [HIK]."""
     if contact.closed is not None:
         return contact.closed
-    return float(np.real(z[contact.unknown])) > float(np.real(gap))
+    return float(np.real(z[contact.unknown])) > float(np.real(gap)) + GAP_ROUNDING
 
 
 def contact_contribution(mesh: Discretisation, contact: ContactAt, z: Any) -> Contribution:

@@ -90,7 +90,7 @@ void contact_term(const Model *m, Int number, const double *z, Term *t) {
     const double *value = m->contact + 6 * number, force = z[given[2]];
     double gap, gradient[3], hessian[9];
     const Int n = measure(m, given, value, z, &gap, t->at, gradient, hessian), count = n + 1;
-    const int closed = given[3] < 0 ? force > gap : given[3] != 0;
+    const int closed = given[3] < 0 ? force > gap + GAP_ROUNDING : given[3] != 0;
     t->count = count;
     t->at[n] = given[2];
     memset(t->gradient, 0, (size_t)count * sizeof(double));

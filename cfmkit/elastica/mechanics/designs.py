@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.elastica.mechanics.network_arrays import fill_arrays, join_held
 from cfmkit.elastica.model.beam_fits import BeamFits, fit_networks
 from cfmkit.elastica.model.drive import find_driven_node
-from cfmkit.elastica.model.network import PointLoad
+from cfmkit.elastica.model.network import PointLoad, swings_with_master
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
@@ -74,7 +74,8 @@ def make_up(network: Network) -> Any:
         (type(one), *(getattr(one, name, None) for name in ("node", "start", "end", "beam", "follows")))
         for one in (*network.springs, *network.loads)
     ]
-    return nodes, beams, network.links, acting, [type(contact) for contact in network.contacts]
+    arms = [swings_with_master(network, link.node) for link in network.links if not link.turns]
+    return nodes, beams, network.links, arms, acting, [type(contact) for contact in network.contacts]
 
 
 def design_of(designs: NetworkDesigns, number: int) -> Discretisation:

@@ -31,7 +31,7 @@ from cfmkit.elastica.mechanics.numbering import Numbering, Topology, find_free, 
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.contact import BeamSide, Stop
 from cfmkit.elastica.model.drive import FRAME_OF_DRIVE, Displacement, Loading, find_driven_node
-from cfmkit.elastica.model.network import PointLoad, TorsionSpring, apart, spring_ends
+from cfmkit.elastica.model.network import PointLoad, TorsionSpring, apart, spring_ends, swings_with_master
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -300,7 +300,7 @@ def _find_topology(network: Network, degree: int, cuts: Mapping[str, list[float]
         degree,
         tuple(network.nodes),
         network.links,
-        tuple(link.node for link in network.links if apart(network, link.node)),
+        tuple(link.node for link in network.links if swings_with_master(network, link.node)),
         tuple((b.start, b.end, b.start_joint == "pin", b.end_joint == "pin", len(own) - 1) for b, own in beams),
         tuple(tuple(spring_ends(spring)) for spring in network.springs) + tuple((load.node,) for load in loads),
         tuple(contact.node for contact in network.contacts if not isinstance(contact, BeamSide)),

@@ -124,6 +124,7 @@ int factors_eliminate(Factors *f, const Int *leaves, Int element);
 int factors_finish(Factors *f);
 void factors_solve(const Factors *f, double *x, double *y);
 
+#define GAP_ROUNDING 1e-13 /* of a gap, mean beam lengths; as in contact/terms.py */
 #define SAME_EQUILIBRIUM 1e-7 /* motions that differ by less are one */
 
 enum { CONVERGED, DIVERGED, SINGULAR_OR_FAR };

@@ -27,7 +27,7 @@ class Topology(NamedTuple):
     degree: int
     nodes: tuple[str, ...]
     links: tuple[Link, ...]
-    apart: tuple[str, ...]  # linked nodes that are away from their masters
+    swinging: tuple[str, ...]  # linked nodes at which arms turn with their masters
     beams: tuple[tuple[str, str, bool, bool, int], ...]  # ends, whether each is pinned, number of elements
     acting: tuple[tuple[str, ...], ...]  # nodes of each spring, then of each load
     touching: tuple[str, ...]  # nodes of contacts
@@ -72,8 +72,8 @@ def number(topology: Topology) -> Numbering:
             master = links[master].master
         if carrier not in turns:
             turns[carrier] = next(fresh)
-        # an arm swings with its master's body, or with the pin between the two if that is where the master is
-        swing = turns[carrier] if carrier != master and carrier not in topology.apart else bodies[master][2]
+        # an arm swings with its master's body, or with the pin between the two if that carries arms of its own
+        swing = turns[carrier] if carrier != master and carrier not in topology.swinging else bodies[master][2]
         node_places[name] = (*bodies[master][:2], swing, turns[carrier]), master
     places = list[tuple[tuple[int, int, int, int], str, str]]()
 

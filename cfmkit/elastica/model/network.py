@@ -175,6 +175,10 @@ class Network(ShortRepr):
         for spring in self.springs:
             for end in spring_ends(spring):
                 self._require_node(end, "a spring")
+            if isinstance(spring, LineSpring):
+                end_place = self._place(spring.end) if spring.end is not None else spring.ground
+                if self._place(spring.start) == end_place:
+                    raise InputError(f"the line spring at {spring.start!r} begins and ends at one place: no direction")
         for load in self.loads:
             self.check_load(load)
         for contact in self.contacts:
@@ -213,6 +217,9 @@ class Network(ShortRepr):
             if link.node == node and link.turns:
                 return self.body_of(link.master)
         return node
+
+    def _place(self, node: str) -> tuple[float, float]:
+        return self.nodes[node].x, self.nodes[node].y
 
     def _require_node(self, node: str, what: str) -> None:
         if node not in self.nodes:
@@ -254,3 +261,24 @@ def apart(network: Network, node: str) -> bool:
     """Return True if a node is away from its master."""
     one, other = network.nodes[node], network.nodes[network.master_of(node)]
     return bool(one.x != other.x or one.y != other.y)
+
+
+def swings_with_master(network: Network, node: str) -> bool:
+    """Return True if arms at a linked node turn with its master; else, with offsets at a pin there, with itself.
+
+    Of a pin without arms the first holds: it may be moved away from its master.
+    """
+    return apart(network, node) or not _carries_arms(network, node)
+
+
+def _carries_arms(network: Network, carrier: str) -> bool:
+    """Return True if a beam's offset is not zero, or a node away, at what turns with a node."""
+    place = network._place(carrier)
+    carried = {name for name in network.nodes if network.body_of(name) == carrier}
+    offsets = [
+        offset
+        for beam in network.beams.values()
+        for name, offset in ((beam.start, beam.start_offset), (beam.end, beam.end_offset))
+        if name in carried
+    ]
+    return any(map(any, offsets)) or any(network._place(name) != place for name in carried)

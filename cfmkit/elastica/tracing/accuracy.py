@@ -64,7 +64,10 @@ def point_errors(path: Path, indices: Sequence[int]) -> FloatArray:
         known[row] = _is_critical(mesh, z[row], float(drives[row]))
     efforts = np.abs(effort_unit * compared.effort - path.effort[chosen])
     reach = float(np.abs(own.z[:, : mesh.numbering.n_ends]).max())
-    load = max(float(compared.largest.max(initial=0.0)), NO_FORCE * reach, ROUNDING_ERROR)
+    largest = float(compared.largest.max(initial=0.0))
+    if max(reach, largest) <= ROUNDING_ERROR:  # nothing moves and nothing bears: no share of rounding is an error
+        return np.where(known, ROUNDING_ERROR, np.inf)
+    load = max(largest, NO_FORCE * reach, ROUNDING_ERROR)
     size = max(float(np.abs(path.effort).max()), NO_FORCE * max(load, reach) * mesh.scales.moment / mesh.scales.drive)
     bearing = np.maximum(efforts / size, compared.force / load) - ROUNDED_PLACES * _rises(path)[chosen] / size
     relative = np.maximum(bearing, compared.motion / max(reach, SMALL_MOTION))

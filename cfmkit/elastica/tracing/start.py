@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 FIRST_SHARE = 0.5  # of what is constant, in the first step
 LOOSEST_CORRECTION, CORRECTION_SHARE = 1e-10, 1e-6
 """Next correction at which a march accepts an equilibrium: at most, and as a share of the path's tolerance."""
-FREE_LENGTH_KEYS = "free_length", "free_angle", "free_displacement"
 FLOOR_SHARE = 0.01
 """Part of the flexibility along a straight beam that its floor may bear: where it bears less, it is taken away."""
 FLOOR_STRAIN = 1e-7  # of a beam that does not stretch, from which on the drive stretches it
@@ -118,13 +117,18 @@ def _ramps(mesh: Discretisation) -> Iterator[tuple[str, tuple[Change, bool]]]:
 
     The second of these says whether the share, not the drive, is the way.
     """
-    springs = [spring.item for spring in mesh.springs]
-    tight = any(getattr(item, name, None) for item in springs for name in FREE_LENGTH_KEYS)
-    if tight or np.count_nonzero(mesh.elements.gap):
+    if any(is_tight(spring.item) for spring in mesh.springs) or np.count_nonzero(mesh.elements.gap):
         yield "prestress", (_remove_loads, True)
     fixed = any(not load.grows for load in mesh.loads) or np.count_nonzero(mesh.base)
     if fixed or np.count_nonzero(mesh.elements.line[:, 0]):
         yield "constant loads", (_loads_as_drive, False)
+
+
+def is_tight(spring: Any) -> bool:
+    """Return True if a spring may bear a force before any load; a line spring may have a free length of zero."""
+    if getattr(spring, "free_length", None) is not None:
+        return True
+    return bool(getattr(spring, "free_angle", 0.0) or getattr(spring, "free_displacement", 0.0))
 
 
 def _make_ramp(change: tuple[Change, bool], mesh: Discretisation, remesh: Remesh | None) -> NetworkProblem:

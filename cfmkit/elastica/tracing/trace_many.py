@@ -33,7 +33,7 @@ from cfmkit.elastica.tracing.accuracy import (
     ROUNDING_ERROR,
     pick_points,
 )
-from cfmkit.elastica.tracing.start import FREE_LENGTH_KEYS, next_correction
+from cfmkit.elastica.tracing.start import is_tight, next_correction
 from cfmkit.elastica.tracing.trace import FIRST_STEP, trace
 from cfmkit.errors import CfmError, InputError
 
@@ -140,11 +140,7 @@ def _goes_straight_on(path: Path, control: Control) -> bool:
     """Return True if a network rests before its drive, is set up without cuts, and nothing happens on its path."""
     arrays = path.mesh
     springs = [spring.item for spring in arrays.springs]
-    rests = not (
-        path.network.loads
-        or arrays.base.any()
-        or any(getattr(s, name, None) for s in springs for name in FREE_LENGTH_KEYS)
-    )
+    rests = not (path.network.loads or arrays.base.any() or any(map(is_tight, springs)))
     quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
     simple = _get_common_values(path.network) is not None and arrays.pieces == 1 and not arrays.tension
     alone = control.imperfection or isinstance(path.load_case, Loading) or np.any(arrays.floored)

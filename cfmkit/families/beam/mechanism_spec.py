@@ -23,6 +23,7 @@ from cfmkit.families.beam.network_elements_spec import (
     Copies,
     DisplacementDrive,
     DriveSpec,
+    LineSpringSpec,
     LinkSpec,
     LoadsDrive,
     LoadSpec,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
 _NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 _SAME_DIRECTION = 1e-6  # rad; the support's direction is used
+_SAME_PLACE = 1e-12  # m; sums of offsets are rounded
 
 
 def faults(mechanism: Mechanism) -> Iterator[Fault]:
@@ -66,6 +68,7 @@ def faults(mechanism: Mechanism) -> Iterator[Fault]:
         for place, text in _beam_faults(mechanism, beam)
     ]
     yield from beams
+    yield from _spring_faults(mechanism)
     yield from _link_faults(mechanism)
     yield from () if beams else _loose_nodes(mechanism)
     yield from _drive_faults(mechanism)
@@ -120,11 +123,21 @@ def _beam_faults(mechanism: Mechanism, beam: MemberSpec) -> Iterator[Fault]:
     arms = beam.start_offset or (0.0, 0.0), beam.end_offset or (0.0, 0.0)
     x, y = (end.at[k] + arms[1][k] - start.at[k] - arms[0][k] for k in (0, 1))
     reach = math.hypot(x, y)
-    if reach == 0:
+    if reach < _SAME_PLACE:
         yield ("end",), f"the two ends of the beam are at the same place, at {beam.start!r}"
         return
     for key, why in beam.shape.find_faults(reach):
         yield ("shape", beam.shape.kind, key), why
+
+
+def _spring_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    for name, spring in mechanism.springs.items():
+        if isinstance(spring, LineSpringSpec):
+            start, end = mechanism.nodes[spring.start].at, spring.ground or mechanism.nodes[str(spring.end)].at
+            if math.dist(start, end) < _SAME_PLACE:
+                key = "end" if spring.ground is None else "ground"
+                why = f"the spring begins and ends at the place of {spring.start!r}: it has no direction"
+                yield ("springs", name, "line", key), f"{why}; use two springs of kind 'slide'"
 
 
 def _link_faults(mechanism: Mechanism) -> Iterator[Fault]:

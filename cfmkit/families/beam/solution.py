@@ -153,6 +153,8 @@ class Solution(ShortRepr):
 
     def _solved_part_efforts(self, places: FloatArray) -> FloatArray:
         assert self.model_between_points is not None
+        if not len(places):  # sides of beams that touch have no arrays of no states
+            return np.empty(0)
         path = self.model_between_points.solve_at(places)
         return np.where(path.accurate, self.replace_path(path).largest_member_efforts, np.nan)
 
