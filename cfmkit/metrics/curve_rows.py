@@ -281,7 +281,8 @@ def _stress_of_trace(trace: BranchTrace, frame: MeasuringFrame) -> StressRows | 
 
     def read() -> Sequence[RowSamples]:
         beside = [item for curve in frame.load_cases for item in traces(curve) if item.name == name]
-        return [_samples_of(item, item.stress) for item in (trace, *beside) if item.stress is not None]
+        cases = (trace, *beside) if trace.read_stress else ()
+        return [_samples_of(item, item.stress) for item in cases if item.stress is not None]
 
     def find_largest(low: FloatArray, high: FloatArray) -> FloatArray | None:
         value = model.largest_stress(name, low[0], high[0]) if isinstance(model, LargestStress) else None
