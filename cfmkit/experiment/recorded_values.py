@@ -95,7 +95,7 @@ def holes_of(curves: Sequence[Curve], window: Window) -> tuple[UnrecordedInterva
     """Return the holes of all branches of all cycles in a window, in their order."""
     holes = []
     for curve in curves:
-        cycle = int(curve.label["cycle"][0]) if len(curves) > 1 else None
+        cycle = number_of(curve)
         for branch in curve.branches:
             places = np.sort(curve.select_branch(branch).motion)
             holes += [

@@ -47,20 +47,20 @@ def bands_of(result: Result) -> tuple[Band, ...]:
         return ()
     kind = result.curves[0].kind
     wanted = [item for item in result.spec.requirements if _plain(item.metric, kind) in _BAND_LABELS]
-    found = (_band(outcome, result) for outcome in check(wanted, result))
-    return tuple(band for band in found if band is not None)
+    bands = (_band(outcome, result) for outcome in check(wanted, result))
+    return tuple(band for band in bands if band is not None)
 
 
 def limits_on(result: Result, metric: str) -> tuple[Limit, ...]:
     """Return what the requirements allow of one of the family's values, as lines for a diagram of it."""
     wanted = [item for item in result.spec.requirements if item.metric == metric]
-    found = []
+    limits = []
     for outcome in check(wanted, result):
         for bound, sign in ((outcome.min, "≥"), (outcome.max, "≤")):
             if bound is not None:
                 text = f"required {sign} {value_text(bound, outcome.dimension)}"
-                found.append(Limit(bound, text, trouble=not outcome.ok))
-    return tuple(found)
+                limits.append(Limit(bound, text, trouble=not outcome.ok))
+    return tuple(limits)
 
 
 def _plain(metric: str, kind: str) -> str:
@@ -125,7 +125,7 @@ def _worst(
     subjects: Mapping[str, RowsInWindow], rule: Callable[[OneSpread, float], BandNeed], limit: float
 ) -> tuple[Bounds | None, str]:
     """Return the band of the branch that needs most of it, and that branch's name."""
-    found = []
+    candidates = []
     for name, rows in subjects.items():
         try:
             mean, largest, least, sign = (value.item() for value in rows.spread)
@@ -133,10 +133,10 @@ def _worst(
             continue
         if largest > 0:
             low, high, need = rule((mean, largest, least), limit)
-            found.append((need, sorted((sign * low, sign * high)), name))
-    if not found:
+            candidates.append((need, sorted((sign * low, sign * high)), name))
+    if not candidates:
         return None, ""
-    _, (low, high), name = max(found, key=lambda item: item[0])
+    _, (low, high), name = max(candidates, key=lambda item: item[0])
     return (low, high), name
 
 
