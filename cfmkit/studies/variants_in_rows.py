@@ -123,7 +123,7 @@ class SolvedVariants:
         """
         own = [getattr(getattr(spec, "analysis", None), "window", None) for spec in self.specs]
         window = self._places(own if over is None else [over])
-        if window is None or not left or self.result is None or self.result.status is not Status.PARTIAL:
+        if window is None or not left:
             return window
         low, high = np.maximum(window[0], self._common[0]), np.minimum(window[1], self._common[1])
         return (low, high) if low[0] < high[0] else window
@@ -133,6 +133,7 @@ class SolvedVariants:
 
         What is no matter of one branch stands under the name "".
         """
+        left = left and self.result is not None and self.result.status is Status.PARTIAL  # of others it is the same
         if (name, over, left) not in self._values:
             self._values[name, over, left] = self._compute(name, over, left)
         return self._values[name, over, left]
