@@ -151,11 +151,9 @@ def worst(codes: list[ExitCode]) -> ExitCode:
 def report_on(result: Result, design: Design | None = None) -> Report:
     """Return the report on a result, and on the design that led to it."""
     from cfmkit.families import family
-    from cfmkit.metrics import check, evaluate, values_of_family
+    from cfmkit.metrics import evaluate
 
-    values = values_of_family(family(result.spec.family).outputs.values)
-    requirements = check(result.spec.part_requirements, result, values)
-    return Report(result, evaluate(result), requirements, design)
+    return Report(result, evaluate(result), family(result.spec.family).check(result), design)
 
 
 def empty_result(spec: Spec, design: Design) -> Result:

@@ -19,7 +19,7 @@ from cfmkit.experiment.calibration import analyze_part
 from cfmkit.experiment.errors_of_made_part import is_thickness
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE_METRICS
-from cfmkit.metrics import Undefined, Window, check, frame_of, values_of_family, window_of
+from cfmkit.metrics import Undefined, Window, frame_of, window_of
 from cfmkit.metrics.compare import effort_at
 from cfmkit.specs.units import format_short, from_border, to_border
 from cfmkit.specs.yamlio.paths import read_item_suffix
@@ -391,9 +391,8 @@ def largest_miss(result: Result, of_envelope: bool = False) -> float:
 
     `of_envelope`: of the requirements on the envelope alone.
     """
-    values = values_of_family(family(result.spec.family).outputs.values)
     shares = [0.0]
-    for outcome in check(result.spec.part_requirements, result, values):
+    for outcome in family(result.spec.family).check(result):
         if outcome.value is None or (of_envelope and outcome.metric not in ENVELOPE_METRICS):
             continue
         for bound, sign in ((outcome.max, 1.0), (outcome.min, -1.0)):

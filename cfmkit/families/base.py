@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.families.papers import Paper
     from cfmkit.families.proposals import FamilyOffer, Request
     from cfmkit.families.rows import SolvedRows
+    from cfmkit.metrics import Outcome
     from cfmkit.plots.mechanism_in_motion import Moving
     from cfmkit.results import Design, Result
     from cfmkit.solid.adaptive_solution import DrivenPart
@@ -296,6 +297,12 @@ class Family:
         if ENVELOPE_METRICS.keys().isdisjoint(names) or not self.part:
             return result
         return add_size(result, self.envelope(result))
+
+    def check(self, result: Result) -> tuple[Outcome, ...]:
+        """Return the outcome of each requirement of its specification on a result, but those on many parts."""
+        from cfmkit.metrics import check, values_of_family
+
+        return check(result.spec.part_requirements, result, values_of_family(self.outputs.values))
 
     def envelope(self, result: Result) -> BoundingBox | None:
         """Return the box that a solved mechanism stays in; None if it is not known."""

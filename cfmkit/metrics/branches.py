@@ -81,11 +81,6 @@ class BranchTrace:
         """Largest stress at each point (n,) [Pa], computed when it is read; None if the curve has none."""
         return None if self.read_stress is None else self.read_stress()
 
-    def changed_stress(self, change: Callable[[FloatArray], FloatArray]) -> Callable[[], FloatArray] | None:
-        """Return what reads the stress as a function changes it; None if there is none."""
-        read = self.read_stress
-        return None if read is None else lambda: change(read())
-
     @cached_property
     def way(self) -> int:
         """1 if the motion never decreases along the path, -1 if it never increases, 0 if it turns back."""
@@ -101,11 +96,6 @@ class BranchTrace:
             first, last = float(self.motion[0]), float(self.motion[-1])
             return (first, last) if self.way > 0 else (last, first)
         return float(self.motion.min()), float(self.motion.max())
-
-    def work(self) -> float:
-        """Return the integral of effort over motion along the path [J], by trapezoids."""
-        steps = self.motion[1:] - self.motion[:-1]
-        return float(steps @ (self.effort[1:] + self.effort[:-1])) / 2
 
 
 def traces(curve: Curve) -> tuple[BranchTrace, ...]:
@@ -145,78 +135,32 @@ def find_between_ends(places: FloatArray, low: float, high: float) -> NDArray[np
     return (places > low + slack) & (places < high - slack)
 
 
-def restrict(trace: BranchTrace, window: Window) -> BranchTrace:
-    """Return the part of a branch inside the window, with interpolated ends; the caller checks `covers`."""
+def restrict(motion: FloatArray, values: FloatArray, window: Window) -> tuple[FloatArray, FloatArray]:
+    """Return places and values of a branch inside a window, in the order of its path, with interpolated ends.
+
+    One that turns back may have several runs there. The caller checks `covers`.
+    """
     slack = WINDOW_RTOL * (window.hi - window.lo)
-    if trace.extent[0] >= window.lo - slack and trace.extent[1] <= window.hi + slack:
-        return trace
-    return _straight(trace, window, slack) if trace.way else _cut_folded(trace, window, slack)
+    inside = (motion >= window.lo - slack) & (motion <= window.hi + slack)
+    if inside.all():
+        return motion, values
+    before, shares, levels = _crossings(motion, window, slack)
+    ends, kept = values[before] + shares * (values[before + 1] - values[before]), np.insert(inside, before + 1, True)
+    return np.insert(motion, before + 1, levels)[kept], np.insert(values, before + 1, ends)[kept]
 
 
-def _straight(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
-    """Return the part of a branch that never turns back."""
-    motion = trace.motion[:: trace.way]
-    first, last = int(motion.searchsorted(window.lo - slack)), int(motion.searchsorted(window.hi + slack, "right"))
-    # an end between two samples needs a point of its own: the segment it lies on, and how far along
-    head = _place_between(motion, first, window.lo) if first and motion[first] > window.lo + slack else None
-    tail = (
-        _place_between(motion, last, window.hi) if last < len(motion) and motion[last - 1] < window.hi - slack else None
-    )
-
-    def cut(values: FloatArray) -> FloatArray:
-        values = values[:: trace.way]
-        pieces = [_values_along(values, head), values[first:last], _values_along(values, tail)]
-        return np.concatenate(pieces)[:: trace.way] if head or tail else pieces[1][:: trace.way]
-
-    return BranchTrace(trace.name, cut(trace.motion), cut(trace.effort), trace.changed_stress(cut))
-
-
-def _place_between(motion: FloatArray, after: int, place: float) -> tuple[int, float]:
-    before = float(motion[after - 1])
-    return after, (place - before) / (float(motion[after]) - before)
-
-
-def _values_along(values: FloatArray, where: tuple[int, float] | None) -> FloatArray:
-    if where is None:
-        return values[:0]
-    after, part = where
-    before = values[after - 1 : after]
-    return before + part * (values[after : after + 1] - before)
-
-
-def _cut_folded(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
-    """Return the part of a branch that turns back: several runs, perhaps."""
-    inside = (trace.motion >= window.lo - slack) & (trace.motion <= window.hi + slack)
-    where, level = _crossings(trace.motion, window, slack)
-    after = where.astype(np.intp) + 1
-    kept = np.insert(inside, after, True)
-    return BranchTrace(
-        trace.name,
-        np.insert(trace.motion, after, level)[kept],
-        _insert_interpolated(trace.effort, where, after)[kept],
-        trace.changed_stress(lambda stress: _insert_interpolated(stress, where, after)[kept]),
-    )
-
-
-def _crossings(motion: FloatArray, window: Window, slack: float) -> tuple[FloatArray, FloatArray]:
-    """Return where along the path, as fractional indices, the ends of the window are crossed between samples."""
-    places, levels = [], []
+def _crossings(motion: FloatArray, window: Window, slack: float) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
+    """Return where ends of the window are crossed between samples: the one before, the share of the step, the end."""
+    pieces = []
     for level in (window.lo, window.hi):
         offset = motion - level
         side = (offset > slack).view(np.int8) - (offset < -slack).view(np.int8)
         before = np.flatnonzero(side[1:] * side[:-1] < 0)
-        start = offset[before]
-        places.append(before + start / (start - offset[before + 1]))
-        levels.append(np.full(len(before), level))
-    where = np.concatenate(places)
-    order = np.argsort(where)
-    return where[order], np.concatenate(levels)[order]
-
-
-def _insert_interpolated(values: FloatArray, where: FloatArray, after: NDArray[np.intp]) -> FloatArray:
-    """Return `values` with linearly interpolated ones at the fractional indices `where`."""
-    before = values[after - 1]
-    return np.insert(values, after, before + (where - (after - 1)) * (values[after] - before))
+        shares = -offset[before] / (motion[before + 1] - motion[before])
+        pieces.append((before, shares, np.full(len(before), level)))
+    before, shares, levels = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    order = np.argsort(before + shares)
+    return before[order], shares[order], levels[order]
 
 
 _LOBATTO_NODE = 1.0 / np.sqrt(5.0)

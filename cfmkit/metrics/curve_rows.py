@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.metrics.branches import BAND_RTOL, WINDOW_RTOL, BranchTrace, Window, reach, restrict, traces
+from cfmkit.metrics.branches import BAND_RTOL, WINDOW_RTOL, Window, reach, restrict, traces
 from cfmkit.metrics.continuous_means_and_extremes import extremes, extremes_of_all
 from cfmkit.metrics.measuring_frame import MeasuringFrame
 from cfmkit.results import LargestStress, OwnStress
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
+    from cfmkit.metrics.branches import BranchTrace
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
     Ends = tuple[FloatArray, FloatArray]
@@ -71,8 +72,8 @@ class RowSamples:
 
     def cut_one(self, low: float, high: float) -> RowSamples:
         """Return the part of one curve in a window that it covers, with ends by linear interpolation."""
-        part = restrict(BranchTrace("", self.motion[0], self.values[0]), Window(low, high))
-        return RowSamples(part.motion[None], part.effort[None], np.array([len(part.motion)]))
+        motion, values = restrict(self.motion[0], self.values[0], Window(low, high))
+        return RowSamples(motion[None], values[None], np.array([len(motion)]))
 
     def find_between(self, window: Ends, slack: FloatArray | float = 0.0) -> NDArray[np.bool_]:
         """Return which samples are inside of windows, the ends left out, (d, n)."""
@@ -281,7 +282,8 @@ def _stress_of_trace(trace: BranchTrace, frame: MeasuringFrame) -> StressRows | 
 
     def read() -> Sequence[RowSamples]:
         beside = [item for curve in frame.load_cases for item in traces(curve) if item.name == name]
-        return [_samples_of(item, item.stress) for item in (trace, *beside) if item.stress is not None]
+        cases = (trace, *beside) if trace.read_stress else ()
+        return [_samples_of(item, item.stress) for item in cases if item.stress is not None]
 
     def find_largest(low: FloatArray, high: FloatArray) -> FloatArray | None:
         value = model.largest_stress(name, low[0], high[0]) if isinstance(model, LargestStress) else None

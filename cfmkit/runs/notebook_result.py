@@ -71,10 +71,7 @@ class AnalysisView(Result):
     @cached_property
     def requirements(self) -> Sequence[Outcome]:
         """Outcome of each requirement of the specification."""
-        from cfmkit.metrics import check, values_of_family
-
-        values = values_of_family(family(self.spec.family).outputs.values)
-        return Requirements(check(self.spec.part_requirements, self, values))
+        return Requirements(family(self.spec.family).check(self))
 
     def plot(self, ax: Axes | None = None, *, bands: bool = True, names: bool = True, arrows: bool = True) -> Axes:
         """Draw force over displacement, or torque over angle, and return the axes.

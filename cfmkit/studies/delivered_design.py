@@ -29,7 +29,7 @@ from cfmkit.designing.rounded_and_reported_values import search_values
 from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
 from cfmkit.families.base import add_size
-from cfmkit.metrics import check, evaluate, mean_effort, values_of_family, window_of
+from cfmkit.metrics import evaluate, mean_effort, window_of
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
 
@@ -271,7 +271,7 @@ def move_free_values(
     nominal = _analyze(spec, run)
     if not nominal.curves:
         return Design(None, nominal.status, nominal.message)
-    outcomes = _outcomes(nominal)
+    outcomes = family(spec.family).check(nominal)
     if nominal.status is Status.COMPLETE and outcomes and all(outcome.ok for outcome in outcomes):
         return Design(spec, Status.COMPLETE, notes=(("free", "all requirements are met as it is: nothing was moved"),))
     kind = nominal.curve.kind
@@ -301,14 +301,11 @@ def _analyze(spec: Spec, run: Run) -> Result:
     return add_size(result, record.envelope(result)) if result.curves else result
 
 
-def _outcomes(result: Result) -> Sequence[Outcome]:
-    return check(result.spec.part_requirements, result, values_of_family(family(result.spec.family).outputs.values))
-
-
 def _judge(design: Design, run: Run) -> Design:
     """Return a design, or what it misses by more than the rounding of its values."""
     assert design.spec is not None
-    missed = [outcome.sentence for outcome in _outcomes(_analyze(design.spec, run)) if not outcome.ok]
+    outcomes = family(design.spec.family).check(_analyze(design.spec, run))
+    missed = [outcome.sentence for outcome in outcomes if not outcome.ok]
     if not missed:
         return design
     reported = f"no values in the ranges of 'design.free' meet all requirements; the nearest: {'; '.join(missed)}"

@@ -17,7 +17,7 @@ import numpy as np
 
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.metrics import check, evaluate, mean_effort, values_of_family
+from cfmkit.metrics import evaluate, mean_effort
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
 from cfmkit.stock.processes import is_whole, strands, strands_in_words
@@ -263,8 +263,8 @@ def _outcomes(spec: Spec, run: Run) -> tuple[list[bool], set[str]]:
     """Return whether a design is solved to its end and meets each requirement on one part; names of its warnings."""
     record = family(spec.family)
     result = record.analyze(spec, run)
-    met = check(spec.part_requirements, result, values_of_family(record.outputs.values))
-    reached = [result.status is Status.COMPLETE, _keeps_tolerance(spec, result), *(bool(entry.ok) for entry in met)]
+    met = (bool(entry.ok) for entry in record.check(result))
+    reached = [result.status is Status.COMPLETE, _keeps_tolerance(spec, result), *met]
     return reached, {entry.name for entry in result.warnings}
 
 

@@ -123,7 +123,7 @@ class SolvedVariants:
         """
         own = [getattr(getattr(spec, "analysis", None), "window", None) for spec in self.specs]
         window = self._places(own if over is None else [over])
-        if window is None or not left or self.result is None or self.result.status is not Status.PARTIAL:
+        if window is None or not left:
             return window
         low, high = np.maximum(window[0], self._common[0]), np.minimum(window[1], self._common[1])
         return (low, high) if low[0] < high[0] else window
@@ -133,6 +133,7 @@ class SolvedVariants:
 
         What is no matter of one branch stands under the name "".
         """
+        left = left and self.result is not None and self.result.status is Status.PARTIAL  # of others it is the same
         if (name, over, left) not in self._values:
             self._values[name, over, left] = self._compute(name, over, left)
         return self._values[name, over, left]
@@ -179,10 +180,9 @@ class SolvedVariants:
         Raises CfmError if a requirement is not well put for such curves.
         """
         shape = len(self), len(self.study.metrics), len(self.study.spec.part_requirements)
-        warned = self.solved.findings() if self.study.findings else {}
         result = self.result
         if result is not None and not result.status.usable:
-            return failed_rows(shape, result.status, result.message, warned=warned)
+            return failed_rows(shape, result.status, result.message, warned=self._findings())
         self.study.check_requirements(next(iter(self.solved.branches.values())).kind)
         values = np.empty(shape[:2])
         for k, (name, over) in enumerate(self._asked[: shape[1]]):
@@ -193,6 +193,7 @@ class SolvedVariants:
             limits = Bounds.from_requirement(one, self._definitions[split_name(one.metric)[0]].dimension)
             by_branch = self.values(one.metric, one.over, left=False).values()
             met[:, k] = np.logical_and.reduce([limits.met_by(item) for item in by_branch]) if by_branch else False
+        warned = self._findings()  # behind the values: many paths are solved at once for these
         if result is None or result.status is Status.COMPLETE:
             odd = {row: (Status.COMPLETE, text) for row, text in self._find_gaps()}
             outside = np.isin(np.arange(shape[0]), list(odd))
@@ -202,6 +203,9 @@ class SolvedVariants:
         for row, error in self.faults.items():
             values[row], met[row], odd[row] = np.nan, False, (Status.INVALID, describe_error(error))
         return ResultRows(values, met, odd, warned=warned)
+
+    def _findings(self) -> dict[str, NDArray[np.bool_]]:
+        return self.solved.findings() if self.study.findings else {}
 
     def _find_gaps(self) -> Iterator[tuple[int, str]]:
         """Yield rows with windows that some branch does not cover, and why cells have no value."""

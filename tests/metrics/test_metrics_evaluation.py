@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from metrics_support import BARE, LOOP, SAW, curve, reason, value
 
 from cfmkit.curves import Curve
 from cfmkit.errors import UsageError
-from cfmkit.metrics import BranchTrace, MeasuringFrame, Window, as_json, evaluate, measure, restrict, traces
+from cfmkit.metrics import MeasuringFrame, Window, as_json, evaluate, measure, restrict, traces
 from cfmkit.results import Quantity, Result, Status
 
 
@@ -21,7 +22,15 @@ def usable(of, frame=BARE):
 
 
 def part(motion, effort, lo, hi):
-    return restrict(BranchTrace("load", np.array(motion, float), np.array(effort, float)), Window(lo, hi))
+    return SimpleNamespace(
+        **dict(
+            zip(
+                ("motion", "effort"),
+                restrict(np.array(motion, float), np.array(effort, float), Window(lo, hi)),
+                strict=True,
+            )
+        )
+    )
 
 
 def test_a_window_between_samples_gets_interpolated_ends():
@@ -57,7 +66,7 @@ def test_a_window_that_is_the_travel_but_for_the_last_bits_is_covered():
 def test_a_fold_gives_every_run_inside_the_window():
     found = part([0, 4, 1, 5], [0, 4, 1, 5], 2, 3)
     assert found.motion.tolist() == [2, 3, 3, 2, 2, 3]
-    assert found.work() == pytest.approx(2.5)
+    assert np.trapezoid(found.effort, found.motion) == pytest.approx(2.5)
 
 
 def test_straight_and_folded_branches_are_cut_alike():

@@ -74,3 +74,23 @@ def test_rows_of_beams_are_solved_together_and_are_runs_of_their_own(stem: str, 
     study, plan = study_of(spec, {path: spec.get_value(path) * draw.uniform(0.99, 1.01, 3) for path in paths})
     assert points_at_once(study, plan) > 1
     assert_rows_equal_runs(study, plan, rtol=1e-11, flat=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("stem", "changes", "path", "values"),
+    [
+        ("cam_dynamics", {}, "mechanism.springs.rest_length", (0.058, 0.2)),
+        ("slider_crank_lumped", {}, "mechanism.crank_length", (0.02, 0.0)),
+        (
+            "vcfm_pla",
+            {"analysis.fidelity": "exact", "analysis.points": 9},
+            "mechanism.bistable.thickness",
+            (9e-4, 1e-3),
+        ),
+    ],
+)
+def test_models_that_solve_one_after_the_other_give_rows_of_one(stem, changes, path, values) -> None:
+    """Of which one may be invalid, or have no equilibrium."""
+    study, plan = study_of(cfmkit.load(CONFIGS / f"{stem}.yaml").replace(changes), {path: np.array(values)})
+    assert points_at_once(study, plan) == 1
+    assert_rows_equal_runs(study, plan)

@@ -6,6 +6,7 @@ or of the stress, at the poses of its window do. Any other metric is a number of
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeGuard
@@ -16,6 +17,7 @@ from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE_METRICS, Sampled
 from cfmkit.families.rows import Variants
+from cfmkit.families.variant_rows import SingleRow
 from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Status
@@ -24,13 +26,13 @@ from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.variants_in_rows import SolvedVariants
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
-    from cfmkit.metrics.curve_rows import CurveRows
+    from cfmkit.metrics.curve_rows import CurveRows, RowSamples
     from cfmkit.results import Result
     from cfmkit.specs.spec import Requirement, Spec
     from cfmkit.studies.point_evaluation import Metric
@@ -312,26 +314,59 @@ def quickly_sampled(spec: Spec, places: FloatArray) -> Sampled | None:
 
 def sampled_on_curves(result: Result, places: FloatArray, reached: tuple[float, ...]) -> Sampled | None:
     """Return effort and stress at places of the curves of a part, as `sampled_of` does."""
-    if result.status is not Status.COMPLETE or not result.curves:
+    branches = SingleRow(result).branches
+    if result.status is not Status.COMPLETE or not _get_to(branches, places, reached).all():
         return None
-    curve, effort, stress = result.curve, {}, []
-    for branch in curve.branches:
-        on = curve.branch == branch
-        motion, order = curve.motion[on], np.argsort(curve.motion[on], kind="stable")
-        if len(motion) < 2 or not (np.diff(motion[order]) > 0).all():
-            return None
-        slack = 1e-9 * float(places[-1] - places[0])
-        if any(not motion.min() - slack <= place <= motion.max() + slack for place in reached):
-            return None
-        between = np.interp(places, motion[order], curve.effort[on][order])
-        if result.closed is not None:  # points may be few, and a force begins steeply
-            exact = result.closed.effort(branch, np.clip(places, motion.min(), motion.max()))
-            between = np.where(np.isfinite(exact), exact, between)
-        effort[branch] = between
-        if "max_stress" in curve.extra:
-            values = np.asarray(curve.extra["max_stress"].values, dtype=float)[on]
-            stress.append(np.interp(places, motion[order], values[order]))
-    return Sampled(effort, np.array(stress).reshape(-1, len(places)))
+    if any((np.diff(curves.samples.motion[0]) <= 0).any() for curves in branches.values()):
+        return None
+    sampled = _sample_rows(branches, places)
+    if sampled is None:
+        return None
+    effort, stress = sampled
+    largest = np.array([values[0] for values in stress]).reshape(-1, len(places))
+    return Sampled({name: values[0] for name, values in effort.items()}, largest)
+
+
+def _get_to(branches: Mapping[str, CurveRows], places: FloatArray, reached: tuple[float, ...]) -> NDArray[np.bool_]:
+    """Return which curves have points, and get to all places that must be reached, on every branch."""
+    slack = 1e-9 * float(places[-1] - places[0])
+    is_reached = np.array([bool(branches)])
+    for curves in branches.values():
+        low, high = curves.extent
+        is_reached = is_reached & (curves.samples.count > 1)
+        for place in reached:
+            is_reached = is_reached & (low - slack <= place) & (place <= high + slack)
+    return is_reached
+
+
+def _sample_rows(
+    branches: Mapping[str, CurveRows], places: FloatArray
+) -> tuple[dict[str, FloatArray], list[FloatArray]] | None:
+    """Return effort (m, p) by branch and stresses, (m, p) each, of curves at places, or at the nearer end of each.
+
+    None if the stress is not known at points: of traced paths a part alone is solved at these places.
+    """
+    effort, stress = {}, []
+    for name, curves in branches.items():
+        low, high = curves.extent
+        with np.errstate(all="ignore"):
+            values = curves.all_at(
+                np.clip(np.broadcast_to(places, (len(low), len(places))), low[:, None], high[:, None])
+            )
+        if not np.isfinite(values).all():
+            values = np.where(np.isfinite(values), values, _interpolate(curves.samples, places))
+        effort[name] = values
+        if curves.stress is not None:
+            if not curves.stress.samples:
+                return None
+            stress.append(_interpolate(curves.stress.samples[0], places))
+    return effort, stress
+
+
+def _interpolate(samples: RowSamples, places: FloatArray) -> FloatArray:
+    """Return values at places between the points of each row, (m, p)."""
+    rows = zip(samples.motion, samples.values, samples.count.tolist(), strict=True)
+    return np.array([np.interp(places, motion[:count], values[:count]) for motion, values, count in rows])
 
 
 def numbers_in(seen: Sampled) -> FloatArray:
@@ -367,7 +402,7 @@ def numbers_of_parts(
         return spec.replace({path: column[k].item() for path, column in columns.items()}, as_made=True)
 
     parts = Variants(spec.model_copy(update={"requirements": ()}), columns, part, count)
-    numbers_by_part = _numbers_in_rows(parts, rows, reached)
+    numbers_by_part = dict(_numbers_in_rows(parts, rows, reached))
 
     def alone(k: int) -> FloatArray | None:
         try:
@@ -380,60 +415,25 @@ def numbers_of_parts(
 
 def _numbers_in_rows(
     parts: Variants, rows: RequirementRows, reached: tuple[float, ...]
-) -> dict[int, FloatArray | None]:
-    """Return the numbers of those parts that are solved together and have complete curves."""
-    numbers_by_part: dict[int, FloatArray | None] = {}
-    solve = family(parts.spec.family).rows
-    if solve is None or not len(parts):
-        return numbers_by_part
+) -> Iterator[tuple[int, FloatArray | None]]:
+    """Yield (index, numbers) of those parts that are solved together and have complete curves."""
+    record = family(parts.spec.family)
+    if record.rows is None or not len(parts):
+        return
     study = Study(parts.spec, tuple(parts.values), rows.metrics, findings=False)
-    try:
-        for members, solved in solve(parts):
+    with suppress(CfmError):  # each part says by itself what is wrong with it
+        for members, solved in record.rows(parts):
             variants = SolvedVariants(study, parts, members, solved)
-            if tuple(solved.branches) != rows.branches or not variants.known:
+            sampled = _sample_rows(solved.branches, rows.places) if variants.known else None
+            if sampled is None or tuple(sampled[0]) != rows.branches or len(sampled[1]) != rows.stresses:
                 continue
-            numbers = _looked_up(solved.branches, rows, variants)
-            if numbers is not None:
-                good = solved.complete & np.isfinite(numbers).all(axis=1)
-                good[list(variants.rows().odd)] = False
-                is_reached = _get_to(solved.branches, rows, reached)
-                numbers_by_part |= {
-                    int(members[row]): numbers[row] if is_reached[row] else None for row in np.flatnonzero(good)
-                }
-    except CfmError:  # each part says by itself what is wrong with it
-        return {}
-    return numbers_by_part
-
-
-def _get_to(branches: Mapping[str, CurveRows], rows: RequirementRows, reached: tuple[float, ...]) -> NDArray[np.bool_]:
-    """Return which rows of a solution get to all places that must be reached, on every branch."""
-    slack = 1e-9 * float(rows.places[-1] - rows.places[0])
-    ends = [curves.extent for curves in branches.values()]
-    is_reached = np.ones(len(ends[0][0]), dtype=bool)
-    for low, high in ends:
-        for place in reached:
-            is_reached &= (low - slack <= place) & (place <= high + slack)
-    return is_reached
-
-
-def _looked_up(branches: Mapping[str, CurveRows], rows: RequirementRows, variants: SolvedVariants) -> FloatArray | None:
-    """Return the numbers of each row of a solution, (m, q); None if it has other stresses than the rows look at."""
-    columns, stresses = [], []
-    for curves in branches.values():
-        low, high = curves.extent
-        places = np.clip(np.broadcast_to(rows.places, (len(low), len(rows.places))), low[:, None], high[:, None])
-        with np.errstate(all="ignore"):
-            columns.append(curves.all_at(places))
-        if curves.stress is not None:
-            if not curves.stress.samples:  # traced paths: a part alone is solved at these places
-                return None
-            # between the points of its curve, as of a part alone
-            points = curves.stress.samples[0]
-            points_by_row = zip(points.motion, points.values, points.count.tolist(), strict=True)
-            stresses.append([np.interp(rows.places, motion[:n], values[:n]) for motion, values, n in points_by_row])
-    if len(stresses) != rows.stresses:
-        return None
-    return np.hstack([*columns, *map(np.array, stresses), variants.rows().values])
+            noted = variants.rows()
+            numbers = np.hstack([*sampled[0].values(), *sampled[1], noted.values])
+            good = solved.complete & np.isfinite(numbers).all(axis=1)
+            good[list(noted.odd)] = False
+            is_reached = _get_to(solved.branches, rows.places, reached)
+            for row in np.flatnonzero(good).tolist():
+                yield int(members[row]), numbers[row] if is_reached[row] else None
 
 
 def numbers_of_known(result: Result, quick: Sampled | None, rows: RequirementRows) -> FloatArray | None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from cfmkit.errors import Problem, SolutionError, SpecError, UsageError
 from cfmkit.families import family
-from cfmkit.metrics import check, values_of_family
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Finding
 from cfmkit.specs.sensitivity_methods import METHOD_NAMES
@@ -226,9 +225,8 @@ def _with_nominal(study: Study, result: Result) -> tuple[Study, Nominal, tuple[F
         Finding("no_value", f"{label} has no value for the specification itself ({reason}): left out")
         for label, reason in reported.items()
     )
-    outcomes = check(study.spec.part_requirements, result, values_of_family(family(study.spec.family).outputs.values))
     kept = replace(study, metrics=tuple(study.metrics[k] for k in valued))
-    return kept, Nominal(result, outcomes, rows.values[0, valued]), without
+    return kept, Nominal(result, family(study.spec.family).check(result), rows.values[0, valued]), without
 
 
 def _valueless(study: Study, result: Result) -> Iterator[tuple[Metric, Quantity]]:
