@@ -223,23 +223,15 @@ class TipOnSurface:
         """Return why the tip does not follow the surface beyond a place [m]."""
         u = float(self.displacement(np.array([place]))[0])
         where, asked = format_short(place, "length"), format_short(u, "length")
+        lifts = f"the tip leaves the surface at {where} along it"
         if u < self.x[0] and self.effort[0] <= 0:
-            return finding(
-                "tip_lifts_off",
-                f"the tip leaves the surface at {where} along it: there the mechanism is at rest and the surface falls "
-                "further",
-            )
+            return finding("tip_lifts_off", f"{lifts}: there the mechanism is at rest and the surface falls further")
         if self.x[0] <= u <= self.x[-1] and np.isfinite(self.force(np.array([place]))).all():
-            return finding(
-                "tip_lifts_off",
-                f"the tip leaves the surface at {where} along it: the force of the mechanism falls to zero at a "
-                f"displacement of {asked}",
-            )
+            reason = f"the force of the mechanism falls to zero at a displacement of {asked}"
+            return finding("tip_lifts_off", f"{lifts}: {reason}")
         low, high = (format_short(float(end), "length") for end in (self.x[0], self.x[-1]))
-        return finding(
-            "surface_out_of_reach",
-            f"the surface requires a displacement of {asked} at {where}, the mechanism is solved for {low} to {high}",
-        )
+        message = f"the surface requires a displacement of {asked} at {where}"
+        return finding("surface_out_of_reach", f"{message}, the mechanism is solved for {low} to {high}")
 
 
 def follow_surface(solution: SolvedMechanism) -> SurfaceResult | None:
@@ -298,9 +290,8 @@ def _tip_on_surface(solution: SolvedMechanism, surface: Surface) -> TipOnSurface
     turns = np.flatnonzero(steps != steps[0])
     count = int(turns[0]) + 1 if len(turns) else len(x)
     sense = slice(None) if steps[0] > 0 else slice(None, None, -1)
-    x, effort, stress, stable = (
-        part[:count][sense] for part in (x, effort, stress, np.asarray(solution.stable, float))
-    )
+    stable = np.asarray(solution.stable, float)
+    x, effort, stress, stable = (values[:count][sense] for values in (x, effort, stress, stable))
     if (law := solution.model_between_points) is not None:  # with the extremes between the points
         places, effort = law.knots
         x, stress, stable = places, law.stress("", places), np.interp(places, x, stable)
@@ -339,11 +330,9 @@ def _findings(tip: TipOnSurface, result: SurfaceResult, allowable: float | None)
     """Yield a warning for a stress beyond the allowable one, and for each direction in which the tip jams."""
     stress = result.values["surface_stress_max"]
     if allowable is not None and stress is not None and stress > allowable:
-        yield finding(
-            "surface_stress_exceeded",
-            f"along the surface the largest stress is {format_short(stress, 'stress')}; the allowable stress is "
-            f"{format_short(allowable, 'stress')}",
-        )
+        largest_stress, limit = (format_short(value, "stress") for value in (stress, allowable))
+        message = f"along the surface the largest stress is {largest_stress}; the allowable stress is {limit}"
+        yield finding("surface_stress_exceeded", message)
     if not len(result.place):
         return
     places = tip.course.places(float(result.place[-1]))
