@@ -172,8 +172,8 @@ def _peak(solution: Solution, ax: Axes, index: int) -> Label:
     points = _unbent_line(solution.path, name)
     arc_length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     x, y = (float(np.interp(share * arc_length[-1], arc_length, points[:, k])) for k in (0, 1))
-    look = {"marker": "o", "markersize": 8, "markerfacecolor": "none", "color": TROUBLE_RED}
-    ax.plot(*parts.mm((x, y)), **look, zorder=5, gid="peak")
+    at = parts.mm((x, y))
+    ax.plot(*at, marker="o", markersize=8, markerfacecolor="none", color=TROUBLE_RED, zorder=5, gid="peak")
     return parts.part_name(value_text(float(solution.stress[index]), "stress"), [(x, y)], (1.0, 0.6), TROUBLE_RED)
 
 
