@@ -19,9 +19,9 @@ import numpy as np
 
 import cfmkit
 from cfmkit.families.run_control import Run
-from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.linkage import resolve
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import chain_of
 from cfmkit.families.slider_crank.printed.design import form_of, task_of
-from cfmkit.families.slider_crank.printed.model import chain_of
 from cfmkit.families.slider_crank.printed.sqp_program import StripProgram
 from cfmkit.families.slider_crank.printed.strip_thickness_search import search
 
@@ -54,12 +54,10 @@ def main() -> None:
     parser.add_argument("--repetitions", type=int, default=5)
     count = parser.parse_args().repetitions
     spec = resolve(cfmkit.load(CONFIGS / "slider_crank_taper_design.yaml"))
-    linkage = linkage_of(spec.mechanism)
-    unloaded = unloaded_angle(spec.mechanism, linkage)
-    chain = chain_of(spec, linkage, unloaded)
+    chain = chain_of(spec)
     travel = np.linspace(0.0, 38e-3, 11)
-    task = task_of(spec, linkage, unloaded)
-    program = StripProgram(task, form_of(spec, spec.design.beam, task, linkage, unloaded)[0])
+    task = task_of(spec)
+    program = StripProgram(task, form_of(spec, spec.design.beam, task)[0])
     z = np.append(np.full(9, 0.98), 3.0)
     program.values(z)
     print(f"{'':44s}{'wall':>10s}{'processor':>12s}")
@@ -78,9 +76,9 @@ def main() -> None:
         for nodes in (9, 17):
             changes = {"design.beam.nodes": nodes, "design.tolerance": ripple, "design.beam.width": width * 1e-3}
             wanted = spec.replace(changes)
-            task = task_of(wanted, linkage, unloaded)
-            form, ranges = form_of(wanted, wanted.design.beam, task, linkage, unloaded)
-            found = search(replace(task, longest=60e-3), form, replace(ranges, longest=60e-3), 1, Run())
+            task = task_of(wanted)
+            form, ranges = form_of(wanted, wanted.design.beam, task)
+            found = search(replace(task, longest=60e-3), form, ranges, 1, Run())
             _, processor = best(lambda t=task, f=form, r=ranges: search(t, f, r, 1, Run()), max(1, count // 2))
             stroke = 1e3 * found.program.stroke(found.descent.z)
             row = f"{width:6.3f}{100 * ripple:7.1f}%{known:8.3f} mm{nodes:7d}{stroke:7.3f} mm"

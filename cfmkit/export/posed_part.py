@@ -114,14 +114,14 @@ def band(line: FloatArray, half: Any) -> FloatArray:
     return np.concatenate([line + aside, (line - aside)[::-1]])
 
 
-def join_poses(each: Sequence[Sequence[PosedBody]]) -> tuple[PosedBody, ...]:
+def join_poses(poses: Sequence[Sequence[PosedBody]]) -> tuple[PosedBody, ...]:
     """Return the bodies of several poses, each given as the same bodies in the same order, as bodies in all poses."""
-    found = []
-    for same in zip(*each, strict=True):
-        cores = np.concatenate([one.core for one in same])
+    joined = []
+    for same in zip(*poses, strict=True):
+        cores = np.concatenate([body.core for body in same])
         still = bool((cores == cores[:1]).all())
-        found.append(replace(same[0], core=cores[:1] if still else cores))
-    return tuple(found)
+        joined.append(replace(same[0], core=cores[:1] if still else cores))
+    return tuple(joined)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,20 +172,38 @@ def screw_positions(
     covered has no screw. If fewer than two are left, the screws are in the corners, below what moves, and the second
     value is False.
     """
-    from shapely import Point
-
-    covered = swept([replace(body, core=body.core[_evenly_moved(body.core)]) for body in moving])
     (x0, y0), (x1, y1) = (ground.min(axis=0) + head).tolist(), (ground.max(axis=0) - head).tolist()
-    shares = np.linspace(0.0, 0.5, N_PLACES).tolist()
-    result: list[FloatArray] = []
-    for x, far_x in ((x0, x1), (x1, x0)):
-        for y, far_y in ((y0, y1), (y1, y0)):
-            pairs = [((x + share * (far_x - x), y), (x, y + share * (far_y - y))) for share in shares]
-            along = [at for pair in pairs for at in pair]
-            clear = [at for at in along if covered.distance(Point(at)) >= 0.5 * head]
-            result += [np.array(clear[0])] if clear else []
+    shares = np.linspace(0.0, 0.5, N_PLACES)
+    corners = [(x, y, far_x, far_y) for x, far_x in ((x0, x1), (x1, x0)) for y, far_y in ((y0, y1), (y1, y0))]
+    along = np.array(
+        [
+            place
+            for x, y, far_x, far_y in corners
+            for share in shares
+            for place in ((x + share * (far_x - x), y), (x, y + share * (far_y - y)))
+        ]
+    )
+    places = along.reshape(4, -1, 2)
+    room = np.min([_distances(replace(body, core=body.core[_evenly_moved(body.core)]), along) for body in moving], 0)
+    clear = room.reshape(4, -1) >= 0.5 * head
+    result = [places[k, clear[k].argmax()] for k in range(4) if clear[k].any()]
     reached = len(result) > 1
-    return result if reached else [np.array([x, y]) for x in (x0, x1) for y in (y0, y1)], reached
+    return result if reached else [places[k, 0] for k in range(4)], reached
+
+
+def _distances(body: PosedBody, places: FloatArray) -> FloatArray:
+    """Return how far places (q, 2) are from a body in its nearest pose, 0 inside, (q,) [m]; lines end in circles."""
+    corners, at = body.core @ np.array([1.0, 1j]), (places @ np.array([1.0, 1j]))[:, None, None]
+    is_ring = body.closed or corners.shape[1] == 1
+    start, end = (corners, np.roll(corners, -1, axis=1)) if is_ring else (corners[:, :-1], corners[:, 1:])
+    side, off = end - start, at - start
+    share = (off * side.conj()).real / np.maximum(np.abs(side) ** 2, 1e-300)
+    away = np.abs(off - np.clip(share, 0.0, 1.0) * side).min(axis=(1, 2))
+    if body.closed:
+        passes = (start.imag > at.imag) != (end.imag > at.imag)
+        to_the_left = (off * side.conj()).imag * np.sign(side.imag) > 0.0
+        away[((passes & to_the_left).sum(axis=2) % 2 == 1).any(axis=1)] = 0.0
+    return np.asarray(np.maximum(away - body.reach, 0.0))
 
 
 def _evenly_moved(core: FloatArray) -> Any:

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from slider_crank import config
 
-import cfmkit
 from cfmkit import Run
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, turn_unloaded
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 PINS = {"diameter": "3 mm", "friction": 0.1}
 GUIDE = {"friction": 0.1, "drag": "0.01 N"}
 
 
 def spec(name, **changes):
-    return cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml").replace(
-        {f"mechanism.{key}": value for key, value in changes.items()}
-    )
+    return config(name, **{f"mechanism__{key}": value for key, value in changes.items()})
 
 
 def analyze(one):
@@ -140,7 +135,7 @@ def test_a_torque_with_a_tight_spring_is_the_change_of_its_energy():
 
 @pytest.mark.parametrize("way", ["load", "unload"])
 def test_springs_that_make_up_for_their_own_friction_hold_the_force_better_than_those_that_do_not(way):
-    given = cfmkit.load(CONFIGS / "slider_crank_friction.yaml")
+    given = config("friction")
     found = family("slider-crank").design.make
     deviations = {}
     for branch in (None, way):
@@ -152,7 +147,7 @@ def test_springs_that_make_up_for_their_own_friction_hold_the_force_better_than_
 
 
 def test_the_spring_of_an_adjustment_is_stiff_enough_for_its_screw():
-    given = cfmkit.load(CONFIGS / "slider_crank_friction.yaml")
+    given = config("friction")
     made = family("slider-crank").design.make(
         given.replace({"design.adjustment": "0.9 N", "design.anchor_travel": "10 mm"}), Run()
     )
@@ -178,7 +173,7 @@ def test_the_unloaded_angle_trims_the_mean_force_by_what_is_stated():
 
 
 def test_springs_are_chosen_that_the_unloaded_angle_can_trim_by_what_is_wanted():
-    given = cfmkit.load(CONFIGS / "slider_crank_bought.yaml")
+    given = config("bought")
     given = given.replace({"design.catalogue": None, "design.tolerance": None, "mechanism.springs": {}})
     plain = family("slider-crank").design.make(given, Run())
     reached = abs(analyze(plain.spec).values["force_per_degree"].value)
@@ -201,7 +196,7 @@ def test_springs_are_chosen_that_the_unloaded_angle_can_trim_by_what_is_wanted()
     ],
 )
 def test_a_trim_that_contradicts_itself_is_refused(block, reported):
-    given = cfmkit.load(CONFIGS / "slider_crank_bought.yaml")
+    given = config("bought")
     with pytest.raises(SpecError, match=reported):
         given.replace({f"design.{key}": value for key, value in block.items()})
 

@@ -11,7 +11,7 @@ from cfmkit.errors import SolutionError
 from cfmkit.families import family
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage import linkage_of
-from cfmkit.families.slider_crank.proposals import PUSHED_PROPORTIONS, _strip, largest_printed
+from cfmkit.families.slider_crank.proposals import PUSHED_PROPORTIONS, PrintedSize, largest_printed
 from cfmkit.families.slider_crank.springs.hardware import hardware as crank_hardware
 from cfmkit.families.slider_crank.sprung_linkage_proposals import _turning, add_custom_springs
 from cfmkit.stock.springs import WIRES_BY_NAME
@@ -22,7 +22,7 @@ from cfmkit.stock.springs import WIRES_BY_NAME
 def test_the_largest_strip_of_some_proportions_just_fits_its_room(lengths, crank):
     """Pads of small parts are smaller, those of large ones are not larger: the box is that of the finished drawing."""
     keys = {"force": "0.5 N", "travel": "2 mm", "envelope": "[1 m, 1 m, 5 mm]"}
-    spec = _strip(request(**keys), {"name": "pom"}, lengths, crank, (1e-4, 0.05 * crank)).spec
+    spec = PrintedSize(request(**keys), lengths, crank, {"name": "pom"}).strip((1e-4, 0.05 * crank)).spec
     width = {"mechanism.beam.width": 4e-3, "mechanism.beam.thickness": 0.01 * crank}
     box = family("slider-crank").envelope(cfmkit.analyze(spec.replace({"design": None, **width})))
     assert largest_printed((box.across, box.along), lengths) == pytest.approx(crank, rel=2e-4)
@@ -82,7 +82,7 @@ def test_springs_at_pins_stay_within_the_depth_required():
     springs, solved = one.spec.mechanism.springs, cfmkit.analyze(one.spec)
     turned = solved.values
     high = {
-        at: springs.coils_at(at)[0].body_length_wound_up(turned[f"{at}_rotation_max"].value)
+        at: springs.coils_at(at)[0].room_for(turned[f"{at}_rotation_max"].value)
         for at in ("pivot", "crank_pin", "slider_pin")
         if springs.coils_at(at)
     }

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from slider_crank import config
 
-import cfmkit
 from cfmkit import api
 from cfmkit.errors import SpecError
 from cfmkit.families.slider_crank.printed.outline import solved_piece
@@ -15,16 +15,12 @@ from cfmkit.results import Status
 QUICK = ("analysis.fidelity=solid", "analysis.solid.poses=7", "analysis.points=41")
 
 
-def spec(name, *changes):
-    return cfmkit.load(f"configs/slider_crank_{name}.yaml", list(changes))
-
-
 @pytest.fixture(scope="module")
 def strip():
     """Two meshes of a strip: two seconds, the least in which its numbers can be had; and the same as a beam."""
     return {
-        "solid": api.analyze(spec("strip", *QUICK, "analysis.solid.error=0.1")),
-        "beam": api.analyze(spec("strip", "analysis.points=41")),
+        "solid": api.analyze(config("strip", *QUICK, "analysis.solid.error=0.1")),
+        "beam": api.analyze(config("strip", "analysis.points=41")),
     }
 
 
@@ -87,19 +83,19 @@ def test_the_stress_map_is_to_scale_so_that_a_narrow_figure_does_not_squeeze_the
 
 
 def test_a_mirrored_pair_has_twice_the_force(strip):
-    pair = api.analyze(spec("strip", *QUICK, "analysis.solid.error=0.1", "mechanism.copies=mirrored"))
+    pair = api.analyze(config("strip", *QUICK, "analysis.solid.error=0.1", "mechanism.copies=mirrored"))
     assert pair.curve.effort == pytest.approx(2.0 * strip["solid"].curve.effort, rel=1e-9)
 
 
 def test_corners_that_no_fillet_fits_are_known_of_the_leg_that_is_solved():
-    assert solved_piece(spec("strip", "mechanism.part.fillet=1 mm")).sharp == ()
-    sharp = solved_piece(spec("strip", "mechanism.part.fillet=10 mm")).sharp
+    assert solved_piece(config("strip", "mechanism.part.fillet=1 mm")).sharp == ()
+    sharp = solved_piece(config("strip", "mechanism.part.fillet=10 mm")).sharp
     assert len(sharp) == 4
     assert sharp[0].startswith("no fillet of 10 mm fits the inside corner at (-4.878")
 
 
 def test_flexures_are_solved_with_their_own_widths():
-    part = part_of(spec("lumped", "analysis.fidelity=solid"))
+    part = part_of(config("lumped", "analysis.fidelity=solid"))
     assert part.width == pytest.approx(2.621e-3)
     assert [width for _, width in part.regions] == pytest.approx([2.478e-3])
     elements = part.create_mesh(0.5e-3).problem.elements
@@ -109,7 +105,7 @@ def test_flexures_are_solved_with_their_own_widths():
 def test_printing_allowance_is_solved_but_not_drawn():
     sizes = []
     for offset in ("0 mm", "0.1 mm"):
-        part = part_of(spec("strip", "analysis.fidelity=solid", f"mechanism.beam.offset={offset}"))
+        part = part_of(config("strip", "analysis.fidelity=solid", f"mechanism.beam.offset={offset}"))
         sizes.append(part.thinnest)
     assert sizes[1] - sizes[0] == pytest.approx(0.1e-3)
 
@@ -123,4 +119,4 @@ def test_printing_allowance_is_solved_but_not_drawn():
 )
 def test_what_is_no_part_is_refused(name, change, reported):
     with pytest.raises(SpecError, match=reported):
-        spec(name, "analysis.fidelity=solid", change)
+        config(name, "analysis.fidelity=solid", change)

@@ -14,7 +14,12 @@ from cfmkit import api
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, choose_preferred, minimax, ranges
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, reactions
-from cfmkit.families.slider_crank.unit_springs import crank_efforts, curves_along_crank, curves_along_slider
+from cfmkit.families.slider_crank.unit_springs import (
+    JOINT_NAMES,
+    crank_efforts,
+    curves_along_crank,
+    curves_along_slider,
+)
 
 rng = np.random.default_rng(20)
 
@@ -241,14 +246,6 @@ def test_what_is_wrong_is_told_by_name(name):
         assert name not in {item.name for item in cfmkit.analyze(config("li2019")).warnings}
 
 
-def test_a_motion_beyond_the_reach_ends_there():
-    result = cfmkit.analyze(config(*FINDINGS["coupler_dead_point"][:1], **FINDINGS["coupler_dead_point"][1]))
-    assert result.status.key == "partial"
-    link = result.state.assembly.linkage
-    assert result.curve.angle[-1] <= link.arc(result.state.assembly.unloaded)[1]
-    assert np.isfinite(result.curve.torque).all()
-
-
 DESIGNS = {
     "infeasible_targets": {"torque": "2 N*mm", "angle": ("0 deg", "8 deg"), "tolerance": "0.5 %"},
     "no_zero_stiffness": {
@@ -258,18 +255,17 @@ DESIGNS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", DESIGNS)
-def test_a_design_that_does_not_exist_says_why(name):
-    found = cfmkit.design(config("li2019", design=DESIGNS[name]))
+@pytest.mark.parametrize(
+    ("name", "start"),
+    [("infeasible_targets", "-5 deg"), ("no_zero_stiffness", "-5 deg"), ("no_zero_stiffness", "3 deg")],
+)
+def test_a_design_that_does_not_exist_says_why(name, start):
+    """Of springs that are relaxed beyond the stretched position all have positive slopes."""
+    design = DESIGNS[name] | ({"angle": ("4 deg", "6 deg"), "springs": JOINT_NAMES} if start == "3 deg" else {})
+    found = cfmkit.design(config("li2019", design=design, mechanism__unloaded_angle=start))
     assert found.spec is None
     assert found.status.key == "infeasible"
     assert [item.name for item in found.warnings] == [name]
-
-
-def test_no_zero_stiffness_when_the_springs_are_relaxed_beyond_the_stretched_position():
-    design = {"torque": "2 N*mm", "angle": ("4 deg", "6 deg"), "stiffness": 0.0, "hold_stiffness": True}
-    found = cfmkit.design(config("li2019", mechanism__unloaded_angle="3 deg", design=design))
-    assert [item.name for item in found.warnings] == ["no_zero_stiffness"]
 
 
 def test_what_would_be_feasible_is_feasible():
@@ -336,23 +332,47 @@ def test_no_rates_do_better_than_the_linear_programme():
     assert goal.deviation(choose_preferred(goal, 1.2 * worst, "even-rates")) <= 1.2 * worst * (1 + 1e-9)
 
 
+RATES = [f"mechanism.springs.{joint}" for joint in ("pivot", "crank_pin", "slider_pin")]
+
+
 @pytest.mark.parametrize("name", ["li2019_prototype", "bilancia2019"])
 def test_gradients_are_those_of_differences(name):
     spec = config(name)
-    paths = [f"mechanism.springs.{joint}" for joint in ("pivot", "crank_pin", "slider_pin", "slider")]
-    found = cfmkit.api.family("slider-crank").gradient(spec, [*paths, "mechanism.offset"])
+    paths = [*RATES, "mechanism.springs.slider"]
+    found = api.family("slider-crank").gradient(spec, [*paths, "mechanism.offset"])
     assert len(found) > 6
     for path in paths:
         rate = spec.get_value(path)
         step = 1e-4 * (rate or (1.0 if path.endswith("slider") else 1e-3))
         low = max(rate - step, 0.0)
         ends = [
-            cfmkit.api.evaluate(cfmkit.analyze(spec.replace({path: value})), list(found))
-            for value in (low, rate + step)
+            cfmkit.evaluate(cfmkit.analyze(spec.replace({path: value})), list(found)) for value in (low, rate + step)
         ]
         for metric, by_path in found.items():
             difference = (ends[1][metric].value - ends[0][metric].value) / (rate + step - low)
             assert by_path[path] == pytest.approx(difference, rel=2e-3, abs=1e-9), (metric, path)
+
+
+@pytest.mark.parametrize("name", ["bought", "bilancia2019_optimum"])
+def test_derivatives_of_extremes_are_those_at_their_places(name):
+    gradient = api.family("slider-crank").gradient
+    few, many = (gradient(config(name, f"analysis.points={count}"), RATES) for count in (11, 301))
+    for metric in ("force_max", "force_min", "force_ripple", "half_band", "energy_max"):
+        for path in RATES:
+            assert few[metric][path] == pytest.approx(many[metric][path], rel=1e-9), (metric, path)
+
+
+def test_a_point_that_is_the_end_of_a_window_but_for_rounding_counts_once_in_sweeps_too():
+    spec = config("bilancia2019_optimum", "analysis.points=301")
+    single = cfmkit.analyze(spec)
+    assert np.abs(single.curve.motion - 0.35e-3).min() < 1e-18  # it is there, and not equal
+    swept = cfmkit.sweep(spec, vary={RATES[0]: spec.get_value(RATES[0]) * np.array([1.0, 1.1])})
+    for metric in ("force_mean", "force_max", "force_min"):
+        assert swept.table[metric][0] == pytest.approx(single.metrics[metric].value, rel=1e-13), metric
+    slopes = api.family("slider-crank").gradient(spec, RATES)["force_mean"]
+    assert sum(slopes[path] * spec.get_value(path) for path in RATES) == pytest.approx(
+        single.metrics["force_mean"].value, rel=1e-12
+    )
 
 
 def test_a_mechanism_without_a_curve_misses_requirements_in_degrees():

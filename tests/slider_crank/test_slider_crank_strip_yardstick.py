@@ -22,7 +22,6 @@ from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import (
     FoundStrip,
-    Ranges,
     descend,
     search,
     uniform_for_stroke,
@@ -49,13 +48,13 @@ def first_and_slow(rows: list[tuple[float, ...]]) -> list[Any]:
 
 @cache
 def found_for(width: float, ripple: float, nodes: int) -> FoundStrip:
-    ranges = Ranges(np.tile([0.5, 2.0], (nodes, 1)), 60 * MM)
+    ranges = np.tile([0.5, 2.0], (nodes, 1))
     return search(replace(TASK, ripple=ripple), Form(nodes, width=width * MM), ranges, 1, Run())
 
 
 def kept(found: FoundStrip) -> tuple[float, float]:
     """Return largest deviation and stress of a found strip over its stroke, looked at in 150 places."""
-    form = found.form
+    form = found.program.form
     stroke = found.program.stroke(found.descent.z)
     travel = np.linspace(1 * MM, stroke, 150)
     chain = strip_chain(found.values * MM, form.places(found.values, corners()), width=form.width or 0.0)
@@ -93,8 +92,7 @@ def test_nine_thicknesses_beat_the_yardstick_at_its_own_force_band_and_stress(
     level = 1.5 * (1 + (upper + lower) / 200)
     ripple = 1.5 * (upper - lower) / 200 / level
     task = replace(TASK, force=level, ripple=ripple, material=Elasticity(1800e6, 0.35, stress * 1e6))
-    ranges = Ranges(np.tile([0.5, 2.0], (9, 1)), 60 * MM)
-    found = search(task, Form(9, width=width * MM), ranges, 1, Run())
+    found = search(task, Form(9, width=width * MM), np.tile([0.5, 2.0], (9, 1)), 1, Run())
     assert found.descent.ending is SearchEnding.OPTIMUM
     assert found.program.stroke(found.descent.z) / MM > 1.01 * stroke
 

@@ -23,9 +23,9 @@ BILANCIA = Linkage(54.0, math.hypot(100.0, 60.0) - 54.0, 60.0)
 TABLE_1 = np.array([28.303, 35.379, 35.379, 0.0])
 
 
-def config(name, **changes):
-    """Return a config of the family, with dotted paths replaced (``mechanism__springs__slider=0``)."""
-    spec = cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml")
+def config(name, *settings, **changes):
+    """Return a config of the family with settings, and dotted paths replaced (``mechanism__springs__slider=0``)."""
+    spec = cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml", settings)
     return spec.replace({path.replace("__", "."): value for path, value in changes.items()})
 
 

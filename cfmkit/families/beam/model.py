@@ -49,7 +49,7 @@ from cfmkit.families.rows import (
     values_of_one,
 )
 from cfmkit.metrics import split_name
-from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
+from cfmkit.metrics.curve_rows import CurveRows, RowSamples, StressRows
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short

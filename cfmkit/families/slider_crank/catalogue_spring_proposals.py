@@ -23,6 +23,7 @@ from cfmkit.families.slider_crank.sprung_linkage_proposals import (
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.stock.springs.offers import generic
 from cfmkit.stock.springs.spec import CatalogueSpring
+from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 
 if TYPE_CHECKING:
     from cfmkit.families.proposals import Candidate, Request
@@ -39,7 +40,7 @@ def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     Raises SolutionError if no springs of the series that fit hold the force, or no links bear them.
     """
     from cfmkit.families.run_control import Run
-    from cfmkit.families.slider_crank.design import design
+    from cfmkit.families.slider_crank.springs.design import design
 
     first = float(spec.analysis.window[0])  # type: ignore[index]
     window = first, first + request.travel * (1.0 + 1e-6)
@@ -71,9 +72,9 @@ def _catalogue_springs(spec: SliderCrankSpec, request: Request, sheet: float) ->
     link = linkage_of(spec.mechanism)
     deep, widest = 0.5 * depth_of_springs(request, sheet), min(link.crank, link.coupler)
     listed = []
-    for offer in generic("torsion"):
+    for offer in generic(HelicalTorsionSpring):
         # wound up by as much as it bears
-        long = math.inf if offer.wound is None else offer.wound.body_length_wound_up(offer.largest or 0.0)
+        long = math.inf if offer.wound is None else offer.wound.room_for(offer.largest or 0.0)
         counts = tuple(count for count in offer.counts if count * long <= deep)
         if counts and (offer.outer_diameter or math.inf) <= widest:
             listed.append(CatalogueSpring.from_offer(replace(offer, counts=counts)))

@@ -6,8 +6,15 @@ run reports carries the numbers that decide and the cure.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from cfmkit.families.end_stops import STOP_FINDINGS
-from cfmkit.families.findings import Finder
+from cfmkit.families.findings import Finder, no_design
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.results import Design
 
 SLIDER_CRANK_FINDINGS = {
     "not_assemblable": "crank and coupler do not reach the guide of the slider, or not in the unloaded position",
@@ -67,3 +74,8 @@ SLIDER_CRANK_FINDINGS = {
 
 finding = Finder(SLIDER_CRANK_FINDINGS)
 """Return a finding of this family; the name must be one that `SLIDER_CRANK_FINDINGS` explains."""
+
+
+def unreachable(message: str, nearest: Mapping[str, str] | None = None) -> Design:
+    """Return the outcome of targets of a part that cannot be met, with the nearest feasible values by path."""
+    return no_design(finding("target_unreachable", message), nearest)

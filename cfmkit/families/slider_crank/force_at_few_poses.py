@@ -8,17 +8,15 @@ import numpy as np
 
 from cfmkit.families.base import Sampled
 from cfmkit.families.findings import CannotBuild
-from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
-from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity
+from cfmkit.families.slider_crank.linkage import resolve
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import chain_of, elasticity
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
-from cfmkit.families.slider_crank.printed.model import chain_of
 from cfmkit.families.slider_crank.printed.solution import Solution
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.printed.solution import ChainModel
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
@@ -34,14 +32,12 @@ def sample_poses(
         return None
     try:
         spec = resolve(spec)
-        linkage = linkage_of(spec.mechanism)
-        chain = chain_of(spec, linkage, unloaded_angle(spec.mechanism, linkage))
+        chain = chain_of(spec)
     except CannotBuild:
         return None
     pressed = chain.press(places)
     if pressed.ending is not PressingEnd.COMPLETE:
         return None
-    model: ChainModel = "lumped" if spec.fidelity == "lumped" else "beam"
     ends = float(places[0]), float(places[-1])
-    solution = Solution(model, chain, pressed, elasticity(spec.mechanism), spec.mechanism.sets, ends, spec=spec)
+    solution = Solution(chain, pressed, elasticity(spec.mechanism), spec.mechanism.sets, ends, spec=spec)
     return Sampled({"load": np.asarray(solution.force)}, np.asarray(solution.stress)[None])

@@ -119,6 +119,15 @@ class Linkage:
         """Return whether the linkage can be assembled at a crank angle [rad]."""
         return abs(self.crank * math.sin(angle) - self.offset) <= self.coupler
 
+    def side(self, angle: float) -> int:
+        """Return 1 for a crank in the stretched position or beyond it, -1 for one before it."""
+        return -1 if self.knee(angle) < 0.0 else 1
+
+    @property
+    def travel_direction(self) -> float:
+        """Direction in which the slider moves towards the pivot [rad]."""
+        return math.pi if self.branch > 0 else 0.0
+
     def mirror(self) -> Linkage:
         """Return the mirror image about a line across the slider's path: the other branch, with angles pi - t."""
         return Linkage(self.crank, self.coupler, self.offset, -self.branch)
@@ -204,13 +213,14 @@ def linkage_of(mechanism: Mechanism) -> Linkage:
     return linkage
 
 
-def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
-    """Return the crank angle with all springs relaxed [rad].
+def unloaded_linkage(mechanism: Mechanism) -> tuple[Linkage, float]:
+    """Return the linkage of a mechanism, and the crank angle with all springs relaxed [rad].
 
-    Raises CannotBuild if the linkage does not reach it.
+    Raises CannotBuild if crank and coupler do not reach the slider's path, or not at that angle.
     """
-    stated_angle = mechanism.unloaded_angle
-    angle = stated_angle if stated_angle is not None else linkage.stretched_angle + (mechanism.unloaded_offset or 0.0)
+    linkage, angle = linkage_of(mechanism), mechanism.unloaded_angle
+    if angle is None:
+        angle = linkage.stretched_angle + (mechanism.unloaded_offset or 0.0)
     if not linkage.reaches(angle):
         low, high = linkage.arc(linkage.stretched_angle)
         raise finding.cannot_build(
@@ -218,13 +228,4 @@ def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
             f"with the crank at {deg(angle)} the coupler of {mm(linkage.coupler)} does not reach the slider's "
             f"path; 'mechanism.unloaded_angle' must be between {deg(low)} and {deg(high)}",
         )
-    return angle
-
-
-def side_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> int:
-    """Return 1 for a crank that is beyond the stretched position when a force drives, -1 for one before it."""
-    if spec.analysis.side is not None:
-        beyond = 1 if spec.analysis.side == "beyond" else -1
-    else:
-        beyond = -1 if linkage.knee(unloaded) < 0 else 1
-    return beyond
+    return linkage, angle

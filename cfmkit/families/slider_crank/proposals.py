@@ -8,8 +8,9 @@ joints are those of `sprung_linkage_proposals`.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,7 +34,7 @@ from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.proposals import Request
@@ -108,11 +109,8 @@ def _propose_for_force(request: Request) -> FamilyOffer:
     if reasons:
         return FamilyOffer(reason="; ".join(reasons))
     crank = request.travel * (1.0 + START_SHARES[0]) / PUSHED_PROPORTIONS[0].reach
-    need = (
-        _printed_box(PUSHED_PROPORTIONS[0], crank)
-        if request.depth is not None
-        else _pinned_box(PUSHED_PROPORTIONS[0], crank)
-    )
+    box = _pinned_box if request.depth is None else _printed_box
+    need = box(PUSHED_PROPORTIONS[0], crank)
     return FamilyOffer(reason=f"a linkage for this travel needs {mm(need[0])} across it and {mm(need[1])} along it")
 
 
@@ -168,15 +166,19 @@ def _offer_pushed(request: Request, lengths: Proportions) -> list[Candidate | fl
         request.envelope[1] / (lengths.stretched + 2 * EYE_SHARE),
     )
     pins = explain_overfilled(request) is None
+    first, last = _window(request, START_SHARES[0])
     offers: list[Candidate | float] = []
     for size in RELATIVE_SIZES:
-        pair = size * pair_size(request, lengths)
-        for crank, parts in ((size * printed, _single_parts), (pair, _pairs)):
-            for start in _starts(request, FOLLOWED_TRAVEL_RATIO * lengths.reach * crank):
-                offers += parts(request, lengths, crank, _window(request, start))
+        for crank, offer in (
+            (size * printed, PrintedSize.strip),
+            (size * pair_size(request, lengths), PrintedSize.pair),
+        ):
+            sizes = [PrintedSize(request, lengths, crank, block) for block in _materials(request)]
+            for start in sizes[0].starts():
+                offers += filter(None, (offer(part, _window(request, start)) for part in sizes))
         if size in RELATIVE_SIZES[:2]:
-            offers += _slow_parts(request, lengths, size * printed)
-        first, last = _window(request, START_SHARES[0])
+            for block in _materials(request):
+                offers += PrintedSize(request, lengths, size * printed, block).slow_parts()
         if last <= lengths.reach * size * pinned and pins:
             offers.append(linkage := pushed_linkage(request, lengths, size * pinned, first))
             offers += [with_catalogue_springs(linkage)] if isinstance(linkage, Candidate) else []
@@ -188,38 +190,6 @@ def _window(request: Request, start: float) -> tuple[float, float]:
     return start * request.travel, (1.0 + start) * request.travel * (1.0 + 1e-6)
 
 
-def _starts(request: Request, reach: float, wanted: Sequence[float] = START_SHARES) -> list[float]:
-    """Return starts with which the travel is within a reach [m]: the wanted ones, or else the earliest."""
-    fitting = [start for start in wanted if _window(request, start)[1] <= reach]
-    return fitting or [start for start in (EARLIEST_START,) if _window(request, start)[1] <= reach]
-
-
-def _single_parts(request: Request, lengths: Proportions, crank: float, travel: tuple[float, float]) -> list[Candidate]:
-    """Return strips of one size that are not much wider than there is room for."""
-    deep = request.depth or max(request.envelope)
-    return [
-        _strip(request, block, lengths, crank, travel)
-        for block in _materials(request)
-        if strip_width(request, block, crank) <= MAX_WIDTH_RATIO * deep
-        and _can_be_cut(request, MAX_THICKNESS_RATIOS * crank)
-    ]
-
-
-def _slow_parts(request: Request, lengths: Proportions, crank: float) -> list[Candidate]:
-    """Return flexures and tapered strips of one size, which take longer to design; they begin late where they can."""
-    deep, reach = request.depth or max(request.envelope), FOLLOWED_TRAVEL_RATIO * lengths.reach * crank
-    candidates = []
-    for block in _materials(request):
-        wide = strip_width(request, block, crank)
-        if FLEXURES_WIDER * wide <= MAX_WIDTH_RATIO * deep:
-            for start in _starts(request, reach, (LATE_START, *START_SHARES))[:2]:
-                candidates.append(_flexures(request, block, lengths, crank, _window(request, start)))
-        if wide <= MAX_WIDTH_RATIO * deep and _can_be_cut(request, THICKEST_TAPERED * crank):
-            for start in _starts(request, reach)[-1:]:
-                candidates.append(_offer_tapered(request, block, lengths, crank, _window(request, start)))
-    return candidates
-
-
 def _can_be_cut(request: Request, thickest: float) -> bool:
     """Return True if strips up to a thickness, and as wide as there is room for, can be as thin as they are made."""
     return request.thinnest <= min(thickest, request.depth or math.inf)
@@ -229,22 +199,6 @@ def pair_size(request: Request, lengths: Proportions) -> float:
     """Return the crank's length of the largest mirrored pair that fits the envelope [m]: two heights and a gap."""
     crank = (request.envelope[0] - PAIR_GAP[1]) / (2.0 + PAIR_GAP[0])
     return largest_printed((crank, request.envelope[1]), lengths) if crank > 0.0 else 0.0
-
-
-def _pairs(request: Request, lengths: Proportions, crank: float, travel: tuple[float, float]) -> list[Candidate]:
-    """Return mirrored pairs of strips, each half as wide as one strip; the guide of the slider carries nothing."""
-    pairs = []
-    for block in _materials(request):
-        wide = 0.5 * strip_width(request, block, crank)
-        if wide <= MAX_WIDTH_RATIO * (request.depth or max(request.envelope)) and _can_be_cut(
-            request, MAX_THICKNESS_RATIOS * crank
-        ):
-            plain = _strip(request, block, lengths, crank, travel)
-            spec = plain.spec.replace({"mechanism.copies": "mirrored"})
-            variant = plain.variant.replace("strip", "pair of strips")
-            doubtful = wide > PROBABLY_TOO_WIDE * (request.depth or math.inf)
-            pairs.append(replace(plain, variant=variant, spec=spec, doubtful=doubtful))
-    return pairs
 
 
 def strip_width(request: Request, block: dict[str, Any], crank: float) -> float:
@@ -263,18 +217,113 @@ def strip_width(request: Request, block: dict[str, Any], crank: float) -> float:
     return 0.005138 * (request.target / 1.5) * size**3 / (stiffer * thicker**3 * scale)
 
 
+@dataclass(frozen=True)
+class PrintedSize:
+    """A part of one piece, to be designed for a request: its proportions, size and material."""
+
+    request: Request
+    lengths: Proportions
+    crank: float  # [m]
+    material: dict[str, Any]
+
+    @cached_property
+    def width(self) -> float:
+        """About how wide a strip has to be [m]."""
+        return strip_width(self.request, self.material, self.crank)
+
+    def starts(self, wanted: Sequence[float] = START_SHARES) -> list[float]:
+        """Return starts with which the travel is within reach: the wanted ones, or else the earliest."""
+        reach = FOLLOWED_TRAVEL_RATIO * self.lengths.reach * self.crank
+        fitting, earliest = (
+            [start for start in starts if _window(self.request, start)[1] <= reach]
+            for starts in (wanted, (EARLIEST_START,))
+        )
+        return fitting or earliest
+
+    def _fits(self, width: float, thickest: float = MAX_THICKNESS_RATIOS) -> bool:
+        """Return True if a width is not much more than there is room for, and up to a thickness strips can be cut."""
+        deep = self.request.depth or max(self.request.envelope)
+        return width <= MAX_WIDTH_RATIO * deep and _can_be_cut(self.request, thickest * self.crank)
+
+    def _is_doubtful(self, width: float) -> bool:
+        return width > PROBABLY_TOO_WIDE * (self.request.depth or math.inf)
+
+    def _candidate(self, kind: str, travel: tuple[float, float], part: dict[str, Any], design: Any) -> Candidate:
+        """Return a part with its block `design`, which is to hold the force over a travel."""
+        request, small = self.request, self.crank / FULL_PADS
+        pads = {} if small >= 1.0 else {"part": {"pad": tuple(small * side for side in PAD_SIZE)}}
+        about = {"material": self.material, "safety_factor": 1.01 / request.strength_used}
+        data = {
+            "family": "slider-crank",
+            "name": "suggested",
+            "mechanism": {**_mechanism(self.lengths, self.crank), **pads, **about, **part},
+            "design": {"force": request.target, **design},
+            "analysis": pushed_analysis(travel),
+        }
+        return Candidate(
+            name_variant(kind, request, self.material),
+            SliderCrankSpec.model_validate(data),
+            True,
+            PART_FUNCTION,
+            largest_first(self.crank, request),
+            correct=CORRECTION_FUNCTION,
+        )
+
+    def _strip(self, kind: str, travel: tuple[float, float], width: float) -> Candidate:
+        """Return a strip of one thickness, to be sized by stress and force, that needs about a width [m]."""
+        least = self.request.thinnest
+        thick, wide = (least, MAX_THICKNESS_RATIOS * self.crank), (least, self.request.depth or self.crank)
+        shape = {"shape": "uniform", "goal": "ripple", "width": wide, "thickness": thick}
+        beam = {"width": wide[1], "thickness": 0.02 * self.crank}
+        plain = self._candidate(kind, travel, {"beam": beam}, {"travel": travel, "beam": shape})
+        return replace(plain, doubtful=self._is_doubtful(width))
+
+    def strip(self, travel: tuple[float, float]) -> Candidate | None:
+        """Return a strip; None if it would be much wider than there is room for."""
+        return self._strip("strip", travel, self.width) if self._fits(self.width) else None
+
+    def pair(self, travel: tuple[float, float]) -> Candidate | None:
+        """Return a mirrored pair of strips, each half as wide as one strip; the guide of the slider carries nothing."""
+        if not self._fits(0.5 * self.width):
+            return None
+        plain = self._strip("pair of strips", travel, 0.5 * self.width)
+        return replace(plain, spec=plain.spec.replace({"mechanism.copies": "mirrored"}))
+
+    def slow_parts(self) -> Iterator[Candidate]:
+        """Yield flexures and tapered strips, which take longer to design; they begin late where they can."""
+        if FLEXURES_WIDER * self.width <= MAX_WIDTH_RATIO * (self.request.depth or max(self.request.envelope)):
+            for start in self.starts((LATE_START, *START_SHARES))[:2]:
+                yield self._flexures(_window(self.request, start))
+        if self._fits(self.width, THICKEST_TAPERED):
+            for start in self.starts()[-1:]:
+                yield self._tapered_strip(_window(self.request, start))
+
+    def _tapered_strip(self, travel: tuple[float, float]) -> Candidate:
+        """Return a strip of varying thickness, to be searched for the flattest force."""
+        plain = self._strip("tapered strip", travel, self.width)
+        thick = (max(self.request.thinnest, 0.005 * self.crank), THICKEST_TAPERED * self.crank)
+        wide = plain.spec.design.beam.width  # type: ignore[attr-defined]
+        shape = {"shape": "even", "nodes": N_STRIP_NODES, "goal": "ripple", "width": wide, "thickness": thick}
+        promise = SLOW_PROMISE + abs(self.crank / self.request.envelope[1] - 0.35)
+        return replace(plain, spec=plain.spec.replace({"design.beam": shape}), promise=promise)
+
+    def _flexures(self, travel: tuple[float, float]) -> Candidate:
+        """Return a chain of links and flexures: first the springs for the force, then flexures of that stiffness."""
+        # rates per rad grow with force times length; those of Bilancia et al. 2019 are for 1.5 N at 54 mm
+        rate = self.request.target / 1.5 * (self.crank / 0.054)
+        rates = {"pivot": 0.028303 * rate, "crank_pin": 0.035379 * rate, "slider_pin": 0.035379 * rate}
+        long = FLEXURE_LENGTH_RATIO * self.crank
+        flexure = {"length": long, "thickness": 0.09 * long, "width": 2.0 * (0.09 * long)}
+        part = {"springs": rates, "flexures": dict.fromkeys(rates, flexure)}
+        return self._candidate("flexures", travel, part, {"travel": (0.0, travel[1]), "flexures": {}})
+
+
 def _vary_by_turns(candidates: list[Candidate]) -> list[Candidate]:
     """Return as many candidates as are offered, of different kinds by turns; what takes long to design comes last."""
     kinds = list(dict.fromkeys(candidate.variant for candidate in candidates))
-    rows = [
-        sorted(
-            (candidate for candidate in candidates if candidate.variant == kind),
-            key=lambda candidate: candidate.promise,
-        )
-        for kind in kinds
-    ]
-    longest = max(map(len, rows))
-    by_turns = [row[k] for k in range(longest) for row in rows if k < len(row)]
+    first = sorted(candidates, key=lambda candidate: candidate.promise)
+    rows = [[candidate for candidate in first if candidate.variant == kind] for kind in kinds]
+    by_turns = [candidate for turn in zip_longest(*rows) for candidate in turn if candidate is not None]
     # cut before what takes long goes to the end, or none of that would be left
     return sorted(by_turns[:MAX_PROPOSALS], key=lambda candidate: candidate.promise >= SLOW_PROMISE)
 
@@ -284,102 +333,11 @@ def _materials(request: Request) -> list[dict[str, Any]]:
 
 
 def _mechanism(lengths: Proportions, crank: float) -> dict[str, Any]:
-    """Return the linkage of a printed part, and its pads where they are smaller than usual."""
-    small = crank / FULL_PADS
-    pads = {} if small >= 1.0 else {"part": {"pad": tuple(small * side for side in PAD_SIZE)}}
+    """Return the linkage of a printed part."""
     return {
         "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
-        "unloaded_angle": lengths.unloaded, **pads,
+        "unloaded_angle": lengths.unloaded,
     }  # fmt: skip
-
-
-def _strip(
-    request: Request,
-    material: dict[str, Any],
-    lengths: Proportions,
-    crank: float,
-    travel: tuple[float, float],
-) -> Candidate:
-    """Return a strip of one thickness, to be sized by stress and force."""
-    thick, wide = (request.thinnest, MAX_THICKNESS_RATIOS * crank), (request.thinnest, request.depth or crank)
-    data = {
-        "family": "slider-crank",
-        "name": "suggested",
-        "mechanism": {
-            **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01 / request.strength_used,
-            "beam": {"width": wide[1], "thickness": 0.02 * crank},
-        },
-        "design": {
-            "force": request.target, "travel": travel,
-            "beam": {"shape": "uniform", "goal": "ripple", "width": wide, "thickness": thick},
-        },
-        "analysis": pushed_analysis(travel),
-    }  # fmt: skip
-    spec = SliderCrankSpec.model_validate(data)
-    doubtful = strip_width(request, material, crank) > PROBABLY_TOO_WIDE * (request.depth or math.inf)
-    return Candidate(
-        name_variant("strip", request, material),
-        spec,
-        True,
-        PART_FUNCTION,
-        largest_first(crank, request),
-        correct=CORRECTION_FUNCTION,
-        doubtful=doubtful,
-    )
-
-
-def _offer_tapered(
-    request: Request,
-    material: dict[str, Any],
-    lengths: Proportions,
-    crank: float,
-    travel: tuple[float, float],
-) -> Candidate:
-    """Return a strip of varying thickness, to be searched for the flattest force."""
-    plain = _strip(request, material, lengths, crank, travel)
-    thick = (max(request.thinnest, 0.005 * crank), THICKEST_TAPERED * crank)
-    wide = plain.spec.design.beam.width  # type: ignore[attr-defined]
-    shape = {"shape": "even", "nodes": N_STRIP_NODES, "goal": "ripple", "width": wide, "thickness": thick}
-    spec = plain.spec.replace({"design.beam": shape})
-    promise = SLOW_PROMISE + abs(crank / request.envelope[1] - 0.35)
-    return replace(plain, variant=name_variant("tapered strip", request, material), spec=spec, promise=promise)
-
-
-def _flexures(
-    request: Request,
-    material: dict[str, Any],
-    lengths: Proportions,
-    crank: float,
-    travel: tuple[float, float],
-) -> Candidate:
-    """Return a chain of links and flexures: first the springs for the force, then flexures of that stiffness."""
-    scale = crank / 0.054
-    rate = request.target / 1.5 * scale
-    long = FLEXURE_LENGTH_RATIO * crank
-    thick = 0.09 * long
-    flexure = {"length": long, "thickness": thick, "width": 2.0 * thick}
-    # rates per rad grow with force times length; those of Bilancia et al. 2019 are for 1.5 N at 54 mm
-    springs = {"pivot": 0.028303 * rate, "crank_pin": 0.035379 * rate, "slider_pin": 0.035379 * rate}
-    data = {
-        "family": "slider-crank",
-        "name": "suggested",
-        "mechanism": {
-            **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01 / request.strength_used,
-            "springs": springs,
-            "flexures": {"pivot": flexure, "crank_pin": flexure, "slider_pin": flexure},
-        },
-        "design": {"force": request.target, "travel": (0.0, travel[1]), "flexures": {}},
-        "analysis": pushed_analysis(travel),
-    }  # fmt: skip
-    spec = SliderCrankSpec.model_validate(data)
-    return Candidate(
-        name_variant("flexures", request, material),
-        spec,
-        True,
-        PART_FUNCTION,
-        largest_first(crank, request),
-        correct=CORRECTION_FUNCTION,
-    )
 
 
 def correct(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:

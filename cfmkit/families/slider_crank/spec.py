@@ -114,6 +114,11 @@ class CrankAnalysis(PrintedAnalysis):
     )
     solid: SolidAnalysis = Field(SolidAnalysis(), description="settings of fidelity 'solid'")
 
+    @property
+    def side_sign(self) -> int:
+        """The side that is stated as a sign: 1 beyond, -1 before the stretched position; 0 if none is."""
+        return {"beyond": 1, "before": -1, None: 0}[self.side]
+
     @model_validator(mode="after")
     def _ranges_increase(self) -> Self:
         for name in ("angle", "travel"):

@@ -1,9 +1,9 @@
 """Effort of a unit spring at each joint of a slider-crank: over the crank's angle, or over the slider's travel.
 
 Torsion springs at pivot A, crank pin B and slider pin C, an extension spring at the slider, all
-relaxed in one position. Energy, effort and stiffness are linear in the four rates, so
-everything here is per unit rate. beta is the coupler's direction: the crank pin
-turns by beta - t, the slider pin by beta.
+relaxed in one position, but for the anchor of the slider's spring, which may be moved. Energy, effort and stiffness are
+linear in the four rates, so everything here is per unit rate. beta is the coupler's direction: the crank pin turns by
+beta - t, the slider pin by beta.
 
 One linkage, with plain numbers, takes places of any shape; m linkages as rows, with columns (m, 1), take places that
 are (m, n), or (1, n) for all.
@@ -55,6 +55,7 @@ def curves_along_crank(
     unloaded: float,  # crank angle at which all springs are relaxed [rad]
     angle: FloatArray,  # (n,): crank angles [rad], any number of turns
     bend: bool = False,  # whether the second derivative of the effort is wanted, too
+    anchor: float = 0.0,  # how far the anchor of the slider's spring is moved beyond where that is relaxed [m]
 ) -> UnitCurves:
     """Return the unit curves over the crank angle: effort is a torque at the crank [LH, eq. 10].
 
@@ -64,7 +65,7 @@ def curves_along_crank(
     r1, r2 = linkage.crank, linkage.coupler
     angle = np.asarray(angle, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        turn, position = _turns(linkage, unloaded, angle)
+        turn, position = _turns(linkage, unloaded, angle, anchor)
         sine, cosine = np.sin(angle), np.cos(angle)
         first, rise, level = _first(linkage, position, sine, cosine)
         _, _, b1, _ = first
@@ -81,11 +82,11 @@ def curves_along_crank(
         return UnitCurves(angle, position, turn, effort, stiffness, 3.0 * first * second + turn * third)
 
 
-def crank_efforts(linkage: Linkage, unloaded: float, angle: FloatArray) -> FloatArray:
+def crank_efforts(linkage: Linkage, unloaded: float, angle: FloatArray, anchor: float = 0.0) -> FloatArray:
     """Return the efforts of `curves_along_crank`, (4, n), to the last bit, without anything else."""
     angle = np.asarray(angle, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        turn, position = _turns(linkage, unloaded, angle)
+        turn, position = _turns(linkage, unloaded, angle, anchor)
         first, _, _ = _first(linkage, position, np.sin(angle), np.cos(angle))
         turn *= first
     return turn
@@ -105,7 +106,7 @@ def _first(
     return first, rise, level
 
 
-def _turns(linkage: Linkage, unloaded: float, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _turns(linkage: Linkage, unloaded: float, angle: FloatArray, anchor: float) -> tuple[FloatArray, FloatArray]:
     """Return q of the four joints, (4, n), and the slider's x."""
     r1, r2, e = linkage.crank, linkage.coupler, linkage.offset
     half = 0.5 * (angle - unloaded)
@@ -120,7 +121,7 @@ def _turns(linkage: Linkage, unloaded: float, angle: FloatArray) -> tuple[FloatA
     coupler = -linkage.branch * np.arctan2(rise * run0 + lift0 * shorter, run * run0 + lift * lift0)
     travel = -swing * np.sin(middle) - linkage.branch * shorter
     turn = np.empty((4, *np.shape(coupler)))
-    turn[0], turn[2], turn[3] = 2.0 * half, coupler, travel
+    turn[0], turn[2], turn[3] = 2.0 * half, coupler, travel - linkage.branch * anchor
     turn[1] = coupler - turn[0]
     return turn, r1 * np.cos(angle) + linkage.branch * run
 
@@ -172,6 +173,7 @@ class SliderPath:
     is_mirrored: bool  # whether that is the mirror image of the linkage that is meant
     unloaded: float  # crank angle of `linkage` [rad]
     side: int
+    anchor: float  # how far the anchor of the slider's spring is moved beyond where that is relaxed [m]
     start: float  # knee angle in the unloaded position [rad]
     stretched: float  # x_s [m]
     gap: float  # x_s^2 - x_0^2 [m^2]
@@ -181,10 +183,10 @@ class SliderPath:
     shares: tuple[float, float]  # `_shares` in the unloaded position [rad]
 
     @classmethod
-    def from_linkage(cls, linkage: Linkage, unloaded: float, side: int) -> SliderPath:
+    def from_linkage(cls, linkage: Linkage, unloaded: float, side: int, anchor: float) -> SliderPath:
         """Return the way of the slider of one linkage."""
         if linkage.branch < 0:
-            return replace(cls.from_linkage(linkage.mirror(), math.pi - unloaded, -side), is_mirrored=True)
+            return replace(cls.from_linkage(linkage.mirror(), math.pi - unloaded, -side, anchor), is_mirrored=True)
         knee = linkage.knee(unloaded)
         start = side * math.pi if knee == math.pi else knee  # folded is on either side
         xs, place = linkage.stretched_position, linkage.place(unloaded)
@@ -193,7 +195,7 @@ class SliderPath:
         x0 = place if square < NEAR_FOOT * xs**2 else math.copysign(math.sqrt(square), place)
         phi, chi = _shares(linkage, np.sin(start), np.cos(start))
         shares = float(phi), float(chi)
-        return cls(linkage, False, unloaded, side, start, xs, gap, x0, *linkage.room(unloaded), shares)
+        return cls(linkage, False, unloaded, side, anchor, start, xs, gap, x0, *linkage.room(unloaded), shares)
 
     @np.errstate(divide="ignore", invalid="ignore", over="ignore")
     def units(self, travel: FloatArray) -> UnitCurves:
@@ -251,7 +253,7 @@ class SliderPath:
         phi, chi = _shares(link, sine, cosine)
         turn = np.empty((4, *np.shape(knee)))
         turn[0], turn[1] = view + phi - self.shares[0], self.start - knee
-        turn[2], turn[3] = view - (chi - self.shares[1]), -travel
+        turn[2], turn[3] = view - (chi - self.shares[1]), -travel - self.anchor
         return _SliderState(knee, position, turn, sine, cosine)
 
     def forces(self, state: _SliderState) -> FloatArray:
@@ -301,9 +303,9 @@ class SliderPath:
 
 
 @lru_cache(maxsize=8)
-def path_of(linkage: Linkage, unloaded: float, side: int) -> SliderPath:
+def path_of(linkage: Linkage, unloaded: float, side: int, anchor: float = 0.0) -> SliderPath:
     """Return the way of the slider: places are solved for on one and the same again and again."""
-    return SliderPath.from_linkage(linkage, unloaded, side)
+    return SliderPath.from_linkage(linkage, unloaded, side, anchor)
 
 
 def _shares(linkage: Linkage, sine: FloatArray, cosine: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -53,7 +53,7 @@ def judge(
     pins: FloatArray,  # (3, 2): where it is kinked, as `beam_chain_from_spec.pins_of` says [m]
 ) -> FinishedStrip | None:
     """Return the outcome of a strip; None if it has no equilibrium over its travel, or breaks its band at once."""
-    task, form = search_result.task, search_result.form
+    task, form = search_result.program.task, search_result.program.form
     strip = form.strip(values, task.corners)
     chain = strip_chain(strip, task.material, pins, task.direction)
     end = search_result.program.stroke(search_result.descent.z)
@@ -64,7 +64,7 @@ def judge(
     pressed = chain.press(travel)
     if pressed.ending is not PressingEnd.COMPLETE:
         return None
-    solution = Solution("beam", chain, pressed, task.material, 1, (task.start, end))
+    solution = Solution(chain, pressed, task.material, 1, (task.start, end))
     ratio = solution.force / task.force - task.share(solution.travel)
     ripple, stress = limits
     stroke = min(end, _end_of_stroke(solution, ratio, ripple, stress))
@@ -118,8 +118,8 @@ def _shares(form: Form, values: FloatArray) -> tuple[tuple[float, ...], ...] | N
 
 def _find_at_bounds(strip: FoundStrip, values: FloatArray) -> list[str]:
     """Return which numbers are at an end of their range."""
-    form, reasons = strip.form, []
-    ends = find_active_bounds(values, strip.ranges.form, *BOUND_TOLERANCES)
+    task, form, reasons = strip.program.task, strip.program.form, []
+    ends = find_active_bounds(values, strip.ranges, *BOUND_TOLERANCES)
     for k in np.flatnonzero(ends).tolist():
         value, side = float(values[k]), "smallest" if ends[k] < 0 else "largest"
         if k < form.count:
@@ -128,8 +128,8 @@ def _find_at_bounds(strip: FoundStrip, values: FloatArray) -> list[str]:
             reasons.append(f"mechanism.beam.shares, number {k - form.count + 1}, at its {side}, {value:.4g}")
         else:
             reasons.append(f"mechanism.beam.width at its {side}, {mm(value * 1e-3)}")
-    if strip.task.goal == "stroke" and np.isclose(0.01 * strip.descent.z[-1], strip.ranges.longest, rtol=1e-6):
-        reasons.append(f"stroke at its longest, {mm(strip.ranges.longest)}")
+    if task.goal == "stroke" and np.isclose(0.01 * strip.descent.z[-1], task.longest, rtol=1e-6):
+        reasons.append(f"stroke at its longest, {mm(task.longest)}")
     return reasons
 
 

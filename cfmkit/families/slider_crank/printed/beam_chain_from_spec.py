@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import InputError
+from cfmkit.families.slider_crank.linkage import linkage_of, unloaded_linkage
 from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
     STRIP_BEAM,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Network, Path
     from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.printed.spec import Printed, StripSpec
+    from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
 
 
 FLEXURE_SHARE = 0.2  # length of a flexure where none is given, in crank lengths: that of [B, Table 2]
@@ -52,30 +54,31 @@ def flexures_of(printed: Printed) -> tuple[Flexure, ...]:
     )
 
 
-def corners(printed: Printed, beam: StripSpec | None, linkage: Linkage, unloaded: float) -> FloatArray:
-    """Return the centre line of a strip: through the ends of the flexures unless it is given [m]."""
+def corners(mechanism: Mechanism, beam: StripSpec | None) -> FloatArray:
+    """Return the centre line of a strip, or of flexures (None): through the ends of the flexures unless given [m].
+
+    Raises InputError if these are longer than the links between them.
+    """
     if beam is not None and beam.centreline is not None:
         return np.array(beam.centreline)
-    flexures = flexures_of(printed)
+    linkage, unloaded = unloaded_linkage(mechanism)
+    flexures, length = flexures_of(mechanism), FLEXURE_SHARE * linkage.crank
     if beam is not None and beam.flexure_length is not None:
-        flexures = ()
-        length = beam.flexure_length
-    else:
-        length = FLEXURE_SHARE * linkage.crank
+        flexures, length = (), beam.flexure_length
     lengths = [flexure.length for flexure in flexures] or [length] * 3
     before = [flexure.before for flexure in flexures] or [0.5] * 3
     return flexure_ends(joints(linkage, unloaded), lengths, before)
 
 
-def strip_of(printed: Printed, linkage: Linkage, unloaded: float) -> Strip:
+def strip_of(mechanism: Mechanism) -> Strip:
     """Return the strip as it is printed.
 
     Raises InputError if 'shares' does not fit the pieces of the centre line.
     """
-    beam = printed.beam
+    beam = mechanism.beam
     if beam is None:
         raise InputError("there is no 'mechanism.beam'")
-    line = corners(printed, beam, linkage, unloaded)
+    line = corners(mechanism, beam)
     if beam.shares is None:
         places = np.linspace(0.0, 1.0, len(beam.values))
     elif len(beam.shares) != len(line) - 1:
@@ -88,9 +91,13 @@ def strip_of(printed: Printed, linkage: Linkage, unloaded: float) -> Strip:
     return Strip(line, beam.width, np.array(beam.values) + beam.offset, places)
 
 
-def lumped_chain(printed: Printed, linkage: Linkage, unloaded: float) -> Chain:
-    """Return flexures and rigid links as a chain to press."""
-    return chain_of_flexures(flexures_of(printed), elasticity(printed), linkage, unloaded)
+def chain_of(spec: SliderCrankSpec) -> Chain:
+    """Return the chain that a specification's fidelity asks for; of a solid the one that it is drawn from."""
+    mechanism, made_of = spec.mechanism, elasticity(spec.mechanism)
+    if spec.piece == "beam":
+        direction = linkage_of(mechanism).travel_direction
+        return strip_chain(strip_of(mechanism), made_of, pins_of(mechanism), direction)
+    return chain_of_flexures(flexures_of(mechanism), made_of, *unloaded_linkage(mechanism))
 
 
 def chain_of_flexures(parts: Sequence[Flexure], made_of: Elasticity, linkage: Linkage, unloaded: float) -> Chain:
@@ -105,18 +112,18 @@ def chain_of_flexures(parts: Sequence[Flexure], made_of: Elasticity, linkage: Li
         place: FloatArray = ends[1] + np.array([dx + cosine * x - sine * y, dy + sine * x + cosine * y])
         return place
 
-    return Chain(ends, pins, lambda points: flexure_network(points, parts, made_of), travel_direction(linkage), knee)
+    return Chain(ends, pins, lambda points: flexure_network(points, parts, made_of), linkage.travel_direction, knee)
 
 
-def pins_of(printed: Printed, linkage: Linkage, unloaded: float) -> FloatArray:
+def pins_of(mechanism: Mechanism) -> FloatArray:
     """Return the three points of a chain that say where it is kinked, (3, 2) [m].
 
     Pivot, crank pin and slider pin; of a strip with a centre line of its own the ends, and between them the corner
     farthest off the line through them, or the middle of a straight one.
     """
-    line = None if printed.beam is None else printed.beam.centreline
+    line = None if mechanism.beam is None else mechanism.beam.centreline
     if line is None:
-        return joints(linkage, unloaded)
+        return joints(*unloaded_linkage(mechanism))
     points = np.array(line)
     off = [abs(kink(np.array([points[0], point, points[-1]]))) for point in points[1:-1]]
     middle = points[1 + int(np.argmax(off))] if off else 0.5 * (points[0] + points[-1])
@@ -141,11 +148,6 @@ def strip_chain(strip: Strip, made_of: Elasticity, pins: FloatArray, direction: 
         return place
 
     return Chain(strip.corners, pins, build, direction, knee)
-
-
-def travel_direction(linkage: Linkage) -> float:
-    """Return the direction in which the slider moves towards the pivot [rad]."""
-    return float(np.pi) if linkage.branch > 0 else 0.0
 
 
 def _unloaded_samples(path: Path) -> FloatArray:

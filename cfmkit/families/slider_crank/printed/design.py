@@ -17,12 +17,12 @@ import numpy as np
 from cfmkit.designing.rounded_and_reported_values import measure_metrics, round_within_bounds, search_values
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.errors import InputError
-from cfmkit.families.findings import mm, mpa, newton, no_design, percent, refusals_answered
+from cfmkit.families.findings import mm, mpa, newton, percent, refusals_answered
 from cfmkit.families.rows import with_values
-from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.findings import finding, unreachable
+from cfmkit.families.slider_crank.linkage import linkage_of, resolve
 from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge
-from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, elasticity, pins_of, travel_direction
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, elasticity, pins_of
 from cfmkit.families.slider_crank.printed.flexure_sizing import design_flexures
 from cfmkit.families.slider_crank.printed.model import analyze, slider_reach
 from cfmkit.families.slider_crank.printed.spec import StripSpec
@@ -31,7 +31,6 @@ from cfmkit.families.slider_crank.printed.strip_thickness_search import (
     COARSE_RIPPLE,
     MIN_BAND_LENGTH,
     FoundStrip,
-    Ranges,
     infeasible,
     search,
     uniform_for_stroke,
@@ -44,9 +43,8 @@ from cfmkit.stock.material_and_part_spec import sheet_of
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
-    from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.printed.spec import StripDesign
-    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
 
 
 SEARCH_RESERVES, RESERVE_STRESS = (4e-5, 2e-4), 5e-4
@@ -77,23 +75,25 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         return Design(None, Status.INVALID, "a part that is pressed needs 'design.force'")
     try:
         spec = resolve(spec)
-        linkage = linkage_of(spec.mechanism)
-        unloaded = unloaded_angle(spec.mechanism, linkage)
-        if wanted.beam is None:
-            return design_flexures(spec, linkage, unloaded)
-        return _strip(spec, linkage, unloaded, run)
+        return design_flexures(spec) if wanted.beam is None else _strip(spec, run)
     except InputError as problem:
         return Design(None, Status.INVALID, str(problem))
 
 
-def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -> Design:
-    wanted = spec.design.beam if spec.design else None
-    assert wanted is not None
-    task = task_of(spec, linkage, unloaded)
-    form, ranges = form_of(spec, wanted, task, linkage, unloaded)
+def _strip_design(spec: SliderCrankSpec) -> tuple[CrankDesign, StripDesign]:
+    """Return the block `design` of a strip, and its block `beam`."""
+    assert spec.design is not None
+    assert spec.design.beam is not None
+    return spec.design, spec.design.beam
+
+
+def _strip(spec: SliderCrankSpec, run: Run) -> Design:
+    _, wanted = _strip_design(spec)
+    task = task_of(spec)
+    form, ranges = form_of(spec, task)
     if wanted.shape == "uniform" and task.goal != "stroke":
-        return _design_uniform_strip(spec, wanted, task, ranges, run)
-    pins, allowed, limits = pins_of(spec.mechanism, linkage, unloaded), task.material.allowable_stress, _limits(spec)
+        return _design_uniform_strip(spec, task, ranges, run)
+    pins, allowed, limits = pins_of(spec.mechanism), task.material.allowable_stress, _limits(spec)
     identity, clock = identity_of(spec, run.seed), Clock.from_budgets(run.time_budget)
     kept: Design | None = None
     for reserve in SEARCH_RESERVES:
@@ -104,13 +104,13 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
             return kept or strip
         if not strip.descent.feasible:
             return kept or infeasible(strip)
-        judged = judge(round_within_bounds(strip.values, ranges.form, FORM_DECIMALS), strip, limits, pins)
+        judged = judge(round_within_bounds(strip.values, ranges, FORM_DECIMALS), strip, limits, pins)
         if judged is None:
             refused = _not_pressed(strip)
             continue
         if allowed is not None:
             allowed /= max(1.0, judged.overstress)
-        reported = _report(_write_strip(spec, judged, wanted), judged.window, run)
+        reported = _report(_write_strip(spec, judged, wanted.shape == "uniform"), judged.window, run)
         if not reported.keeps(*limits):
             refused = _not_kept(reported, judged.window, limits)
             continue
@@ -175,14 +175,14 @@ def _not_kept(reported: Reported, window: tuple[float, float], limits: tuple[flo
     if reported.spec.analysis.side is not None:
         cure = "a strip is designed for the side to which it is kinked: remove 'analysis.side'"
     text = f"from {mm(window[0])} to {mm(window[1])} the strip found {' and '.join(missed)} in its analysis; {cure}"
-    return no_design(finding("target_unreachable", text))
+    return unreachable(text)
 
 
 def _not_pressed(strip: FoundStrip) -> Design:
     """Return that a strip keeps its limits at the places of its search only."""
-    over = f"from {mm(strip.task.start)} to {mm(strip.program.stroke(strip.descent.z))}"
+    over = f"from {mm(strip.program.task.start)} to {mm(strip.program.stroke(strip.descent.z))}"
     text = f"{over} the strip found keeps its band, or has its force, at the places of the search only"
-    return no_design(finding("target_unreachable", f"{text}; change 'design.travel' or the ranges in 'design.beam'"))
+    return unreachable(f"{text}; change 'design.travel' or the ranges in 'design.beam'")
 
 
 def _search_of(strip: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
@@ -198,7 +198,12 @@ def _search_of(strip: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
 
 def _has_uniform_strip(strip: FoundStrip) -> bool:
     """Return whether a strip of one thickness is known to compare with."""
-    return strip.uniform is not None and strip.uniform.feasible and strip.form.count > 1 and strip.task.goal == "stroke"
+    return (
+        strip.uniform is not None
+        and strip.uniform.feasible
+        and strip.program.form.count > 1
+        and strip.program.task.goal == "stroke"
+    )
 
 
 def _one_thickness(strip: FoundStrip) -> float:
@@ -206,15 +211,13 @@ def _one_thickness(strip: FoundStrip) -> float:
     return 0.0 if strip.uniform is None else 0.01 * float(strip.uniform.z[-1])
 
 
-def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTask:
+def task_of(spec: SliderCrankSpec) -> StripTask:
     """Return what the strip of a `design` block is to do, with its reserve.
 
     Raises InputError if the goal lacks its tolerance or its travel.
     """
-    wanted = spec.design
-    assert wanted is not None
-    assert wanted.beam is not None
-    beam, ripple, travel = wanted.beam, wanted.tolerance, wanted.travel
+    wanted, beam = _strip_design(spec)
+    ripple, travel = wanted.tolerance, wanted.travel
     if beam.goal == "stroke" and (ripple is None or travel is not None):
         raise InputError("the longest stroke needs 'design.tolerance', and no 'design.travel'; else set 'goal: ripple'")
     if wanted.curve is not None and (beam.goal == "stroke" or beam.shape == "uniform"):
@@ -223,7 +226,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
         raise InputError("'design.target' must not be negative over 'design.travel': a strip is pressed, not pulled")
     if beam.goal != "stroke" and travel is None:
         raise InputError(f"the goal {beam.goal!r} needs 'design.travel', the travel over which the force is required")
-    reach = slider_reach(linkage, unloaded)
+    reach = slider_reach(spec.mechanism)
     start, stroke = travel if travel is not None else (beam.start, 0.2 * reach)
     if beam.goal != "rms" and start <= 0:
         raise InputError("'design.travel' must begin after the run-in, above 0: the force begins at zero there")
@@ -235,10 +238,9 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
     made_of = elasticity(spec.mechanism)
     limit = made_of.allowable_stress if beam.stressed else None
     limit = None if limit is None else limit * (1.0 - RESERVE_STRESS)
-    line = corners(spec.mechanism, spec.mechanism.beam, linkage, unloaded)
     return StripTask(
-        line,
-        travel_direction(linkage),
+        corners(spec.mechanism, spec.mechanism.beam),
+        linkage_of(spec.mechanism).travel_direction,
         replace(made_of, allowable_stress=limit),
         wanted.size / spec.mechanism.sets,
         float(start),
@@ -251,11 +253,12 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
     )
 
 
-def form_of(
-    spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, linkage: Linkage, unloaded: float
-) -> tuple[Form, Ranges]:
-    """Return how the strip is described, and the ranges of its numbers."""
-    beam = spec.mechanism.beam
+def form_of(spec: SliderCrankSpec, task: StripTask) -> tuple[Form, FloatArray]:
+    """Return how the strip is described, and the ranges of its numbers, (n, 2).
+
+    Raises InputError if the ranges do not fit the shape.
+    """
+    (_, wanted), beam = _strip_design(spec), spec.mechanism.beam
     width = sheet_of(spec.mechanism.part) or wanted.width or (beam.width if beam is not None else DEFAULT_WIDTH)
     fixed = None if isinstance(width, tuple) else float(width)
     per_piece: tuple[int, ...] = ()
@@ -281,97 +284,82 @@ def form_of(
         raise InputError("the middles of the ranges in 'design.beam.shares' must increase: the search begins there")
     if isinstance(width, tuple):
         table.append((width[0] * 1e3, width[1] * 1e3))
-    return form, Ranges(np.array(table), task.longest)
+    return form, np.array(table)
 
 
 def _limits(spec: SliderCrankSpec) -> tuple[float | None, float | None]:
     """Return the ripple and the stress that the finished strip is held to."""
-    wanted = spec.design
-    assert wanted is not None
-    assert wanted.beam is not None
-    stress = elasticity(spec.mechanism).allowable_stress if wanted.beam.stressed else None
-    return (wanted.tolerance if wanted.beam.goal == "stroke" else None), stress
+    wanted, beam = _strip_design(spec)
+    stress = elasticity(spec.mechanism).allowable_stress if beam.stressed else None
+    return (wanted.tolerance if beam.goal == "stroke" else None), stress
 
 
-def _design_uniform_strip(
-    spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, ranges: Ranges, run: Run
-) -> Design:
+def _design_uniform_strip(spec: SliderCrankSpec, task: StripTask, ranges: FloatArray, run: Run) -> Design:
     """Return the uniform strip for a stroke: thickness from the stress, width from the force.
 
     Where the width is stated, the thickness follows from the force.
     """
-    fixed = sheet_of(spec.mechanism.part) or (None if isinstance(wanted.width, tuple) else wanted.width)
+    wanted = _strip_design(spec)[1].width
+    fixed = sheet_of(spec.mechanism.part) or (None if isinstance(wanted, tuple) else wanted)
     if fixed is not None:
         return _design_of_width(spec, task, ranges, float(fixed), run)
     uniform = uniform_for_stroke(task)
     if uniform is None:
-        return no_design(
-            finding(
-                "target_unreachable",
-                "the strip has no equilibrium over 'design.travel', or 'mechanism.material' no yield strength",
-            )
+        return unreachable(
+            "the strip has no equilibrium over 'design.travel', or 'mechanism.material' no yield strength"
         )
     thickness, width = uniform
-    low, high = ranges.form[0] / 1e3
+    low, high = ranges[0] / 1e3
+    allowed = f"'design.beam.thickness', {mm(low)} to {mm(high)}"
     if thickness > THICKER_BY * high:
-        text = f"the stress allows strips far thicker than 'design.beam.thickness', {mm(low)} to {mm(high)}; "
-        return no_design(
-            finding(
-                "target_unreachable", text + "state one 'design.beam.width': the thickness then follows from the force"
-            )
-        )
+        cure = "state one 'design.beam.width': the thickness then follows from the force"
+        return unreachable(f"the stress allows strips far thicker than {allowed}; {cure}")
     if not low <= thickness <= high:
-        text = f"the stress requires a thickness of {mm(thickness)}, outside 'design.beam.thickness', "
-        text += f"{mm(low)} to {mm(high)}"
-        return no_design(finding("target_unreachable", text), {"design.beam.thickness": mm(thickness)})
-    if isinstance(wanted.width, tuple) and not wanted.width[0] <= width <= wanted.width[1]:
-        wide = float(np.clip(width, *wanted.width))
-        reached = newton(_four_digits(task.sum_over_sets(task.force) * wide / width, up=width < wide))
+        text = f"the stress requires a thickness of {mm(thickness)}, outside {allowed}"
+        return unreachable(text, {"design.beam.thickness": mm(thickness)})
+    if isinstance(wanted, tuple) and not wanted[0] <= width <= wanted[1]:
+        wide, force = float(np.clip(width, *wanted)), task.sum_over_sets(task.force)
+        reached = newton(_four_digits(force * wide / width, up=width < wide))
         text = (
-            f"{newton(task.sum_over_sets(task.force))} need a width of {mm(width)}; within 'design.beam.width', "
-            f"{mm(wanted.width[0])} to {mm(wanted.width[1])}, the nearest is {reached}"
+            f"{newton(force)} need a width of {mm(width)}; within 'design.beam.width', "
+            f"{mm(wanted[0])} to {mm(wanted[1])}, the nearest is {reached}"
         )
-        nearest = {"design.force": reached, "design.beam.width": mm(width)}
-        return no_design(finding("target_unreachable", text), nearest)
-    part = _part(
-        spec, {"width": round(width, LENGTH_DECIMALS), "thickness": round(thickness, LENGTH_DECIMALS), "shares": None}
-    )
+        return unreachable(text, {"design.force": reached, "design.beam.width": mm(width)})
     text = f"thickness {mm(thickness)} from the stress up to {mm(task.stroke)}, width {mm(width)} from the force"
-    return _analyse_strip(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
+    return _analyse_strip(spec, task, (round(width, LENGTH_DECIMALS), thickness), text, run)
 
 
-def _design_of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: float, run: Run) -> Design:
+def _design_of_width(spec: SliderCrankSpec, task: StripTask, ranges: FloatArray, width: float, run: Run) -> Design:
     """Return the uniform strip of a stated width, its thickness from the force."""
     uniform = uniform_for_width(task, width)
     if uniform is None:
-        return no_design(finding("target_unreachable", "the strip has no equilibrium over 'design.travel'"))
+        return unreachable("the strip has no equilibrium over 'design.travel'")
     (thickness, stress), allowed = uniform, task.material.allowable_stress
-    low, high = ranges.form[0] / 1e3
+    low, high = ranges[0] / 1e3
     # the stress goes with the thickness, and the force with its cube
-    thickest = high if allowed is None else min(high, thickness * allowed / stress)
+    strongest = math.inf if allowed is None else thickness * allowed / stress
+    thickest = min(high, strongest)
     if not low <= thickness <= thickest * (1 + 1e-9):
-        limit = (
-            "the stress" if allowed is not None and thickness * allowed / stress < high else "'design.beam.thickness'"
-        )
-        nearest = task.sum_over_sets((float(np.clip(thickness, low, thickest)) / thickness) ** 3 * task.force)
+        limit = "the stress" if strongest < high else "'design.beam.thickness'"
+        nearest = newton(task.sum_over_sets((float(np.clip(thickness, low, thickest)) / thickness) ** 3 * task.force))
         text = (
             f"a strip {mm(width)} wide would have to be {mm(thickness)} thick; {limit} allows {mm(low)} to "
-            f"{mm(thickest)}, which is about {newton(nearest)}"
+            f"{mm(thickest)}, which is about {nearest}"
         )
-        cure = {"design.force": newton(nearest)} if thickest >= low else {}
-        return no_design(finding("target_unreachable", text), cure)
-    part = _part(spec, {"width": width, "thickness": round(thickness, LENGTH_DECIMALS), "shares": None})
+        return unreachable(text, {"design.force": nearest} if thickest >= low else {})
     text = f"width {mm(width)} as stated, thickness {mm(thickness)} from the force"
     if allowed is not None:
         text += f", stress {mpa(stress)} up to {mm(task.stroke)}"
-    return _analyse_strip(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
+    return _analyse_strip(spec, task, (width, thickness), text, run)
 
 
-def _analyse_strip(spec: SliderCrankSpec, task: StripTask, text: str, run: Run) -> Design:
-    """Return a uniform strip as a design, if its analysis keeps the stress, too."""
+def _analyse_strip(spec: SliderCrankSpec, task: StripTask, section: tuple[float, float], text: str, run: Run) -> Design:
+    """Return a uniform strip of a width and a thickness [m] as a design, if its analysis keeps the stress, too."""
     window, limits = (task.start, task.stroke), _limits(spec)
-    plain = with_values(spec, {"analysis.points": min(spec.analysis.points, MAX_ANALYSIS_POINTS)})
-    reported = _report(plain, window, run)
+    spec = _with_strip(spec, *section, None, window)
+    reported = _report(
+        with_values(spec, {"analysis.points": min(spec.analysis.points, MAX_ANALYSIS_POINTS)}), window, run
+    )
     return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _not_kept(reported, window, limits)
 
 
@@ -381,44 +369,40 @@ def _four_digits(value: float, up: bool) -> float:
     return (math.ceil if up else math.floor)(value / unit) * unit
 
 
-def _part(spec: SliderCrankSpec, changes: dict[str, object]) -> StripSpec:
-    """Return the strip as the specification says it, with changes."""
-    kept = {} if spec.mechanism.beam is None else spec.mechanism.beam.model_dump(exclude_unset=True)
-    kept.pop("offset", None)
-    return StripSpec.model_validate(kept | changes)
-
-
-def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, float]) -> SliderCrankSpec:
+def _with_strip(
+    spec: SliderCrankSpec,
+    width: float,
+    thickness: float | tuple[float, ...],
+    shares: tuple[tuple[float, ...], ...] | None,
+    window: tuple[float, float],
+) -> SliderCrankSpec:
+    """Return a specification with a strip, analysed up to the end of its window."""
+    kept = {} if spec.mechanism.beam is None else spec.mechanism.beam.model_dump(exclude_unset=True, exclude={"offset"})
+    many = thickness if isinstance(thickness, tuple) else round(thickness, LENGTH_DECIMALS)
+    strip = StripSpec.model_validate(kept | {"width": width, "thickness": many, "shares": shares})
     analysis = {"travel": (0.0, window[1]), "window": window, "fidelity": None, "drive": "force"}
-    changes: dict[str, Any] = {
-        "mechanism.beam": part,
-        **{f"analysis.{name}": value for name, value in analysis.items()},
-    }
+    changes: dict[str, Any] = {f"analysis.{name}": value for name, value in analysis.items()}
     if spec.design is not None and spec.design.target is not None:
         changes |= {"design.target": spec.design.target.written_out(spec.design.force), "design.force": None}
-    return with_values(spec, changes)
+    return with_values(spec, changes | {"mechanism.beam": strip})
 
 
-def _write_strip(spec: SliderCrankSpec, judged: FinishedStrip, wanted: StripDesign) -> SliderCrankSpec:
-    strip = judged.strip
-    values: FloatArray = np.asarray(strip.thickness)
-    listed = tuple(round(float(value), LENGTH_DECIMALS) for value in values)
-    thickness = listed[0] if wanted.shape == "uniform" else listed
-    width = round(float(strip.width), LENGTH_DECIMALS)
-    part = _part(spec, {"width": width, "thickness": thickness, "shares": judged.shares})
-    return _with_part(spec, part, judged.window)
+def _write_strip(spec: SliderCrankSpec, judged: FinishedStrip, uniform: bool) -> SliderCrankSpec:
+    listed = tuple(round(float(value), LENGTH_DECIMALS) for value in np.asarray(judged.strip.thickness))
+    width = round(float(judged.strip.width), LENGTH_DECIMALS)
+    return _with_strip(spec, width, listed[0] if uniform else listed, judged.shares, judged.window)
 
 
 def _message(strip: FoundStrip, judged: FinishedStrip, reported: Reported) -> str:
-    descent, count = strip.descent, strip.form.count
+    descent, count = strip.descent, strip.program.form.count
     what = "one thickness" if count == 1 else f"{count} thicknesses"
-    if strip.task.goal == "rms":
+    if strip.program.task.goal == "rms":
         head = f"root mean square {newton(reported.rms or 0.0)} over {mm(judged.window[1])}"
     else:
         head = f"within {percent(reported.deviation or 0.0)} from {mm(judged.window[0])} to {mm(judged.window[1])}"
     compared = ""
     if _has_uniform_strip(strip):
-        within = percent(max(strip.task.ripple, COARSE_RIPPLE))
+        within = percent(max(strip.program.task.ripple, COARSE_RIPPLE))
         compared = f"; one thickness reaches {mm(_one_thickness(strip))} within {within}"
     shown = judged.active[:MAX_NAMED_LIMITS]
     more = f" and {len(judged.active) - MAX_NAMED_LIMITS} more" if len(judged.active) > MAX_NAMED_LIMITS else ""

@@ -45,10 +45,6 @@ def _mechanism(solution: Solution) -> Mechanism:
     return solution.spec.mechanism
 
 
-def _is_overstressed(solution: Solution) -> bool:
-    return bool(stress_stroke(solution) < solution.travel[-1])
-
-
 def _too_large_stress(solution: Solution) -> Sentence:
     limit, place, worst = solution.material.allowable_stress, stress_stroke(solution), int(solution.stress.argmax())
     assert limit is not None
@@ -66,68 +62,24 @@ def _pulls(solution: Solution) -> NDArray[np.bool_]:
     return np.asarray(moved & (solution.force < 0))
 
 
-def _pulling_chain(solution: Solution) -> Sentence:
-    return (f"from {mm(float(solution.travel[_pulls(solution)][0]))} on the chain pulls the slider towards the pivot",)
-
-
 def _is_straight(solution: Solution) -> bool:
     return solution.chain.side == 0
-
-
-def _straight_chain(solution: Solution) -> Sentence:
-    return (
-        f"the chain is exactly straight: it carries {newton(float(solution.force[1]))} before it buckles, and a "
-        "deviation of 0.1 um determines the side; state a kink of 0.25 to 0.5 mm with 'mechanism.unloaded_offset'",
-    )
 
 
 def _offset(solution: Solution) -> float:
     return abs(kink(solution.chain.pins))
 
 
-def _is_kink_too_small(solution: Solution) -> bool:
-    resolved = _mechanism(solution).resolved[0]
-    return not _is_straight(solution) and resolved is not None and _offset(solution) < resolved
-
-
-def _small_kink(solution: Solution) -> Sentence:
-    resolved = _mechanism(solution).resolved[0]
-    assert resolved is not None
-    return (
-        f"the kink of {mm(_offset(solution))} that determines the buckling side is smaller than the process can make "
-        f"({mm(resolved)}): the part may bend to the other side, with another force; 0.25 to 0.5 mm is safe",
-    )
+def _made_sizes(solution: Solution) -> tuple[float, float]:
+    """Return the resolution of the process in the plane, and its thinnest wall [m]; 0 if not stated."""
+    position, thinnest = _mechanism(solution).resolved
+    return position or 0.0, thinnest or 0.0
 
 
 def _runs_in_long(solution: Solution) -> bool:
     run_in, off = solution.run_in(0.98), _offset(solution)
     is_long = run_in is not None and run_in > RUN_IN_SHARE * solution.travel[-1]
     return not _is_straight(solution) and is_long and off > 1e-3 * solution.chain.length
-
-
-def _long_run_in(solution: Solution) -> Sentence:
-    return (
-        f"with a kink of {mm(_offset(solution))} the force needs {mm(solution.run_in(0.98) or 0.0)} of travel to reach "
-        "98 % of its level; a smaller kink shortens it",
-    )
-
-
-def _is_too_thin(solution: Solution) -> bool:
-    thinnest = _mechanism(solution).resolved[1]
-    return thinnest is not None and solution.thinnest < thinnest
-
-
-def _thin_place(solution: Solution) -> Sentence:
-    thinnest = _mechanism(solution).resolved[1]
-    assert thinnest is not None
-    return (f"the thinnest place is {mm(solution.thinnest)}, the process needs at least {mm(thinnest)}",)
-
-
-def _narrow_part(solution: Solution) -> Sentence:
-    return (
-        f"the width is {solution.width_ratio:.3g} times the largest thickness: out of its plane the part bends "
-        "nearly as easily as in it; guide it between plates, or make it wider",
-    )
 
 
 def _hindered_share(solution: Solution) -> tuple[float, str]:
@@ -139,20 +91,20 @@ def _hindered_share(solution: Solution) -> tuple[float, str]:
     return float(share[worst]), f"at {mm(float(solution.travel[worst]))}"
 
 
-def _side_share(solution: Solution) -> tuple[int, float]:
-    """Return the point with the largest side force, and its share of the force there."""
+def _side_share(solution: Solution) -> tuple[int, float, float]:
+    """Return the point with the largest side force, this force [N], and its share of the force there."""
     worst = int(np.abs(solution.side_force).argmax())
-    return worst, float(abs(solution.side_force[worst]) / max(abs(solution.force[worst]), 1e-300))
+    side = float(abs(solution.side_force[worst]))
+    return worst, side, side / max(float(abs(solution.force[worst])), 1e-300)
 
 
 def _burdens_guide(solution: Solution) -> bool:
-    worst, share = _side_share(solution)
+    worst, _, share = _side_share(solution)
     return share > SIDE_SHARE and bool(solution.travel[worst] > 0)
 
 
 def _burdened_guide(solution: Solution) -> Sentence:
-    worst, share = _side_share(solution)
-    side = float(abs(solution.side_force[worst]))
+    _, side, share = _side_share(solution)
     return (
         f"the guide carries up to {newton(side)} across the travel, {100 * share:.0f} % of the force: friction of 0.1 "
         f"there changes it by {newton(0.1 * side)}; a mirrored pair on one slider cancels it",
@@ -161,8 +113,8 @@ def _burdened_guide(solution: Solution) -> Sentence:
 
 
 def _burden(solution: Solution) -> str:
-    worst, share = _side_share(solution)
-    return f"{newton(float(abs(solution.side_force[worst])))} on the guide, {100 * share:.0f} % of the force"
+    _, side, share = _side_share(solution)
+    return f"{newton(side)} on the guide, {100 * share:.0f} % of the force"
 
 
 def _left_out_friction(solution: Solution) -> str:
@@ -173,21 +125,58 @@ def _left_out_friction(solution: Solution) -> str:
 FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule(
         "overstressed",
-        _is_overstressed,
+        lambda solution: bool(stress_stroke(solution) < solution.travel[-1]),
         _too_large_stress,
         lambda solution: f"{mpa(float(solution.stress.max()))} beyond {mm(stress_stroke(solution))} of travel",
     ),
-    FindingRule("force_negative", lambda solution: _pulls(solution).any(), _pulling_chain),
-    FindingRule("straight_start", _is_straight, _straight_chain),
+    FindingRule(
+        "force_negative",
+        lambda solution: _pulls(solution).any(),
+        lambda solution: (
+            f"from {mm(float(solution.travel[_pulls(solution)][0]))} on the chain pulls the slider towards the pivot",
+        ),
+    ),
+    FindingRule(
+        "straight_start",
+        _is_straight,
+        lambda solution: (
+            f"the chain is exactly straight: it carries {newton(float(solution.force[1]))} before it buckles, and a "
+            "deviation of 0.1 um determines the side; state a kink of 0.25 to 0.5 mm with 'mechanism.unloaded_offset'",
+        ),
+    ),
     FindingRule(
         "kink_too_small",
-        _is_kink_too_small,
-        _small_kink,
-        lambda solution: f"kink of {mm(_offset(solution))}, {mm(_mechanism(solution).resolved[0] or 0.0)} can be made",
+        lambda solution: not _is_straight(solution) and _offset(solution) < _made_sizes(solution)[0],
+        lambda solution: (
+            f"the kink of {mm(_offset(solution))} that determines the buckling side is smaller than the process can "
+            f"make ({mm(_made_sizes(solution)[0])}): the part may bend to the other side, with another force; 0.25 to "
+            "0.5 mm is safe",
+        ),
+        lambda solution: f"kink of {mm(_offset(solution))}, {mm(_made_sizes(solution)[0])} can be made",
     ),
-    FindingRule("long_run_in", _runs_in_long, _long_run_in),
-    FindingRule("too_thin", _is_too_thin, _thin_place),
-    FindingRule("lateral_buckling", lambda solution: solution.width_ratio < THINNEST_RATIO, _narrow_part),
+    FindingRule(
+        "long_run_in",
+        _runs_in_long,
+        lambda solution: (
+            f"with a kink of {mm(_offset(solution))} the force needs {mm(solution.run_in(0.98) or 0.0)} of travel to "
+            "reach 98 % of its level; a smaller kink shortens it",
+        ),
+    ),
+    FindingRule(
+        "too_thin",
+        lambda solution: solution.thinnest < _made_sizes(solution)[1],
+        lambda solution: (
+            f"the thinnest place is {mm(solution.thinnest)}, the process needs at least {mm(_made_sizes(solution)[1])}",
+        ),
+    ),
+    FindingRule(
+        "lateral_buckling",
+        lambda solution: solution.width_ratio < THINNEST_RATIO,
+        lambda solution: (
+            f"the width is {solution.width_ratio:.3g} times the largest thickness: out of its plane the part bends "
+            "nearly as easily as in it; guide it between plates, or make it wider",
+        ),
+    ),
     FindingRule(
         "wide_beam",
         lambda solution: bool(too_soft(*_hindered_share(solution))),

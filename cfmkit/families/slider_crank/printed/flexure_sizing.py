@@ -19,8 +19,8 @@ from cfmkit.designing.rounded_and_reported_values import search_values
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, no_design
 from cfmkit.families.rows import with_values
-from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage import side_of
+from cfmkit.families.slider_crank.findings import finding, unreachable
+from cfmkit.families.slider_crank.linkage import unloaded_linkage
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
     FLEXURE_SHARE,
     chain_of_flexures,
@@ -83,10 +83,9 @@ def size_flexure(rate: float, length: float, youngs_modulus: float, stress: floa
 def rotations(linkage: Linkage, unloaded: float, travel: FloatArray, side: int = 0) -> FloatArray:
     """Return how far the three joints have turned where the slider has travelled, (3, n) [rad].
 
-    `side`: 1 or -1, as `linkage_from_spec.side_of` says it; 0: that of the kink.
+    `side`: 1 or -1, as `Linkage.side` says it; 0: that of the kink.
     """
-    bent = side or (-1 if linkage.knee(unloaded) < 0 else 1)
-    return curves_along_slider(linkage, unloaded, bent, np.asarray(travel)).turn[:3]
+    return curves_along_slider(linkage, unloaded, side or linkage.side(unloaded), np.asarray(travel)).turn[:3]
 
 
 _MAX_ROUNDS = 8  # `configs/slider_crank_lumped.yaml` needs four; a fixed width may take four times as many
@@ -125,7 +124,7 @@ class FixedWidth:
         )
 
 
-def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Design:
+def design_flexures(spec: SliderCrankSpec) -> Design:
     """Return the specification with flexures that have the springs' rates and bear the stroke.
 
     Raises InputError if springs, travel or strength are missing.
@@ -140,11 +139,11 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
             "flexures are sized for the rates of 'pivot', 'crank_pin' and 'slider_pin' in 'mechanism.springs', "
             "'design.travel' and the 'yield_strength' of 'mechanism.material'"
         )
-    stated = flexures_of(spec.mechanism)
+    stated, (linkage, unloaded) = flexures_of(spec.mechanism), unloaded_linkage(spec.mechanism)
     length = wanted.flexures.length or FLEXURE_SHARE * linkage.crank
     lengths = [length] * 3 if wanted.flexures.length or not stated else [flexure.length for flexure in stated]
     stroke = float(wanted.travel[1])
-    side = side_of(spec, linkage, unloaded)
+    side = spec.analysis.side_sign or linkage.side(unloaded)
     turn = np.abs(rotations(linkage, unloaded, np.array([stroke]), side)[:, 0])
     sheet, stays = sheet_of(spec.mechanism.part), wanted.flexures.length is not None
     first = (
@@ -156,14 +155,12 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     if stubby is not None:
         text = f"the stress would allow a thickness of {mm(stubby.thickness)} on a length of {mm(stubby.length)}"
         cure = "make the flexures longer ('design.flexures.length'), or increase the stroke ('design.travel')"
-        return no_design(finding("target_unreachable", f"{text}: too stubby for a flexure; {cure}"))
+        return unreachable(f"{text}: too stubby for a flexure; {cure}")
     travel = np.linspace(0.1 * stroke, stroke, _N_POINTS)
     springs_force = rates @ curves_along_slider(linkage, unloaded, side, travel).effort[:3]
     kept = None if sheet is None else FixedWidth(tuple(lengths), stays)
-    bent = 0 if spec.analysis.side is None else side
-    sized = correct_flexures(
-        first, made_of, (linkage, unloaded, bent), travel, springs_force, wanted.flexures.exact, kept
-    )
+    built_in = linkage, unloaded, spec.analysis.side_sign
+    sized = correct_flexures(first, made_of, built_in, travel, springs_force, wanted.flexures.exact, kept)
     if sized is None:
         return no_design(
             finding("not_converged", "the flexures of the closed forms have no equilibrium over 'design.travel'")
@@ -174,10 +171,10 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
         text = (
             f"flexures of {mm(max(lengths))} from a sheet of {mm(sheet)} have {sized.over:.4g} times the stress allowed"
         )
-        return no_design(finding("target_unreachable", text), {"design.flexures.length": longer})
+        return unreachable(text, {"design.flexures.length": longer})
     if (thinnest := min(min(flexure.thickness, flexure.width) for flexure in sized.flexures)) < 1.0 / PER_METRE:
         text = f"stress and force allow flexures of {mm(thinnest)} at most: less travel, or a stronger material"
-        return no_design(finding("target_unreachable", text))
+        return unreachable(text)
     factors: dict[str, tuple[float | None, str, str]] = {
         "closed_form_force": (sized.force_factor, "factor", f"force {FACTOR_PHRASES[0]}"),
         "closed_form_stress": (sized.stress_factor, "factor", f"largest stress {FACTOR_PHRASES[1]}"),

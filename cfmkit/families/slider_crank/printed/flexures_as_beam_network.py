@@ -172,6 +172,12 @@ def flexure_network(ends: FloatArray, flexures: Sequence[Flexure], material: Ela
     return Network(nodes, beams, links=(Link("crank", "crank end"), Link("coupler", "coupler end")))
 
 
+def taper_of(section: Section) -> Taper:
+    """Return the thickness of a section along its beam; of one thickness both ends."""
+    thickness = section.thickness
+    return thickness if isinstance(thickness, Taper) else Taper(np.array([0.0, 1.0]), np.repeat(thickness, 2))
+
+
 def spread(
     corners: FloatArray,  # (k + 1, 2): the polyline [m]
     shares: Sequence[Sequence[float]],  # for every straight piece, shares of its length at which a place lies

@@ -17,17 +17,11 @@ from cfmkit.errors import InputError
 from cfmkit.families.findings import CannotBuild, no_result
 from cfmkit.families.rows import findings_of_one, values_of_one, with_values
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage import linkage_of, resolve, side_of, unloaded_angle
-from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
-    elasticity,
-    lumped_chain,
-    pins_of,
-    strip_chain,
-    strip_of,
-    travel_direction,
-)
+from cfmkit.families.slider_crank.linkage import resolve, unloaded_linkage
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import chain_of, elasticity
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd, kept_clear
 from cfmkit.families.slider_crank.printed.findings import FINDING_RULES
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import taper_of
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_QUANTITIES
 from cfmkit.families.slider_crank.printed.solution import Solution
 from cfmkit.results import Result, Status
@@ -38,9 +32,8 @@ if TYPE_CHECKING:
 
     from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.families.run_control import Run
-    from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
-    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
 
 
 DEFAULT_SHARE = 0.35
@@ -62,11 +55,8 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     PARTIAL if equilibrium ends within the travel, NO_EQUILIBRIUM if nothing was found that is on the requested branch.
     """
     try:
-        spec = resolve(spec)
-        linkage = linkage_of(spec.mechanism)
-        unloaded = unloaded_angle(spec.mechanism, linkage)
-        spec = as_run(spec, linkage, unloaded)
-        chain = chain_of(spec, linkage, unloaded)
+        spec = as_run(spec)
+        chain = chain_of(spec)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     except InputError as problem:
@@ -75,7 +65,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     if low < 0:
         pulled = finding("pulled", "a printed chain is pressed, not pulled: 'analysis.travel' must not begin below 0")
         return no_result(spec, pulled)
-    side = side_of(spec, linkage, unloaded) if spec.analysis.side is not None else 0
+    side = spec.analysis.side_sign
     stops, grid = spec.mechanism.end_stops, np.linspace(low, high, spec.analysis.points)
     pressed = chain.press(stops.mark_rows([grid])[0] if stops else grid, side)
     pressed = kept_clear(pressed, _thickness(chain))
@@ -90,7 +80,6 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     whole = (float(pressed.travel[0]), min(float(pressed.travel[-1]), stops.free_end))
     window = whole if spec.analysis.window is None else window_places(spec.analysis.window, (low, high))
     solution = Solution(
-        "lumped" if spec.fidelity == "lumped" else "beam",
         chain,
         pressed,
         elasticity(spec.mechanism),
@@ -124,29 +113,26 @@ def _interpolate(solution: Solution) -> BetweenPoints | None:
 
 def _thickness(chain: Chain) -> float:
     """Return the mean thickness of both ends of a chain [m]."""
-    beams = list(chain.build(chain.points).beams.values())
-    thicknesses = [beam.section.thickness for beam in (beams[0], beams[-1])]
-    first, last = ([thickness] if isinstance(thickness, float) else thickness.values for thickness in thicknesses)
-    return 0.5 * (float(first[0]) + float(last[-1]))
+    tapers = [taper_of(beam.section) for beam in chain.build(chain.points).beams.values()]
+    return 0.5 * float(tapers[0].values[0] + tapers[-1].values[-1])
 
 
-def chain_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Chain:
-    """Return the chain that a specification's fidelity asks for; of a solid the one that it is drawn from."""
-    if spec.piece == "lumped":
-        return lumped_chain(spec.mechanism, linkage, unloaded)
-    strip = strip_of(spec.mechanism, linkage, unloaded)
-    pins = pins_of(spec.mechanism, linkage, unloaded)
-    return strip_chain(strip, elasticity(spec.mechanism), pins, travel_direction(linkage))
+def slider_reach(mechanism: Mechanism) -> float:
+    """Return the slider's distance from the pivot along its way, unloaded [m].
 
-
-def slider_reach(linkage: Linkage, unloaded: float) -> float:
-    """Return the slider's distance from the pivot along its way, unloaded [m]."""
+    Raises CannotBuild if the linkage cannot be assembled.
+    """
+    linkage, unloaded = unloaded_linkage(mechanism)
     return abs(float(linkage.slider_position(np.array(unloaded))))
 
 
-def as_run(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> SliderCrankSpec:
-    """Return the spec with the defaults of the analysis made explicit."""
-    travel = spec.analysis.travel or (0.0, DEFAULT_SHARE * slider_reach(linkage, unloaded))
+def as_run(spec: SliderCrankSpec) -> SliderCrankSpec:
+    """Return the spec with its coupler and the defaults of the analysis made explicit.
+
+    Raises CannotBuild if the linkage cannot be assembled.
+    """
+    spec = resolve(spec)
+    travel = spec.analysis.travel or (0.0, DEFAULT_SHARE * slider_reach(spec.mechanism))
     return with_values(spec, {"analysis.travel": travel, "analysis.fidelity": spec.fidelity})
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from cfmkit.export.contours import BeamSection, Contour, Line, polygon
 from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.posed_part import PosedBody, PosedPart
-from cfmkit.families.slider_crank.linkage import linkage_of, unloaded_angle
-from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, flexures_of, strip_of, travel_direction
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, STRIP_BEAM
+from cfmkit.families.slider_crank.linkage import linkage_of
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, flexures_of, strip_of
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, STRIP_BEAM, taper_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,11 +62,9 @@ class Leg:
     @classmethod
     def from_spec(cls, spec: SliderCrankSpec, as_printed: bool = False) -> Leg:
         """Return the leg of a specification as it is drawn, or with what printing adds to a strip."""
-        linkage = linkage_of(spec.mechanism)
-        unloaded = unloaded_angle(spec.mechanism, linkage)
         beam = spec.mechanism.beam
         if spec.piece == "beam" and beam is not None:
-            strip = strip_of(spec.mechanism, linkage, unloaded)
+            strip = strip_of(spec.mechanism)
             marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(strip.corners, axis=0).T))])
             shares = np.unique(np.concatenate([marks / marks[-1], strip.places]))
             points = np.column_stack([np.interp(shares * marks[-1], marks, strip.corners[:, k]) for k in (0, 1)])
@@ -78,7 +76,7 @@ class Leg:
             width = np.full(len(points), beam.width)
             return cls(points, shares * marks[-1], thickness, width, pieces, _pad_sizes(spec))
         flexures = flexures_of(spec.mechanism)
-        points = corners(spec.mechanism, None, linkage, unloaded)
+        points = corners(spec.mechanism, None)
         thickness, width = (
             np.repeat([getattr(flexure, key) for flexure in flexures], 2) for key in ("thickness", "width")
         )
@@ -192,14 +190,11 @@ def bodies(spec: SliderCrankSpec, solution: Solution, points: NDArray[Any]) -> t
         if pieces:
             link = np.stack([pieces[-1].core[:, -1], line[:, 0]], axis=1)
             pieces.append(PosedBody.line("link", "free", link, leg.widest))
-        place, thickness = path.places(name), beam.section.thickness
-        if isinstance(thickness, float):
-            half: FloatArray = np.full(len(place), 0.5 * thickness)
-        else:
-            half = 0.5 * np.interp(place, thickness.stations, np.real(thickness.values))
+        taper = taper_of(beam.section)
+        half = 0.5 * np.interp(path.places(name), taper.stations, taper.values)
         pieces.append(PosedBody.line("flexure", "free", line, half))
     ground, slider = leg.pads
-    angle = travel_direction(linkage_of(spec.mechanism))
+    angle = linkage_of(spec.mechanism).travel_direction
     travel = solution.travel[points, None] * np.array([np.cos(angle), np.sin(angle)])
     return (
         PosedBody.polygon("pad", "held", ground),

@@ -35,11 +35,11 @@ from cfmkit.families.fem_results import (
 )
 from cfmkit.families.findings import CannotBuild, no_result, sharp_inside
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.linkage import linkage_of, resolve, unloaded_angle
-from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction
+from cfmkit.families.slider_crank.linkage import linkage_of
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import chain_of, elasticity
 from cfmkit.families.slider_crank.printed.findings import left_out_friction
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, kink
-from cfmkit.families.slider_crank.printed.model import as_run, chain_of
+from cfmkit.families.slider_crank.printed.model import as_run
 from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS
 from cfmkit.families.slider_crank.printed.solution import first_at
@@ -121,10 +121,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     from cfmkit.solid.path_following import PathEnd
 
     try:
-        spec = resolve(spec)
-        linkage = linkage_of(spec.mechanism)
-        unloaded = unloaded_angle(spec.mechanism, linkage)
-        spec = as_run(spec, linkage, unloaded)
+        spec = as_run(spec)
         solved = driven_part(spec).solve(run.progress)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
@@ -138,7 +135,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     asked = np.linspace(low, high, spec.analysis.points)
     course = solved.solution.course
     reached = read_only(asked[asked <= course.travel[-1] * (1 + 1e-12)])
-    solution = SolidSolution(spec, solved, reached, chain_of(spec, linkage, unloaded))
+    solution = SolidSolution(spec, solved, reached, chain_of(spec))
     complete = course.ending is PathEnd.COMPLETE
     warnings = tuple(_findings(solution))
     return Result(
@@ -164,7 +161,7 @@ def part_of(spec: SliderCrankSpec) -> Part:
 
     piece = solved_piece(spec)
     made_of, material = elasticity(spec.mechanism), spec.mechanism.material
-    direction = travel_direction(linkage_of(spec.mechanism))
+    direction = linkage_of(spec.mechanism).travel_direction
     driven = np.array([np.cos(direction), np.sin(direction), 0.0])
     places = tuple(
         HeldOrDriven(name, (pad,), pad.mean(axis=0), motion, seams=(pad[:2],))
@@ -187,30 +184,20 @@ def driven_part(spec: SliderCrankSpec) -> DrivenPart:
 
 def elastic_parts(spec: SliderCrankSpec) -> tuple[DrivenPart, ...]:
     """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
-    spec = resolve(spec.replace({"analysis.fidelity": "solid"}))
-    linkage = linkage_of(spec.mechanism)
-    return (driven_part(as_run(spec, linkage, unloaded_angle(spec.mechanism, linkage))),)
+    return (driven_part(as_run(spec.replace({"analysis.fidelity": "solid"}))),)
 
 
 def elastic_networks(spec: SliderCrankSpec) -> tuple[DrivenNetwork, ...]:
     """Return the same leg as beams, for decks of other solvers."""
     from cfmkit.elastica import Displacement
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
-    from cfmkit.families.slider_crank.printed.beam_chain_from_spec import lumped_chain, strip_of
     from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE
 
-    spec = resolve(spec)
-    linkage = linkage_of(spec.mechanism)
-    unloaded = unloaded_angle(spec.mechanism, linkage)
-    _, end = as_run(spec, linkage, unloaded).analysis.travel or (0.0, 0.0)
-    if spec.piece == "beam":
-        network = strip_of(spec.mechanism, linkage, unloaded).network(elasticity(spec.mechanism))
-    else:
-        chain = lumped_chain(spec.mechanism, linkage, unloaded)
-        network = chain.build(chain.points)
-    return (
-        DrivenNetwork("slider-crank", network, Displacement(SLIDER_NODE, travel_direction(linkage), np.array([end]))),
-    )
+    spec = as_run(spec)
+    _, end = spec.analysis.travel or (0.0, 0.0)
+    chain = chain_of(spec)
+    drive = Displacement(SLIDER_NODE, chain.direction, np.array([end]))
+    return (DrivenNetwork("slider-crank", chain.build(chain.points), drive),)
 
 
 def _stops(spec: SliderCrankSpec) -> list[float]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.results.member_efforts import effort_error
 from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.slider_crank.printed.equilibrium_path import ANALYSIS_TOLERANCE, PressingEnd
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, STRIP_BEAM
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, STRIP_BEAM, taper_of
 from cfmkit.metrics.continuous_means_and_extremes import mean
 from cfmkit.numerics.interpolation import nodes_of, resolve_panels
 from cfmkit.numerics.roots import bracketed_root
@@ -78,10 +78,6 @@ class ChainCurve(ShortRepr):
         """Return the largest stress of a leg at travels of any shape [Pa]."""
         return self._evaluate(places, 1)
 
-    def force(self, places: FloatArray) -> FloatArray:
-        """Return the force of all legs at travels of any shape [N]."""
-        return self._evaluate(places, 0)
-
     def _evaluate(self, places: FloatArray, which: int) -> FloatArray:
         law, first = self.laws[which], self.first[which]
         nearest = float(np.exp(law.ends[0]))
@@ -95,7 +91,7 @@ class ChainCurve(ShortRepr):
 
     def mean(self, window: tuple[float, float]) -> float:
         """Return the mean force in a window of the travel [N]."""
-        return mean(self.force, self.places, *window)
+        return mean(lambda places: self._evaluate(places, 0), self.places, *window)
 
     def first_at(self, level: float, which: int = 0) -> float | None:
         """Return the travel at which the force [N], or the stress [Pa] (1), first reaches a level; None if nowhere."""
@@ -129,8 +125,6 @@ def course(
     return ChainCurve(ends, first, (force, stress)) if whole else None
 
 
-ChainModel = Literal["lumped", "beam"]
-
 COMPLETE_ENDINGS = (PressingEnd.COMPLETE, PressingEnd.UNSTABLE)
 """Endings of a path that has all points that were requested."""
 
@@ -139,7 +133,6 @@ COMPLETE_ENDINGS = (PressingEnd.COMPLETE, PressingEnd.UNSTABLE)
 class Solution(ShortRepr):
     """A chain with its equilibria; forces of all legs together, stresses of one."""
 
-    model: ChainModel  # which
     chain: Chain  # what is pressed
     pressed: Pressed  # the outcome
     material: Elasticity  # with the stress allowed
@@ -270,23 +263,13 @@ class Solution(ShortRepr):
     @cached_property
     def width_ratio(self) -> float:
         """Smallest width over thickness."""
-        ratios = []
-        for beam in self.pressed.path.network.beams.values():
-            section = beam.section
-            thickest = float(
-                np.max(section.thickness if isinstance(section.thickness, float) else section.thickness.values)
-            )
-            ratios.append(float(section.width) / thickest)
-        return min(ratios)
+        sections = [beam.section for beam in self.pressed.path.network.beams.values()]
+        return min(float(section.width / taper_of(section).values.max()) for section in sections)
 
     @cached_property
     def thinnest(self) -> float:
         """Smallest thickness [m]."""
-        values = []
-        for beam in self.pressed.path.network.beams.values():
-            thickness = beam.section.thickness
-            values.append(float(np.min(thickness if isinstance(thickness, float) else thickness.values)))
-        return min(values)
+        return min(beam.section.thinnest for beam in self.pressed.path.network.beams.values())
 
 
 def first_at(place: FloatArray, values: FloatArray, level: float) -> float | None:

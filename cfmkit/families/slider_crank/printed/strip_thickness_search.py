@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock, OneStart, Stage, from_record, run_stage
-from cfmkit.families.findings import mm, mpa, newton, no_design, percent
+from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.run_control import Run
-from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.findings import unreachable
 from cfmkit.families.slider_crank.printed.sqp_program import METRES_PER_MM, Form, StripProgram
 from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
 from cfmkit.results import Design, Status
@@ -58,22 +58,11 @@ _MAX_ROUNDS, _STEP_RTOL = 12, 1e-10
 
 
 @dataclass(frozen=True)
-class Ranges:
-    """Smallest and largest value of every number of a form, (n, 2) in its units, and of the stroke [m]."""
-
-    form: FloatArray
-    longest: float
-
-
-@dataclass(frozen=True)
 class FoundStrip:
     """A strip that was found."""
 
-    # task, form, ranges: what was asked
-    task: StripTask
-    form: Form
-    ranges: Ranges
     program: StripProgram  # of the last search
+    ranges: FloatArray  # (n, 2): smallest and largest value of every number of its form
     descent: Optimum  # its outcome
     # that of one thickness, within `COARSE_RIPPLE` at least, for comparison; None if it has no equilibrium
     uniform: Optimum | None
@@ -82,7 +71,7 @@ class FoundStrip:
     @property
     def values(self) -> FloatArray:
         """Numbers of the form."""
-        return self.descent.z[: self.form.size]
+        return self.descent.z[: self.program.form.size]
 
 
 def uniform_thickness(task: StripTask, width: float, guess: float = INITIAL_THICKNESS) -> float:
@@ -91,13 +80,12 @@ def uniform_thickness(task: StripTask, width: float, guess: float = INITIAL_THIC
     The force follows the third power of the thickness but for stretching and shear: a few corrections do.
     """
     program = _make_uniform_program(task, width)
+    wanted = np.asarray(task.share(program.travel(np.ones(2))))
+    level = 0.5 * task.force * (wanted.max() + wanted.min())
 
     def step(thickness: float) -> float | None:
-        state = program.state(np.array([thickness / METRES_PER_MM, 1.0]))
-        if state is None:
-            return None
-        wanted = np.asarray(task.share(program.travel(np.array([thickness / METRES_PER_MM, 1.0]))))
-        return float((0.5 * task.force * (wanted.max() + wanted.min()) / _level(state)) ** (1.0 / 3.0))
+        state = _press_uniform(program, thickness)
+        return None if state is None else float((level / _level(state)) ** (1.0 / 3.0))
 
     iterated = _iterate_thickness(step, guess)
     return guess if iterated is None else iterated
@@ -115,7 +103,7 @@ def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
 
     def step(thickness: float) -> float | None:
         nonlocal width
-        state = _make_uniform_program(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
+        state = _press_uniform(_make_uniform_program(task, width), thickness)
         if state is None:
             return None
         factor = limit / _peak(state)
@@ -136,7 +124,7 @@ def uniform_for_width(task: StripTask, width: float) -> tuple[float, float] | No
 
     def step(thickness: float) -> float | None:
         nonlocal worst
-        state = _make_uniform_program(task, width).state(np.array([thickness / METRES_PER_MM, 1.0]))
+        state = _press_uniform(_make_uniform_program(task, width), thickness)
         if state is None:
             return None
         worst = _peak(state)
@@ -164,6 +152,10 @@ def _make_uniform_program(task: StripTask, width: float) -> StripProgram:
     return StripProgram(replace(task, goal="ripple"), Form(1, width=width))
 
 
+def _press_uniform(program: StripProgram, thickness: float) -> State | None:
+    return program.state(np.array([thickness / METRES_PER_MM, 1.0]))
+
+
 def _level(state: State) -> float:
     """Return the mean of the extremes of a force [N]."""
     return float(0.5 * (state.force.max() + state.force.min()))
@@ -175,7 +167,7 @@ def _peak(state: State) -> float:
 
 
 @dataclass(frozen=True)
-class StripStarts:
+class StripSearch:
     """From the number of a start to the strip that it led to, from the uniform one on.
 
     The first one climbs from the uniform strip, from few thicknesses to all; the others begin with all of them, random.
@@ -183,30 +175,104 @@ class StripStarts:
 
     task: StripTask
     form: Form
-    ranges: Ranges
-    uniform: Optimum | None
-    seed: int
-    clock: Clock
+    ranges: FloatArray  # (n, 2): smallest and largest value of every number of the form
+    seed: int = 0
+    clock: Clock = UNLIMITED_CLOCK  # when it is late, no more is tried
+    uniform: Optimum | None = None  # the best strip of one thickness; None if it has no equilibrium
+
+    def find_uniform(self) -> Optimum | None:
+        """Return the best strip of one thickness; None if it has no equilibrium."""
+        width = self.form.width or float(self.ranges[-1].mean()) * METRES_PER_MM
+        first = uniform_thickness(self.task, width, float(self.ranges[0].mean()) * METRES_PER_MM) / METRES_PER_MM
+        wide = replace(self.task, ripple=max(self.task.ripple, COARSE_RIPPLE))
+        search = StripSearch(wide, Form(1, width=width), self.ranges[:1], clock=self.clock)
+        start = search.add_goal(np.array([first]), search.first_goal())
+        descent = descend(StripProgram(wide, search.form), start, search.bounds(1), clock=self.clock)
+        return None if descent.ending is SearchEnding.NO_ANSWER else descent
 
     def descend(self, number: int) -> Optimum:
         """Return where the last search of a start ended."""
-        steps, factors = _ladder(self.form), None
-        if number:
-            steps = (self.form.count,)
-            drawn = np.random.default_rng(self.seed).standard_normal((number, self.form.count))[-1]
-            factors = np.exp(START_DEVIATION * drawn)
-        return _climb(self, steps, factors).descent
+        if not number:
+            return self.climb(_ladder(self.form), 1.0)
+        drawn = np.random.default_rng(self.seed).standard_normal((number, self.form.count))[-1]
+        return self.climb((self.form.count,), np.exp(START_DEVIATION * drawn))
 
     def read(self, record: dict[str, Any]) -> FoundStrip:
         """Return the strip of a record."""
-        descent = from_record(Optimum, record["found"] | {"ending": SearchEnding[record["found"]["ending"]]})
-        return FoundStrip(self.task, self.form, self.ranges, StripProgram(self.task, self.form), descent, self.uniform)
+        return self.finish(from_record(Optimum, record["found"] | {"ending": SearchEnding[record["found"]["ending"]]}))
+
+    def finish(self, descent: Optimum) -> FoundStrip:
+        """Return the strip at which a search ended."""
+        return FoundStrip(StripProgram(self.task, self.form), self.ranges, descent, self.uniform)
+
+    def climb(self, steps: tuple[int, ...], factors: FloatArray | float) -> Optimum:
+        """Return the outcome of one start: every search begins where the one with fewer thicknesses ended."""
+        task, form = self.task, self.form
+        x, last = self.begin(steps[0])
+        x[: steps[0]] *= factors
+        for count in steps:
+            now = replace(form, count=count)
+            n_sizes = len(x) - (form.size - form.count)
+            x = np.concatenate([_refine_nodes(x[:n_sizes], count), x[n_sizes:]])
+            coarse = count < steps[-1]
+            goal = replace(task, ripple=max(task.ripple, COARSE_RIPPLE)) if coarse else task
+            effort = (20, 1e-3) if coarse else (100, 1e-9 if task.goal == "rms" else 1e-6)
+            start, bounds = self.add_goal(x, last), self.bounds(count)
+            descent = descend(StripProgram(goal, now), start, bounds, *effort, self.clock)
+            x, last = descent.z[: now.size], descent.z[-1]
+        return descent
+
+    def tighten_band(self) -> Optimum | None:
+        """Return the outcome of a band that begins as wide as the uniform strip needs it, made narrower in steps.
+
+        Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not. None
+        where a wide band is missed by more than its own width: a narrower one is not reached from there.
+        """
+        task, form = self.task, self.form
+        x, last = self.begin(form.count)
+        missed = 0.0 if self.uniform is None else min(0.01 * self.uniform.violation, MAX_BAND_WIDENING)
+        loose = max(task.ripple, COARSE_RIPPLE) + missed
+        for ripple in np.geomspace(loose, task.ripple, N_NARROWING_STEPS).tolist():
+            program = StripProgram(replace(task, ripple=ripple), form)
+            descent = descend(program, np.append(x, last), self.bounds(form.count), clock=self.clock)
+            if ripple > task.ripple and 0.01 * descent.violation > ripple:
+                return None
+            x, last = descent.z[: form.size], descent.z[-1]
+        return descent
+
+    def begin(self, count: int) -> tuple[FloatArray, float]:
+        """Return the first numbers of a search with so many thicknesses, and the first value of the goal."""
+        middle = self.ranges.mean(axis=1)
+        if self.uniform is not None and not (self.form.per_piece or self.form.shares):
+            middle = np.concatenate([np.full(count, self.uniform.z[0]), middle[self.form.count :]])
+        return middle, self.first_goal()
+
+    def first_goal(self) -> float:
+        """Return the stroke [cm] or the ripple [%] that a search begins with."""
+        if self.task.goal != "stroke":
+            return 2.0
+        known = self.uniform if self.uniform is not None and np.isfinite(self.uniform.violation) else None
+        return 100.0 * self.task.stroke if known is None else float(known.z[-1])
+
+    def add_goal(self, x: FloatArray, goal: float) -> FloatArray:
+        """Return the variables of a search: numbers of a form, and what is sought unless that is no variable."""
+        return x if self.task.goal == "rms" else np.append(x, goal)
+
+    def bounds(self, count: int) -> FloatArray:
+        """Return the bounds of a search with another number of thicknesses, and of its goal."""
+        n, task = self.form.count, self.task
+        thickness = self.ranges[:n] if count == n else np.tile(self.ranges[0], (count, 1))
+        rows = np.concatenate([thickness, self.ranges[n:]])
+        if task.goal == "rms":
+            return rows
+        stroke = [100.0 * (task.start + MIN_BAND_LENGTH), 100.0 * task.longest]
+        return np.concatenate([rows, [stroke if task.goal == "stroke" else [1e-3, MOST_RIPPLE]]])
 
 
 def search(
     task: StripTask,
     form: Form,
-    ranges: Ranges,
+    ranges: FloatArray,  # (n, 2): smallest and largest value of every number of the form
     starts: int,  # how many, the uniform strip included
     run: Run,
     identity: str = "",  # of everything that decides the outcome of a start but its number
@@ -221,15 +287,17 @@ def search(
         count = len(records)
         run.progress(count / starts, f"start {count + 1} of {starts}" if count < starts else "done")
 
-    work = StripStarts(task, form, ranges, _uniform(task, form, ranges, clock), run.seed, clock)
+    work = StripSearch(task, form, ranges, run.seed, clock)
+    work = replace(work, uniform=work.find_uniform())
     means = run if starts > 1 else replace(run, executor=Run().executor)  # one alone is not worth a process
     outcome = run_stage(Stage(OneStart(work.descend, clock), tuple(range(starts)), identity), means, clock, tell)
     if not outcome.records:
         return _nothing(outcome.lost)
     strips = [_with_its_ripple(work.read(outcome.records[number])) for number in sorted(outcome.records)]
     best = min(strips, key=lambda strip: _rank(strip.descent))
-    if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM):
-        best = min(filter(None, (best, _tighten_band(work))), key=lambda strip: _rank(strip.descent))
+    unsure = not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM)
+    if task.goal == "stroke" and unsure and (tightened := work.tighten_band()) is not None:
+        best = min((best, work.finish(tightened)), key=lambda strip: _rank(strip.descent))
     return replace(best, lost=outcome.lost)
 
 
@@ -239,7 +307,7 @@ def _with_its_ripple(strip: FoundStrip) -> FoundStrip:
     Such a search may stop on its way; no ripple is too large for it, and the strip is one.
     """
     descent, program = strip.descent, strip.program
-    if strip.task.goal != "ripple" or descent.feasible or (seen := program.evaluate(descent.z, False)) is None:
+    if program.task.goal != "ripple" or descent.feasible or (seen := program.evaluate(descent.z, False)) is None:
         return strip
     z = descent.z.copy()
     z[-1] -= min(float(rows.values.min()) for rows in seen.rows if rows.name == "band")
@@ -252,9 +320,7 @@ def _nothing(lost: tuple[str, ...]) -> Design:
     """Return why no start led to anything."""
     if lost:
         return Design(None, Status.CRASHED, f"no start was completed: {'; '.join(lost)}")
-    return no_design(
-        finding("target_unreachable", "the time budget ended before any start led to a strip: increase it")
-    )
+    return unreachable("the time budget ended before any start led to a strip: increase it")
 
 
 def _rank(descent: Optimum) -> tuple[bool, float]:
@@ -272,117 +338,23 @@ def _ladder(form: Form) -> tuple[int, ...]:
     return (*steps, form.count)
 
 
-def _climb(start: StripStarts, steps: tuple[int, ...], factors: FloatArray | None) -> FoundStrip:
-    """Return the outcome of one start: every search begins where the one with fewer thicknesses ended."""
-    task, form, ranges = start.task, start.form, start.ranges
-    x, last = _begin(task, form, ranges, start.uniform, steps[0])
-    if factors is not None:
-        x[: steps[0]] *= factors
-    for count in steps:
-        now = replace(form, count=count)
-        n_sizes = len(x) - (form.size - form.count)
-        x = np.concatenate([_refine_nodes(x[:n_sizes], count), x[n_sizes:]])
-        coarse = count < steps[-1]
-        goal = replace(task, ripple=max(task.ripple, COARSE_RIPPLE)) if coarse else task
-        program = StripProgram(goal, now)
-        bounds = _bounds(task, ranges, form, count)
-        begin = np.append(x, last) if program.extra else x
-        effort = (20, 1e-3) if coarse else (100, 1e-9 if task.goal == "rms" else 1e-6)
-        descent = descend(program, begin, bounds, *effort, start.clock)
-        x = descent.z[: now.size]
-        last = descent.z[-1]
-    return FoundStrip(task, form, ranges, program, descent, start.uniform)
-
-
-def _tighten_band(start: StripStarts) -> FoundStrip | None:
-    """Return the outcome of a band that begins as wide as the uniform strip needs it, and is made narrower in steps.
-
-    Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not. None
-    where a wide band is missed by more than its own width: a narrower one is not reached from there.
-    """
-    task, form, ranges, uniform = start.task, start.form, start.ranges, start.uniform
-    x, last = _begin(task, form, ranges, uniform, form.count)
-    missed = 0.0 if uniform is None else min(0.01 * uniform.violation, MAX_BAND_WIDENING)
-    loose = max(task.ripple, COARSE_RIPPLE) + missed
-    for ripple in np.geomspace(loose, task.ripple, N_NARROWING_STEPS):
-        program = StripProgram(replace(task, ripple=float(ripple)), form)
-        begin = np.append(x, last)
-        descent = descend(program, begin, _bounds(task, ranges, form, form.count), clock=start.clock)
-        if ripple > task.ripple and 0.01 * descent.violation > ripple:
-            return None
-        x, last = descent.z[: form.size], descent.z[-1]
-    return FoundStrip(task, form, ranges, program, descent, uniform)
-
-
 def _refine_nodes(values: FloatArray, count: int) -> FloatArray:
     """Return thicknesses on more nodes, the same strip."""
     old = np.linspace(0.0, 1.0, len(values))
     return values if len(values) == count else np.interp(np.linspace(0.0, 1.0, count), old, values)
 
 
-def _begin(
-    task: StripTask, form: Form, ranges: Ranges, uniform: Optimum | None, count: int
-) -> tuple[FloatArray, float]:
-    """Return the first numbers, and the first value of the goal."""
-    low, high = ranges.form.T
-    middle = 0.5 * (low + high)
-    if form.per_piece or form.shares or uniform is None:
-        x = middle.copy()
-        return x, _first_goal(task, uniform)
-    x = np.concatenate([np.full(count, uniform.z[0]), middle[form.count :]])
-    return x, _first_goal(task, uniform)
-
-
-def _first_goal(task: StripTask, uniform: Optimum | None) -> float:
-    if task.goal == "stroke":
-        width = None if uniform is None or not np.isfinite(uniform.violation) else float(uniform.z[-1])
-        return width if width is not None else 100.0 * task.stroke
-    return 2.0
-
-
-def _bounds(task: StripTask, ranges: Ranges, form: Form, count: int) -> FloatArray:
-    """Return the bounds of a search with another number of thicknesses, and of its goal."""
-    ends = ranges.form
-    thickness = ends[: form.count] if count == form.count else np.tile(ends[0], (count, 1))
-    rows = np.concatenate([thickness, ends[form.count :]])
-    if task.goal == "rms":
-        return rows
-    goal = (
-        [100.0 * (task.start + MIN_BAND_LENGTH), 100.0 * ranges.longest]
-        if task.goal == "stroke"
-        else [1e-3, MOST_RIPPLE]
-    )
-    return np.concatenate([rows, [goal]])
-
-
-def _uniform(task: StripTask, form: Form, ranges: Ranges, clock: Clock) -> Optimum | None:
-    """Return the best strip of one thickness."""
-    ends = ranges.form
-    width = form.width or float(ends[-1].mean()) * METRES_PER_MM
-    first = uniform_thickness(task, width, float(ends[0].mean()) * METRES_PER_MM) / METRES_PER_MM
-    program = StripProgram(replace(task, ripple=max(task.ripple, COARSE_RIPPLE)), Form(1, width=width))
-    last = [100.0 * task.stroke] if task.goal == "stroke" else [2.0]
-    bounds = _bounds(task, Ranges(ends[:1], ranges.longest), Form(1, width=width), 1)
-    start = np.array([first, *last]) if program.extra else np.array([first])
-    descent = descend(program, start, bounds, clock=clock)
-    return None if descent.ending is SearchEnding.NO_ANSWER else descent
-
-
 def infeasible(strip: FoundStrip) -> Design:
     """Return what the nearest strip misses, and the target that it would meet."""
-    descent, program, task = strip.descent, strip.program, strip.task
+    descent, program, task = strip.descent, strip.program, strip.program.task
     if descent.ending is SearchEnding.NO_ANSWER:
-        why = "could not begin: the first strip has no equilibrium over 'design.travel'; reduce it, or "
-        why += "for other ranges in 'design.beam'"
-        return no_design(finding("target_unreachable", f"the search {why}"))
+        why = "the first strip has no equilibrium over 'design.travel'; reduce it, or for other ranges in 'design.beam'"
+        return unreachable(f"the search could not begin: {why}")
     if descent.ending is SearchEnding.OUT_OF_TIME:
-        text = "the time budget ended before a strip met its targets: increase it"
-        return no_design(finding("target_unreachable", text))
+        return unreachable("the time budget ended before a strip met its targets: increase it")
     state = program.state(descent.z)
     if state is None:
-        return no_design(
-            finding("target_unreachable", f"the search {descent.ending.value}; change 'design.travel' or 'design.beam'")
-        )
+        return unreachable(f"the search {descent.ending.value}; change 'design.travel' or 'design.beam'")
     low, high = float(state.force.min()), float(state.force.max())
     level, missed, nearest = 0.5 * (low + high), [], {}
     ratio, limit = state.force / task.force - task.share(program.travel(descent.z)), task.material.allowable_stress
@@ -401,4 +373,4 @@ def infeasible(strip: FoundStrip) -> Design:
         f"{mm(program.stroke(descent.z))} the nearest {' and '.join(missed)} ({descent.ending.value}); change "
         "'design.force', 'design.travel' or the ranges in 'design.beam'"
     )
-    return no_design(finding("target_unreachable", text), nearest)
+    return unreachable(text, nearest)

@@ -24,7 +24,7 @@ from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.support_spec import guide_cure, guide_needed
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -68,17 +68,6 @@ def _locks(number: int, name: str) -> Rule:
     return FindingRule("self_locks", holds, sentence)
 
 
-def _snaps_out(solution: Solution) -> Any:
-    return (solution.classified.kind == SNAP_THROUGH_CLASS) & (solution.classified.unstable > 0)
-
-
-def _snap(solution: Solution) -> Sentence:
-    return (
-        f"at {place(solution, float(solution.nearest(stable=False)[0][0]))} the mechanism snaps through, and the "
-        "motion ends before the next stable position; extend the motion to find it",
-    )
-
-
 def _boundary(solution: Solution) -> Sentence:
     kind, drop = int(solution.classified.kind[0]), float(solution.classified.drop[0])
     side = "has" if kind in (SNAP_THROUGH_CLASS, BISTABLE_CLASS, TRISTABLE_CLASS) else "just misses"
@@ -98,13 +87,6 @@ def _is_restless(solution: Solution) -> Any:
     return (solution.drive == "torque") & inside[:, 0] & only_slider & (_knee(solution) == 0)
 
 
-def _rest(_solution: Solution) -> Sentence:
-    return (
-        "only the slider's spring acts, and it is relaxed in the stretched position: the energy grows with the "
-        "fourth power there, and the stiffness at rest is zero; add a torsion spring",
-    )
-
-
 # --- driven by a torque ---------------------------------------------------------------------------------------------
 
 
@@ -115,10 +97,10 @@ def _winds_up(solution: Solution) -> Any:
 
 def _winding(solution: Solution) -> Sentence:
     rates = solution.assemblies[0].rates
-    wound = [name for name, rate in zip(JOINT_NAMES[:2], rates, strict=False) if rate > 0.0]
+    wound = [name.replace("_", " ") for name, rate in zip(JOINT_NAMES[:2], rates, strict=False) if rate > 0.0]
     return (
-        f"over a full turn the spring at the {' and at the '.join(name.replace('_', ' ') for name in wound)} is "
-        "wound up: the torque differs in the next turn; only springs at slider and slider pin repeat",
+        f"over a full turn the spring at the {' and at the '.join(wound)} is wound up: the torque differs in the next "
+        "turn; only springs at slider and slider pin repeat",
     )
 
 
@@ -153,22 +135,6 @@ def _starts_stretched(solution: Solution) -> Any:
     return (solution.drive == "force") & (_knee(solution) == 0.0)
 
 
-def _column(solution: Solution) -> Sentence:
-    return (
-        "the linkage starts in the stretched position, where the force is 0/0: its limit is "
-        f"{newton(float(solution.frictionless(np.zeros((1, 1)))[0]))}, "
-        "the buckling load of a column; a kink smaller than the part's tolerance determines the side",
-    )
-
-
-def _sides(_solution: Solution) -> Sentence:
-    return (
-        "from the stretched position the crank can move to either side, and 'analysis.side' is not stated: "
-        "'beyond' is assumed; with an offset the force on the other side differs",
-        "analysis.side=before",
-    )
-
-
 def _is_nearly_stretched(solution: Solution) -> Any:
     knee = _knee(solution)
     return (solution.drive == "force") & (knee != 0.0) & (np.abs(knee) < RUN_IN) & (solution.motion[:, 0] <= 0.0)
@@ -178,14 +144,6 @@ def _lead(solution: Solution) -> float:
     return solution.assemblies[0].unloaded - solution.assemblies[0].linkage.stretched_angle
 
 
-def _far_side(solution: Solution) -> Sentence:
-    return (
-        f"the springs are relaxed {deg(abs(_lead(solution)))} away, on the far side "
-        "of the stretched position: at the stretched position the force is unbounded; leave 'analysis.side' out to "
-        "start on the side on which they are relaxed",
-    )
-
-
 def _run_in_end(solution: Solution) -> str:
     """Return where the force has come up, to 95 % of what it is in the middle of the motion."""
     assembly, end = solution.assemblies[0], float(solution.motion[0, -1])
@@ -193,10 +151,6 @@ def _run_in_end(solution: Solution) -> str:
     force = assembly.efforts(motion)
     reaching = np.flatnonzero(force >= 0.95 * float(np.interp(0.5 * end, motion, force)))
     return f"within {mm(float(motion[reaching[0]]))} it reaches 95 %" if len(reaching) else "it never reaches 95 %"
-
-
-def _run_in_in_short(solution: Solution) -> str:
-    return f"the force begins at zero: {_run_in_end(solution)} of that at mid-travel"
 
 
 def _run_in(solution: Solution) -> Sentence:
@@ -217,17 +171,6 @@ def _nears_pole(solution: Solution) -> Any:
     return (np.abs(_knee(solution)) >= RUN_IN) & is_near[:, 0]
 
 
-def _pole(solution: Solution) -> Sentence:
-    return (
-        f"at {mm(solution.assemblies[0].reach[0])} of travel crank and coupler are in one line and the springs are "
-        "not relaxed: no finite force moves the slider there; choose a motion that does not reach it",
-    )
-
-
-def _pole_in_short(solution: Solution) -> str:
-    return f"no finite force moves the slider at {mm(solution.assemblies[0].reach[0])}"
-
-
 # --- reference and window -------------------------------------------------------------------------------------------
 
 
@@ -243,13 +186,6 @@ def _misses_reference(solution: Solution) -> Any:
 
 def _describe_reference(solution: Solution) -> str:
     return f"the reference {place(solution, float(solution.reference[0, 0]))}"
-
-
-def _no_level(solution: Solution) -> Sentence:
-    return (
-        f"at {_describe_reference(solution)} the {solution.drive} is zero, and a "
-        "band stated in per cent of zero has no width; choose another reference",
-    )
 
 
 def _efforts_in_window(solution: Solution) -> tuple[FloatArray, FloatArray]:
@@ -279,54 +215,60 @@ def _leaves_out_stretched(solution: Solution) -> Any:
 
 
 def _stretched_outside(solution: Solution) -> Sentence:
-    low, high = solution.window_or_motion
+    low, high, stretched = (deg(float(at[0, 0])) for at in (*solution.window_or_motion, solution.stretched))
     return (
-        f"the window {deg(float(low[0, 0]))} to {deg(float(high[0, 0]))} does not contain the stretched position "
-        f"{deg(float(solution.stretched[0, 0]))}: only around it is the slider's spring certain to give negative "
-        "stiffness",
+        f"the window {low} to {high} does not contain the stretched position {stretched}: only around it is the "
+        "slider's spring certain to give negative stiffness",
     )
 
 
 # --- limits of springs ----------------------------------------------------------------------------------------------
 
 
-def _fault_of_bought_spring(
-    spec: SliderCrankSpec,  # with bought springs
-    number: int,  # which of them
-    moved: float,  # size of the largest turn of its joint, of the slider its travel [rad or m]
-) -> tuple[Any, ...] | None:
-    """Return what is wrong with a bought spring over a motion, and settings that cure it; None if nothing is."""
-    spring, pins = spec.mechanism.springs.bought[number], spec.mechanism.pins
-    coil, key = spring.coil, f"mechanism.springs.bought.{number}"
-    if spring.kind == "compression":
-        if spring.is_guided or not moved > spring.unguided * (1 + 1e-9):
-            return None
-        return (
-            f"{spring.name} buckles when it is deflected by {mm(spring.unguided)} (ends {spring.seats}), and "
-            f"is deflected by {mm(moved)}; {guide_needed(spring, coil, key)}",
-            *guide_cure(coil, key),
-        )
-    if spring.kind != "torsion" or coil is None or pins is None or not np.isfinite(moved):
+def _buckling(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | None:
+    """Return how a bought spring buckles that is deflected so far, and what guides it; None if it does not."""
+    spring, key = spec.mechanism.springs.bought[number], f"mechanism.springs.bought.{number}"
+    if spring.is_guided or not moved > spring.unguided * (1 + 1e-9):
         return None
-    inside = coil.inner_diameter_wound_up(moved)
+    return (
+        f"{spring.name} buckles when it is deflected by {mm(spring.unguided)} (ends {spring.seats}), and "
+        f"is deflected by {mm(moved)}; {guide_needed(spring, spring.coil, key)}",
+        *guide_cure(spring.coil, key),
+    )
+
+
+def _binding(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | None:
+    """Return how a bought spring that is wound up so far [rad] binds on its pin; None if it does not."""
+    spring, pins = spec.mechanism.springs.bought[number], spec.mechanism.pins
+    if spring.coil is None or pins is None or not np.isfinite(moved):
+        return None
+    inside = spring.coil.inner_diameter_at(moved)
     if inside >= pins.diameter:
         return None
     return (
-        f"{spring.name} at the {spring.at.replace('_', ' ')} is {mm(coil.inner_diameter)} wide inside, "
+        f"{spring.name} at the {spring.at.replace('_', ' ')} is {mm(spring.coil.inner_diameter)} wide inside, "
         f"wound up by {deg(moved)} {mm(max(inside, 0.0))}: it binds on its pin of {mm(pins.diameter)}; use "
         "a wider spring, or a thinner pin ('mechanism.pins.diameter')",
     )
 
 
-def _fails(number: int, spring: Bought) -> Rule:
-    """Return the rule on what a bought spring cannot do."""
+def _rules_on(number: int, spring: Bought) -> Iterator[Rule]:
+    """Yield the rules on what the bought spring of a number cannot do."""
+    if spring.spring_type.needs_guide:
+        yield _fails("spring_buckles", _buckling, number, spring)
+    if spring.at != "slider":
+        yield _fails("spring_binds_on_pin", _binding, number, spring)
+
+
+def _fails(name: str, describe_fault: Callable[..., Sentence | None], number: int, spring: Bought) -> Rule:
+    """Return the rule on one fault of a bought spring."""
 
     def fault(solution: Solution, row: int) -> Sentence | None:
         turns = np.broadcast_to(solution.extremes.largest_turns, (4, len(solution)))
-        return _fault_of_bought_spring(solution.specs[row], number, float(turns[JOINT_NAMES.index(spring.at), row]))
+        return describe_fault(solution.specs[row], number, float(turns[JOINT_NAMES.index(spring.at), row]))
 
     return FindingRule(
-        "spring_buckles" if spring.kind == "compression" else "spring_binds_on_pin",
+        name,
         lambda solution: np.array([fault(solution, row) is not None for row in range(len(solution))]),
         lambda solution: fault(solution, 0) or (),
     )
@@ -354,17 +296,51 @@ def _overturns(joint: int) -> Rule:
 FINDING_RULES: tuple[Rule, ...] = (
     _locks(0, "forth"),
     _locks(1, "back"),
-    FindingRule("second_stable_outside", _snaps_out, _snap),
+    FindingRule(
+        "second_stable_outside",
+        lambda solution: (solution.classified.kind == SNAP_THROUGH_CLASS) & (solution.classified.unstable > 0),
+        lambda solution: (
+            f"at {place(solution, float(solution.nearest(stable=False)[0][0]))} the mechanism snaps through, and the "
+            "motion ends before the next stable position; extend the motion to find it",
+        ),
+    ),
     FindingRule("class_boundary", lambda solution: np.abs(solution.classified.drop - 1.0) < DROP_TOL, _boundary),
-    FindingRule("quartic_minimum", _is_restless, _rest),
+    FindingRule(
+        "quartic_minimum",
+        _is_restless,
+        lambda _solution: (
+            "only the slider's spring acts, and it is relaxed in the stretched position: the energy grows with the "
+            "fourth power there, and the stiffness at rest is zero; add a torsion spring",
+        ),
+    ),
     FindingRule("spring_winds_up", _winds_up, _winding),
     FindingRule("same_position_twice", _rests_again, _again),
-    FindingRule("stretched_start", _starts_stretched, _column),
     FindingRule(
-        "two_positions", lambda solution: _starts_stretched(solution) & (solution.spec.analysis.side is None), _sides
+        "stretched_start",
+        _starts_stretched,
+        lambda solution: (
+            "the linkage starts in the stretched position, where the force is 0/0: its limit is "
+            f"{newton(float(solution.frictionless(np.zeros((1, 1)))[0]))}, the buckling load of a column; a kink "
+            "smaller than the part's tolerance determines the side",
+        ),
     ),
     FindingRule(
-        "force_unbounded", lambda solution: _is_nearly_stretched(solution) & np.isnan(solution.rest[:, 0]), _far_side
+        "two_positions",
+        lambda solution: _starts_stretched(solution) & (solution.spec.analysis.side is None),
+        lambda _solution: (
+            "from the stretched position the crank can move to either side, and 'analysis.side' is not stated: "
+            "'beyond' is assumed; with an offset the force on the other side differs",
+            "analysis.side=before",
+        ),
+    ),
+    FindingRule(
+        "force_unbounded",
+        lambda solution: _is_nearly_stretched(solution) & np.isnan(solution.rest[:, 0]),
+        lambda solution: (
+            f"the springs are relaxed {deg(abs(_lead(solution)))} away, on the far side of the stretched position: at "
+            "the stretched position the force is unbounded; leave 'analysis.side' out to start on the side on which "
+            "they are relaxed",
+        ),
     ),
     FindingRule(
         "run_in",
@@ -372,15 +348,30 @@ FINDING_RULES: tuple[Rule, ...] = (
             _is_nearly_stretched(solution) & ~np.isnan(solution.rest[:, 0]) & (solution.motion[:, -1] >= 0.0)
         ),
         _run_in,
-        _run_in_in_short,
+        lambda solution: f"the force begins at zero: {_run_in_end(solution)} of that at mid-travel",
     ),
-    FindingRule("force_unbounded", _nears_pole, _pole, _pole_in_short),
+    FindingRule(
+        "force_unbounded",
+        _nears_pole,
+        lambda solution: (
+            f"at {mm(solution.assemblies[0].reach[0])} of travel crank and coupler are in one line and the springs are "
+            "not relaxed: no finite force moves the slider there; choose a motion that does not reach it",
+        ),
+        lambda solution: f"no finite force moves the slider at {mm(solution.assemblies[0].reach[0])}",
+    ),
     FindingRule(
         "reference_outside",
         _misses_reference,
         lambda solution: (f"{_describe_reference(solution)} is outside the motion",),
     ),
-    FindingRule("reference_zero", lambda solution: _reaches_reference(solution) & ~solution.has_level, _no_level),
+    FindingRule(
+        "reference_zero",
+        lambda solution: _reaches_reference(solution) & ~solution.has_level,
+        lambda solution: (
+            f"at {_describe_reference(solution)} the {solution.drive} is zero, and a band stated in per cent of zero "
+            "has no width; choose another reference",
+        ),
+    ),
     FindingRule("effort_changes_sign", _changes_sign, _signs),
     FindingRule("stretched_outside_window", _leaves_out_stretched, _stretched_outside),
 )
@@ -399,6 +390,6 @@ def rules_of(solution: Solution) -> tuple[Rule, ...]:
     springs = solution.spec.mechanism.springs.bought
     return (
         *FINDING_RULES,
-        *(_fails(*number_and_spring) for number_and_spring in enumerate(springs)),
+        *(rule for number, spring in enumerate(springs) for rule in _rules_on(number, spring)),
         *(_overturns(joint) for joint in range(4)),
     )

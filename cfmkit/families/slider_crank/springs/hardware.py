@@ -47,7 +47,7 @@ from cfmkit.families.hardware import (
     with_faults,
 )
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
-from cfmkit.families.slider_crank.springs.sprung_linkage import coupler_angle
+from cfmkit.families.slider_crank.springs.sprung_linkage import coupler_angle, pull_on_coupler
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
 from cfmkit.stock.joint_strength import (
@@ -156,12 +156,10 @@ def link_loads(assembly: Assembly, motion: FloatArray, legs: Any) -> LinkLoads:
     units, link = assembly.units(motion), assembly.linkage
     per_leg = 1.0 / np.asarray(legs, dtype=float)[..., None]
     drive = assembly.total(units.effort) if assembly.drive == "force" else np.zeros(1)
-    moments = assembly.weigh(units.turn)
-    at_crank_pin, at_slider_pin = moments[1], moments[2]
+    _, at_crank_pin, at_slider_pin, _ = assembly.weigh(units.turn)
     beta, angle = coupler_angle(link, units), units.angle
-    pulled = -moments[3] - link.branch * drive  # on the slider, along its path
+    pulled, across = pull_on_coupler(assembly, units, drive, beta)
     with np.errstate(divide="ignore", invalid="ignore"):
-        across = (link.coupler * np.sin(beta) * pulled + at_crank_pin + at_slider_pin) / (link.coupler * np.cos(beta))
         at_pivot = link.crank * (-pulled * np.sin(angle) + across * np.cos(angle)) + at_crank_pin
         axial = [pulled * np.cos(link_angle) + across * np.sin(link_angle) for link_angle in (angle, beta)]
         moment = [np.maximum(np.abs(at_crank_pin), np.abs(at_end)) for at_end in (at_pivot, at_slider_pin)]
@@ -357,7 +355,7 @@ def _tallest_spring(spec: SliderCrankSpec, solution: Solution) -> float:
     for entry in spec.mechanism.springs.bought:
         if entry.at in heights and entry.coil is not None:
             turn = float(turns[JOINT_NAMES.index(entry.at)])
-            heights[entry.at] += entry.count * entry.coil.body_length_wound_up(turn)
+            heights[entry.at] += entry.count * entry.coil.room_for(turn)
     return max(heights.values())
 
 

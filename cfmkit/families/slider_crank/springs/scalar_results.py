@@ -41,44 +41,40 @@ NO_FACTOR = "it needs torsion springs and a spring at the slider"
 HELD_TEXT = "friction holds the mechanism in a part of its motion, next to which forces are unbounded"
 
 
-def _make_drive_quantity(
+def _quantity_of_drive(
     drive: str, dimension: str, definition: str, function: Function, reason: str
 ) -> ScalarQuantity[Solution]:
     """Return a quantity that only mechanisms with one kind of drive have."""
     return ScalarQuantity(dimension, definition, function, reason, lambda solution: solution.drive == drive)
 
 
-def _make_equilibrium_quantity(name: str, words: str, stable: bool) -> dict[str, ScalarQuantity[Solution]]:
+def _quantity_of_equilibrium(name: str, words: str, stable: bool) -> dict[str, ScalarQuantity[Solution]]:
     """Return where the next equilibrium of a kind is, over the motion of either drive."""
-    reason = NO_SECOND if stable else NO_UNSTABLE
+    text, reason = f"of the {words} equilibrium from the unloaded position", NO_SECOND if stable else NO_UNSTABLE
+
+    def place(solution: Solution) -> FloatArray:
+        return solution.nearest(stable)[0]
+
     return {
-        f"{name}_{motion}": _make_drive_quantity(
-            drive,
-            dimension,
-            f"{motion_words} of the {words} equilibrium from the unloaded position",
-            lambda solution: solution.nearest(stable)[0],
-            reason,
-        )
-        for drive, motion, dimension, motion_words in (
-            ("torque", "angle", "angle", "crank angle"),
-            ("force", "travel", "length", "slider travel"),
-        )
+        f"{name}_angle": _quantity_of_drive("torque", "angle", f"crank angle {text}", place, reason),
+        f"{name}_travel": _quantity_of_drive("force", "length", f"slider travel {text}", place, reason),
     }
 
 
-def _make_band_quantities(drive: str, motion: str, dimension: str) -> dict[str, ScalarQuantity[Solution]]:
+def _quantity_of_band(drive: str, motion: str, dimension: str) -> dict[str, ScalarQuantity[Solution]]:
     """Return width, start and end of the constant band over the motion of one kind of drive."""
     reason = f"the reference is outside the motion, or the {drive} there is zero"
     within = f"of the interval around {_REFERENCE_TEXT} with the {drive} within `analysis.tolerance`"
-    name = f"constant_{motion}"
+    functions: dict[str, Function] = {
+        "": lambda solution: solution.band[1] - solution.band[0],
+        "start": lambda solution: solution.band[0],
+        "end": lambda solution: solution.band[1],
+    }
     return {
-        name: _make_drive_quantity(
-            drive, dimension, f"width {within}", lambda values: values.band[1] - values.band[0], reason
-        ),
-        f"{name}_start": _make_drive_quantity(
-            drive, dimension, f"start {within}", lambda values: values.band[0], reason
-        ),
-        f"{name}_end": _make_drive_quantity(drive, dimension, f"end {within}", lambda values: values.band[1], reason),
+        f"constant_{motion}_{end}".rstrip("_"): _quantity_of_drive(
+            drive, dimension, f"{end or 'width'} {within}", function, reason
+        )
+        for end, function in functions.items()
     }
 
 
@@ -95,14 +91,12 @@ def _list_springs_in_use(solution: Solution, number: int) -> list[SpringInUse]:
         high, low = (float(np.broadcast_to(ends[joint], len(solution))[number]) for ends in solution.extremes.turns)
         least, largest = orient_to_larger(high, low)
         # springs of a joint turn alike: each bears its wire's share of the rate, which may be stated
-        wound = None if spring.wound is None else spring.wound.to_wound(spring.kind)
-        rate_of_each = wound.rate * springs.stated_over_wires(spring.at) if wound is not None else 0.0
-        fatigue = None if spring.wound is None or spring.wound.fatigue is None else spring.wound.fatigue.law
-        in_use.append(SpringInUse(wound, rate_of_each * least, rate_of_each * largest, fatigue, spring.life))
+        rate = 0.0 if spring.coil is None else spring.coil.rate * springs.stated_over_wires(spring.at)
+        in_use.append(spring.put_under(rate * least, rate * largest))
     return in_use
 
 
-def _make_link_quantity(
+def _quantity_of_links(
     name: str, function: Callable[[LinkBar, LinkLoads, FloatArray], Any]
 ) -> ScalarQuantity[Solution]:
     """Return what the links bear over the motion; mechanisms whose links are not described do not name it."""
@@ -130,15 +124,14 @@ def _lost_energy(solution: Solution, kind: str) -> FloatArray:
     lost = solution.broadcast(forth.lost[kind] + back.lost[kind])
     low, high = (np.broadcast_to(end, (len(solution), 1)) for end in solution.window_or_motion)
     low, high = np.maximum(low, motion[:, :1]), np.minimum(high, motion[:, -1:])
-    extremes = []
-    for row in range(len(solution)):
-        inner = motion[row][(motion[row] > low[row]) & (motion[row] < high[row])]
-        at = np.concatenate([low[row], inner, high[row]])
-        extremes.append(np.trapezoid(np.interp(at, motion[row], lost[row]), at))
-    return np.array(extremes)
+    energies = []
+    for places, first, last, values in zip(motion, low, high, lost, strict=True):
+        at = np.concatenate([first, places[(places > first) & (places < last)], last])
+        energies.append(np.trapezoid(np.interp(at, places, values), at))
+    return np.array(energies)
 
 
-def _make_loop_quantity(name: str, dimension: str, definition: str) -> dict[str, ScalarQuantity[Solution]]:
+def _quantity_of_loop(name: str, dimension: str, definition: str) -> dict[str, ScalarQuantity[Solution]]:
     """Return what pins and guide take, as an energy or as shares of it."""
 
     def read(kind: str, solution: Solution) -> FloatArray:
@@ -171,12 +164,13 @@ def _drop(solution: Solution) -> FloatArray:
     return np.where(is_there, solution.classified.drop, np.nan)
 
 
-def _stretched_slope(solution: Solution) -> Any:
-    return solution.assembly.total(solution.assembly.units(solution.stretched).stiffness)[:, 0]
-
-
-def _largest_turn(joint: int) -> Function:
-    return lambda solution: solution.extremes.largest_turns[joint]
+def _quantity_of_turn(joint: int) -> ScalarQuantity[Solution]:
+    words = JOINT_NAMES[joint].replace("_", " ")
+    return ScalarQuantity(
+        "angle",
+        f"largest rotation of the spring at the {words}",
+        lambda solution: solution.extremes.largest_turns[joint],
+    )
 
 
 def _slider_travel(solution: Solution) -> Any:
@@ -214,18 +208,18 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "unstable equilibria in the motion; beyond each the mechanism snaps through",
         lambda solution: solution.classified.unstable,
     ),
-    **_make_equilibrium_quantity("snap_through", "first unstable", stable=False),
-    **_make_equilibrium_quantity("second_stable", "next stable", stable=True),
+    **_quantity_of_equilibrium("snap_through", "first unstable", stable=False),
+    **_quantity_of_equilibrium("second_stable", "next stable", stable=True),
     "energy_barrier": ScalarQuantity(
         "energy",
         "energy at the first unstable equilibrium",
         lambda solution: solution.nearest(stable=False)[1],
         NO_UNSTABLE,
     ),
-    **_make_band_quantities("torque", "angle", "angle"),
-    **_make_band_quantities("force", "travel", "length"),
+    **_quantity_of_band("torque", "angle", "angle"),
+    **_quantity_of_band("force", "travel", "length"),
     **{
-        f"reference_{drive}": _make_drive_quantity(
+        f"reference_{drive}": _quantity_of_drive(
             drive,
             drive,
             f"{drive} at {_REFERENCE_TEXT}",
@@ -234,25 +228,25 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         )
         for drive in ("torque", "force")
     },
-    "start_force": _make_drive_quantity(
+    "start_force": _quantity_of_drive(
         "force",
         "force",
         "force that moves the slider from the unloaded position; where stretched, the limit",
         lambda solution: solution.frictionless(np.zeros((1, 1))),
         "the force is unbounded there",
     ),
-    "stretched_torque": _make_drive_quantity(
+    "stretched_torque": _quantity_of_drive(
         "torque",
         "torque",
         "torque in the stretched position",
         lambda solution: solution.frictionless(solution.stretched),
         "the torque is unbounded there",
     ),
-    "stretched_stiffness": _make_drive_quantity(
+    "stretched_stiffness": _quantity_of_drive(
         "torque",
         "rotational_stiffness",
         "slope of the torque in the stretched position [LH, eq. 31]",
-        _stretched_slope,
+        lambda solution: solution.assembly.total(solution.assembly.units(solution.stretched).stiffness)[:, 0],
         "the torque is unbounded there",
     ),
     "bistable_factor": ScalarQuantity(
@@ -275,8 +269,8 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         lambda solution: solution.column(small_angle_number),
         "the unloaded position is the stretched one, or there is no torsion spring",
     ),
-    **_make_loop_quantity("loop_energy", "energy", "energy that {} over the window, back and forth"),
-    **_make_loop_quantity("loop_share", "ratio", "share of the loop's area that {}"),
+    **_quantity_of_loop("loop_energy", "energy", "energy that {} over the window, back and forth"),
+    **_quantity_of_loop("loop_share", "ratio", "share of the loop's area that {}"),
     "force_per_anchor": ScalarQuantity(
         "stiffness",
         "increase of the force per travel of the anchor of the slider's spring; the same over the whole motion, so "
@@ -284,7 +278,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         lambda solution: solution.assembly.rates[3],
         applies=lambda solution: solution.drive == "force" and solution.spec.mechanism.springs.anchor is not None,
     ),
-    "force_per_degree": _make_drive_quantity(
+    "force_per_degree": _quantity_of_drive(
         "force",
         "force",
         "increase of the mean force in the window per degree of the unloaded angle, at the same positions of the "
@@ -309,13 +303,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         lambda solution: solution.column(lambda assembly: assembly.unloaded),
     ),
     "energy_max": ScalarQuantity("energy", "largest energy in the springs", lambda solution: solution.extremes.energy),
-    "pivot_rotation_max": ScalarQuantity("angle", "largest rotation of the spring at the pivot", _largest_turn(0)),
-    "crank_pin_rotation_max": ScalarQuantity(
-        "angle", "largest rotation of the spring at the crank pin", _largest_turn(1)
-    ),
-    "slider_pin_rotation_max": ScalarQuantity(
-        "angle", "largest rotation of the spring at the slider pin", _largest_turn(2)
-    ),
+    **{f"{name}_rotation_max": _quantity_of_turn(joint) for joint, name in enumerate(JOINT_NAMES[:3])},
     "slider_travel_max": ScalarQuantity(
         "length", "largest travel of the slider from the unloaded position", _slider_travel
     ),
@@ -329,10 +317,10 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "force", "largest transverse force of the slider of one leg on its guide", _guide_force, HELD_TEXT
     ),
     **{name: quantity_of_each(name, about, _wires) for name, about in WIRE_DEFINITIONS.items()},
-    "link_stress_max": _make_link_quantity("link_stress_max", lambda bar, loads, _allowable: bar.stress(loads)),
-    "pin_bearing_max": _make_link_quantity("pin_bearing_max", lambda bar, loads, _allowable: bar.bearing(loads)),
-    "link_safety_factor": _make_link_quantity("link_safety_factor", LinkBar.safety),
-    "link_turn_share_max": _make_link_quantity(
+    "link_stress_max": _quantity_of_links("link_stress_max", lambda bar, loads, _allowable: bar.stress(loads)),
+    "pin_bearing_max": _quantity_of_links("pin_bearing_max", lambda bar, loads, _allowable: bar.bearing(loads)),
+    "link_safety_factor": _quantity_of_links("link_safety_factor", LinkBar.safety),
+    "link_turn_share_max": _quantity_of_links(
         "link_turn_share_max", lambda bar, loads, _allowable: bar.turn_share(loads)
     ),
 }

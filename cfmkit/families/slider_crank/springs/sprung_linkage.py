@@ -25,7 +25,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.guide_friction import FRICTIONLESS_GUIDE, GuideFriction
 from cfmkit.families.rows import stack
-from cfmkit.families.slider_crank.linkage import linkage_of, side_of, unloaded_angle
+from cfmkit.families.slider_crank.linkage import unloaded_linkage
 from cfmkit.families.slider_crank.unit_springs import SliderPath, UnitCurves, crank_efforts, curves_along_crank, path_of
 from cfmkit.specs.units import window_places
 
@@ -78,48 +78,24 @@ class Assembly(ShortRepr):
     @cached_property
     def path(self) -> SliderPath:
         """The way of the slider."""
-        return path_of(self.linkage, self.unloaded, self.side)
+        return path_of(self.linkage, self.unloaded, self.side, self.anchor)
 
     def units(self, motion: FloatArray) -> UnitCurves:
         """Return what unit springs do along the motion of the drive."""
-        is_turned = self.drive == "torque"
-        plain = curves_along_crank(self.linkage, self.unloaded, motion) if is_turned else self.path.units(motion)
-        if not np.any(self.anchor):
-            return plain
-        first, second = self._slider_rates(motion)
-        more = self.tight, self.tight * first, self.tight * second
-        rows = zip((plain.turn, plain.effort, plain.stiffness), more, strict=True)
-        turn, effort, stiffness = (_with_more_at_slider(row, added) for row, added in rows)
-        return replace(plain, turn=turn, effort=effort, stiffness=stiffness)
+        if self.drive == "torque":
+            return curves_along_crank(self.linkage, self.unloaded, motion, anchor=self.anchor)
+        return self.path.units(motion)
+
+    def forces(self, motion: FloatArray) -> FloatArray:
+        """Return the efforts of `units` alone, (4, n)."""
+        if self.drive == "torque":
+            return crank_efforts(self.linkage, self.unloaded, motion, self.anchor)
+        return self.path.unit_forces(motion)
 
     @property
     def tight(self) -> float:
         """Contribution of the anchor to the deflection of the slider's spring, along the slider's path [m]."""
         return -self.linkage.branch * self.anchor + 0.0  # no minus before a zero
-
-    def _slider_rates(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return dx/d(motion) and its derivative, of the slider's place x."""
-        link = self.linkage
-        if self.drive == "force":
-            return np.full(np.shape(motion), -float(link.branch)), np.zeros(np.shape(motion))
-        sine, cosine = np.sin(motion), np.cos(motion)
-        beta = link.coupler_angle(motion)
-        rise, level = np.sin(beta), np.cos(beta)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            swing = -link.crank * cosine / (link.coupler * level)
-            sway = (link.crank * sine / link.coupler + rise * swing**2) / level
-        first = -link.crank * sine - link.coupler * rise * swing
-        return first, -link.crank * cosine - link.coupler * (level * swing**2 + rise * sway)
-
-    def forces(self, motion: FloatArray) -> FloatArray:
-        """Return the efforts of `units` alone, (4, n)."""
-        if self.drive == "torque":
-            forces = crank_efforts(self.linkage, self.unloaded, motion)
-        else:
-            forces = self.path.unit_forces(motion)
-        if np.any(self.anchor):
-            forces = _with_more_at_slider(forces, self.tight * self._slider_rates(motion)[0])
-        return forces
 
     def rates_over(self, unit: FloatArray) -> FloatArray:
         """Return the rates with as many axes as unit curves (4, ..., n)."""
@@ -242,19 +218,13 @@ class Assembly(ShortRepr):
         return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, FULL_TURN)
 
 
-def _with_more_at_slider(rows: FloatArray, more: Any) -> FloatArray:
-    """Return rows of the four joints with something added to that of the slider."""
-    return np.stack(np.broadcast_arrays(*rows[:3], rows[3] + more))
-
-
 def assemble(spec: SliderCrankSpec) -> Assembly:
     """Return the slider-crank put together.
 
     Raises CannotBuild if it cannot exist as described; the finding says why.
     """
     mechanism, analysis = spec.mechanism, spec.analysis
-    linkage = linkage_of(mechanism)
-    unloaded = unloaded_angle(mechanism, linkage)
+    linkage, unloaded = unloaded_linkage(mechanism)
     springs = mechanism.springs
     rates = np.array(springs.rates) * mechanism.sets
     rates.setflags(write=False)
@@ -263,7 +233,7 @@ def assemble(spec: SliderCrankSpec) -> Assembly:
         unloaded,
         rates,
         analysis.drive,
-        side_of(spec, linkage, unloaded),
+        analysis.side_sign or linkage.side(unloaded),
         springs.anchor or 0.0,
         _rubbing(mechanism),
     )
@@ -319,16 +289,22 @@ def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple
     `drive`: force that drives the slider towards the pivot, (n,) [N]; zero where a torque drives the crank. Both are
     (n,), for the rates and the drive given, so of all legs together or of one.
     """
-    link, turn, rates = assembly.linkage, units.turn, assembly.rates_over(units.turn)
-    beta = coupler_angle(link, units)
-    along = -rates[3] * turn[3] - link.branch * drive  # force of spring and drive on the slider, along x
-    moment = -rates[1] * turn[1] - rates[2] * turn[2]  # of both torsion springs on the coupler
-    sine, cosine = np.sin(beta), np.cos(beta)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # moments about the crank pin: r2 (cos b Y - sin b X) + moment = 0, X and Y the slider's pull on the coupler
-        across = (link.coupler * sine * along - moment) / (link.coupler * cosine)
-    coupler: FloatArray = along * cosine + across * sine
+    beta = coupler_angle(assembly.linkage, units)
+    along, across = pull_on_coupler(assembly, units, drive, beta)
+    coupler: FloatArray = along * np.cos(beta) + across * np.sin(beta)
     return coupler, -across
+
+
+def pull_on_coupler(
+    assembly: Assembly, units: UnitCurves, drive: FloatArray, beta: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the slider's pull on a coupler that points to beta [rad], along the slider's path and across it [N]."""
+    link, turns = assembly.linkage, assembly.rates_over(units.turn) * units.turn
+    along = -turns[3] - link.branch * drive
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # moments about the crank pin: r2 (cos b Y - sin b X), X and Y the pull, balance both torsion springs
+        across = (link.coupler * np.sin(beta) * along + turns[1] + turns[2]) / (link.coupler * np.cos(beta))
+    return along, across
 
 
 def coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
