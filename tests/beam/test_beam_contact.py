@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from beam_support import CANTILEVER, CONFIGS, config, solved, warned
+from beam_support import CANTILEVER, CONFIGS, config, solved, value, warned
 
 import cfmkit
 from cfmkit.errors import InputError, SpecError
@@ -15,10 +15,8 @@ from cfmkit.results import Status
 FLOOR = "work: {kind: line, through: [0 mm, -40 mm], direction: 0 deg, nodes: {tip: 2 mm}}"
 
 
-def stated(contacts, text=CANTILEVER, **changes):
+def stated(contacts, text=CANTILEVER):
     """Return a specification with blocks of contacts put in front of its drive."""
-    for old, new in changes.items():
-        text = text.replace(old, new)
     return cfmkit.loads(text.replace("  drive:", f"{contacts}  drive:", 1))
 
 
@@ -66,12 +64,8 @@ def test_the_curve_has_a_column_of_each_force_and_a_row_at_each_event():
 
 
 def test_mean_and_ripple_of_a_contact_force_are_those_of_the_curve_in_the_window():
-    spec = with_floor()
-    spec = spec.replace({"analysis.window": ["50 mm", "100 mm"]})
-    result = cfmkit.analyze(spec)
-    mean, ripple = (
-        cfmkit.evaluate(result)[f"{name}[work]"].value for name in ("contact_force", "contact_force_ripple")
-    )
+    result = cfmkit.analyze(with_floor().replace({"analysis.window": ["50 mm", "100 mm"]}))
+    mean, ripple = (value(result, f"{name}[work]") for name in ("contact_force", "contact_force_ripple"))
     at = np.linspace(0.05, 0.1, 2001)
     force = result.closed.effort("", at)
     assert mean == pytest.approx(np.trapezoid(force, at) / 0.05, rel=1e-7)
@@ -79,10 +73,8 @@ def test_mean_and_ripple_of_a_contact_force_are_those_of_the_curve_in_the_window
 
 
 def test_findings_say_where_contacts_begin_and_what_passes_through():
-    result = cfmkit.analyze(
-        with_floor("work: {kind: disc, centre: [320 mm, -60 mm], radius: 20 mm, nodes: {tip: 1 mm}}")
-    )
-    said = warned(result)
+    disc = "work: {kind: disc, centre: [320 mm, -60 mm], radius: 20 mm, nodes: {tip: 1 mm}}"
+    said = warned(cfmkit.analyze(with_floor(disc)))
     assert said["side_in_obstacle"].startswith("the side of beam 'beam' passes through 'work' from 40 mm on")
     said = warned(cfmkit.analyze(with_floor()))
     assert said["contact_begins"] == "contact begins at 38 mm between 'tip' and 'work'"
@@ -97,79 +89,62 @@ def test_a_blocked_drive_is_a_partial_result_that_says_by_what():
 
 
 def test_a_stop_with_two_sides_has_one_signed_column():
-    text = CANTILEVER.replace("support: clamped", "support: guided, direction: 90 deg").replace(
-        "node: tip, direction: -90 deg", "node: root, direction: 90 deg"
-    )
-    stop = "  stops: {s: {node: tip, direction: -90 deg, gap: [20 mm, 5 mm], stiffness: 3 N/mm}}\n"
-    force = cfmkit.analyze(stated(stop, text)).curve.extra["stop_s_force"].values
+    text = CANTILEVER.replace("support: clamped", "support: guided, direction: 90 deg")
+    text = text.replace("node: tip, direction: -90 deg", "node: root, direction: 90 deg")
+    two_sided = stop("node: tip, direction: -90 deg, gap: [20 mm, 5 mm], stiffness: 3 N/mm")
+    force = cfmkit.analyze(stated(two_sided, text)).curve.extra["stop_s_force"].values
     assert force[-1] < 0
     assert force.max() == 0.0
 
 
 def test_a_rotation_that_is_stopped_has_a_moment():
-    text = CANTILEVER.replace("kind: displacement, node: tip, direction: -90 deg", "kind: moment, node: tip").replace(
-        "travel: 100 mm", "moment: 100 N*mm"
-    )
-    stop = "  stops: {lock: {node: tip, rotation: true, gap: 40 deg, stiffness: 1 N*m/rad}}\n"
-    column = cfmkit.analyze(stated(stop, text)).curve.extra["stop_lock_force"]
+    text = CANTILEVER.replace("kind: displacement, node: tip, direction: -90 deg", "kind: moment, node: tip")
+    lock = stop("node: tip, rotation: true, gap: 40 deg, stiffness: 1 N*m/rad", "lock")
+    result = cfmkit.analyze(stated(lock, text.replace("travel: 100 mm", "moment: 100 N*mm")))
+    column = result.curve.extra["stop_lock_force"]
     angle = 0.1 * 0.4 / 0.02  # of the free leaf [rad]
     yields = (angle - np.radians(40)) / (1 / 1.0 + 0.4 / 0.02)  # the leaf has 0.05 N m/rad
     assert column.dimension == "torque"
     assert column.values[-1] == pytest.approx(yields, rel=1e-9)
 
 
+def stop(text, name="s"):
+    return f"  stops: {{{name}: {{{text}}}}}\n"
+
+
+def body(text):
+    return f"  obstacles: {{o: {{{text}}}}}\n"
+
+
+WALL = "kind: line, through: [0 mm, -50 mm], direction: 0 deg"
+CORNER = "kind: polyline, points: [[0 mm, -50 mm], [9 mm, -50 mm], [9 mm, -90 mm]]"
+DISC = "kind: disc, centre: [400 mm, -10 mm], radius: 12 mm, nodes: {tip: 1 mm}"
+HOLE = "kind: hole, centre: [400 mm, 0 mm], radius: 2 mm, nodes: {tip: 3 mm}"
+
+
 @pytest.mark.parametrize(
     ("contacts", "place", "says"),
     [
-        ("  stops: {s: {node: top, direction: 0 deg, gap: 1 mm}}\n", "stops.s", "there is no node 'top'"),
-        ("  stops: {s: {node: tip, direction: 0 deg, gap: -1 mm}}\n", "stops.s", "must be >= 0"),
-        ("  stops: {s: {node: tip, direction: 0 deg, gap: 1 deg}}\n", "stops.s", "length"),
-        ("  stops: {s: {node: tip, rotation: true, gap: 1 mm}}\n", "stops.s", "angle"),
-        ("  stops: {s: {node: tip, direction: 0 deg, gap: 1 mm, friction: 2}}\n", "stops.s", "must be >= 0 and < 2"),
-        ("  stops: {s: {node: tip, rotation: true, gap: 1 deg, friction: 0.2}}\n", "stops.s", "friction"),
-        (
-            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [beam], friction: 0.2}}\n",
-            "obstacles.o", "friction along a beam's flank is not modelled: state 'nodes', or leave out 'friction'",
-        ),
-        (
-            "  stops: {s: {node: tip, direction: 0 deg, gap: 1 mm, friction: 0.2}}\n"
-            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg}}\n",
-            "obstacles.o", "flanks of beams beside contacts with friction are not modelled",
-        ),
-        ("  stops: {s: {node: tip, gap: 1 mm}}\n", "stops.s", "direction"),
-        ("  stops: {s: {node: root, direction: 0 deg, gap: 1 mm}}\n", "stops.s.node", "is clamped: it reaches no stop"),
-        (
-            "  obstacles: {o: {kind: disc, centre: [400 mm, -10 mm], radius: 12 mm, nodes: {tip: 1 mm}}}\n",
-            "obstacles.o", "the pad of node 'tip' lies 3 mm inside it before any load",
-        ),
-        (
-            "  obstacles: {o: {kind: hole, centre: [400 mm, 0 mm], radius: 2 mm, nodes: {tip: 3 mm}}}\n",
-            "obstacles.o", "its hollow of 2 mm is too tight for the pad of 'tip', radius 3 mm",
-        ),
-        (
-            "  obstacles:\n    o: {kind: polyline, fillet: 10 mm, "
-            "points: [[0 mm, -50 mm], [9 mm, -50 mm], [9 mm, -90 mm]]}\n",
-            "obstacles.o", "the sides allow a fillet of at most 9 mm",
-        ),
-        (
-            "  obstacles: {o: {kind: polyline, points: [[0 mm, -50 mm], [9 mm, -50 mm], [9 mm, -90 mm]]}}\n",
-            "obstacles.o", "'fillet', the radius of its corners, is missing",
-        ),
-        (
-            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [baem]}}\n",
-            "obstacles.o", "baem",
-        ),
-        (
-            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [beam], "
-            "stiffness: 1 N/mm}}\n",
-            "obstacles.o", "rigid",
-        ),
-        ("  obstacles: {o: {kind: lin, through: [0 mm, -50 mm], direction: 0 deg}}\n", "obstacles.o", "line"),
-        (
-            "  stops: {o: {node: tip, direction: 0 deg, gap: 1 mm}}\n"
-            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg}}\n",
-            "obstacles.o", "a stop has the same name",
-        ),
+        (stop("node: top, direction: 0 deg, gap: 1 mm"), "stops.s", "there is no node 'top'"),
+        (stop("node: tip, direction: 0 deg, gap: -1 mm"), "stops.s", "must be >= 0"),
+        (stop("node: tip, direction: 0 deg, gap: 1 deg"), "stops.s", "length"),
+        (stop("node: tip, rotation: true, gap: 1 mm"), "stops.s", "angle"),
+        (stop("node: tip, direction: 0 deg, gap: 1 mm, friction: 2"), "stops.s", "must be >= 0 and < 2"),
+        (stop("node: tip, rotation: true, gap: 1 deg, friction: 0.2"), "stops.s", "friction"),
+        (stop("node: tip, gap: 1 mm"), "stops.s", "direction"),
+        (stop("node: root, direction: 0 deg, gap: 1 mm"), "stops.s.node", "is clamped: it reaches no stop"),
+        (body(f"{WALL}, beams: [beam], friction: 0.2"), "obstacles.o",
+         "friction along a beam's flank is not modelled: state 'nodes', or leave out 'friction'"),
+        (stop("node: tip, direction: 0 deg, gap: 1 mm, friction: 0.2") + body(WALL), "obstacles.o",
+         "flanks of beams beside contacts with friction are not modelled"),
+        (body(DISC), "obstacles.o", "the pad of node 'tip' lies 3 mm inside it before any load"),
+        (body(HOLE), "obstacles.o", "its hollow of 2 mm is too tight for the pad of 'tip', radius 3 mm"),
+        (body(f"{CORNER}, fillet: 10 mm"), "obstacles.o", "the sides allow a fillet of at most 9 mm"),
+        (body(CORNER), "obstacles.o", "'fillet', the radius of its corners, is missing"),
+        (body(f"{WALL}, beams: [baem]"), "obstacles.o", "baem"),
+        (body(f"{WALL}, beams: [beam], stiffness: 1 N/mm"), "obstacles.o", "rigid"),
+        (body(WALL.replace("line", "lin")), "obstacles.o", "line"),
+        (stop("node: tip, direction: 0 deg, gap: 1 mm", "o") + body(WALL), "obstacles.o", "a stop has the same name"),
     ],
 )  # fmt: skip
 def test_a_contact_that_cannot_be_is_refused_with_its_place(contacts, place, says):
@@ -186,12 +161,10 @@ def test_a_contact_that_cannot_be_is_refused_with_its_place(contacts, place, say
         ("design:\n  rescale: {force: 5 N}\nanalysis:", "do not scale with them"),
         ("analysis:\n  fidelity: solid", "mechanism.stops is not supported"),
         ('requirements:\n  - {metric: "contact_force[wall]", max: 1 N}\nanalysis:', "there are: s"),
-        (
-            "requirements:\n  - {metric: contact_force, max: 1 N}\nanalysis:",
-            "needs the name of a stop, an obstacle or a contact",
-        ),
+        ("requirements:\n  - {metric: contact_force, max: 1 N}\nanalysis:",
+         "needs the name of a stop, an obstacle or a contact"),
     ],
-)
+)  # fmt: skip
 def test_what_is_not_possible_with_contacts_is_refused(more, says):
     text = CANTILEVER.replace("analysis:", more).replace("2.4 GPa", "2.4 GPa, density: 1000 kg/m^3")
     with pytest.raises(SpecError, match="(?s)" + says.replace("[", r"\[")):
@@ -234,14 +207,10 @@ def test_forces_of_contacts_are_arrows_in_one_scale_and_events_are_ticks():
 
 
 def test_a_contact_that_a_constant_load_closes_is_reported_from_the_start():
-    text = CANTILEVER.replace(
-        "kind: displacement, node: tip, direction: -90 deg", "kind: force, node: tip, direction: 0 deg"
-    )
-    text = text.replace("travel: 100 mm", "force: 0.01 N")
-    contacts = (
-        "  stops: {end: {node: tip, direction: -90 deg, gap: 9 mm}}\n  loads: [{kind: point, node: tip, fy: -0.1 N}]\n"
-    )
-    result = cfmkit.analyze(stated(contacts, text))
+    text = CANTILEVER.replace("kind: displacement, node: tip, direction: -90", "kind: force, node: tip, direction: 0")
+    load = "  loads: [{kind: point, node: tip, fy: -0.1 N}]\n"
+    contacts = stop("node: tip, direction: -90 deg, gap: 9 mm", "end") + load
+    result = cfmkit.analyze(stated(contacts, text.replace("travel: 100 mm", "force: 0.01 N")))
     (said,) = (finding.message for finding in result.warnings if finding.name == "contact_begins")
     assert said == "closed before the drive moves: stop 'end'"
     assert result.values["first_contact"].value == result.curve.displacement[0]
@@ -250,15 +219,9 @@ def test_a_contact_that_a_constant_load_closes_is_reported_from_the_start():
 
 
 def test_a_support_that_is_pushed_against_a_rigid_stop_has_no_start():
-    text = (
-        CANTILEVER.replace(
-            "root: {at: [0 mm, 0 mm], support: clamped}",
-            "root: {at: [0 mm, 0 mm], support: clamped, moved: {across: -20 mm}}",
-        )
-        .replace("node: tip, direction: -90 deg}", "node: tip, direction: 0 deg}")
-        .replace("travel: 100 mm", "travel: 1 mm")
-    )
-    result = cfmkit.analyze(stated("  stops: {end: {node: root, direction: -90 deg, gap: 10 mm}}\n", text))
+    text = CANTILEVER.replace("support: clamped}", "support: clamped, moved: {across: -20 mm}}")
+    text = text.replace("direction: -90 deg}", "direction: 0 deg}").replace("travel: 100 mm", "travel: 1 mm")
+    result = cfmkit.analyze(stated(stop("node: root, direction: -90 deg, gap: 10 mm", "end"), text))
     assert result.status is Status.NO_EQUILIBRIUM
     assert "the drive is blocked by stop 'end' at 0.5 of the constant loads" in result.message
 

@@ -22,6 +22,8 @@ from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task_and_variables import TaskLimits, Variables
 
 CLOSE = Control(tolerance=1e-10)
+DISC = {"kind": "disc", "centre": (14e-3, -16e-3), "radius": 10e-3}
+LOCK = {"lock": {"node": "tip", "rotation": True, "gap": "10 deg"}}
 OPTIMISE = {
     "contact": "work",
     "window": (9e-3, 14e-3),
@@ -77,9 +79,7 @@ def test_forces_with_closed_contacts_have_the_derivatives_of_differences(spec, n
 
 
 def test_derivatives_are_refused_where_sides_touch():
-    spec = gripper().replace(
-        {"design": None, "mechanism.obstacles.work": {"kind": "disc", "centre": (14e-3, -16e-3), "radius": 10e-3}}
-    )
+    spec = gripper().replace({"design": None, "mechanism.obstacles.work": DISC})
     assembly = assemble(spec)
     path = trace(assembly.network, Displacement(assembly.driven, assembly.direction, np.array([0.0, 1e-3])), CLOSE)
     with pytest.raises(InputError, match="sides of beams touch"):
@@ -147,8 +147,7 @@ def test_mechanisms_with_contacts_are_not_solved_twice_in_a_study(monkeypatch):
 
 
 def test_a_stop_of_a_rotation_beside_the_contact_is_no_reason_to_refuse_a_search():
-    stop = {"lock": {"node": "tip", "rotation": True, "gap": "10 deg"}}
-    assert "lock" in gripper().replace({"mechanism.stops": stop}).mechanism.stops
+    assert "lock" in gripper().replace({"mechanism.stops": LOCK}).mechanism.stops
 
 
 @pytest.mark.parametrize(
@@ -156,18 +155,11 @@ def test_a_stop_of_a_rotation_beside_the_contact_is_no_reason_to_refuse_a_search
     [
         ({"design.optimise.contact": "wrok"}, "design.optimise.contact", "there are: work"),
         (
-            {
-                "design.optimise.contact": "lock",
-                "mechanism.stops": {"lock": {"node": "tip", "rotation": True, "gap": "10 deg"}},
-            },
+            {"design.optimise.contact": "lock", "mechanism.stops": LOCK},
             "design.optimise.contact",
             "its force is a moment",
         ),
-        (
-            {"mechanism.obstacles.work": {"kind": "disc", "centre": (14e-3, -16e-3), "radius": 10e-3}},
-            "design.optimise",
-            "state 'nodes' alone of 'obstacles.work'",
-        ),
+        ({"mechanism.obstacles.work": DISC}, "design.optimise", "state 'nodes' alone of 'obstacles.work'"),
         ({"design.target": {"stiffness": "1 N/mm", "start": "1 N"}}, "design", "remove it, or 'optimise.contact'"),
     ],
 )

@@ -6,11 +6,10 @@ import re
 import subprocess
 import sys
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
-from beam_support import MM, cantilever, config, solved, value, warned
+from beam_support import CONFIGS, MM, cantilever, config, solved, value, warned
 
 import cfmkit
 from cfmkit.elastica import Section, Taper, engine
@@ -451,7 +450,7 @@ def test_equilibria_between_points_are_those_of_a_path_through_them(name):
 @pytest.mark.slow
 def test_a_coil_of_many_turns_is_analysed_without_dense_matrices():
     """With 10 500 unknowns one such matrix takes 0.9 GB: it was one for each of 137 points."""
-    spec = cfmkit.load(Path(__file__).parents[2] / "configs" / "beam_two_layers.yaml")
+    spec = config("beam_two_layers")
     coiled = spec.replace({"mechanism.beams.b1.shape.coefficients.1": 1309.2})
     tracemalloc.start()
     try:
@@ -470,6 +469,6 @@ def test_a_short_run_loads_neither_the_compiler_nor_masked_arrays():
         "import sys, cfmkit; cfmkit.analyze(cfmkit.load(sys.argv[1])); "
         "sys.exit(any(name in sys.modules for name in ('scipy', 'numpy.ma')))"
     )
-    command = [sys.executable, "-P", "-c", code, str(Path(__file__).parents[2] / "configs" / "beam_lan2010.yaml")]
+    command = [sys.executable, "-P", "-c", code, str(CONFIGS / "beam_lan2010.yaml")]
     codes = (subprocess.run(command, check=False).returncode for _ in range(2))
     assert 0 in codes  # the first one may compile

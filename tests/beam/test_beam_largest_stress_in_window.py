@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from beam_support import config
 
-from cfmkit import Run, api
+from cfmkit import Run
 from cfmkit.families import family
 from cfmkit.families.beam.model import solve
 from cfmkit.metrics import evaluate
 from cfmkit.studies import Study, metrics_of
 
-CONFIGS = Path(__file__).parents[2] / "configs"
-LAN = "beam_lan2010.yaml"
+LAN = "beam_lan2010"
 SAMPLES = 400
 
 
@@ -23,14 +21,14 @@ SAMPLES = 400
     [
         (LAN, ["analysis.points=13"]),
         (LAN, ["analysis.points=181", "analysis.stress=total"]),
-        ("beam_design_arch.yaml", []),
-        ("beam_design_arch.yaml", ["analysis.points=9"]),
-        ("beam_end_effector.yaml", []),
-        ("beam_cantilever.yaml", []),
+        ("beam_design_arch", []),
+        ("beam_design_arch", ["analysis.points=9"]),
+        ("beam_end_effector", []),
+        ("beam_cantilever", []),
     ],
 )
 def test_nothing_in_a_window_is_stressed_more(name: str, changes: list[str]) -> None:
-    law = solve(api.load(CONFIGS / name, changes)).model_between_points
+    law = solve(config(name, *changes)).model_between_points
     assert law is not None
     assert not len(law.corners)
     for first, last in [(0.0, 1.0), (0.013, 0.31), (0.4, 0.77), (0.512, 0.513), (0.8, 1.0)]:
@@ -43,9 +41,9 @@ def test_nothing_in_a_window_is_stressed_more(name: str, changes: list[str]) -> 
         assert found <= sampled.max() + np.abs(np.diff(sampled)).max()
 
 
-@pytest.mark.parametrize("name", [LAN, "beam_v_bifurcation.yaml", "beam_lee_frame.yaml", "beam_cantilever.yaml"])
+@pytest.mark.parametrize("name", [LAN, "beam_v_bifurcation", "beam_lee_frame", "beam_cantilever"])
 def test_metrics_of_a_part_are_those_of_its_analysis(name: str) -> None:
-    spec = api.load(CONFIGS / name)
+    spec = config(name)
     whole = family("beam").analyze(spec, Run())
     metrics = metrics_of(spec, ["stress_max", "safety_factor", "half_band", "force_mean"], whole.curve)
     study = Study(spec, (), metrics, findings=False)

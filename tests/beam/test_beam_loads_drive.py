@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from beam_support import CANTILEVER
+from beam_support import CANTILEVER, config
 from scipy.integrate import solve_bvp
 
 import cfmkit
@@ -138,16 +136,8 @@ def test_what_is_wrong_is_said_at_its_place(old, new, reported):
 
 
 PLACES = (
-    "range_95",
-    "band_range_05pct",
-    "band_range_1pct",
-    "band_range_5pct",
-    "usable_stroke",
-    "usable_start",
-    "usable_end",
-)
-
-
+    "range_95", "band_range_05pct", "band_range_1pct", "band_range_5pct", "usable_stroke", "usable_start", "usable_end"
+)  # fmt: skip
 DRIVES = {
     "force": ("{kind: force, node: tip, direction: -90 deg}", "force: 1.25 N"),
     "moment": ("{kind: moment, node: tip}", "moment: 60 N*mm"),
@@ -170,7 +160,6 @@ def test_places_on_a_curve_driven_by_a_load_do_not_depend_on_its_points(kind):
 @pytest.mark.slow
 def test_a_path_that_folds_is_followed_to_its_end_with_many_points():
     """It passes most loads three times: the points that are requested do not use up those of the path."""
-    frame = cfmkit.load(Path(__file__).parents[2] / "configs" / "beam_lee_frame.yaml")
-    ends = [cfmkit.analyze(frame.replace({"analysis.points": points})) for points in (121, 1921)]
+    ends = [cfmkit.analyze(config("beam_lee_frame", f"analysis.points={points}")) for points in (121, 1921)]
     assert [end.status for end in ends] == [Status.COMPLETE, Status.COMPLETE]
     assert ends[1].metrics["travel_end"].value == pytest.approx(ends[0].metrics["travel_end"].value, rel=1e-9)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from beam_support import CANTILEVER, MM, cantilever, config
+from beam_support import CONFIGS, MM, cantilever, config
 
 import cfmkit
 from cfmkit.cli import run_command
@@ -21,6 +20,10 @@ from cfmkit.numerics import points_on
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * 10 * MM
 TWO = [OutlinePiece.polygon(SQUARE), OutlinePiece.polygon(SQUARE + 5 * MM)]
+
+
+def cuts(spec, tolerance=None):
+    return [one for one in cfmkit.drawing(spec, tolerance).contours if one.layer == "cut"]
 
 
 def area(contours):
@@ -48,8 +51,7 @@ def test_holes_stay_holes():
 
 def test_a_straight_cantilever_has_the_area_of_its_strip_and_its_pad():
     spec = cantilever(("width: 100 mm", "width: 100 mm\n  part: {fillet: 0 mm}"))
-    contours = [one for one in cfmkit.drawing(spec).contours if one.layer == "cut"]
-    assert area(contours) == pytest.approx((400 + 16) * 1e-6, rel=1e-9)
+    assert area(cuts(spec)) == pytest.approx((400 + 16) * 1e-6, rel=1e-9)
 
 
 @pytest.mark.parametrize(("curvature", "straight"), [(0.0, True), (2.0, False)])
@@ -87,10 +89,8 @@ def test_a_tapered_strip_has_its_thickness_everywhere():
 
 
 def test_two_halves_are_one_piece_at_the_top_and_symmetric():
-    drawn = cfmkit.drawing(config("beam_lan2010"))
-    cuts = [one for one in drawn.contours if one.layer == "cut" and not one.hole]
-    assert len(cuts) == 1
-    x0, _, x1, _ = cuts[0].extents
+    (outline,) = (one for one in cuts(config("beam_lan2010")) if not one.hole)
+    x0, _, x1, _ = outline.extents
     assert x0 == pytest.approx(-x1, abs=2e-6)
 
 
@@ -100,8 +100,7 @@ def test_every_file_is_written_with_kerf_too():
 
 
 def test_pinned_supports_become_eyes_with_holes():
-    cuts = [one for one in cfmkit.drawing(config("beam_lee_frame")).contours if one.layer == "cut"]
-    assert sum(one.hole for one in cuts) == 2
+    assert sum(one.hole for one in cuts(config("beam_lee_frame"))) == 2
 
 
 def test_gaps_of_two_parallel_lines():
@@ -124,10 +123,6 @@ def test_mirroring_twice_is_nothing():
     np.testing.assert_allclose(mirror.reflect(mirror.reflect(points)), points, atol=1e-14)
 
 
-def cuts(spec):
-    return [one for one in cfmkit.drawing(spec).contours if one.layer == "cut"]
-
-
 @pytest.mark.parametrize(("usual", "own", "on"), [(1, 20, True), (20, 1, False)])
 def test_what_is_on_the_mirror_axis_depends_on_the_thickness_of_the_beams_there(usual, own, on):
     thick = ("thickness: 1 mm", f"thickness: {usual} mm"), ("end: tip}", f"end: tip, thickness: {own} mm}}")
@@ -146,11 +141,8 @@ def test_elastica_that_meet_on_the_mirror_axis_are_one_strip_without_a_hole():
 
 
 def test_a_beam_beside_its_node_is_joined_to_it_by_an_arm():
-    text = CANTILEVER.replace(
-        "beam: {start: root, end: tip}", "beam: {start: root, end: tip, end_offset: [0 mm, 9 mm]}"
-    )
-    spec = cantilever(("width: 100 mm", "width: 100 mm\n  part: {fillet: 0 mm}"), text=text)
-    (one,) = cuts(spec)
+    arm = ("end: tip}", "end: tip, end_offset: [0 mm, 9 mm]}")
+    (one,) = cuts(cantilever(arm, ("width: 100 mm", "width: 100 mm\n  part: {fillet: 0 mm}")))
     away = [abs(place - 0.4) for edge in one.edges for place in edge.ends]
     assert min(away) < 3 * MM
 
@@ -207,7 +199,7 @@ def test_the_edges_of_a_curved_beam_hold_the_tolerance(tolerance, sweep):
     """Of an arc: two circles about its centre, half a thickness inside and outside of its radius."""
     pair = ("end: tip}", f"end: tip, thickness: 8 mm, shape: {{kind: arc, sweep: {sweep}}}}}")
     part = ("width: 100 mm", "width: 100 mm\n  part: {fillet: 2 mm}")
-    contours = [one for one in cfmkit.drawing(cantilever(pair, part), tolerance).contours if one.layer == "cut"]
+    contours = cuts(cantilever(pair, part), tolerance)
     half = np.radians(float(sweep.split()[0])) / 2
     radius, center = 0.2 / abs(np.sin(half)), np.array([0.2, 0.2 / np.tan(half)])
     away = edge_points(contours, tolerance) - center
@@ -219,10 +211,8 @@ def test_the_edges_of_a_curved_beam_hold_the_tolerance(tolerance, sweep):
 
 def test_the_eyes_of_pins_hold_the_tolerance():
     for tolerance in TOLERANCES:
-        contours = cfmkit.drawing(config("beam_lee_frame"), tolerance).contours
-        holes = [
-            edge_points([replace(one, hole=False)], tolerance) for one in contours if one.layer == "cut" and one.hole
-        ]
+        contours = cuts(config("beam_lee_frame"), tolerance)
+        holes = [edge_points([replace(one, hole=False)], tolerance) for one in contours if one.hole]
         assert len(holes) == 2
         for points in holes:
             distance = np.hypot(*(points - points.mean(axis=0)).T)
@@ -249,7 +239,7 @@ def test_windings_on_one_circle_become_a_ring(turns):
 
 def test_a_part_that_cannot_be_drawn_within_its_tolerance_is_refused(tmp_path, capsys):
     """Before, it was drawn with as many points as there may be, however far off."""
-    source = str(Path(__file__).parents[2] / "configs" / "beam_lan2010_thin.yaml")
+    source = str(CONFIGS / "beam_lan2010_thin.yaml")
     large = [source, "--set", "mechanism.nodes.n3.at.1=1.877e10 mm", "-q", "-o", str(tmp_path / "out")]
     assert run_command(["export", *large]) == 3
     assert "coarser --tolerance" in capsys.readouterr().err
@@ -265,8 +255,8 @@ def test_a_line_without_its_end_keeps_all_other_points(end):
 
 def test_a_strip_is_as_curved_as_its_beam():
     """An arc of 60 deg over 400 mm: its radius is 400 mm."""
-    text = CANTILEVER.replace("end: tip}", "end: tip, shape: {kind: arc, sweep: 60 deg}}")
-    (strip,) = strips_of(assemble(cfmkit.loads(text)))["beam"]
+    spec = cantilever(("end: tip}", "end: tip, shape: {kind: arc, sweep: 60 deg}}"))
+    (strip,) = strips_of(assemble(spec))["beam"]
     np.testing.assert_allclose(np.abs(strip.curvature), 2.5, rtol=1e-9)
     np.testing.assert_allclose(np.diff(strip.angle).sum(), np.sign(strip.curvature[0]) * np.pi / 3, rtol=1e-9)
 

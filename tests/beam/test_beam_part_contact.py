@@ -31,12 +31,9 @@ analysis: {travel: 30 mm, points: 16}
 PAIR = "{between: [tip, lower], radius: 1 mm}"
 
 
-def stated(pair=PAIR, **changes):
-    """Return the specification of two leaves with another contact, and other changes of its text."""
-    text = TWO_LEAVES.replace(PAIR, pair)
-    for old, new in changes.items():
-        text = text.replace(old, new)
-    return text
+def stated(pair):
+    """Return the text of two leaves with another contact."""
+    return TWO_LEAVES.replace(PAIR, pair)
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +93,7 @@ def test_pads_that_touch_are_drawn(result):
 
 
 def test_a_pad_that_leaves_its_beam_gives_a_partial_result_with_the_reason():
-    text = stated().replace("[130 mm, 0 mm]", "[99 mm, 0 mm]").replace("radius: 1 mm", "radius: 4 mm")
+    text = TWO_LEAVES.replace("[130 mm, 0 mm]", "[99 mm, 0 mm]").replace("radius: 1 mm", "radius: 4 mm")
     result = cfmkit.analyze(cfmkit.loads(text))
     assert result.status is Status.PARTIAL
     assert "'tip' on beam 'lower'" in result.message
@@ -171,7 +168,6 @@ BULGE = (
     stated("{between: [upper, lower]}")
     .replace("{start: root, end: tip}", "{start: root, end: tip, shape: {kind: arc, sweep: 57.3 deg}}")
     .replace("tip: {at: [100 mm, 10 mm]}", "tip: {at: [95.41 mm, 19.57 mm]}")
-    .replace("root: {at: [0 mm, 10 mm]", "root: {at: [0 mm, 10 mm]")
     .replace("travel: 30 mm", "travel: 60 mm")
 )
 
@@ -249,9 +245,8 @@ def test_a_contact_that_cannot_be_is_refused_with_its_place(pair, says):
     ],
 )  # fmt: skip
 def test_what_is_not_possible_with_contacts_is_refused(old, new, says):
-    text = stated().replace("steel-1.4310", "steel-1.4310").replace(old, new)
     with pytest.raises(SpecError, match="(?s)" + says):
-        cfmkit.loads(text)
+        cfmkit.loads(TWO_LEAVES.replace(old, new))
 
 
 def test_a_pad_that_overlaps_a_beam_at_rest_is_refused_with_depth_and_place():

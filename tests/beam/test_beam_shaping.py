@@ -361,18 +361,14 @@ def test_finished_starts_are_noted_and_used_again() -> None:
 
 def test_the_widest_designs_are_widened_again_in_finer_orders_and_none_gets_narrower(monkeypatch) -> None:
     task = replace(lan("range"), orders=(1, 3, 4, 5))
-    assert (task.started.orders, lan().started.orders, replace(task, orders=(4, 5)).started.orders) == (
-        (1, 3),
-        (2,),
-        (4, 5),
-    )
-    monkeypatch.setattr(
-        search, "_minimise_objective", lambda _task, found, order, _plan, _steps: replace(found, order=order)
-    )
+    started = [one.started.orders for one in (task, lan(), replace(task, orders=(4, 5)))]
+    assert started == [(1, 3), (2,), (4, 5)]
     gain = {4: 0.5e-3, 5: -0.5e-3}
-    monkeypatch.setattr(
-        search, "widen", lambda _task, found, _plan: replace(found, start=found.start - gain[found.order])
-    )
+    for name, step in {
+        "_minimise_objective": lambda _task, found, order, _plan, _steps: replace(found, order=order),
+        "widen": lambda _task, found, _plan: replace(found, start=found.start - gain[found.order]),
+    }.items():
+        monkeypatch.setattr(search, name, step)
     begun = ShapeCandidate(np.zeros(17), 3, 4e-3, 0.02, 0.0, "", 0)
     ended = search.refine(task, begun, StartBudget())
     assert (ended.start, ended.order) == (3.5e-3, 4)
@@ -403,26 +399,16 @@ def test_of_two_designs_of_a_start_the_wider_one_is_kept(monkeypatch) -> None:
     bands = {0: 0.05, 1: 0.024, 2: 0.04, 3: 0.03, 4: 0.06}
     led = {0.05: 5e-3, 0.024: 3.8e-3, 0.04: 4.5e-3, 0.03: 3.9e-3, 0.06: 1e-3}
 
-    def searched_far(_task: Task, _seed: int, index: int, plan: StartBudget) -> ShapeCandidate:
-        return replace(far, objective=bands[index])
-
-    def nearer(_task: Task, found: ShapeCandidate, _plan: StartBudget) -> ShapeCandidate:
-        return replace(found, start=led[found.objective], objective=0.02)
-
-    monkeypatch.setattr(multistart, "search_start", lambda _task, _seed, _index, plan: near)
-    monkeypatch.setattr(multistart, "widen", lambda _task, found, _plan: found)
-    monkeypatch.setattr(multistart, "audit_design", lambda _variables, _found: None)
-    monkeypatch.setattr(multistart, "searched_far", searched_far)
-    monkeypatch.setattr(multistart, "nearer", nearer)
-    task = replace(lan("range"), orders=(1, 3))
-    ended = explore(task, StartBudget(), (5, 5), "x", Run())
-    assert {index: one.start for index, one in ended.designs.items()} == {
-        0: 4e-3,
-        1: 3.8e-3,
-        2: 4e-3,
-        3: 3.9e-3,
-        4: 4e-3,
-    }
+    for name, step in {
+        "search_start": lambda _task, _seed, _index, plan: near,
+        "widen": lambda _task, found, _plan: found,
+        "audit_design": lambda _task, _found: None,
+        "searched_far": lambda _task, _seed, index, plan: replace(far, objective=bands[index]),
+        "nearer": lambda _task, found, _plan: replace(found, start=led[found.objective], objective=0.02),
+    }.items():
+        monkeypatch.setattr(multistart, name, step)
+    ended = explore(replace(lan("range"), orders=(1, 3)), StartBudget(), (5, 5), "x", Run())
+    assert [ended.designs[index].start for index in range(5)] == [4e-3, 3.8e-3, 4e-3, 3.9e-3, 4e-3]
 
 
 def test_a_widening_that_more_poses_refute_keeps_the_window_that_they_confirm(monkeypatch) -> None:
@@ -430,14 +416,15 @@ def test_a_widening_that_more_poses_refute_keeps_the_window_that_they_confirm(mo
     task = lan("range")
     good = ShapeCandidate(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
     wide = replace(good, start=3.4e-3, objective=task.half_band)
-    monkeypatch.setattr(search, "_widest", lambda _task, _found, _plan: wide)
-    monkeypatch.setattr(search, "_repair", lambda _task, _wide, kept, _plan: kept)
-    monkeypatch.setattr(search, "round_design", lambda _task, found: found)
-    monkeypatch.setattr(search, "view_closely", lambda _task, _network: object())
-    monkeypatch.setattr(search, "_shows_all", lambda _task, found, _view: found.start == good.start)
-    monkeypatch.setattr(
-        search, "_as_seen", lambda _task, found, _view: replace(found, start=3.6e-3) if found.start < 4e-3 else found
-    )
+    for name, step in {
+        "_widest": lambda _task, _found, _plan: wide,
+        "_repair": lambda _task, _wide, kept, _plan: kept,
+        "round_design": lambda _task, found: found,
+        "view_closely": lambda _task, _network: object(),
+        "_shows_all": lambda _task, found, _view: found.start == good.start,
+        "_as_seen": lambda _task, found, _view: replace(found, start=3.6e-3) if found.start < 4e-3 else found,
+    }.items():
+        monkeypatch.setattr(search, name, step)
     ended = search.widen(task, good, StartBudget())
     assert (ended.start, ended.feasible) == (3.6e-3, True)
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
+from beam_support import CONFIGS
 from vee_leaf import VEE
 
 import cfmkit
@@ -15,7 +15,6 @@ from cfmkit.families import family
 from cfmkit.results import Result, Status
 from cfmkit.solid import SolidProblem
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 LAN = CONFIGS / "beam_lan2010.yaml"
 
 

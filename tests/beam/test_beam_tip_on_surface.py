@@ -51,9 +51,7 @@ def test_a_surface_is_judged_between_its_points(tmp_path, between):
 
     x = np.linspace(0, 12.3, 8)
     y = 3.5 * np.sin(np.pi * x / 12.3)
-    points = "\n".join(f"{a:.9f},{b:.9f}" for a, b in zip(x, y, strict=True))
-    (tmp_path / "hump.csv").write_text(f"x [mm],y [mm]\n{points}\n")
-    found = on_file(tmp_path, f"{{kind: file, file: hump.csv, between: {between}}}")
+    found = cfmkit.analyze(on_measured_surface(tmp_path, x, y, between))
     fine = np.linspace(0, 12.3, 200_001)
     height = (CubicSpline(x, y) if between == "smooth" else lambda at: np.interp(at, x, y))(fine) * MM
     nominal = found.curves[0]
@@ -63,14 +61,6 @@ def test_a_surface_is_judged_between_its_points(tmp_path, between):
     assert value(found, "tip_force_max") == pytest.approx(force.max(), rel=1e-5)
     stress = CubicSpline(nominal.motion, nominal.extra["max_stress"].values)(1.76 * MM + height.max())
     assert value(found, "surface_stress_max") == pytest.approx(stress, rel=1e-6)
-
-
-def on_file(folder, profile):
-    """The end-effector on a surface from a file."""
-    text = cfmkit.dumps(config("beam_end_effector"))
-    start, end = text.index("    profile:"), text.index("    preload:")
-    (folder / "spec.yaml").write_text(text[:start] + f"    profile: {profile}\n" + text[end:])
-    return cfmkit.analyze(cfmkit.load(folder / "spec.yaml"))
 
 
 def test_forces_along_a_surface_do_not_depend_on_how_many_of_its_points_are_written():
@@ -102,31 +92,22 @@ def test_a_tip_that_leaves_the_surface_is_not_out_of_reach():
     far = solved("beam_end_effector", "analysis.surface.preload=3 mm")
     assert {"surface_out_of_reach"} == {"tip_lifts_off", "surface_out_of_reach"} & warned(far).keys()
     assert warned(far)["surface_out_of_reach"].endswith("the mechanism is solved for 0 mm to 5.5 mm")
+    assert far.status is Status.PARTIAL
+    assert "the surface requires a displacement of" in far.message
+    assert value(far, "surface_reach") < 12.3 * MM
 
 
-def test_a_surface_that_rises_too_far_is_partial():
-    result = solved("beam_end_effector", "analysis.surface.preload=3 mm")
-    assert result.status is Status.PARTIAL
-    assert "the surface requires a displacement of" in result.message
-    assert value(result, "surface_reach") < 12.3 * MM
+@pytest.mark.parametrize(("length", "jams"), [("12.3", False), ("3", True)])
+def test_a_steep_surface_jams(length, jams):
+    changes = (f"{PROFILE}.length={length} mm", f"{PROFILE}.height=1.75*(1 - cos(pi*x/{length}))")
+    reported = warned(solved("beam_end_effector", "analysis.surface.friction=1.99", *changes))
+    assert ("tip_jams" in reported) is jams
 
 
-def test_a_steep_surface_jams():
-    reported = warned(
-        solved("beam_end_effector", "analysis.surface.friction=1.99", "analysis.surface.profile.length=12.3 mm")
-    )
-    assert "tip_jams" not in reported
-    changes = (
-        "analysis.surface.friction=1.99",
-        "analysis.surface.profile.length=3 mm",
-        "analysis.surface.profile.height=1.75*(1 - cos(pi*x/3))",
-    )
-    assert "tip_jams" in warned(solved("beam_end_effector", *changes))
-
-
-def on_measured_surface(folder, places, between="smooth"):
-    """Return the specification of the end-effector on the points of its surface at places [mm]."""
-    rows = [f"{x:.9f},{1.75 * (1 - np.cos(np.pi * x / 12.3)):.9f}" for x in places]
+def on_measured_surface(folder, places, heights=None, between="smooth"):
+    """Return the specification of the end-effector on measured heights [mm], else those of its surface, at places."""
+    heights = 1.75 * (1 - np.cos(np.pi * places / 12.3)) if heights is None else heights
+    rows = [f"{x:.9f},{y:.9f}" for x, y in zip(places, heights, strict=True)]
     (folder / "heights.csv").write_text("x [mm],y [mm]\n" + "\n".join(rows) + "\n")
     text = cfmkit.dumps(config("beam_end_effector"))
     start, end = text.index("    profile:"), text.index("    preload:")
@@ -152,7 +133,7 @@ def test_a_hole_in_a_measured_surface_is_not_bridged(tmp_path):
     assert np.isnan(along.effort[inside]).all()
     assert np.isfinite(along.effort[~inside]).all()
     for points, between in ((places, "smooth"), (holed, "straight")):
-        assert cfmkit.analyze(on_measured_surface(tmp_path, points, between)).status is Status.COMPLETE
+        assert cfmkit.analyze(on_measured_surface(tmp_path, points, between=between)).status is Status.COMPLETE
 
 
 def test_a_surface_from_a_file(tmp_path):

@@ -236,11 +236,9 @@ class AlongMotion:
         clear = np.concatenate([self.motion[[0, -1]], self.corners])
         step = min(float(np.abs(np.diff(self.motion)).max()), float(np.abs(clear - place).min()) / EXTREME_STENCIL[-1])
         for _ in range(2):
-            powers = np.polynomial.polynomial.polyfit(
-                EXTREME_STENCIL, self.effort_at(place + step * EXTREME_STENCIL), 4
-            )
-            rates = np.polynomial.polynomial.polyder(powers)
-            turns = np.roots(rates[::-1])
+            efforts = self.effort_at(place + step * EXTREME_STENCIL)
+            powers = np.polynomial.polynomial.polyfit(EXTREME_STENCIL, efforts, 4)
+            turns = np.roots(np.polynomial.polynomial.polyder(powers)[::-1])
             real = turns.real[np.isreal(turns)]
             if not len(real) or np.abs(real).min() > EXTREME_STENCIL[-1]:
                 return extreme

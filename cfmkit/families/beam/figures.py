@@ -15,7 +15,7 @@ from cfmkit.families.beam.drawn_contacts import draw_contacts
 from cfmkit.families.beam.network_from_spec import node_place
 from cfmkit.families.beam.part import BOX_TOLERANCE, bodies, made_strips, regions
 from cfmkit.families.beam.scalar_results import natural
-from cfmkit.families.beam.solution import node_at
+from cfmkit.families.beam.solution import choose_points, node_at
 from cfmkit.families.beam.strips_and_gaps import strips
 from cfmkit.families.beam.tip_on_uneven_surface import follow_surface
 from cfmkit.families.fem_results import number_fillets
@@ -111,7 +111,7 @@ def stress_map(result: Result) -> Figure:
 def shapes(result: Result) -> Figure:
     """Return the mechanism to scale: as cut, and bent at several places of the travel."""
     solution: Solution = result.state
-    poses = np.unique(np.linspace(0, len(solution.keep) - 1, N_DRAWN_POSES).astype(int))[1:]
+    poses = choose_points(len(solution.keep), N_DRAWN_POSES)[1:]
     shown, made = bodies(solution, poses, centre_line=centre_line), made_strips(solution.assembly)
     drawn = {int(pose): [body.core_at(k) for body in shown] for k, pose in enumerate(poses)}
     springs = solution.assembly.add_images(spring_lines(solution.path))
@@ -169,23 +169,26 @@ def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> 
 def _peak(solution: Solution, ax: Axes, index: int) -> Label:
     """Mark where the stress is largest, on the unbent beam: there a reader finds the place on the part."""
     name, share = str(solution.stress_at[0][index]), float(solution.stress_at[1][index])
-    path = solution.path
-    centre_line = np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
-    arc_length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(centre_line, axis=0).T))])
-    x, y = (float(np.interp(share * arc_length[-1], arc_length, centre_line[:, k])) for k in (0, 1))
-    ax.plot(
-        *parts.mm((x, y)), marker="o", markersize=8, markerfacecolor="none", color=TROUBLE_RED, zorder=5, gid="peak"
-    )
+    points = _unbent_line(solution.path, name)
+    arc_length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    x, y = (float(np.interp(share * arc_length[-1], arc_length, points[:, k])) for k in (0, 1))
+    at = parts.mm((x, y))
+    ax.plot(*at, marker="o", markersize=8, markerfacecolor="none", color=TROUBLE_RED, zorder=5, gid="peak")
     return parts.part_name(value_text(float(solution.stress[index]), "stress"), [(x, y)], (1.0, 0.6), TROUBLE_RED)
 
 
 def _names(solution: Solution) -> list[Label]:
     """Return the names of the beams as cut."""
-    path, labels = solution.path, []
-    for name in list(path.network.beams)[: 2 * MOST_BEAMS]:
-        points = np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
+    labels = []
+    for name in list(solution.path.network.beams)[: 2 * MOST_BEAMS]:
+        points = _unbent_line(solution.path, name)
         labels.append(parts.part_name(name, points[len(points) // 4 : 3 * len(points) // 4], (0.3, 1.0), TEXT_INK))
     return labels
+
+
+def _unbent_line(path: Path, name: str) -> FloatArray:
+    """Return the centre line of a beam as cut, (n, 2) [m]."""
+    return np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
 
 
 def _box(shown: Sequence[PosedBody]) -> parts.Box:
@@ -222,10 +225,8 @@ def reactions(result: Result) -> Figure:
     along, across = ({name: zero_rounding(row, size) for name, row in rows.items()} for rows in (along, across))
     per_copy = ", one copy" if solution.assembly.parallel > 1 else ""
     heading = Heading.from_result(result, f"force of each beam on its last node{per_copy}{_left_out(forces)}")
-    diagrams = [
-        Diagram(solution.motion, _motion(result), Scale(names[0], "force"), _series(along)),
-        Diagram(solution.motion, _motion(result), Scale(names[1], "force"), _series(across)),
-    ]
+    pairs = zip(names, (along, across), strict=True)
+    diagrams = [Diagram(solution.motion, _motion(result), Scale(name, "force"), _series(rows)) for name, rows in pairs]
     return diagram_figure(heading, diagrams)
 
 
@@ -242,16 +243,12 @@ def _series(values: dict[str, FloatArray]) -> list[Series]:
         same = next((key for key, (_, drawn_values) in lines.items() if _alike(values[name], drawn_values)), None)
         names = name if same is None else f"{lines[same][0]}, {name}"
         lines[same or name] = (names, values[name])
-    chosen = sorted(lines, key=list(values).index)
-    return [
-        Series(
-            lines[name][1],
-            lines[name][0],
-            LINE_COLOURS[number % len(LINE_COLOURS)],
-            prefer=0.25 + 0.5 * number / len(chosen),
-        )
-        for number, name in enumerate(chosen)
-    ]
+    series = []
+    for number, name in enumerate(sorted(lines, key=list(values).index)):
+        names, line = lines[name]
+        color, prefer = LINE_COLOURS[number % len(LINE_COLOURS)], 0.25 + 0.5 * number / len(lines)
+        series.append(Series(line, names, color, prefer=prefer))
+    return series
 
 
 def _alike(first: FloatArray, second: FloatArray) -> bool:
@@ -270,9 +267,8 @@ def stress(result: Result) -> Figure:
     series = _series({name: value for name, (value, _) in solution.stresses.items()})
     part = "bending and axial" if solution.spec.stress == "total" else "bending"
     diagram = Diagram(solution.motion, _motion(result), Scale("largest stress", "stress"), series, limits)
-    return diagram_figure(
-        Heading.from_result(result, f"largest stress of each beam ({part}){_left_out(solution.stresses)}"), [diagram]
-    )
+    heading = Heading.from_result(result, f"largest stress of each beam ({part}){_left_out(solution.stresses)}")
+    return diagram_figure(heading, [diagram])
 
 
 def frequencies(result: Result) -> Figure:
@@ -283,15 +279,11 @@ def frequencies(result: Result) -> Figure:
         for name, dashed in (("held", False), ("free", True)):
             values = both[name][:, number]
             if np.isfinite(values).any():
-                prefer = (0.3 if dashed else 0.7) - 0.1 * (number % 2)
-                series.append(
-                    Series(values, f"{number + 1} {name}", LINE_COLOURS[number % len(LINE_COLOURS)], dashed, prefer)
-                )
+                color, prefer = LINE_COLOURS[number % len(LINE_COLOURS)], (0.3 if dashed else 0.7) - 0.1 * (number % 2)
+                series.append(Series(values, f"{number + 1} {name}", color, dashed, prefer))
     most = f"; the lowest {MOST_MODES}" if solution.spec.analysis.modes > MOST_MODES else ""
     heading = Heading.from_result(result, f"natural frequencies about each pose, drive held and free{most}")
-    values = np.concatenate(
-        [diagram_series.values[np.isfinite(diagram_series.values)] for diagram_series in series] or [np.ones(1)]
-    )
+    values = np.concatenate([line.values[np.isfinite(line.values)] for line in series] or [np.ones(1)])
     wide = bool(values.min() > 0 and values.max() > MAX_LINEAR_FREQUENCY_RATIO * values.min())
     scale = Scale("frequency", "frequency", zero=not wide, log=wide)
     return diagram_figure(heading, [Diagram(solution.motion, _motion(result), scale, series)])
@@ -307,15 +299,10 @@ def surface(result: Result) -> Figure:
     limits = [*limits_on(result, "tip_force_min"), *limits_on(result, "tip_force_max")]
     if low is not None and high is not None:
         limits += [Limit(value, value_text(value, "force")) for value in (low, high)]
+    heights, forces = Series(contact.height, "surface", TEXT_GREY), Series(contact.force, "", LINE_COLOURS[0])
     diagrams = [
-        Diagram(contact.place, scale, Scale("height", "length"), [Series(contact.height, "surface", TEXT_GREY)]),
-        Diagram(
-            contact.place,
-            scale,
-            Scale("tip force", "force", zero=False),
-            [Series(contact.force, "", LINE_COLOURS[0])],
-            limits,
-        ),
+        Diagram(contact.place, scale, Scale("height", "length"), [heights]),
+        Diagram(contact.place, scale, Scale("tip force", "force", zero=False), [forces], limits),
     ]
     return diagram_figure(Heading.from_result(result, "contact force along the surface"), diagrams)
 
@@ -355,16 +342,15 @@ def centre_line(path: Path, beam: str, point: int) -> FloatArray:
 def rigid_parts(path: Path, point: int | None) -> list[FloatArray]:
     """Return links and the arms beside nodes as lines (2, 2) [m], at a point of the path or before any load."""
     network = path.network
-    parts_of_links = [
-        np.array([node_at(path, link.master, point), node_at(path, link.node, point)]) for link in network.links
-    ]
+    ends = [(node_at(path, link.master, point), node_at(path, link.node, point)) for link in network.links]
     for beam in network.beams.values():
         for node, arm in ((beam.start, beam.start_offset), (beam.end, beam.end_offset)):
             at = node_at(path, node, point)
             angle = 0.0 if point is None else float(path.motion(node)[point, 2])
             turned = complex(*map(float, np.real(arm))) * np.exp(1j * angle)
-            parts_of_links.append(np.array([at, at + np.array([turned.real, turned.imag])]))
-    return [line for line in parts_of_links if np.hypot(*(line[1] - line[0])) > _LENGTH_RTOL * path.mesh.scales.length]
+            ends.append((at, at + np.array([turned.real, turned.imag])))
+    least = _LENGTH_RTOL * path.mesh.scales.length
+    return [np.array([start, end]) for start, end in ends if np.hypot(*(end - start)) > least]
 
 
 def spring_lines(path: Path) -> list[FloatArray]:

@@ -18,7 +18,7 @@ from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of
 from cfmkit.families.beam.path_ending import add_units, drive_text, ending_of
 from cfmkit.families.beam.scalar_results import find_in_window
-from cfmkit.families.beam.solution import pairs_in_contact
+from cfmkit.families.beam.solution import node_at, pairs_in_contact
 from cfmkit.families.findings import percent, stiffer, too_soft
 from cfmkit.families.rows import FindingRule, findings_of_one
 from cfmkit.specs.units import format_short
@@ -63,16 +63,9 @@ def _find_moved_nodes(solution: Solution) -> dict[str, float]:
     """Return the nodes that the closure "chain" moved, each with how far [m]."""
     if solution.spec.mechanism.closure != "chain":
         return {}
-    network, nodes = solution.path.network, solution.spec.mechanism.nodes
-    ways = {
-        name: float(np.hypot(*(np.real([network.nodes[name].x, network.nodes[name].y]) - node.at)))
-        for name, node in nodes.items()
-    }
-    return {
-        name: displacement
-        for name, displacement in ways.items()
-        if displacement > LENGTH_RTOL * solution.path.mesh.scales.length
-    }
+    nodes, least = solution.spec.mechanism.nodes, LENGTH_RTOL * solution.path.mesh.scales.length
+    moved = {name: float(np.hypot(*(node_at(solution.path, name) - node.at))) for name, node in nodes.items()}
+    return {name: displacement for name, displacement in moved.items() if displacement > least}
 
 
 def _moved_guides(solution: Solution) -> list[str]:
@@ -81,11 +74,9 @@ def _moved_guides(solution: Solution) -> list[str]:
 
 
 def _moved_nodes(solution: Solution) -> Sentence:
-    reported = (
-        f"{name} by {format_short(displacement, 'length')}"
-        for name, displacement in _find_moved_nodes(solution).items()
-    )
-    return (f"nodes were moved to where the beams end: {', '.join(reported)}",)
+    moved = _find_moved_nodes(solution).items()
+    reported = ", ".join(f"{name} by {format_short(displacement, 'length')}" for name, displacement in moved)
+    return (f"nodes were moved to where the beams end: {reported}",)
 
 
 def _misfits(solution: Solution) -> dict[str, Fit]:
@@ -293,19 +284,14 @@ def _wide_beams(solution: Solution) -> Sentence:
     return too_soft(*_hindered_share(solution)), (wide, "analysis.modes=0") if narrow else wide
 
 
-def _gap_of(solution: Solution, moving: bool) -> BeamGap | None:
-    return solution.gaps[moving] if _has_curve(solution) else None
-
-
-def _touches(solution: Solution) -> bool:
-    gap = _gap_of(solution, moving=True)
+def _overlap(gap: BeamGap | None) -> bool:
     return gap is not None and gap.size <= 0
 
 
 def _touching_beams(solution: Solution) -> Sentence:
     still, moving = solution.gaps
     assert moving is not None
-    when = "before any load" if still is not None and still.size <= 0 else "during the travel"
+    when = "before any load" if _overlap(still) else "during the travel"
     if frozenset((moving.first, moving.second)) in pairs_in_contact(solution.path.network):
         return (f"beams {moving.first} and {moving.second} overlap {when}, beside their contact that is stated",)
     remedy = "" if moving.second.endswith("'") else "; state it in 'mechanism.contacts'"
@@ -319,7 +305,7 @@ def _least_gap(solution: Solution) -> float:
 
 
 def _has_small_gap(solution: Solution) -> bool:
-    gap = _gap_of(solution, moving=False)
+    gap = solution.gaps[0]
     return solution.spec.mechanism.part is not None and gap is not None and gap.size < _least_gap(solution)
 
 
@@ -401,7 +387,7 @@ LAST_RULES: tuple[FindingRule[Solution], ...] = (
         _wide_beams,
         lambda solution: stiffer(_hindered_share(solution)[0]),
     ),
-    FindingRule("beams_touch", _touches, _touching_beams),
+    FindingRule("beams_touch", lambda solution: _overlap(solution.gaps[1]), _touching_beams),
     FindingRule("gap_small", _has_small_gap, _small_gap),
 )
 

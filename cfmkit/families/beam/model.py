@@ -37,7 +37,7 @@ from cfmkit.families.beam.path_ending import add_units, distance, ending_of, way
 from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, natural, target_of
 from cfmkit.families.beam.solution import END_FORCES, Solution, columns_of, output_columns
 from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as OF_SURFACES
-from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, follow_surface, values_along
+from cfmkit.families.beam.tip_on_uneven_surface import add_surface
 from cfmkit.families.end_stops import CONTACT_QUANTITIES
 from cfmkit.families.rows import (
     ScalarQuantity,
@@ -64,9 +64,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.families.beam.solution import LazyColumns
     from cfmkit.families.beam.spec import BeamSpec
-    from cfmkit.families.beam.tip_on_uneven_surface import SurfaceResult
     from cfmkit.families.run_control import Run
-    from cfmkit.results import Finding
 
 
 _MAX_TRAVEL_RATIO = 3.0  # travel in lengths from the driven node to a support: these are at least twice as long then
@@ -86,20 +84,13 @@ def analyze(spec: BeamSpec, _run: Run) -> Result:
     status, message = Status.COMPLETE, ""
     if solution.path.status is not PathStatus.COMPLETE:
         status, message = Status.PARTIAL, ending_of(solution).message
-    values, along = values_of_one(SCALAR_QUANTITIES, solution) | contact_values(solution), follow_surface(solution)
-    curves: tuple[Curve, ...] = (_curve(solution),)
-    if along is not None:
-        curves += (curve_of(along),) if len(along.place) > 1 else ()
-        values |= values_along(along)
-        if along.missing and status is Status.COMPLETE:
-            status, message = Status.PARTIAL, along.missing
-    return Result(
+    result = Result(
         spec=resolved,
         status=status,
         message=message,
-        curves=curves,
-        values=values,
-        warnings=LazySequence(partial(_findings, solution, along)),
+        curves=(_curve(solution),),
+        values=values_of_one(SCALAR_QUANTITIES, solution) | contact_values(solution),
+        warnings=LazySequence(partial(findings_of, solution)),
         travel=travel_of(solution),
         target=target_of(solution),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
@@ -111,12 +102,7 @@ def analyze(spec: BeamSpec, _run: Run) -> Result:
         part_efforts=None if isinstance(spec.mechanism.drive, LoadsDrive) else solution.part_efforts,
         state=solution,
     )
-
-
-def _findings(solution: Solution, along: SurfaceResult | None) -> Iterator[Finding]:
-    yield from findings_of(solution)
-    if along is not None:
-        yield from findings_along(along)
+    return add_surface(result, solution)
 
 
 def solve(spec: BeamSpec) -> Solution:

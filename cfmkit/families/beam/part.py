@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import distinct
 from cfmkit.elastica import Path, PointLoad
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.export.contours import Contour
@@ -32,6 +31,7 @@ from cfmkit.families.beam.drawn_pieces import (
     section_at_bend,
 )
 from cfmkit.families.beam.network_from_spec import Mirror, assemble, is_on_axis, node_place, thickest_of
+from cfmkit.families.beam.solution import choose_points
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, strips
 from cfmkit.families.run_control import Run
 
@@ -173,7 +173,7 @@ def _swept(assembly: Assembly, places: Sequence[HeldPlace]) -> Any:
     rest = list(itertools.chain.from_iterable(strips_of(assembly).values()))
     half = 0.5 * max(float(strip.thickness.max()) for strip in rest)
     lines = with_image(assembly, [PosedBody.line("beam", "free", strip.points, half) for strip in rest])
-    poses = bodies(solution, choose_points(solution, N_SWEPT), places)
+    poses = bodies(solution, choose_points(len(solution.keep), N_SWEPT), places)
     moving = (body if body.closed else replace(body, half_thickness=half) for body in poses if body.role != "held")
     return swept([*lines, *moving])
 
@@ -195,7 +195,8 @@ def part_over_motion(result: Result) -> PosedPart | None:
         return None
     solution: Solution = result.state
     assembly, mechanism = solution.assembly, solution.spec.mechanism
-    moving = bodies(solution, choose_points(solution, N_POSES), regions(solution.spec, BOX_TOLERANCE))
+    points = choose_points(len(solution.keep), N_POSES)
+    moving = bodies(solution, points, regions(solution.spec, BOX_TOLERANCE))
     return PosedPart(
         (*as_made(assembly), *moving),
         direction=0.5 * np.pi if mechanism.drive.turns else assembly.direction,
@@ -256,10 +257,3 @@ def with_image(assembly: Assembly, described: Sequence[PosedBody]) -> list[Posed
     """Return bodies of the described half, and those of its mirror image."""
     mirror = assembly.mirror
     return [*described, *(replace(body, core=mirror.reflect(body.core)) for body in described if mirror is not None)]
-
-
-def choose_points(solution: Solution, count: int) -> NDArray[Any]:
-    """Return so many points of the curve, evenly, its ends included; none if it has none."""
-    if not len(solution.keep):
-        return np.zeros(0, int)
-    return distinct(np.linspace(0, len(solution.keep) - 1, count).astype(int))

@@ -151,15 +151,10 @@ def ending_of(solution: Solution) -> PathEnding:
         return PathEnding(f"{said}: {_list_blocking_keys(solution)}", (EXTENSIBLE_OPTION,) if rigid else ())
     if not taut:
         return PathEnding(said)
-    if kept:
-        where = solution.describe_motion(float(solution.motion[-1]))
-    else:
-        where = drive_text(solution.assembly, float(path.drive[-1]))
-    return PathEnding(
-        f"the beams are taut at {where} ({', '.join(taut)}), and inextensible beams cannot follow: allow stretching "
-        "('mechanism.axial: true')",
-        (EXTENSIBLE_OPTION,),
-    )
+    end = float(path.drive[-1])
+    where = solution.describe_motion(float(solution.motion[-1])) if kept else drive_text(solution.assembly, end)
+    reason = f"the beams are taut at {where} ({', '.join(taut)}), and inextensible beams cannot follow"
+    return PathEnding(f"{reason}: allow stretching ('mechanism.axial: true')", (EXTENSIBLE_OPTION,))
 
 
 def _list_blocking_keys(solution: Solution) -> str:

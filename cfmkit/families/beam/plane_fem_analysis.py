@@ -25,7 +25,7 @@ from cfmkit.families.beam.scalar_results import EXTREME_METRICS, RANGE_METRICS, 
 from cfmkit.families.beam.solid_nodes_and_fillets import SolidNodes, fillets
 from cfmkit.families.beam.solid_part import driven_part, ends_of_windows, load_of_one, moved_far_enough
 from cfmkit.families.beam.solution import output_columns
-from cfmkit.families.beam.tip_on_uneven_surface import N_PLACES, curve_of, findings_along, follow_surface, values_along
+from cfmkit.families.beam.tip_on_uneven_surface import N_PLACES, add_surface
 from cfmkit.families.fem_results import (
     columns_of_solid,
     fillet_table,
@@ -184,21 +184,13 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     message = _explain_ending(solution)
     if len(solution.motion) < 2:
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, f"no curve: {message}")
-    curves: tuple[Curve, ...] = (_curve(solution),)
-    values, warnings = _values(solution), tuple(_findings(solution))
-    status = Status.PARTIAL if message else Status.COMPLETE
-    if (along := follow_surface(solution.densely)) is not None:
-        curves += (curve_of(along),) if len(along.place) > 1 else ()
-        values, warnings = {**values, **values_along(along)}, (*warnings, *findings_along(along))
-        if along.missing and status is Status.COMPLETE:
-            status, message = Status.PARTIAL, along.missing
-    return Result(
+    result = Result(
         spec=resolve(spec),
-        status=status,
+        status=Status.PARTIAL if message else Status.COMPLETE,
         message=message,
-        curves=curves,
-        values=values,
-        warnings=warnings,
+        curves=(_curve(solution),),
+        values=_values(solution),
+        warnings=tuple(_findings(solution)),
         travel=(0.0, solution.end),
         target=target_of(solution),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
@@ -207,6 +199,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         tables={"fillets": partial(_fillet_table, solution)},
         state=solution,
     )
+    return add_surface(result, solution.densely)
 
 
 def _solve_part(spec: BeamSpec, run: Run) -> tuple[Assembly, AdaptiveSolution]:

@@ -159,22 +159,17 @@ def _rescale_shape(
     ripple = ripples(kept.motion, kept.force, starts, length)
     ends = np.searchsorted(kept.motion, starts + length).clip(max=len(kept.motion) - 1)
     stress = np.maximum.accumulate(kept.stress)[ends]
-    flat = next(
-        (flat for share in RIPPLE_SHARES if len(flat := np.flatnonzero(ripple <= share * request.ripple))), None
-    )
+    flat_windows = (np.flatnonzero(ripple <= share * request.ripple) for share in RIPPLE_SHARES)
+    flat = next((windows for windows in flat_windows if len(windows)), None)
     if flat is None:
         least = float(ripple.min())
         reason = f"the force of beams in this envelope changes by {percent(least)} over the travel"
         return 1.0 + least / request.ripple, reason
     best = int(flat[np.argmin(stress[flat] / 1e3 ** (1 - ripple[flat]))])
     window = float(starts[best]) * size, float(starts[best] + length) * size
-    curve = float(stress[best]), _mean(kept, starts[best], length)
+    places = np.linspace(starts[best], starts[best] + length, 101)
+    curve = float(stress[best]), float(np.interp(places, kept.motion, kept.force).mean())
     return _size_section(request, kept, size, block, window, curve, thickest * size)
-
-
-def _mean(kept: Kept, start: float, length: float) -> float:
-    places = np.linspace(start, start + length, 101)
-    return float(np.interp(places, kept.motion, kept.force).mean())
 
 
 def _size_section(

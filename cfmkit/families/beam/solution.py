@@ -29,6 +29,8 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path
     from cfmkit.elastica.results.between_points import BetweenPoints
@@ -239,11 +241,11 @@ class Solution(ShortRepr):
 
     @cached_property
     def gaps(self) -> tuple[BeamGap | None, BeamGap | None]:
-        """The smallest gap between two beams before any load, and of some places of the curve [m]."""
-        poses = sorted(set(np.linspace(0, len(self.keep) - 1, _N_POSES).astype(int).tolist()))
-        gaps_of_poses = [self._gap(int(self.keep[pose])) for pose in poses]
-        moving = min((gap for gap in gaps_of_poses if gap is not None), default=None)
-        return gaps_of_poses[0], moving
+        """The smallest gap between two beams before any load, and of some places of the curve [m]; None without one."""
+        if len(self.keep) < 2:
+            return None, None
+        gaps_of_poses = [self._gap(int(self.keep[pose])) for pose in choose_points(len(self.keep), _N_POSES)]
+        return gaps_of_poses[0], min((gap for gap in gaps_of_poses if gap is not None), default=None)
 
     def _gap(self, point: int) -> BeamGap | None:
         network = self.path.network
@@ -256,6 +258,11 @@ class Solution(ShortRepr):
     def beam_force(self, beam: str) -> FloatArray:
         """Return force and moment that a beam exerts on its last node, (n, 3) [N, N, N m], of one copy."""
         return read_only(-self.path.end_force(beam, 1)[self.keep])
+
+
+def choose_points(count: int, most: int) -> NDArray[Any]:
+    """Return at most so many of the points of a curve, evenly, its ends included; none if it has none."""
+    return distinct(np.linspace(0, count - 1, most).astype(int)) if count else np.zeros(0, int)
 
 
 def node_at(path: Path, node: str, point: int | None = None) -> FloatArray:

@@ -22,23 +22,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr
+from cfmkit.arrays import LazyMapping, LazySequence, ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.end_stops import LARGEST_FORCE
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between
 from cfmkit.numerics.interpolation import bisect, values_at
-from cfmkit.results import Quantity, quantities
+from cfmkit.results import Quantity, Status, quantities
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.families.beam.constant_force_range_and_extremes import SolvedMechanism
     from cfmkit.families.beam.spec import FileProfile, FormulaProfile, Surface
-    from cfmkit.results import Finding
+    from cfmkit.results import Finding, Result
 
 
 N_PLACES = 4001  # places along a surface among which an extreme is searched, before the best one is refined
@@ -158,16 +158,9 @@ class SurfaceResult:
     stress: FloatArray  # (n,) largest stress in the mechanism [Pa]
     stable: Any  # (n,) whether the mechanism is stable there
     values: Mapping[str, float | None]  # the scalar results; extremes are those between the points, too
-    ending: Finding | None = None  # why it ends before the surface does
-    findings: tuple[Finding, ...] = ()  # what else is wrong with it
-    # where the surface was not measured: nothing is known there, nor what holds over the whole surface
-    hole: Finding | None = None
-
-    @property
-    def missing(self) -> str:
-        """Why it ends before the surface does, or has a hole; empty if neither."""
-        reasons = [warning.message for warning in (self.ending, self.hole) if warning is not None]
-        return "; ".join(reasons)
+    findings: tuple[Finding, ...] = ()  # all that is wrong with it
+    missing: str = ""  # why it ends before the surface does, or has a hole
+    hole: str = ""  # where the surface was not measured: nothing is known there, nor what holds over the whole surface
 
 
 @dataclass(frozen=True)
@@ -223,23 +216,15 @@ class TipOnSurface:
         """Return why the tip does not follow the surface beyond a place [m]."""
         u = float(self.displacement(np.array([place]))[0])
         where, asked = format_short(place, "length"), format_short(u, "length")
+        lifts = f"the tip leaves the surface at {where} along it"
         if u < self.x[0] and self.effort[0] <= 0:
-            return finding(
-                "tip_lifts_off",
-                f"the tip leaves the surface at {where} along it: there the mechanism is at rest and the surface falls "
-                "further",
-            )
+            return finding("tip_lifts_off", f"{lifts}: there the mechanism is at rest and the surface falls further")
         if self.x[0] <= u <= self.x[-1] and np.isfinite(self.force(np.array([place]))).all():
-            return finding(
-                "tip_lifts_off",
-                f"the tip leaves the surface at {where} along it: the force of the mechanism falls to zero at a "
-                f"displacement of {asked}",
-            )
+            reason = f"the force of the mechanism falls to zero at a displacement of {asked}"
+            return finding("tip_lifts_off", f"{lifts}: {reason}")
         low, high = (format_short(float(end), "length") for end in (self.x[0], self.x[-1]))
-        return finding(
-            "surface_out_of_reach",
-            f"the surface requires a displacement of {asked} at {where}, the mechanism is solved for {low} to {high}",
-        )
+        message = f"the surface requires a displacement of {asked} at {where}"
+        return finding("surface_out_of_reach", f"{message}, the mechanism is solved for {low} to {high}")
 
 
 def follow_surface(solution: SolvedMechanism) -> SurfaceResult | None:
@@ -248,10 +233,10 @@ def follow_surface(solution: SolvedMechanism) -> SurfaceResult | None:
     if surface is None:
         return None
     tip = _tip_on_surface(solution, surface)
+    endings: list[Finding] = []
     rows = tip.course.rows
-    places = tip.course.places(float(rows[-1]))
+    places, end = tip.course.places(float(rows[-1])), float(rows[-1])
     lost = np.flatnonzero(~tip.follows(places))
-    end, ending = float(rows[-1]), None
     if len(lost):
         first = int(lost[0])
         beyond = float(places[first])
@@ -259,36 +244,35 @@ def follow_surface(solution: SolvedMechanism) -> SurfaceResult | None:
             last_good = float(places[first - 1])
             beyond = bisect(lambda place: not tip.follows(np.array([place]))[0], last_good, beyond)
             end = float(np.nextafter(beyond, last_good))
-        ending = tip.ending(beyond)
+        endings.append(tip.ending(beyond))
         rows = np.append(rows[rows < end], end) if first else rows[:0]
     u = tip.displacement(rows)
     contact, lateral = (np.array([force(rows, 1), force(rows, -1)]) for force in (tip.contact, tip.lateral))
     stress, stable = tip.stress_at(u), np.interp(u, tip.x, tip.stable) == 1
-    values = _values(tip, rows, solution.assembly.allowable_stress)
-    height, force = u - surface.preload, tip.force(rows)
-    result = SurfaceResult(rows, height, u, force, contact, lateral, stress, stable, values, ending)
-    result = _drop_holes(result, tip.course.holes)
-    return replace(result, findings=tuple(_findings(tip, result, solution.assembly.allowable_stress)))
+    allowable = solution.assembly.allowable_stress
+    values, height, force = _values(tip, rows, allowable), u - surface.preload, tip.force(rows)
+    result = SurfaceResult(rows, height, u, force, contact, lateral, stress, stable, values)
+    if holes := [hole for hole in tip.course.holes if len(rows) and hole[0] < rows[-1]]:
+        result, hole = _drop_holes(result, holes)
+        endings.append(hole)
+    missing = "; ".join(warning.message for warning in endings)
+    return replace(result, findings=(*endings, *_findings(tip, result, allowable)), missing=missing)
 
 
-def _drop_holes(result: SurfaceResult, holes: tuple[tuple[float, float], ...]) -> SurfaceResult:
-    """Return a result without numbers in holes of the surface, and without scalar results if there are any."""
-    holes = tuple(hole for hole in holes if len(result.place) and hole[0] < result.place[-1])
-    if not holes:
-        return result
+def _drop_holes(result: SurfaceResult, holes: Sequence[tuple[float, float]]) -> tuple[SurfaceResult, Finding]:
+    """Return a result without numbers in holes of the surface, and without scalar results; and what says so."""
     unknown = np.any([(result.place > low) & (result.place < high) for low, high in holes], axis=0)
     rows: dict[str, Any] = {
         name: np.where(unknown, np.nan, getattr(result, name))
         for name in ("height", "displacement", "force", "contact", "lateral", "stress")
     }
     spans = " and ".join(f"{format_short(low, 'length')} to {format_short(high, 'length')}" for low, high in holes)
-    hole = finding(
-        "surface_hole",
-        f"the surface has no points from {spans} along it: the force there is not known, nor the extremes; "
-        "'analysis.surface.profile.between: straight' takes straight lines there for the surface",
-        "analysis.surface.profile.between=straight",
-    )
-    return replace(result, **rows, values=dict.fromkeys(TIP_DEFINITIONS), hole=hole)
+    hole = f"the surface has no points from {spans} along it"
+    unknown_values = "the force there is not known, nor the extremes"
+    remedy = "'analysis.surface.profile.between: straight' takes straight lines there for the surface"
+    message, cure = f"{hole}: {unknown_values}; {remedy}", "analysis.surface.profile.between=straight"
+    result = replace(result, **rows, values=dict.fromkeys(TIP_DEFINITIONS), hole=hole)
+    return result, finding("surface_hole", message, cure)
 
 
 def _tip_on_surface(solution: SolvedMechanism, surface: Surface) -> TipOnSurface:
@@ -298,9 +282,8 @@ def _tip_on_surface(solution: SolvedMechanism, surface: Surface) -> TipOnSurface
     turns = np.flatnonzero(steps != steps[0])
     count = int(turns[0]) + 1 if len(turns) else len(x)
     sense = slice(None) if steps[0] > 0 else slice(None, None, -1)
-    x, effort, stress, stable = (
-        part[:count][sense] for part in (x, effort, stress, np.asarray(solution.stable, float))
-    )
+    stable = np.asarray(solution.stable, float)
+    x, effort, stress, stable = (values[:count][sense] for values in (x, effort, stress, stable))
     if (law := solution.model_between_points) is not None:  # with the extremes between the points
         places, effort = law.knots
         x, stress, stable = places, law.stress("", places), np.interp(places, x, stable)
@@ -339,11 +322,9 @@ def _findings(tip: TipOnSurface, result: SurfaceResult, allowable: float | None)
     """Yield a warning for a stress beyond the allowable one, and for each direction in which the tip jams."""
     stress = result.values["surface_stress_max"]
     if allowable is not None and stress is not None and stress > allowable:
-        yield finding(
-            "surface_stress_exceeded",
-            f"along the surface the largest stress is {format_short(stress, 'stress')}; the allowable stress is "
-            f"{format_short(allowable, 'stress')}",
-        )
+        largest_stress, limit = (format_short(value, "stress") for value in (stress, allowable))
+        message = f"along the surface the largest stress is {largest_stress}; the allowable stress is {limit}"
+        yield finding("surface_stress_exceeded", message)
     if not len(result.place):
         return
     places = tip.course.places(float(result.place[-1]))
@@ -354,7 +335,21 @@ def _findings(tip: TipOnSurface, result: SurfaceResult, allowable: float | None)
             yield finding("tip_jams", f"on the way {direction_name} the slope at {place} is too steep for the friction")
 
 
-def curve_of(result: SurfaceResult) -> Curve:
+def add_surface(result: Result, solution: SolvedMechanism) -> Result:
+    """Return the result of an analysis with what is along its surface, if there is one."""
+    along = follow_surface(solution)
+    if along is None:
+        return result
+    curves = (*result.curves, *([_curve_of(along)] if len(along.place) > 1 else []))
+    warnings = LazySequence(lambda: (*result.warnings, *along.findings))
+    values = LazyMapping(result.values, result.values.__getitem__, _values_along(along))
+    followed = replace(result, curves=curves, values=values, warnings=warnings)
+    if along.missing and result.status is Status.COMPLETE:
+        followed = replace(followed, status=Status.PARTIAL, message=along.missing)
+    return followed
+
+
+def _curve_of(result: SurfaceResult) -> Curve:
     """Return forces and motions as a curve over the distance along the surface."""
     extra = {
         "surface_height": Column(result.height, "length"),
@@ -369,15 +364,8 @@ def curve_of(result: SurfaceResult) -> Curve:
     return Curve(result.place, result.force, branch, result.stable, extra, label={"over": ("surface", "text")})
 
 
-def values_along(result: SurfaceResult) -> Mapping[str, Quantity]:
+def _values_along(result: SurfaceResult) -> Mapping[str, Quantity]:
     """Return the scalar results along a surface by name."""
-    if result.hole is not None:
-        reason = result.hole.message.partition(":")[0]
-        return {name: Quantity(None, *meant, reason) for name, meant in TIP_DEFINITIONS.items()}
+    if result.hole:
+        return {name: Quantity(None, *meant, result.hole) for name, meant in TIP_DEFINITIONS.items()}
     return quantities(TIP_DEFINITIONS, result.values)
-
-
-def findings_along(result: SurfaceResult) -> Iterator[Finding]:
-    """Yield all warnings of a result along a surface."""
-    yield from (item for item in (result.ending, result.hole) if item is not None)
-    yield from result.findings
