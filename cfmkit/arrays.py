@@ -98,9 +98,9 @@ class LazyMapping(Mapping[str, ValueT]):
     """
 
     def __init__(
-        self, names: Iterable[str], compute: Callable[[str], ValueT], known: Mapping[str, ValueT] | None = None
+        self, names: Iterable[str], compute: Callable[[str], ValueT], precomputed: Mapping[str, ValueT] | None = None
     ) -> None:
-        self._known = dict(known or {})
+        self._known = dict(precomputed or {})
         self._names = dict.fromkeys((*names, *self._known))
         self._compute = compute
 
@@ -204,7 +204,7 @@ def brief(value: Any) -> str:
         text = _array(value)
     elif isinstance(value, (Mapping, tuple, list)):
         few = not isinstance(value, Mapping) and len(value) <= 4
-        is_short = few and all(isinstance(one, PLAIN_TYPES) for one in value)
+        is_short = few and all(isinstance(item, PLAIN_TYPES) for item in value)
         text = repr(value) if is_short else f"{type(value).__name__} of {len(value)}"
     elif is_dataclass(value) and not isinstance(value, ShortRepr):
         is_short = all(isinstance(getattr(value, item.name), PLAIN_TYPES) for item in fields(value))
@@ -220,8 +220,8 @@ def _array(values: Any) -> str:
     import numpy as np
 
     shape = " x ".join(map(str, values.shape))
-    known = values[np.isfinite(values)] if values.dtype.kind == "f" else np.empty(0)
-    return f"array of {shape}" + (f": {known.min():.4g} ... {known.max():.4g}" if len(known) else "")
+    finite = values[np.isfinite(values)] if values.dtype.kind == "f" else np.empty(0)
+    return f"array of {shape}" + (f": {finite.min():.4g} ... {finite.max():.4g}" if len(finite) else "")
 
 
 def _join_texts(texts: list[str]) -> str:

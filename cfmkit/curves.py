@@ -72,8 +72,8 @@ class Curve(ShortRepr):
 
     def __post_init__(self) -> None:
         for name, dtype in (("motion", float), ("effort", float), ("branch", np.str_), ("stable", bool)):
-            given = getattr(self, name)
-            value = np.full(len(self.motion), given) if isinstance(given, str | bool) else given
+            values = getattr(self, name)
+            value = np.full(len(self.motion), values) if isinstance(values, str | bool) else values
             object.__setattr__(self, name, read_only(value, dtype))
         object.__setattr__(self, "label", MappingProxyType(dict(self.label)))
         lengths = {self.motion.shape, self.effort.shape, self.branch.shape, self.stable.shape}

@@ -30,12 +30,12 @@ _LONG_WORD = re.compile(r"\S{400,}")
 
 def shorten_quotes(message: str) -> str:
     """Return a message in which whatever somebody gave is quoted only as far as he needs to recognise it."""
-    quoted = _LONG_QUOTE.sub(lambda found: f"{found['quote']}{found['text'][:47]}...{found['quote']}", message)
+    quoted = _LONG_QUOTE.sub(lambda match: f"{match['quote']}{match['text'][:47]}...{match['quote']}", message)
     return _words_shortened(quoted)
 
 
 def _words_shortened(text: str) -> str:
-    return _LONG_WORD.sub(lambda found: f"{found[0][:60]}...{found[0][-20:]}", text)
+    return _LONG_WORD.sub(lambda match: f"{match[0][:60]}...{match[0][-20:]}", text)
 
 
 def visible(text: str) -> str:

@@ -248,8 +248,8 @@ class Result:
         if not self.message:
             object.__setattr__(self, "message", self.status.value)
         for name in ("curves", "warnings", "load_cases"):
-            if not isinstance(given := getattr(self, name), LazySequence):
-                object.__setattr__(self, name, Several(given))
+            if not isinstance(items := getattr(self, name), LazySequence):
+                object.__setattr__(self, name, Several(items))
         if not isinstance(self.values, LazyMapping):
             object.__setattr__(self, "values", Named(self.values))
 
@@ -257,7 +257,7 @@ class Result:
         about = f"{self.spec.family} {self.spec.name!r}, {self.status.key}"
         reported = [repr(curve) for curve in self.curves[:1]]
         reported += [f"{len(self.curves) - 1} more curves"] if len(self.curves) > 1 else []
-        reported += [f"warnings: {', '.join(one.name for one in self.warnings[:10])}"] if self.warnings else []
+        reported += [f"warnings: {', '.join(finding.name for finding in self.warnings[:10])}"] if self.warnings else []
         return f"<{type(self).__name__} of {'; '.join([about, *reported])}>"
 
     @property
@@ -290,11 +290,11 @@ class Result:
         from cfmkit.tables.table import library
 
         table = curve_table(self.curves)
-        found = library("xarray", "to_xarray").Dataset()
+        dataset = library("xarray", "to_xarray").Dataset()
         for column in table.columns:
             attributes = {} if column.unit is None else {"units": column.unit}
-            found[column.name] = ("point", np.asarray(column.values), attributes)
-        return found
+            dataset[column.name] = ("point", np.asarray(column.values), attributes)
+        return dataset
 
 
 @dataclass(frozen=True)
@@ -338,7 +338,7 @@ class Design:
 
         reported = [f"<p>{escape(self.explanation)}</p>"]
         reported += [f"<p>{escape(word)}: {escape(text)}</p>" for word, text in self.notes]
-        reported += [f"<p>{escape(one.name)}: {escape(one.message)}</p>" for one in self.warnings]
+        reported += [f"<p>{escape(finding.name)}: {escape(finding.message)}</p>" for finding in self.warnings]
         return "<div>" + "".join(reported) + ("" if self.spec is None else self.spec._repr_html_()) + "</div>"
 
     @property

@@ -165,7 +165,10 @@ def _spell_out_empty_values(arguments: list[str]) -> list[str]:
     ['show', '--figure=', '--json']
     """
     followed = zip(arguments, [*arguments[1:], "-"], strict=False)
-    return [f"{one}=" if one in OPTIONAL_VALUE_OPTIONS and after.startswith("-") else one for one, after in followed]
+    return [
+        f"{option}=" if option in OPTIONAL_VALUE_OPTIONS and after.startswith("-") else option
+        for option, after in followed
+    ]
 
 
 def parse(app: typer.Typer, arguments: list[str]) -> Call | None:

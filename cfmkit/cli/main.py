@@ -69,33 +69,33 @@ def main(
     arguments: Sequence[str] | None = None,  # without the program's name; default: those of the process
 ) -> int:
     """Run the program; return its exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
     streams.make_tolerant()
     try:
         try:
-            return int(_run(given))
+            return int(_run(words))
         finally:
             streams.flush()
     except Stopped as stop:  # while it was told how the command has ended
         return int(stop.exit_code)
 
 
-def _run(given: list[str]) -> ExitCode:
-    terminal = Terminal.guess(given)
+def _run(words: list[str]) -> ExitCode:
+    terminal = Terminal.guess(words)
     try:
         _listen()
         if not sys.warnoptions:
             # Libraries warn about their own affairs; what concerns the user is in the results.
             warnings.simplefilter("ignore")
-        return _answer(given, terminal)
+        return _answer(words, terminal)
     except Stopped as stop:
         return fail(stop, terminal)
     except Exception as error:
         return _report_error(Stopped.last or error, terminal)
 
 
-def _answer(given: list[str], terminal: Terminal) -> ExitCode:
-    call = parse(program(_accept_global_options, HELP_TEXT, HELP_EPILOG), given)
+def _answer(words: list[str], terminal: Terminal) -> ExitCode:
+    call = parse(program(_accept_global_options, HELP_TEXT, HELP_EPILOG), words)
     if call is None:
         streams.write_output("")
         return ExitCode.OK

@@ -37,9 +37,9 @@ def topics(incomplete: str) -> list[str]:
     """Return what `cfmkit show` explains and begins so: topics, families, and everything else that has a name."""
     from cfmkit.cli.show_topics import TOPIC_HEADINGS, names
 
-    known = [*TOPIC_HEADINGS, *families("")]
+    topics = [*TOPIC_HEADINGS, *families("")]
     # names by the hundred only once somebody has begun one
-    every = [*known, *names()] if incomplete else known
+    every = [*topics, *names()] if incomplete else topics
     return list(dict.fromkeys(name for name in every if name.startswith(incomplete)))
 
 
@@ -53,13 +53,15 @@ def changes(ctx: Any, incomplete: str) -> list[str]:
 
     path, equals, _ = incomplete.partition("=")
     records = [families.family(name) for name in _families_named(ctx)]
-    known = {key.path.replace("[]", ".0"): key for record in records for key in keys(record.spec_type)}
+    keys_by_path = {key.path.replace("[]", ".0"): key for record in records for key in keys(record.spec_type)}
     if equals:
-        words = known[path].kind.split(" | ") if path in known and " | " in known[path].kind else []
+        words = (
+            keys_by_path[path].kind.split(" | ") if path in keys_by_path and " | " in keys_by_path[path].kind else []
+        )
         return [f"{path}={word}" for word in words if f"{path}={word}".startswith(incomplete)]
-    found = [path for path in known if path.startswith(incomplete) and known[path].kind != "block"]
+    paths = [path for path in keys_by_path if path.startswith(incomplete) and keys_by_path[path].kind != "block"]
     # one level at a time would save no key press: names below a block are few
-    return [f"{path}=" for path in found]
+    return [f"{path}=" for path in paths]
 
 
 def _families_named(ctx: Any) -> list[str]:
@@ -67,16 +69,16 @@ def _families_named(ctx: Any) -> list[str]:
     from cfmkit import families
 
     named = [ctx.params.get("spec"), *(ctx.params.get("specs") or ())]
-    found = []
+    choices = []
     for name in filter(None, named):
         try:
             with open(name, encoding="utf-8") as file:
                 lines = file.read(LARGEST_HEAD).splitlines()
         except (OSError, UnicodeDecodeError):
             continue
-        found += [line.partition(":")[2].split("#")[0].strip() for line in lines if line.startswith("family:")]
-    known = families.names()
-    return [name for name in found if name in known] or list(known)
+        choices += [line.partition(":")[2].split("#")[0].strip() for line in lines if line.startswith("family:")]
+    names = families.names()
+    return [name for name in choices if name in names] or list(names)
 
 
 MAX_INTEGER = 2**63 - 1
@@ -193,9 +195,9 @@ class FigureChoice(Common):
             "--no-titles": self.no_titles or None,
             "--plain": self.plain or None,
         }
-        given = [name for name, value in said.items() if value is not None]
-        if self.no_plots and given and not getattr(self, "report", False):
-            raise UsageError(f"--no-plots draws no figures and cannot be combined with {given[0]}")
+        stated = [name for name, value in said.items() if value is not None]
+        if self.no_plots and stated and not getattr(self, "report", False):
+            raise UsageError(f"--no-plots draws no figures and cannot be combined with {stated[0]}")
         return form_of(self.figures, self.figure_width, not self.no_titles, self.figure_style, self.plain, overlay)
 
 

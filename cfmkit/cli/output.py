@@ -99,10 +99,10 @@ class Terminal:
     @classmethod
     def guess(cls, arguments: Sequence[str]) -> Terminal:
         """Return what a command line that may be malformed seems to request."""
-        given = list(arguments[: arguments.index("--")] if "--" in arguments else arguments)
-        flags = "".join(item[1:] for item in given if item.startswith("-") and item[1:].strip("vq") == "")
-        verbose = flags.count("v") + given.count("--verbose")
-        return cls(tuple(arguments), "--json" in given, verbose=verbose)
+        options = list(arguments[: arguments.index("--")] if "--" in arguments else arguments)
+        flags = "".join(item[1:] for item in options if item.startswith("-") and item[1:].strip("vq") == "")
+        verbose = flags.count("v") + options.count("--verbose")
+        return cls(tuple(arguments), "--json" in options, verbose=verbose)
 
     @property
     def width(self) -> int:

@@ -89,7 +89,7 @@ class StudyFolder:
 
     def write_pages(
         self,
-        found: Document,
+        document: Document,
         study: Study,
         varied: Sequence[str],
         tables: Mapping[str, bytes],
@@ -110,17 +110,17 @@ class StudyFolder:
             command = shlex.join(["cfmkit", *self.terminal.arguments])
             shown = form.select_page_figures(makers, drawn)
             point = command_of_a_point(options, study.design)
-            page = report_html.study_page(found, study.spec, varied, tables, command, shown, point)
+            page = report_html.study_page(document, study.spec, varied, tables, command, shown, point)
             self.folder.write(report_html.REPORT_NAME, page)
 
     def commit(
-        self, found: Document, study: Study, seed: int, pieces: Sequence[Records], data: Mapping[str, Any]
+        self, document: Document, study: Study, seed: int, pieces: Sequence[Records], data: Mapping[str, Any]
     ) -> Document:
         """Put the files in place, make the journal of a finished study small, and return the document with its data."""
         from cfmkit.runs.run import provenance
         from cfmkit.studies.engine import compact
 
-        spec, code = study.spec, found.exit_code
+        spec, code = study.spec, document.exit_code
         ending = {"points": sum(map(len, pieces)), "status": code.name.lower(), "exit_code": int(code)}
         about = provenance(self.verb, spec, self.options.spec, self.terminal.arguments) | {"seed": seed} | ending
         files = (*self.folder.commit(about).files, "manifest.json")
@@ -132,7 +132,7 @@ class StudyFolder:
         record["reused"] = sum(piece.reused for piece in pieces)
         bugs = sum(piece.bugs for piece in pieces)
         complaints = (f"error    {bugs} points hit a bug in cfmkit; -vv shows the first",) if bugs else ()
-        return replace(found, data=record, files=written, complaints=complaints)
+        return replace(document, data=record, files=written, complaints=complaints)
 
 
 @contextmanager
@@ -153,7 +153,11 @@ def open_study(verb: str, options: StudyOptions, terminal: Terminal, start: floa
 def command_of_a_point(options: StudyOptions, redesigns: bool) -> str:
     """Return the command that computes a point of a study, but for what the study varies."""
     spec = options.spec if options.spec != "-" else "SPEC"
-    said = ["design" if redesigns else "analyze", spec, *(part for one in options.changes for part in ("--set", one))]
+    said = [
+        "design" if redesigns else "analyze",
+        spec,
+        *(part for change in options.changes for part in ("--set", change)),
+    ]
     said += ["--fidelity", options.fidelity] if options.fidelity else []
     return shlex.join(["cfmkit", *said, *(["--seed", str(options.seed)] if options.seed else [])])
 

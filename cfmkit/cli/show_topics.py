@@ -56,9 +56,9 @@ def explain(name: str | None) -> Document:
     topics = [*TOPIC_HEADINGS, *families.names()]
     by_name = "keys, materials, metrics, values, warnings, units, papers and symbols by their names"
     every = f"there are {', '.join(topics)}, and {by_name}"
-    known = names()
-    parts = (part for one in known for part in one.split("_"))  # which lead to all names that have them
-    hint = did_you_mean(name, [*topics, *known, *parts]) or every
+    topic_names = names()
+    parts = (part for name in topic_names for part in name.split("_"))  # which lead to all names that have them
+    hint = did_you_mean(name, [*topics, *topic_names, *parts]) or every
     raise UsageError(f"there is nothing to show about {name!r}; {hint}")
 
 
@@ -245,8 +245,8 @@ def _symbols(name: str) -> list[Record]:
 
 def names() -> list[str]:
     """Return every name that `find_page` knows, but for the paths of keys and symbols."""
-    known = (name for kind in TOPIC_KINDS.values() for record in kind.records() for name in kind.names(record))
-    return [name for name in dict.fromkeys(known) if "." not in name]
+    topic_names = (name for kind in TOPIC_KINDS.values() for record in kind.records() for name in kind.names(record))
+    return [name for name in dict.fromkeys(topic_names) if "." not in name]
 
 
 def references() -> list[dict[str, str]]:

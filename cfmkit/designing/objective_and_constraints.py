@@ -46,27 +46,27 @@ class Missed:
 
 def worst(rows: Iterable[LimitRows]) -> float:
     """Return by how much the worst row is missed; zero or less where all hold."""
-    return max((-float(one.values.min(initial=0.0)) for one in rows), default=0.0)
+    return max((-float(row.values.min(initial=0.0)) for row in rows), default=0.0)
 
 
 def list_missed_limits(rows: Iterable[LimitRows], allowed: float) -> list[Missed]:
     """Return the limits that are missed by more than what counts as nothing, the worst first."""
-    found: dict[str, Missed] = {}
-    for one in rows:
-        at = int(one.values.argmin()) if len(one.values) else 0
-        if len(one.values) and one.values[at] < -allowed:
-            before = found.get(one.name)
-            if before is None or -one.values[at] > before.by:
-                found[one.name] = Missed(one.name, -float(one.values[at]), one.about()[at])
-    return sorted(found.values(), key=lambda one: (-one.by, one.name, one.about))
+    missed_by_name: dict[str, Missed] = {}
+    for row in rows:
+        at = int(row.values.argmin()) if len(row.values) else 0
+        if len(row.values) and row.values[at] < -allowed:
+            before = missed_by_name.get(row.name)
+            if before is None or -row.values[at] > before.by:
+                missed_by_name[row.name] = Missed(row.name, -float(row.values[at]), row.about()[at])
+    return sorted(missed_by_name.values(), key=lambda missed: (-missed.by, missed.name, missed.about))
 
 
 def list_active_rows(rows: Iterable[LimitRows], close: float) -> Iterator[str]:
     """Yield what holds a design: the rows that are nearly zero and move with it, as ``limit: about``."""
-    for one in rows:
-        about = one.about()
-        moves = one.values < 1 if one.slopes is None else abs(one.slopes).max(axis=1, initial=0.0) > MIN_ROW_SLOPE
-        yield from (f"{one.name}: {about[k]}" for k in np.flatnonzero((one.values < close) & moves))
+    for row in rows:
+        about = row.about()
+        moves = row.values < 1 if row.slopes is None else abs(row.slopes).max(axis=1, initial=0.0) > MIN_ROW_SLOPE
+        yield from (f"{row.name}: {about[k]}" for k in np.flatnonzero((row.values < close) & moves))
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class DesignProgram(ABC):
         seen = self.evaluate(z[:-1] if elastic else z, False)
         if seen is None:
             return None
-        rows = [one.values + z[-1] if one.name in elastic else one.values for one in seen.rows]
+        rows = [row.values + z[-1] if row.name in elastic else row.values for row in seen.rows]
         return (float(z[-1]) if elastic else seen.objective), np.concatenate([np.zeros(0), *rows])
 
     def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
@@ -107,7 +107,7 @@ class DesignProgram(ABC):
             objective[-1] = 1.0
         elif seen.slope is not None:
             objective[: len(seen.slope)] = seen.slope
-        return objective, np.concatenate([np.zeros((0, len(z))), *(_wide(one, len(z), elastic) for one in seen.rows)])
+        return objective, np.concatenate([np.zeros((0, len(z))), *(_wide(row, len(z), elastic) for row in seen.rows)])
 
 
 def _wide(rows: LimitRows, count: int, elastic: tuple[str, ...]) -> FloatArray:

@@ -36,17 +36,17 @@ SIGMA_STEP = 0.5
 
 
 def differentiate(
-    numbers: Callable[[int, float], FloatArray | None], ends: FloatArray, known: FloatArray | None = None
+    numbers: Callable[[int, float], FloatArray | None], ends: FloatArray, exact: FloatArray | None = None
 ) -> FloatArray | None:
     """Return the derivatives of numbers of a part by some of its values, (q, d); None if a part has no numbers.
 
     `numbers(k, value)`: those of a part whose k-th value is so, (q,); `ends`, (d, 2): the values between which a
-    difference is taken; `known`, (q, d): exact derivatives, NaN where one is not known.
+    difference is taken; `exact`, (q, d): exact derivatives, NaN where one is not known.
     """
     columns = []
     for k, (low, high) in enumerate(ends.tolist()):
-        if known is not None and np.isfinite(known[:, k]).all():
-            columns.append(known[:, k])
+        if exact is not None and np.isfinite(exact[:, k]).all():
+            columns.append(exact[:, k])
             continue
         above, below = numbers(k, high), numbers(k, low)
         if above is None or below is None or not (np.isfinite(above).all() and np.isfinite(below).all()):
@@ -106,10 +106,10 @@ def best_move(
     chosen = np.zeros(parts.shape, dtype=bool)
     np.put_along_axis(chosen, np.argpartition(parts, kept - 1, axis=1)[:, :kept], True, axis=1)
     for _ in range(MOST_PROGRAMS):
-        found = _program(parts, slopes, chosen, share, bounds, x, trust)
-        if found is None:
+        solution = _program(parts, slopes, chosen, share, bounds, x, trust)
+        if solution is None:
             return None
-        move, level, slack = found
+        move, level, slack = solution
         left = parts + slopes @ move + level + slack[:, None]
         worst = np.argsort(left, axis=1)[:, :MORE_ROWS]
         present = np.take_along_axis(chosen, worst, axis=1)
@@ -146,10 +146,10 @@ def _program(
     high = np.minimum(trust, (bounds[:, 1] - x) / reach)
     limits = [*zip(low.tolist(), high.tolist(), strict=True), (None, None), *([(0.0, None)] * count)]
     solve: Any = linprog  # its stubs know no sparse matrices
-    found = solve(cost, hstack([moves, level, slack]).tocsr(), parts[part, row], bounds=limits, method="highs-ds")
-    if found.x is None:
+    solution = solve(cost, hstack([moves, level, slack]).tocsr(), parts[part, row], bounds=limits, method="highs-ds")
+    if solution.x is None:
         return None
-    return np.asarray(found.x[:size] * reach), float(found.x[size]), np.asarray(found.x[size + 1 :])
+    return np.asarray(solution.x[:size] * reach), float(solution.x[size]), np.asarray(solution.x[size + 1 :])
 
 
 DIFFERENCE_STEP = 2e-4  # step of a difference by a value of the design, as a share of its range
@@ -259,8 +259,8 @@ class _Counted:
 
     def __call__(self, x: FloatArray, errors: FloatArray) -> FloatArray | None:
         self.count += 1
-        found = self.problem.seen(x, errors)
-        return found if found is not None and np.isfinite(found).all() else None
+        part = self.problem.seen(x, errors)
+        return part if part is not None and np.isfinite(part).all() else None
 
     def rows(self, numbers: FloatArray) -> FloatArray:
         return np.asarray(self.problem.matrix @ numbers + self.problem.constant)
@@ -271,9 +271,9 @@ def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | No
     middle = seen(x, problem.perfect)
     if middle is None:
         return None
-    known = problem.slopes(x, problem.perfect)
-    by_x = _differentiate_by_values(problem, x, problem.perfect, seen, known)
-    by_error = _differentiate_by_errors(problem, x, seen, known)
+    slopes = problem.slopes(x, problem.perfect)
+    by_x = _differentiate_by_values(problem, x, problem.perfect, seen, slopes)
+    by_error = _differentiate_by_errors(problem, x, seen, slopes)
     if by_x is None or by_error is None:
         return None
     matrix = problem.matrix
@@ -281,7 +281,7 @@ def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | No
 
 
 def _differentiate_by_values(
-    problem: RobustProblem, x: FloatArray, errors: FloatArray, seen: SeenPart, known: PartSlopes | None
+    problem: RobustProblem, x: FloatArray, errors: FloatArray, seen: SeenPart, slopes: PartSlopes | None
 ) -> FloatArray | None:
     """Return the derivatives of the numbers of a part by the values of its design, (q, n)."""
     if not len(x):  # nothing may move
@@ -294,11 +294,11 @@ def _differentiate_by_values(
         moved[k] = value
         return seen(moved, errors)
 
-    return differentiate(numbers, ends, None if known is None else known.by_x)
+    return differentiate(numbers, ends, None if slopes is None else slopes.by_x)
 
 
 def _differentiate_by_errors(
-    problem: RobustProblem, x: FloatArray, seen: SeenPart, known: PartSlopes | None
+    problem: RobustProblem, x: FloatArray, seen: SeenPart, slopes: PartSlopes | None
 ) -> FloatArray | None:
     """Return the derivatives of the numbers by the errors, (q, d); exact ones hold for errors about zero only."""
     step, about = SIGMA_STEP * problem.deviations, problem.middle
@@ -306,7 +306,7 @@ def _differentiate_by_errors(
     def numbers(k: int, error: float) -> FloatArray | None:
         return seen(x, np.where(np.arange(len(about)) == k, error, 0.0))
 
-    exact = None if known is None else np.where(about == 0.0, known.by_error, np.nan)
+    exact = None if slopes is None else np.where(about == 0.0, slopes.by_error, np.nan)
     return differentiate(numbers, np.column_stack([about - step, about + step]), exact)
 
 
@@ -336,12 +336,12 @@ def with_margins(
         move = best_move(parts, slopes, problem.share, problem.bounds, now.x, trust)
         if move is None:
             break
-        there = np.clip(now.x + move, *problem.bounds.T)
+        moved = np.clip(now.x + move, *problem.bounds.T)
         # one part tells most of what the way bends: errors and slopes are looked at where that is good only
-        if not _risk_at(now, there, few, scale, problem, seen) < risk:
+        if not _risk_at(now, moved, few, scale, problem, seen) < risk:
             trust *= 0.5
             continue
-        next_ = linear(problem, there, seen)
+        next_ = linear(problem, moved, seen)
         new_risk = np.inf if next_ is None else tail_risk(next_.numbers(few) / scale, problem.share)
         if next_ is None or not new_risk < risk - 1e-6 * (1.0 + abs(risk)):
             trust *= 0.5
@@ -356,10 +356,10 @@ def with_margins(
 
 
 def _risk_at(
-    now: Linear, there: FloatArray, few: FloatArray, scale: FloatArray, problem: RobustProblem, seen: _Counted
+    now: Linear, moved: FloatArray, few: FloatArray, scale: FloatArray, problem: RobustProblem, seen: _Counted
 ) -> float:
     """Return the risk of other values, errors moving the rows as they do now."""
-    numbers = seen(there, problem.perfect)
+    numbers = seen(moved, problem.perfect)
     if numbers is None:
         return np.inf
     return tail_risk(replace(now, middle=seen.rows(numbers)).numbers(few) / scale, problem.share)
@@ -369,8 +369,8 @@ def _scale(now: Linear, problem: RobustProblem) -> FloatArray:
     """Return by what each row is divided: its standard deviation over the drawn parts."""
     moved = (problem.errors @ now.by_error.T).std(axis=0)
     out: FloatArray = np.empty(len(moved))
-    for one in np.unique(problem.about):
-        mine = problem.about == one
+    for number in np.unique(problem.about):
+        mine = problem.about == number
         # limits that no error moves at all have their own size for a scale
         largest = float(moved[mine].max()) or float(np.abs(problem.constant[mine]).max()) or 1.0
         out[mine] = np.maximum(moved[mine], MIN_RELATIVE_DEVIATION * largest)
@@ -387,23 +387,23 @@ class _Parts:
 
     def rows(self, x: FloatArray) -> FloatArray | None:
         """Return the rows of all parts, (k, m); None if a part has no numbers."""
-        found = [self.seen(x, error) for error in self.errors]
-        return None if any(one is None for one in found) else np.array([self.seen.rows(one) for one in found])  # type: ignore[arg-type]
+        parts = [self.seen(x, error) for error in self.errors]
+        return None if any(part is None for part in parts) else np.array([self.seen.rows(part) for part in parts])  # type: ignore[arg-type]
 
     def differentiate_rows(self, x: FloatArray) -> FloatArray | None:
         """Return the derivatives of those rows by the values, (k, m, n)."""
         out = []
         for error in self.errors:
-            found = _differentiate_by_values(self.problem, x, error, self.seen, self.problem.slopes(x, error))
-            if found is None:
+            slopes = _differentiate_by_values(self.problem, x, error, self.seen, self.problem.slopes(x, error))
+            if slopes is None:
                 return None
-            out.append(self.problem.matrix @ found)
+            out.append(self.problem.matrix @ slopes)
         return np.array(out)
 
 
 def optimise_on_samples(
     problem: RobustProblem,  # what may vary and what must hold
-    found: RobustResult,  # where to begin
+    result: RobustResult,  # where to begin
     count: int,  # parts that are drawn
     worst: bool = False,  # whether the worst of them counts, and not the mean of the worst share
     most: int = 25,  # steps
@@ -412,10 +412,10 @@ def optimise_on_samples(
     asked = replace(problem, share=1.0) if worst else problem
     seen = _Counted(problem)
     parts = _Parts(problem, problem.errors[-count:], seen)
-    scale = _scale(found.linear, problem)
-    x, rows = found.x, parts.rows(found.x)
+    scale = _scale(result.linear, problem)
+    x, rows = result.x, parts.rows(result.x)
     if rows is None:
-        return found
+        return result
     risk, trust, steps = tail_risk(rows / scale, asked.share), 0.25 * FIRST_TRUST, 0
     slopes = None
     for _ in range(most):
@@ -427,38 +427,38 @@ def optimise_on_samples(
         move = best_move(rows / scale, slopes / scale[:, None], asked.share, problem.bounds, x, trust)
         if move is None:
             break
-        there = np.clip(x + move, *problem.bounds.T)
-        new = parts.rows(there)
+        moved = np.clip(x + move, *problem.bounds.T)
+        new = parts.rows(moved)
         new_risk = np.inf if new is None else tail_risk(new / scale, asked.share)
         if new is None or not new_risk < risk - 1e-6 * (1.0 + abs(risk)):
             trust *= 0.35
             continue
         small = risk - new_risk < SMALL_GAIN
-        x, rows, risk, slopes, steps = there, new, new_risk, None, steps + 1
+        x, rows, risk, slopes, steps = moved, new, new_risk, None, steps + 1
         trust = min(MOST_TRUST, 1.6 * trust)
         problem.tell(float((rows >= 0).all(axis=1).mean()), steps)
         if small:
             break
     now = linear(problem, x, seen)
     if now is None:
-        return found
+        return result
     share = now.share(problem.errors)
     return RobustResult(
-        x, share, found.began, found.steps + steps, found.seen + seen.count, now, share >= problem.share
+        x, share, result.began, result.steps + steps, result.seen + seen.count, now, share >= problem.share
     )
 
 
-def costliest(found: RobustResult, problem: RobustProblem, groups: list[tuple[int, ...]]) -> int:
+def costliest(result: RobustResult, problem: RobustProblem, groups: list[tuple[int, ...]]) -> int:
     """Return the number of the group of errors without which most more parts would be good, by linear estimate.
 
     Where no group alone makes a difference to that, the one without which parts miss their limits by least.
     """
-    spread = found.linear.spread(problem.errors.std(axis=0))
+    spread = result.linear.spread(problem.errors.std(axis=0))
     spread = np.where(spread > 0.0, spread, np.inf)  # what no error moves is missed alike whatever is held still
     gained = []
     for members in groups:
         still = problem.errors.copy()
         still[:, members] = 0.0
-        missed = np.maximum(-found.linear.numbers(still) / spread, 0.0).max(axis=1)
-        gained.append((found.linear.share(still), -float(missed.mean())))
+        missed = np.maximum(-result.linear.numbers(still) / spread, 0.0).max(axis=1)
+        gained.append((result.linear.share(still), -float(missed.mean())))
     return max(range(len(groups)), key=gained.__getitem__)

@@ -72,8 +72,8 @@ def measure_metrics(result: Result, window: tuple[float, float], *names: str) ->
     """Return metrics [SI] that the analysis of a design measures over a window [m or rad]; None if it cannot."""
     if not result.curves:
         return [None] * len(names)
-    found = evaluate(result, names, Window(*window))
-    return [found[name].value for name in names]
+    quantities = evaluate(result, names, Window(*window))
+    return [quantities[name].value for name in names]
 
 
 def search_values(

@@ -55,8 +55,8 @@ class Clock:
     @classmethod
     def from_budgets(cls, *budgets: float | None) -> Clock:
         """Return the clock on which the shortest of some budgets [s] begins now."""
-        given = [budget for budget in budgets if budget is not None]
-        return cls(time() + min(given) if given else None)
+        limits = [budget for budget in budgets if budget is not None]
+        return cls(time() + min(limits) if limits else None)
 
     def late(self) -> bool:
         """Return whether the time is up."""
@@ -80,17 +80,17 @@ class OneStart:
 
     def __call__(self, number: int) -> dict[str, Any]:
         """Return the record; what was found is empty where there is nothing."""
-        found = self.search(number)
-        return {"found": {} if found is None else to_record(found), "late": self.clock.late()}
+        outcome = self.search(number)
+        return {"found": {} if outcome is None else to_record(outcome), "late": self.clock.late()}
 
 
-def to_record(found: Any) -> dict[str, Any]:
+def to_record(outcome: Any) -> dict[str, Any]:
     """Return a dataclass of numbers, words and arrays as it is noted: arrays as lists, enumerations by name."""
 
     def plain(value: Any) -> Any:
         return value.tolist() if isinstance(value, np.ndarray) else value.name if isinstance(value, Enum) else value
 
-    return {one.name: plain(getattr(found, one.name)) for one in fields(found)}
+    return {attribute.name: plain(getattr(outcome, attribute.name)) for attribute in fields(outcome)}
 
 
 def from_record(kind: type[Anything], record: Mapping[str, Any]) -> Anything:

@@ -26,14 +26,14 @@ def document_of(
     compared: BatchComparison | None = None,  # with an earlier batch
 ) -> Document:
     """Return the document of a batch."""
-    reused = sum(one.reused for one in entries)
+    reused = sum(entry.reused for entry in entries)
     columns = (GridColumn(), GridColumn(wraps=False), GridColumn(wraps=False), GridColumn())
     return Document(
         exit_code=code,
         title=message(entries),
         summary=f"{reused} reused" if reused else "",
         verdict=_count_changes(compared) if compared else "",
-        tables=(PageTable("", columns, tuple(_row(one) for one in entries)), *_warnings(entries)),
+        tables=(PageTable("", columns, tuple(_row(entry) for entry in entries)), *_warnings(entries)),
         notes=(*_missed_notes(entries), *(_changes(compared) if compared else ())),
         files=files,
     )
@@ -46,16 +46,16 @@ def _count_changes(compared: BatchComparison) -> str:
 
 def _warnings(entries: Sequence[Entry]) -> Iterator[PageTable]:
     """Yield the warnings of all specifications, which a short page only counts."""
-    rows = tuple((visible(one.spec), item["name"], item["message"]) for one in entries for item in one.warnings)
+    rows = tuple((visible(entry.spec), item["name"], item["message"]) for entry in entries for item in entry.warnings)
     if rows:
         yield PageTable("warnings", (GridColumn(wraps=False), GridColumn(wraps=False), GridColumn()), rows, 0)
 
 
 def _missed_notes(entries: Sequence[Entry]) -> Iterator[Note]:
-    for one in entries:
-        for requirement in one.missed if one.verb and not one.errors else ():
+    for entry in entries:
+        for requirement in entry.missed if entry.verb and not entry.errors else ():
             reported = requirement["sentence"].removesuffix(": missed")
-            yield Note("missed", f"{visible(one.spec)}: {reported}", tone=Tone.BAD, whole=True)
+            yield Note("missed", f"{visible(entry.spec)}: {reported}", tone=Tone.BAD, whole=True)
 
 
 def _changes(compared: BatchComparison) -> Iterator[Note]:
@@ -63,33 +63,33 @@ def _changes(compared: BatchComparison) -> Iterator[Note]:
     beyond = compared.changes_beyond_tolerance
     text = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
     yield Note("compared", text, tone=Tone.BAD if beyond else Tone.GOOD, whole=True)
-    for one in beyond[:MAX_CHANGES]:
-        yield Note("changed", f"{visible(one.spec)}: {one.sentence}", tone=Tone.BAD, whole=True)
+    for change in beyond[:MAX_CHANGES]:
+        yield Note("changed", f"{visible(change.spec)}: {change.sentence}", tone=Tone.BAD, whole=True)
     if len(beyond) > MAX_CHANGES:
         yield Note("changed", f"{len(beyond) - MAX_CHANGES} more values in changes.csv", tone=Tone.FAINT)
     if compared.gone:
         yield Note("missing", f"not in this batch: {', '.join(map(visible, compared.gone))}", tone=Tone.BAD, whole=True)
 
 
-def _row(one: Entry) -> tuple[str | Span, ...]:
-    word = outcome(one)
+def _row(entry: Entry) -> tuple[str | Span, ...]:
+    word = outcome(entry)
     good = word == "ok"
-    tone = Tone.GOOD if good else Tone.FAINT if one.skipped else Tone.BAD
-    link = quote(str(PurePosixPath(one.folder) / "report.html")) if one.written else ""
-    spec = Span(visible(one.spec), link=link)
-    return spec, one.verb, Span(word if good or one.skipped else word.upper(), tone), detail(one)
+    tone = Tone.GOOD if good else Tone.FAINT if entry.skipped else Tone.BAD
+    link = quote(str(PurePosixPath(entry.folder) / "report.html")) if entry.written else ""
+    spec = Span(visible(entry.spec), link=link)
+    return spec, entry.verb, Span(word if good or entry.skipped else word.upper(), tone), detail(entry)
 
 
-def detail(one: Entry) -> str:
+def detail(entry: Entry) -> str:
     """Return how many requirements are met, or what went wrong before any could be."""
-    if one.skipped:
+    if entry.skipped:
         return ""
-    if one.errors:
+    if entry.errors:
         return "see above"
-    if one.missed and one.code is ExitCode.REQUIREMENT_MISSED:
-        return f"{len(one.missed)} of {len(one.requirements)} requirements"
-    if one.code:
-        return one.message
-    reported = f"{len(one.requirements)} requirement{'s' * (len(one.requirements) != 1)} met"
-    count = len(one.warnings)
+    if entry.missed and entry.code is ExitCode.REQUIREMENT_MISSED:
+        return f"{len(entry.missed)} of {len(entry.requirements)} requirements"
+    if entry.code:
+        return entry.message
+    reported = f"{len(entry.requirements)} requirement{'s' * (len(entry.requirements) != 1)} met"
+    count = len(entry.warnings)
     return reported + (f", {count} warning{'s' * (count != 1)}" if count else "")

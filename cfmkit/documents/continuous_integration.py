@@ -35,27 +35,27 @@ def workflow_commands(
     changes: Sequence[MetricChange] = (),  # since an earlier batch; those beyond the tolerance are errors
 ) -> Iterator[str]:
     """Yield one workflow command for each specification with something to say, at the place of its gravest problem."""
-    for one in entries:
-        beyond = [change for change in changes if change.spec == one.spec and change.beyond]
-        if not one.skipped and (found := _annotation(one, place_of, beyond)):
-            yield found
+    for entry in entries:
+        beyond = [change for change in changes if change.spec == entry.spec and change.beyond]
+        if not entry.skipped and (annotation := _annotation(entry, place_of, beyond)):
+            yield annotation
 
 
-def _annotation(one: Entry, place_of: Callable[[str, int], tuple[int, int]], beyond: Sequence[MetricChange]) -> str:
+def _annotation(entry: Entry, place_of: Callable[[str, int], tuple[int, int]], beyond: Sequence[MetricChange]) -> str:
     """Return the one command for a specification: faults before missed requirements, changes and warnings; or ""."""
-    place: dict[str, Any] = {"file": one.spec}
-    if one.errors:
-        texts = [found["reported"] if (found := LOCATION_PATTERN.fullmatch(text)) else text for text in one.errors]
-        if first := LOCATION_PATTERN.fullmatch(one.errors[0]):
+    place: dict[str, Any] = {"file": entry.spec}
+    if entry.errors:
+        texts = [match["reported"] if (match := LOCATION_PATTERN.fullmatch(text)) else text for text in entry.errors]
+        if first := LOCATION_PATTERN.fullmatch(entry.errors[0]):
             place = {"file": first["file"], "line": first["line"], "col": first["col"]}
         return command("error", place, "\n".join(text.removeprefix("error    ") for text in texts))
-    texts = [requirement["sentence"] for requirement in one.missed]
+    texts = [requirement["sentence"] for requirement in entry.missed]
     if texts:
-        number = next(at for at, requirement in enumerate(one.requirements) if not requirement["ok"])
-        line, column = place_of(one.spec, number)
+        number = next(at for at, requirement in enumerate(entry.requirements) if not requirement["ok"])
+        line, column = place_of(entry.spec, number)
         place |= ({"line": line, "col": column} if line else {}) | {"title": "requirement missed"}
-    elif one.code:
-        texts = [one.message]
+    elif entry.code:
+        texts = [entry.message]
     elif beyond:
         place["title"] = "changed"
     texts += [change.sentence for change in beyond[:MAX_CHANGES_IN_ANNOTATION]]
@@ -64,10 +64,10 @@ def _annotation(one: Entry, place_of: Callable[[str, int], tuple[int, int]], bey
     )
     if texts:
         return command("error", place, "\n".join(texts))
-    if not one.warnings:
+    if not entry.warnings:
         return ""
-    names = ", ".join(dict.fromkeys(item["name"] for item in one.warnings))
-    return command("warning", place | {"title": names}, "\n".join(item["message"] for item in one.warnings))
+    names = ", ".join(dict.fromkeys(item["name"] for item in entry.warnings))
+    return command("warning", place | {"title": names}, "\n".join(item["message"] for item in entry.warnings))
 
 
 def command(kind: str, properties: Mapping[str, Any], message: str) -> str:
@@ -141,7 +141,7 @@ def _solution(entry: Entry) -> Element:
         case.append(_problem(tag, entry.status, entry.message, reported))
     if entry.warnings:
         said = Element("system-out")
-        said.text = clean("\n".join(f"warning {one['name']}: {one['message']}" for one in entry.warnings))
+        said.text = clean("\n".join(f"warning {warning['name']}: {warning['message']}" for warning in entry.warnings))
         case.append(said)
     return case
 
@@ -154,18 +154,18 @@ def _problem(tag: str, kind: str, message: str, text: str) -> Element:
 
 def _requirements(entry: Entry) -> Iterator[Element]:
     names: dict[str, int] = {}
-    for one in entry.requirements:
-        name = requirement_name(one)
+    for requirement in entry.requirements:
+        name = requirement_name(requirement)
         names[name] = names.get(name, 0) + 1
         case = _case(entry, name if names[name] == 1 else f"{name} (again, {names[name]})")
         if entry.code not in (*PASSED_CODES, ExitCode.PARTIAL):
             case.append(Element("skipped", message="there is no solution to measure"))
-        elif not one["ok"]:
-            case.append(_problem("failure", "requirement", one["sentence"], one["sentence"]))
+        elif not requirement["ok"]:
+            case.append(_problem("failure", "requirement", requirement["sentence"], requirement["sentence"]))
         yield case
 
 
-def requirement_name(one: Mapping[str, Any]) -> str:
+def requirement_name(requirement: Mapping[str, Any]) -> str:
     """Return a requirement without what was found.
 
     Examples
@@ -174,10 +174,18 @@ def requirement_name(one: Mapping[str, Any]) -> str:
     >>> requirement_name(known | {"over_unit": "mm"})
     'force_ripple <= 0.05 over 2 ... 240 mm'
     """
-    unit = "" if one["unit"] == "1" else f" {one['unit']}"
-    bounds = [f"{sign} {one[key]:.6g}{unit}" for key, sign in (("min", ">="), ("max", "<=")) if one[key] is not None]
-    over = f" over {one['over'][0]:.6g} ... {one['over'][1]:.6g} {one['over_unit']}" if one["over"] else ""
-    return f"{one['metric']} {' and '.join(bounds)}{over}"
+    unit = "" if requirement["unit"] == "1" else f" {requirement['unit']}"
+    bounds = [
+        f"{sign} {requirement[key]:.6g}{unit}"
+        for key, sign in (("min", ">="), ("max", "<="))
+        if requirement[key] is not None
+    ]
+    over = (
+        f" over {requirement['over'][0]:.6g} ... {requirement['over'][1]:.6g} {requirement['over_unit']}"
+        if requirement["over"]
+        else ""
+    )
+    return f"{requirement['metric']} {' and '.join(bounds)}{over}"
 
 
 def clean(text: str) -> str:
@@ -225,30 +233,31 @@ def _lines(entries: Sequence[Entry], compared: BatchComparison | None) -> Iterat
     yield ""
     yield "| specification | verb | verdict | requirements | warnings |"
     yield "|---|---|---|---|---|"
-    for one in entries:
-        met = len(one.requirements) - len(one.missed)
-        required = f"{met} of {len(one.requirements)} met" if one.requirements else ""
-        yield f"| {plain(one.spec)} | {plain(one.verb)} | {_mark(one)} | {required} | {plain(one.warned or '')} |"
-    troubles = [line for one in entries for line in _troubles(one)]
+    for entry in entries:
+        met = len(entry.requirements) - len(entry.missed)
+        required = f"{met} of {len(entry.requirements)} met" if entry.requirements else ""
+        cells = (plain(entry.spec), plain(entry.verb), _mark(entry), required, plain(entry.warned or ""))
+        yield f"| {' | '.join(cells)} |"
+    troubles = [line for entry in entries for line in _troubles(entry)]
     if troubles:
         yield from ("", "### What is wrong", "", *troubles)
     if compared is not None:
         yield from _comparison_lines(compared)
 
 
-def _mark(one: Entry) -> str:
-    word = outcome(one)
-    return word if word == "ok" or one.skipped else f"**{word}**"
+def _mark(entry: Entry) -> str:
+    word = outcome(entry)
+    return word if word == "ok" or entry.skipped else f"**{word}**"
 
 
-def _troubles(one: Entry) -> Iterator[str]:
-    if one.errors:
-        yield from (f"- {plain(line)}" for line in one.errors)
-    elif one.code is ExitCode.REQUIREMENT_MISSED:
-        for requirement in one.missed:
-            yield f"- {plain(one.spec)}: {plain(requirement['sentence'])}"
-    elif one.code:
-        yield f"- {plain(one.spec)}: {plain(one.message)}"
+def _troubles(entry: Entry) -> Iterator[str]:
+    if entry.errors:
+        yield from (f"- {plain(line)}" for line in entry.errors)
+    elif entry.code is ExitCode.REQUIREMENT_MISSED:
+        for requirement in entry.missed:
+            yield f"- {plain(entry.spec)}: {plain(requirement['sentence'])}"
+    elif entry.code:
+        yield f"- {plain(entry.spec)}: {plain(entry.message)}"
 
 
 def _comparison_lines(compared: BatchComparison) -> Iterator[str]:
@@ -260,12 +269,12 @@ def _comparison_lines(compared: BatchComparison) -> Iterator[str]:
         reported = f"{count} value{'s' * (count != 1)} changed by more than {100 * compared.tolerance:.4g} %"
         less = len(compared.changes) - count
         yield plain(f"{reported}, {less} by less." if less else f"{reported}.")
-        shown = (*compared.changes_beyond_tolerance, *(one for one in compared.changes if not one.beyond))[
+        shown = (*compared.changes_beyond_tolerance, *(change for change in compared.changes if not change.beyond))[
             :MAX_CHANGES_IN_SUMMARY
         ]
         yield from ("", "| specification | change |", "|---|---|")
-        for one in shown:
-            yield f"| {plain(one.spec)} | {'**' * one.beyond}{plain(one.sentence)}{'**' * one.beyond} |"
+        for change in shown:
+            yield f"| {plain(change.spec)} | {'**' * change.beyond}{plain(change.sentence)}{'**' * change.beyond} |"
         if len(compared.changes) > len(shown):
             yield from ("", f"{len(compared.changes) - len(shown)} more values in changes.csv.")
     if compared.gone:

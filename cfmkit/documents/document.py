@@ -105,7 +105,7 @@ def line(text: str, tone: str = Tone.PLAIN) -> TextLine:
 
 def whole_line(*spans: str | Span) -> TextLine:
     """Return a line that keeps its length."""
-    return TextLine(tuple(Span(one) if isinstance(one, str) else one for one in spans), whole=True)
+    return TextLine(tuple(Span(span) if isinstance(span, str) else span for span in spans), whole=True)
 
 
 def verdict(ok: bool | None) -> Span:
@@ -141,13 +141,13 @@ def field(name: str, head: str | None = None, wraps: bool = False) -> Field:
 
 def record_table(heading: str, records: Iterable[Record], fields: Sequence[Field]) -> Iterator[Block]:
     """Yield a table of records under its heading; nothing where there are none."""
-    rows = [[one.cell(record) for one in fields] for record in records]
+    rows = [[column.cell(record) for column in fields] for record in records]
     if not rows:
         return
     yield BLANK_LINE
     if heading:
         yield line(heading, Tone.LABEL)
-    yield CellGrid(tuple(GridColumn(one.head, one.wraps) for one in fields), rows, gap=2, indented=True)
+    yield CellGrid(tuple(GridColumn(column.head, column.wraps) for column in fields), rows, gap=2, indented=True)
 
 
 class Written(NamedTuple):

@@ -35,7 +35,7 @@ def page(
     **more: Any,  # what the template knows besides: `film`, `points`, `script`, `references`, `bibtex`, `versions`
 ) -> bytes:
     """Return the page of a document; the same document gives the same bytes."""
-    figures = {name: one if isinstance(one, str) else drawing(one, name) for name, one in drawn.items()}
+    figures = {name: figure if isinstance(figure, str) else drawing(figure, name) for name, figure in drawn.items()}
     text: str = template("document.html.j2").render(
         document=document,
         required=[row for row in document.headline if row.required],

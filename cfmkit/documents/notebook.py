@@ -50,7 +50,7 @@ def text_of(document: Document) -> str:
     facts = [row for row in document.headline if not row.required][:MAX_FACTS]
     rows = [(row.label, row.value, row.bound, marks[row.ok]) for row in (*required, *facts)]
     ends = [f"<p>{escape(note.word)}: {escape(note.text)}</p>" for note in document.notes if note.whole]
-    ends += [f"<p>{escape(one.name)}: {escape(one.short)}</p>" for one in document.warnings[:MAX_WARNINGS]]
+    ends += [f"<p>{escape(warning.name)}: {escape(warning.short)}</p>" for warning in document.warnings[:MAX_WARNINGS]]
     while True:
         table = html_table(("", "value", "required", ""), rows) if rows else ""
         text = head + table + "".join(ends)

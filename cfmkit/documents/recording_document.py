@@ -21,21 +21,23 @@ def document_of(
     reports: Mapping[str, MeasureReport], data: Mapping[str, Any], code: ExitCode, written: Written
 ) -> Document:
     """Return the document of one recording, or of several of one file."""
-    each = list(reports.values())
-    source, window = each[0].source, each[0].data["window"]
+    listed = list(reports.values())
+    source, window = listed[0].source, listed[0].data["window"]
     points = f"{len(source.recording)} points, {len(source.raw)} cycle{'s' * (len(source.raw) > 1)}"
     where = f"window {window['from']:.6g} to {window['to']:.6g} {window['unit']}"
-    notes = [Note("read", text) for report in each for text in report.data["reading"]]
-    notes += [Note("filter", report.source.low_pass.sentence) for report in each if report.source.low_pass]
+    notes = [Note("read", text) for report in listed for text in report.data["reading"]]
+    notes += [Note("filter", report.source.low_pass.sentence) for report in listed if report.source.low_pass]
     return Document(
         data=data,
         exit_code=code,
-        title=source.recording.name if len(each) == 1 else f"{len(each)} recordings",
-        summary=f"{points}, {where}" if len(each) == 1 else "",
+        title=source.recording.name if len(listed) == 1 else f"{len(listed)} recordings",
+        summary=f"{points}, {where}" if len(listed) == 1 else "",
         verdict="" if code is ExitCode.OK else "partial",
-        tables=tuple(_numbers(report, "" if len(each) == 1 else report.source.recording.name) for report in each),
+        tables=tuple(_numbers(report, "" if len(listed) == 1 else report.source.recording.name) for report in listed),
         notes=tuple(dict.fromkeys(notes)),
-        warnings=tuple(warning_of(item) for item in dict.fromkeys(one for report in each for one in report.warnings)),
+        warnings=tuple(
+            warning_of(item) for item in dict.fromkeys(finding for report in listed for finding in report.warnings)
+        ),
         files=written,
     )
 

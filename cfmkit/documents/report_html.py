@@ -101,7 +101,11 @@ def _cursors(figure: Figure, motion: Any) -> Iterator[tuple[list[float], float, 
         scale = 72.0 / figure.dpi
         x = ax.transData.transform(np.column_stack([motion, np.zeros(len(motion))]))[:, 0]
         x = np.clip(x, box.x0, box.x1) * scale
-        yield [round(float(one), 2) for one in x], round(height - box.y0 * scale, 2), round(height - box.y1 * scale, 2)
+        yield (
+            [round(float(value), 2) for value in x],
+            round(height - box.y0 * scale, 2),
+            round(height - box.y1 * scale, 2),
+        )
 
 
 def _pose_caption(result: Result, place: float) -> str:
@@ -216,15 +220,15 @@ def _numbers(column: Sequence[str], exact: bool) -> list[Any]:
 
     What was varied keeps every digit: the command of a point is made of it.
     """
-    found: list[Any] = []
+    cells: list[Any] = []
     for text in column:
         try:
             value = float(text if exact else _short(text))
         except ValueError:
-            found.append(text or None)
+            cells.append(text or None)
         else:
-            found.append(value if math.isfinite(value) else text)
-    return found
+            cells.append(value if math.isfinite(value) else text)
+    return cells
 
 
 def _curves(content: bytes | None, paths: Sequence[str], cells: Sequence[Sequence[str]]) -> dict[str, Any]:
@@ -236,11 +240,11 @@ def _curves(content: bytes | None, paths: Sequence[str], cells: Sequence[Sequenc
         return {}
     head, *rows = csv.reader(io.StringIO(content.decode()))
     numbers = {key: at for at, key in reversed(list(enumerate(zip(*cells, strict=True))))}
-    own, branch = [head.index(path) for path in paths], head.index("branch") if "branch" in head else None
+    varied, branch = [head.index(path) for path in paths], head.index("branch") if "branch" in head else None
     x, y = (next((at for at, name in enumerate(head) if name.startswith(names)), None) for names in _AXIS_PREFIXES)
     points: dict[int, dict[str, list[list[float]]]] = {}
     for row in rows:
-        number = numbers.get(tuple(row[at] for at in own))
+        number = numbers.get(tuple(row[at] for at in varied))
         if number is None or x is None or y is None or (number not in points and len(points) >= MOST_CURVES):
             continue
         line = points.setdefault(number, {}).setdefault("" if branch is None else row[branch], [[], []])

@@ -132,8 +132,8 @@ def warning_of(item: Finding, command: RunCommand | None = None) -> WarningEntry
 def _option(cure: str | tuple[str, ...], command: RunCommand | None) -> str:
     """Return a remedy as options; with the verb where it is another one than that of the run."""
     first = cure if isinstance(cure, str) else cure[0]
-    other = first.startswith("design.") and command is not None and command.verb != "design"
-    return command_line(*(["design"] if other else []), *_settings(cure))
+    is_other_verb = first.startswith("design.") and command is not None and command.verb != "design"
+    return command_line(*(["design"] if is_other_verb else []), *_settings(cure))
 
 
 def _settings(cure: str | tuple[str, ...]) -> list[str]:
@@ -187,13 +187,13 @@ def _nearest_feasible(nearest: Mapping[str, str]) -> Iterator[Note]:
             yield Note("feasible", f"{path}: {value}", whole=True)
 
 
-def search_sentences(found: Mapping[str, Searched]) -> list[str]:
+def search_sentences(searched: Mapping[str, Searched]) -> list[str]:
     """Return what only a design search knows: one sentence for each model and window, which it names first."""
     groups: dict[str, list[str]] = {}
-    for name, one in found.items():
-        if one.quantity.value is not None:
-            over = "" if one.window is None else f", {span(*one.window, one.motion)}"
-            groups.setdefault(one.model + over, []).append(f"{words(name)} {short_value(one.quantity)}")
+    for name, value in searched.items():
+        if value.quantity.value is not None:
+            over = "" if value.window is None else f", {span(*value.window, value.motion)}"
+            groups.setdefault(value.model + over, []).append(f"{words(name)} {short_value(value.quantity)}")
     return [f"{about}: {', '.join(reported)}" for about, reported in groups.items()]
 
 
@@ -214,8 +214,8 @@ def span(low: float, high: float, dimension: str) -> str:
 
 def shown_window(report: Report) -> Window | None:
     """Return the window of the title: that of the analysis, else the one that all requirements share."""
-    if (own := window_of(report.result)) is not None:
-        return left_of(own, report.result)
+    if (window := window_of(report.result)) is not None:
+        return left_of(window, report.result)
     shared = {outcome.over for outcome in report.requirements if outcome.over is not None}
     return left_of(Window(*shared.pop()), report.result) if len(shared) == 1 else None
 
@@ -315,15 +315,15 @@ def value_and_bounds(outcome: Outcome) -> tuple[str, str]:
 def _facts(report: Report) -> Iterator[ValueRow]:
     """Yield what is not required and matters most: stress and size, then what the family leads with."""
     spec = report.result.spec
-    known = {split_name(outcome.metric)[0] for outcome in report.requirements}
-    known |= {f"{report.result.curve.kind}_mean"} if report.result.curves else set()
-    if (stress := _stress(report, known)) is not None:
+    shown = {split_name(outcome.metric)[0] for outcome in report.requirements}
+    shown |= {f"{report.result.curve.kind}_mean"} if report.result.curves else set()
+    if (stress := _stress(report, shown)) is not None:
         yield stress
-        known |= {"stress_max", "allowable_stress", "safety_factor"}
+        shown |= {"stress_max", "allowable_stress", "safety_factor"}
     if (size := _size(report)) is not None:
         yield size
     if spec.target_curve is not None:
-        known |= {"force_ripple", "torque_ripple"}
+        shown |= {"force_ripple", "torque_ripple"}
     for name in dict.fromkeys(
         (
             "deviation_from_curve",
@@ -333,20 +333,20 @@ def _facts(report: Report) -> Iterator[ValueRow]:
             *SHOWN_METRICS,
         )
     ):
-        if name not in known and _has_value(report, name):
+        if name not in shown and _has_value(report, name):
             text = _stroke(report) if name == "usable_stroke" else branches(report, name, report.metrics)
             about = report.metrics[name].definition
             yield ValueRow(SHORT_LABELS.get(name, words(name)), text + _remark(report, name), about=about)
 
 
-def _stress(report: Report, known: set[str]) -> ValueRow | None:
+def _stress(report: Report, shown: set[str]) -> ValueRow | None:
     """Return the largest stress beside what is allowed, with the safety factor where no requirement says it."""
-    if not _has_value(report, "stress_max") or "stress_max" in known:
+    if not _has_value(report, "stress_max") or "stress_max" in shown:
         return None
     text, allowed = short_value(report.metrics["stress_max"], 3), report.result.allowable_stress
     if allowed is not None:
         text = f"{text.partition(' ')[0]} of {format_short(allowed, 'stress', 3)}"
-    if "safety_factor" not in known and _has_value(report, "safety_factor"):
+    if "safety_factor" not in shown and _has_value(report, "safety_factor"):
         factor = report.metrics["safety_factor"].value or 0.0
         text += f", safety {factor:.3g}"
         text += " (little margin)" if 1.0 <= factor < LITTLE_MARGIN else ""
@@ -407,12 +407,12 @@ def _stroke(report: Report) -> str:
 
 def branches(report: Report, name: str, metrics: Mapping[str, Quantity]) -> str:
     """Return the value on each branch where they differ, else the one value."""
-    each: Mapping[str, Quantity | None] = {}
+    by_branch: Mapping[str, Quantity | None] = {}
     if report.result.curves:
-        each = {branch: metrics.get(f"{name}[{branch}]") for branch in report.result.curve.branches}
-    known = {branch: item for branch, item in each.items() if item is not None and item.value is not None}
-    texts = {branch: short_value(item, 3) for branch, item in known.items()}
-    if len(texts) == len(each) and len(set(texts.values())) > 1:
+        by_branch = {branch: metrics.get(f"{name}[{branch}]") for branch in report.result.curve.branches}
+    with_value = {branch: item for branch, item in by_branch.items() if item is not None and item.value is not None}
+    texts = {branch: short_value(item, 3) for branch, item in with_value.items()}
+    if len(texts) == len(by_branch) and len(set(texts.values())) > 1:
         return ", ".join(f"{text} {branch}" for branch, text in texts.items())
     return short_value(metrics[name])
 

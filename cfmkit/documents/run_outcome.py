@@ -109,11 +109,11 @@ class Report:
         single = iter(self.requirements)
         spec = self.result.spec
         judged = tuple(
-            judge_part_metric(one, self.metrics[one.metric])
-            if one.metric in self.metrics and one.metric in OF_MANY_PARTS
+            judge_part_metric(requirement, self.metrics[requirement.metric])
+            if requirement.metric in self.metrics and requirement.metric in OF_MANY_PARTS
             else next(single)
-            for one in spec.requirements
-            if one.metric not in OF_MANY_PARTS or one.metric in self.metrics
+            for requirement in spec.requirements
+            if requirement.metric not in OF_MANY_PARTS or requirement.metric in self.metrics
         )
         return replace(self, requirements=judged)
 

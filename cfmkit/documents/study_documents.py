@@ -64,12 +64,12 @@ def sweep_document(
         headline=(
             *(
                 ValueRow(
-                    _describe_objective(one["metric"]),
-                    f"met at {one['met']} of {one['of']}",
-                    format_bounds(one),
-                    bool(one["ok"]),
+                    _describe_objective(requirement["metric"]),
+                    f"met at {requirement['met']} of {requirement['of']}",
+                    format_bounds(requirement),
+                    bool(requirement["ok"]),
                 )
-                for one in summary["requirements"]
+                for requirement in summary["requirements"]
             ),
             *_best(summary, dimensions),
         ),
@@ -77,11 +77,11 @@ def sweep_document(
         notes=tuple(_settings(summary)),
         warnings=tuple(
             WarningEntry(
-                one["name"],
-                shortened_to_clause(one["message"], MAX_WARNING_LENGTH - len(one["name"]) - 2),
-                one["message"],
+                warning["name"],
+                shortened_to_clause(warning["message"], MAX_WARNING_LENGTH - len(warning["name"]) - 2),
+                warning["message"],
             )
-            for one in summary["warnings"]
+            for warning in summary["warnings"]
         ),
         files=files,
     )
@@ -119,14 +119,14 @@ def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterat
     rows: list[tuple[str, ...]] = []
     constant: list[tuple[str, ...]] = []
     first = [summary["best"]["by"]] if summary["best"] else []
-    asked = [one["metric"] for one in summary["requirements"]]
+    asked = [requirement["metric"] for requirement in summary["requirements"]]
     names = [name for name in dict.fromkeys((*first, *asked, *summary["range"])) if name in summary["range"]]
     for name in names:
-        one, dimension = summary["range"][name], dimensions.get(name, "")
-        low, high = (_quantity(one[end], one["unit"], dimension) for end in ("min", "max"))
+        extent, dimension = summary["range"][name], dimensions.get(name, "")
+        low, high = (_quantity(extent[end], extent["unit"], dimension) for end in ("min", "max"))
         at_best = summary["metrics"].get(name, {}).get("value")
-        shown = "" if at_best is None else _quantity(at_best, one["unit"], dimension)
-        if one["max"] - one["min"] <= NO_INFLUENCE_RTOL * max(abs(one["min"]), abs(one["max"])):
+        shown = "" if at_best is None else _quantity(at_best, extent["unit"], dimension)
+        if extent["max"] - extent["min"] <= NO_INFLUENCE_RTOL * max(abs(extent["min"]), abs(extent["max"])):
             row, others = (_describe_objective(name), low, "no influence", shown), constant
         else:
             row, others = (_describe_objective(name), low, high, shown), rows
@@ -166,74 +166,78 @@ NO_INFLUENCE_INDEX = 1e-12
 MAX_PARAMETERS = 6  # parameters of each metric on a short page: two metrics with them fit on a screen of 24 lines
 
 
-def sensitivity_document(found: Findings, files: Written | None = None) -> Document:
+def sensitivity_document(findings: Findings, files: Written | None = None) -> Document:
     """Return the document of a sensitivity study."""
-    evaluator, spec = found.evaluator, found.setup.study.spec
+    evaluator, spec = findings.evaluator, findings.setup.study.spec
     reused = sum(piece.records.reused for piece in evaluator.pieces)
     again = f" ({reused} from the journal)" if reused else ""
     return Document(
-        exit_code=exit_code(found),
+        exit_code=exit_code(findings),
         title=" ".join(spec.name.split()),
-        summary=f"{found.setup.method}, {evaluator.count} samples{again}",
-        verdict=_yield_verdict(found),
-        headline=tuple(_yields(found)),
-        tables=tuple(_rankings(found)),
-        notes=tuple(_notes(found)),
-        warnings=tuple(warning_of(item) for item in warnings(found)),
+        summary=f"{findings.setup.method}, {evaluator.count} samples{again}",
+        verdict=_yield_verdict(findings),
+        headline=tuple(_yields(findings)),
+        tables=tuple(_rankings(findings)),
+        notes=tuple(_notes(findings)),
+        warnings=tuple(warning_of(item) for item in warnings(findings)),
         files=files,
     )
 
 
-def _yield_verdict(found: Findings) -> str:
-    if found.interrupted:
+def _yield_verdict(findings: Findings) -> str:
+    if findings.interrupted:
         return "interrupted"
-    if any(not outcome.ok for outcome in found.setup.nominal.outcomes):
+    if any(not outcome.ok for outcome in findings.setup.nominal.outcomes):
         return "nominal values miss requirements"
-    if found.all_met is None:
-        return f"{found.evaluator.failed} samples failed" if found.evaluator.failed else "complete"
+    if findings.all_met is None:
+        return f"{findings.evaluator.failed} samples failed" if findings.evaluator.failed else "complete"
     return (
         "yield reached"
-        if yield_ok(found) and found.setup.block.min_yield is not None
-        else ("yield missed" if found.setup.block.min_yield is not None else "complete")
+        if yield_ok(findings) and findings.setup.block.min_yield is not None
+        else ("yield missed" if findings.setup.block.min_yield is not None else "complete")
     )
 
 
-def _notes(found: Findings) -> Iterator[Note]:
-    for outcome in found.setup.nominal.outcomes:
+def _notes(findings: Findings) -> Iterator[Note]:
+    for outcome in findings.setup.nominal.outcomes:
         if not outcome.ok:
             yield Note("missed", f"by the nominal values: {outcome.sentence}", tone=Tone.BAD)
-    if found.interrupted:
-        yield Note("stopped", message(found), tone=Tone.BAD, whole=True)
-    if is_met_by_interval(found):
+    if findings.interrupted:
+        yield Note("stopped", message(findings), tone=Tone.BAD, whole=True)
+    if is_met_by_interval(findings):
         yield Note("yield", "its 95 % interval reaches the one that is required: not missed", whole=True)
-    if found.evaluator.failed:
-        yield Note("first", found.evaluator.first_failure)
+    if findings.evaluator.failed:
+        yield Note("first", findings.evaluator.first_failure)
 
 
-def _yields(found: Findings) -> Iterator[ValueRow]:
-    if found.all_met is None:
+def _yields(findings: Findings) -> Iterator[ValueRow]:
+    if findings.all_met is None:
         return
-    wanted = found.setup.block.min_yield
+    wanted = findings.setup.block.min_yield
     bound = "" if wanted is None else f">= {100 * wanted:.4g} %"
-    yield ValueRow("yield", share_of(found.all_met), bound, None if wanted is None else yield_ok(found))
-    for outcome, one in zip(found.setup.nominal.outcomes, found.each_met, strict=True):
-        yield ValueRow(words(outcome.metric), f"{share_of(one)}  {_describe_metric(value_and_bounds(outcome)[1])}")
+    yield ValueRow("yield", share_of(findings.all_met), bound, None if wanted is None else yield_ok(findings))
+    for outcome, share in zip(findings.setup.nominal.outcomes, findings.each_met, strict=True):
+        yield ValueRow(words(outcome.metric), f"{share_of(share)}  {_describe_metric(value_and_bounds(outcome)[1])}")
 
 
-def share_of(one: Share) -> str:
+def share_of(share: Share) -> str:
     """Return the share of parts that are good, with its 95 % interval."""
-    if one.value != one.value:
-        return f"not stated: {one.failed} of {one.count} parts have no result"
-    low, high = (f"{100 * end:.1f}" for end in one.wilson)
-    least, most = (100 * (one.good + more) / one.count for more in (0, one.failed))
-    value = f"{least:.1f} to {most:.1f} %" if one.failed else f"{100 * one.value:.1f} %"
+    if share.value != share.value:
+        return f"not stated: {share.failed} of {share.count} parts have no result"
+    low, high = (f"{100 * end:.1f}" for end in share.wilson)
+    least, most = (100 * (share.good + more) / share.count for more in (0, share.failed))
+    value = f"{least:.1f} to {most:.1f} %" if share.failed else f"{100 * share.value:.1f} %"
     return f"{value} (95 %: {low} to {high} %)"
 
 
-def _rankings(found: Findings) -> Iterator[PageTable]:
-    shares = {metric.label for metric in found.setup.study.metrics if metric.dimension == "ratio"}
-    for metric, each in _group_by_metric(found).items():
-        indices = [name for name in found.setup.record.indices if any(name in lines for lines in each.values())]
+def _rankings(findings: Findings) -> Iterator[PageTable]:
+    shares = {metric.label for metric in findings.setup.study.metrics if metric.dimension == "ratio"}
+    for metric, lines_by_parameter in _group_by_metric(findings).items():
+        indices = [
+            name
+            for name in findings.setup.record.indices
+            if any(name in lines for lines in lines_by_parameter.values())
+        ]
         ranked = enumerate(indices)
         heads = (
             GridColumn(_describe_metric(metric)),
@@ -241,7 +245,7 @@ def _rankings(found: Findings) -> Iterator[PageTable]:
         )
         rows = tuple(
             (_drop_block(parameter), *(_index(lines.get(name), metric in shares) for name in indices))
-            for parameter, lines in each.items()
+            for parameter, lines in lines_by_parameter.items()
         )
         yield PageTable("", heads, rows, MAX_PARAMETERS)
 
@@ -256,13 +260,13 @@ def _drop_block(parameters: str) -> str:
     return ", ".join(path.removeprefix("mechanism.") for path in parameters.split(", "))
 
 
-def _group_by_metric(found: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:
+def _group_by_metric(findings: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:
     """Return metric -> parameter -> index -> line, the parameters with the largest influence first."""
     tree: dict[str, dict[str, dict[str, IndexLine]]] = defaultdict(lambda: defaultdict(dict))
-    for one in found.lines:
-        tree[one.metric][one.parameter][one.index] = one
-    rank = partial(_rank, found.setup.record.indices)
-    return {metric: dict(sorted(each.items(), key=rank)) for metric, each in tree.items()}
+    for line in findings.lines:
+        tree[line.metric][line.parameter][line.index] = line
+    rank = partial(_rank, findings.setup.record.indices)
+    return {metric: dict(sorted(lines_by_parameter.items(), key=rank)) for metric, lines_by_parameter in tree.items()}
 
 
 def _rank(indices: tuple[str, ...], item: tuple[str, dict[str, IndexLine]]) -> float:

@@ -146,12 +146,12 @@ def _warning_lines(warnings: Sequence[WarningEntry], width: int, most: int) -> l
     room = width - INDENT_COLUMNS - WORD_COLUMNS
     shown = warnings if len(warnings) <= most else warnings[: max(most - 1, 0)]
     lines = []
-    for at, one in enumerate(shown):
+    for at, warning in enumerate(shown):
         word = f"{'warning' if len(warnings) == 1 else f'warnings {len(warnings)}'}" if not at else ""
-        remedy = one.options[0] if one.options else ""
-        lines.append(_with_remedy(_word(word, Tone.BAD), f"{one.name}: ", one.short, remedy, room))
+        remedy = warning.options[0] if warning.options else ""
+        lines.append(_with_remedy(_word(word, Tone.BAD), f"{warning.name}: ", warning.short, remedy, room))
     if rest := warnings[len(shown) :]:
-        names = ", ".join(dict.fromkeys(one.name for one in rest))
+        names = ", ".join(dict.fromkeys(warning.name for warning in rest))
         text = shortened_to_clause(f"and {len(rest)} more (-v): {names}", room)
         lines.append(whole_line(_word("" if shown else f"warnings {len(warnings)}", Tone.BAD), text))
     return lines
@@ -187,7 +187,7 @@ def _headline(rows: Sequence[ValueRow], width: int, most: int) -> Iterator[TextL
         return
     for at in range(max(len(left), len(right))):
         texts: tuple[Span, ...] = left[at] if at < len(left) else ()
-        pad = " " * (_wide(left) - sum(len(one.text) for one in texts) + GAP_COLUMNS)
+        pad = " " * (_wide(left) - sum(len(span.text) for span in texts) + GAP_COLUMNS)
         yield whole_line(*texts, *([Span(pad), *right[at]] if at < len(right) else []))
 
 
@@ -215,7 +215,7 @@ def _value(row: ValueRow) -> str:
 
 
 def _wide(lines: Iterable[Sequence[Span]]) -> int:
-    return max([0, *(sum(len(one.text) for one in spans) for spans in lines)])
+    return max([0, *(sum(len(span.text) for span in spans) for spans in lines)])
 
 
 def _drop_ranked_columns(table: PageTable, width: int) -> PageTable:
@@ -270,12 +270,13 @@ def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
             return [*lines, CellGrid(columns, rows, gap=2, indented=True)]
         widest = max(able, key=lambda at: wide[at])
         wide[widest] = max(wide[widest] - (sum(wide) - room), least[widest])
-    cells = [[one if isinstance(one, Span) else Span(one) for one in row] for row in rows]
+    cells = [[cell if isinstance(cell, Span) else Span(cell) for cell in row] for row in rows]
     if any(heads):
         cells.insert(0, [Span(head, Tone.FAINT) for head in heads])
     for row in cells:
         spans = [
-            Span(f"{shortened_to_clause(one.text, wide[at]):<{wide[at] + 2}}", one.tone) for at, one in enumerate(row)
+            Span(f"{shortened_to_clause(span.text, wide[at]):<{wide[at] + 2}}", span.tone)
+            for at, span in enumerate(row)
         ]
         lines.append(whole_line(" " * INDENT_COLUMNS, *spans))
     if more > 0:
@@ -323,9 +324,9 @@ def _whole_page(document: Document) -> Iterator[Block]:
             yield whole_line(Span(f"{note.word:<{LABEL_COLUMNS}}", note.tone), note.text)
         else:
             yield Paragraph(note.word, note.text + (f": {note.remedy}" if note.remedy else ""), note.tone)
-    for one in document.warnings:
-        yield Paragraph("warning", f"{one.name}: {one.text}" + (":" if one.commands else ""), Tone.BAD)
-        yield from (whole_line(" " * LABEL_COLUMNS + command) for command in one.commands)
+    for warning in document.warnings:
+        yield Paragraph("warning", f"{warning.name}: {warning.text}" + (":" if warning.commands else ""), Tone.BAD)
+        yield from (whole_line(" " * LABEL_COLUMNS + command) for command in warning.commands)
     if document.files is not None:
         yield Paragraph("files", f"{document.files.place}  {' '.join(document.files.files)}", Tone.GOOD)
         if document.files.seconds:

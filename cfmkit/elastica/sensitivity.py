@@ -17,7 +17,6 @@ SI, variables last; each output is computed when it is first needed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -44,6 +43,8 @@ from cfmkit.errors import InputError
 from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, dual_of_steps, slopes_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.model.network import Network
@@ -122,15 +123,18 @@ class Gradient:
             raise InputError(SINGULAR_MESSAGE)
         return solutions.rate
 
-    @property
-    def motion(self) -> Mapping[str, FloatArray]:
-        """Node -> (p, 3, k) derivatives of `EquilibriumPath.motion`, of linked nodes too."""
-        return _Lookup(self, lambda node: self.differentiate(lambda _, at: node_motion(at, node)))
+    def motion(self, node: str) -> FloatArray:
+        """Return the derivatives of `EquilibriumPath.motion`, (p, 3, k); of linked nodes, too."""
+        return self.differentiate(lambda _, at: node_motion(at, node))
 
-    @property
-    def reaction(self) -> Mapping[str, FloatArray]:
-        """Node -> (p, 3, k) derivatives of `EquilibriumPath.reaction`."""
-        return _Lookup(self, lambda node: self.differentiate(lambda _, at: node_reaction(at, node, _residual(at))))
+    def reaction(self, node: str) -> FloatArray:
+        """Return the derivatives of `EquilibriumPath.reaction`, (p, 3, k)."""
+
+        def output(_: Network, at: Equilibria) -> Any:
+            residual = [energy.gradient(at.mesh, *state) for state in zip(at.z, at.drive, strict=True)]
+            return node_reaction(at, node, np.array(residual))
+
+        return self.differentiate(output)
 
     def contact_force(self, number: int) -> FloatArray:
         """Return the derivatives of `EquilibriumPath.contact_force`, (p, k)."""
@@ -220,26 +224,6 @@ class Gradient:
         known = self.path.stress_extremes(beam, axial)
         element, fraction = known.element[self.points], known.fraction[self.points]
         return self.differentiate(lambda net, at: stress_extremes.stress_at(net, at, beam, element, fraction, axial))
-
-
-class _Lookup(Mapping[str, Any]):
-    """Derivatives by node, computed when needed."""
-
-    def __init__(self, gradient: Gradient, output: Callable[[str], FloatArray]) -> None:
-        self.gradient, self.output = gradient, output
-
-    def __getitem__(self, node: str) -> FloatArray:
-        return self.output(node)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.gradient.path.network.nodes)
-
-    def __len__(self) -> int:
-        return len(self.gradient.path.network.nodes)
-
-
-def _residual(at: Equilibria) -> Any:
-    return np.array([energy.gradient(at.mesh, z, drive) for z, drive in zip(at.z, at.drive, strict=True)])
 
 
 def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any, points: Any = None) -> Gradient:

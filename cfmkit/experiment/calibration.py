@@ -111,7 +111,7 @@ class ModelCurves:
         """
         key = tuple(sorted(self._changes(parameters, values).items()))
         if key not in self._solved:
-            self._solved[key] = _analyse(self.spec_with(parameters, values)).curve
+            self._solved[key] = analyze_part(self.spec_with(parameters, values)).curve
         return self._solved[key]
 
     def _changes(self, parameters: Sequence[FitParameter], values: FloatArray) -> dict[str, float]:
@@ -172,7 +172,7 @@ def fit_samples(
     fit = solve(problem, loss) if parameters else evaluate_start(problem)
     _check(problem, fit.values, parameters)
     fitted = curves.spec_with(parameters, fit.values)
-    result = _analyse(fitted)
+    result = analyze_part(fitted)
     zeros = _zeros(parameters, fit.values)
     samples, branches = (
         tuple(item.correct_zeros(zeros) for item in measured) for measured in (before.samples, before.branches)
@@ -186,7 +186,7 @@ def _compare_start(
     spec: Spec, source: MeasuredCurves, parameters: Sequence[FitParameter], window: Window | None
 ) -> Comparison:
     """Return the start beside the measurement, where the model exists for every zero that is tried."""
-    result = _analyse(spec)
+    result = analyze_part(spec)
     comparison = compare(result, source, window)
     shift = next((item for item in parameters if _is_shift(item)), None)
     if shift is None:
@@ -240,7 +240,11 @@ def _zeros(parameters: Sequence[FitParameter], values: FloatArray) -> Zeros:
     return Zeros(**totals)
 
 
-def _analyse(spec: Spec) -> Result:
+def analyze_part(spec: Spec) -> Result:
+    """Return the result of a part.
+
+    Raises SolutionError if it has no curve.
+    """
     result: Result = family(spec.family).analyze(spec, Run())
     if not result.curves:
         raise SolutionError(f"there is no curve to compare with: {result.message}")
@@ -378,6 +382,7 @@ __all__ = [
     "Calibration",
     "ModelCurves",
     "Samples",
+    "analyze_part",
     "calibrate",
     "fit_samples",
     "has_no_loss",

@@ -22,7 +22,7 @@ from cfmkit.experiment.recorded_values import (
 from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
-from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.branches import span_text
 from cfmkit.metrics.compare import Compared, Points, counterpart, effort_at, largest, mean, overlap, rms
 from cfmkit.metrics.compare import compare as compare_sides
 from cfmkit.numerics.holes_in_samples import holes_between, sample_weights

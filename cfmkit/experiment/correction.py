@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
+from cfmkit.experiment.calibration import analyze_part
 from cfmkit.experiment.errors_of_made_part import explain, name_of
 from cfmkit.experiment.parameters_to_fit import DATA_PREFIX
-from cfmkit.experiment.redrawn_values import Redesign, aim_of, analyze_part, largest_miss, limits_of
+from cfmkit.experiment.redrawn_values import Redesign, aim_of, largest_miss, limits_of
 from cfmkit.families.run_control import Run
 from cfmkit.results import Finding
 from cfmkit.specs.units import format_short

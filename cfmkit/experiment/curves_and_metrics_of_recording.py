@@ -40,7 +40,7 @@ from cfmkit.experiment.recorded_values import (
 )  # fmt: skip
 from cfmkit.experiment.reversal_transitions import remove_transitions
 from cfmkit.metrics import Definition, MeasuringFrame, Window, measure, metrics_by_name
-from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.branches import span_text
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
 from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.results import Finding, Quantity
@@ -302,11 +302,11 @@ def numbers_of(
         return tuple(empty_uncovered(metrics, select_cycle(large, curve), kind) for curve, metrics in measured)
 
     covered_by = tuple(coverage(curve, select_cycle(holes, curve), window) for curve in source.raw)
-    each = tuple({**metrics, **shares} for metrics, shares in zip(all_metrics(source.raw), covered_by, strict=True))
+    by_cycle = tuple({**metrics, **shares} for metrics, shares in zip(all_metrics(source.raw), covered_by, strict=True))
     smooth = all_metrics(source.filtered)
     repeated = empty_uncovered(repeatability(source.raw, window), large, kind)
-    raw = _mean(each) | least(covered_by) | repeated
-    return Measurement(raw, _mean(smooth) if smooth else {}, each, window, warnings, large)
+    raw = _mean(by_cycle) | least(covered_by) | repeated
+    return Measurement(raw, _mean(smooth) if smooth else {}, by_cycle, window, warnings, large)
 
 
 def _motion_definitions(kind: Kind) -> tuple[Definition, ...]:

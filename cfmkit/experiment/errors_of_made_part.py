@@ -23,11 +23,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import CfmError, DataError, SolutionError
-from cfmkit.experiment.calibration import POORLY_DETERMINED, ModelCurves, fit_samples, has_no_loss, scaled_jacobian
+from cfmkit.experiment.calibration import (
+    POORLY_DETERMINED,
+    ModelCurves,
+    analyze_part,
+    fit_samples,
+    has_no_loss,
+    scaled_jacobian,
+)
 from cfmkit.experiment.comparison import compare
 from cfmkit.experiment.parameters_to_fit import DATA_PREFIX, ZERO_OFFSETS, FitParameter, parameters
 from cfmkit.families import family
-from cfmkit.families.run_control import Run
 from cfmkit.metrics import Window
 from cfmkit.numerics.robust_statistics import robust_scale
 from cfmkit.specs.units import format_short
@@ -68,14 +74,14 @@ class Explanation:
     calibration: Calibration
     criterion: float  # Schwarz's, smaller is better
 
-    @property
-    def errors(self) -> tuple[FitParameter, ...]:
-        """Those of the part, without the zeros of the recording."""
-        return tuple(item for item in self.calibration.parameters if not item.path.startswith(DATA_PREFIX))
-
     @cached_property
     def _places(self) -> list[int]:
         return [k for k, item in enumerate(self.calibration.parameters) if not item.path.startswith(DATA_PREFIX)]
+
+    @property
+    def errors(self) -> tuple[FitParameter, ...]:
+        """Those of the part, without the zeros of the recording."""
+        return tuple(self.calibration.parameters[k] for k in self._places)
 
     @property
     def values(self) -> FloatArray:
@@ -113,12 +119,8 @@ class Explanation:
         for k, value in zip(self._places, self.values, strict=True):
             item = self.calibration.parameters[k]
             shown = value - item.start if is_thickness(item) else value
-            stated = "than drawn" if is_thickness(item) else f"stated {_number(item, item.start)}"
-            yield f"{name_of(item)} {_number(item, shown)} ± {_number(item, float(half[k]), 2)}, {stated}"
-
-
-def _number(item: FitParameter, value: float, digits: int = 4) -> str:
-    return f"{value:.{digits}g}" if item.dimension == "ratio" else format_short(value, item.dimension, digits)
+            stated = "than drawn" if is_thickness(item) else f"stated {item.format_value(item.start)}"
+            yield f"{name_of(item)} {item.format_value(shown)} ± {item.format_value(float(half[k]), 2)}, {stated}"
 
 
 def is_thickness(item: FitParameter) -> bool:
@@ -198,14 +200,10 @@ def explain(
     Raises DataError if the recording is not of such a part; SolutionError if the specification has no curve, or the
     recording determines nothing.
     """
-    result = family(spec.family).analyze(spec, Run())
-    if not result.curves:
-        raise SolutionError(f"there is no curve to compare with: {result.message}")
-    _check_travel(result.curve.motion, source, spec)
+    _check_travel(analyze_part(spec).curve.motion, source, spec)
     candidates = errors_that_can_be_told(spec) if fit is None else parameters(spec, fit, None, source.recording)
     spec, candidates = _rubbing(spec, candidates, source)
-    curves = ModelCurves(spec, as_made=True)
-    result = family(spec.family).analyze(spec, Run())
+    curves, result = ModelCurves(spec, as_made=True), analyze_part(spec)
     ends = Window(float(result.curve.motion.min()), float(result.curve.motion.max()))
     before = compare(result, source, ends)
     if has_no_loss(curves, before, candidates):
@@ -392,7 +390,7 @@ def _check_best(best: Explanation, before: Comparison, source: MeasuredCurves, u
                 "of another part? If it does, state it with --tare"
             )
         if bounds[k] and item in best.errors and not item.path.endswith("friction"):
-            low, high = (_number(item, end) for end in (item.low, item.high))
+            low, high = (item.format_value(end) for end in (item.low, item.high))
             raise DataError(
                 f"{name}: no {name_of(item)} from {low} to {high} explains it: a recording of another part, or of "
                 "another unit or sign (--units, --flip)?"

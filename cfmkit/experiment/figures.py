@@ -16,7 +16,7 @@ from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import MarkedRange
 from cfmkit.plots.style import LINE_COLOURS, TEXT_GREY, apply_style, axes_mm, new_figure
-from cfmkit.specs.units import to_border
+from cfmkit.specs.units import from_border, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -59,20 +59,14 @@ def loop(source: MeasuredCurves, numbers: Measurement) -> Figure:
     smooth = broken_at_holes(thin_curve(source.curve))
     limits = _range_in(source.raw, (window.lo, window.hi))
     motion = smooth.motion_dimension
-    ends = tuple(_from_border(value, motion) for value in across)
+    left, right = (float(from_border(value, motion)) for value in across)
     marked = tuple(
         MarkedRange(low, high, "not recorded")
         for low, high in sorted({(hole.low, hole.high) for hole in numbers.holes})
     )
-    plot_curve(replace(smooth, label={}), lower, CurveLook(window=((ends[0], ends[1]), limits), regions=marked))
+    plot_curve(replace(smooth, label={}), lower, CurveLook(window=((left, right), limits), regions=marked))
     _note_window(source, window, lower)
     return figure
-
-
-def _from_border(value: float, dimension: str) -> float:
-    from cfmkit.specs.units import from_border
-
-    return float(from_border(value, dimension))
 
 
 def broken_at_holes(curve: Curve) -> Curve:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.experiment.branches import COMPLETE_STROKE_SHARE, covered_fraction
-from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.branches import span_text
 from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
 

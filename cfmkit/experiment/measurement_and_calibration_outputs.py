@@ -15,12 +15,12 @@ from cfmkit.curves import Column
 from cfmkit.experiment.calibration import MAX_HALF_INTERVAL, UNDETERMINED_MESSAGE, table
 from cfmkit.experiment.corrections_and_low_pass import raw_zeros, words_of
 from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
-from cfmkit.experiment.recorded_values import hole_finding
+from cfmkit.experiment.recorded_values import hole_finding, number_of
 from cfmkit.metrics import flat_metrics, metrics_json, split_name
-from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.branches import span_text
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
 from cfmkit.results import Status
-from cfmkit.specs.units import format_short
+from cfmkit.specs.units import border_unit, format_short, to_border
 from cfmkit.tables import Table, TableColumn, border_column, curve_table, to_csv
 
 if TYPE_CHECKING:
@@ -80,18 +80,15 @@ class MeasureReport:
             "warnings": [{"name": item.name, "message": item.message} for item in self.warnings],
             "metrics_filtered": metrics_json(self.numbers.filtered),
             "filter": low_pass.sentence if low_pass else None,
-            "window": _ends(self),
+            "window": _window_json(self.numbers.window, source.raw[0].motion_dimension),
             "cycles": len(source.raw),
             "data": source.recording.name,
             "reading": source.recording.lines,
         }
 
 
-def _ends(report: MeasureReport) -> dict[str, Any]:
-    from cfmkit.specs.units import border_unit, to_border
-
-    dimension = report.source.raw[0].motion_dimension
-    low, high = (float(to_border(end, dimension)) for end in (report.numbers.window.lo, report.numbers.window.hi))
+def _window_json(window: Window, dimension: str) -> dict[str, Any]:
+    low, high = (float(to_border(end, dimension)) for end in (window.lo, window.hi))
     return {"from": low, "to": high, "unit": border_unit(dimension)}
 
 
@@ -164,7 +161,7 @@ def curves_table(source: MeasuredCurves) -> Table:
     table = curve_table([replace(curve, label={}) for curve in curves])
     if len(curves) == 1:
         return table
-    cycle = np.repeat([int(curve.label["cycle"][0]) for curve in source.raw], [len(curve) for curve in source.raw])
+    cycle = np.repeat([number_of(curve) for curve in source.raw], [len(curve) for curve in source.raw])
     return Table((TableColumn("cycle", cycle), *table.columns))
 
 
@@ -179,7 +176,7 @@ def cycles_table(report: MeasureReport) -> Table:
     """Return the raw metrics that have a value, one row per cycle."""
     cycles = report.numbers.each
     names = [name for name in cycles[0] if any(item[name].value is not None for item in cycles)]
-    numbers = [int(curve.label["cycle"][0]) if curve.label else 1 for curve in report.source.raw]
+    numbers = [number_of(curve) or 1 for curve in report.source.raw]
     columns = [
         border_column(
             _column_name(name), [np.nan if item[name].value is None else item[name].value for item in cycles],
@@ -220,14 +217,10 @@ def files(
 
 def comparison_data(comparison: Comparison, source: MeasuredCurves) -> dict[str, Any]:
     """Return what metrics.json says about the data besides the errors, which are metrics."""
-    from cfmkit.specs.units import border_unit, to_border
-
-    dimension, window = comparison.curve.motion_dimension, comparison.window
-    low, high = (float(to_border(end, dimension)) for end in (window.lo, window.hi))
     return {
         "data": {
             "file": source.recording.name,
-            "window": {"from": low, "to": high, "unit": border_unit(dimension)},
+            "window": _window_json(comparison.window, comparison.curve.motion_dimension),
             "points": sum(len(item.motion) for item in comparison.samples),
             "reading": source.recording.lines,
         }
@@ -269,16 +262,17 @@ def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:
 
 def shortfall(comparison: Comparison) -> str:
     """Return why the errors have no value; "" where they have one."""
-    if not comparison.holes:
-        return ""
-    return hole_finding(comparison.holes, comparison.window, comparison.curve.kind).message
+    return "".join(item.message for item in _hole_findings(comparison))
+
+
+def _hole_findings(comparison: Comparison) -> tuple[Finding, ...]:
+    holes = comparison.holes
+    return (hole_finding(holes, comparison.window, comparison.curve.kind),) if holes else ()
 
 
 def comparison_warnings(comparison: Comparison, source: MeasuredCurves) -> tuple[Finding, ...]:
     """Return what the user must know of a recording beside a model."""
-    if not comparison.holes:
-        return source.warnings
-    return (*source.warnings, hole_finding(comparison.holes, comparison.window, comparison.curve.kind))
+    return (*source.warnings, *_hole_findings(comparison))
 
 
 def comparison_files(source: MeasuredCurves) -> Mapping[str, Callable[[], bytes]]:
@@ -302,15 +296,16 @@ def _overlay(comparison: Comparison, before: Comparison | None, name: str) -> Fi
 
 def calibration_data(calibration: Calibration) -> dict[str, Any]:
     """Return what metrics.json says about a fit."""
-    fit = calibration.fit
+    fit, kind = calibration.fit, calibration.after.curve.kind
+    unit = border_unit(kind)
     return {
         "parameters": table(calibration),
         "correlation": [[float(value) for value in row] for row in fit.correlation],
         "fit": {
-            "noise": {"value": _border(fit.noise, calibration), "unit": _unit(calibration)},
+            "noise": {"value": float(to_border(fit.noise, kind)), "unit": unit},
             "samples_that_count_as_one": float(fit.inflation),
             "degrees_of_freedom": float(fit.freedom),
-            "rms_at_the_start": {"value": _border(_rms(calibration.before), calibration), "unit": _unit(calibration)},
+            "rms_at_the_start": {"value": float(to_border(_rms(calibration.before), kind)), "unit": unit},
             "converged": fit.converged,
         },
     }
@@ -320,18 +315,6 @@ def _rms(comparison: Comparison) -> float:
     errors = np.concatenate([item.errors(comparison.curve) for item in comparison.samples])
     weight = np.concatenate([item.weight for item in comparison.samples])
     return float(np.sqrt(np.average(errors**2, weights=weight)))
-
-
-def _border(value: float, calibration: Calibration) -> float:
-    from cfmkit.specs.units import to_border
-
-    return float(to_border(value, calibration.after.curve.kind))
-
-
-def _unit(calibration: Calibration) -> str:
-    from cfmkit.specs.units import border_unit
-
-    return border_unit(calibration.after.curve.kind)
 
 
 def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[tuple[str, str], ...]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
+from cfmkit.specs.units import format_short, from_border, read_number, read_quantity
 from cfmkit.specs.yamlio.paths import Slot
 from cfmkit.studies.variations import CannotVary, leaf
 
@@ -47,6 +48,10 @@ class FitParameter:
     def label(self) -> str:
         """The paths in words."""
         return ", ".join(self.joint) or self.path
+
+    def format_value(self, value: float, digits: int = 4) -> str:
+        """Return a value of the parameter with its unit; shares as plain numbers."""
+        return f"{value:.{digits}g}" if self.dimension == "ratio" else format_short(value, self.dimension, digits)
 
     def changes(self, spec: Spec, value: float) -> dict[str, float]:
         """Return the values of a specification that change with the parameter, by path [SI]."""
@@ -123,7 +128,7 @@ def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> Fit
     high = min(high - margin * _open(type(spec), path, "lt"), asked_high)
     if not low < high or not low <= value <= high:
         raise UsageError(
-            f"--fit: {path} starts at {_report_parameter(value, dimension)}, outside its bounds "
+            f"--fit: {path} starts at {format_short(value, dimension, 6)}, outside its bounds "
             f"{_range(low, high, dimension)}"
         )
     return FitParameter(path, dimension, value, low, high, size)
@@ -165,22 +170,14 @@ def _open(spec_type: type[Spec], path: str, name: str) -> float:
 
 def _size(value: float, limits: tuple[float, float], dimension: str) -> float:
     """Return how large a typical change is: the value itself; from zero a hundredth of the range, else one unit."""
-    from cfmkit.specs.units import from_border
-
     if value:
         return abs(value)
     width = limits[1] - limits[0]
     return 0.01 * width if math.isfinite(width) else float(from_border(1.0, dimension))
 
 
-def _report_parameter(value: float, dimension: str) -> str:
-    from cfmkit.specs.units import format_short
-
-    return format_short(value, dimension, 6)
-
-
 def _range(low: float, high: float, dimension: str) -> str:
-    return f"{_report_parameter(low, dimension)} ... {_report_parameter(high, dimension)}"
+    return f"{format_short(low, dimension, 6)} ... {format_short(high, dimension, 6)}"
 
 
 def read_bounds(
@@ -190,11 +187,10 @@ def read_bounds(
 
     Raises UsageError if one is malformed.
     """
-    parameters = {}
-    for option in options:
-        path, equals, text = (part.strip() for part in option.partition("="))
-        ends = text.split(":")
-        if not equals or len(ends) != 2:
+    bounds = {}
+    for path, text in split_bounds(options).items():
+        option, ends = f"{path}={text}", text.split(":")
+        if len(ends) != 2:
             raise UsageError(f"--bounds: {option!r} is not 'a.b=low:high'")
         try:
             low, high = (_bound(end, path, spec, recording) for end in ends)
@@ -202,8 +198,8 @@ def read_bounds(
             raise UsageError(f"--bounds: {option!r}: {problem}") from None
         if not low < high:
             raise UsageError(f"--bounds: {option!r} must be increasing")
-        parameters[path] = (low, high)
-    return parameters
+        bounds[path] = (low, high)
+    return bounds
 
 
 def split_bounds(options: Iterable[str]) -> dict[str, str]:
@@ -222,8 +218,6 @@ def split_bounds(options: Iterable[str]) -> dict[str, str]:
 
 def _bound(text: str, path: str, spec: Spec, recording: Recording | None) -> float:
     """Return one end of ``--bounds`` from its text [SI]: of a path of the file, or of the recording (`DATA_PREFIX`)."""
-    from cfmkit.specs.units import read_quantity
-
     if path.startswith(DATA_PREFIX):
         return read_quantity(text, _dimension_of_offset(path, "--bounds", recording))
     return float(leaf(type(spec), path).read(_number(text))[0])
@@ -231,8 +225,6 @@ def _bound(text: str, path: str, spec: Spec, recording: Recording | None) -> flo
 
 def _number(text: str) -> float | str:
     """Return a bare number as one, anything else as it is."""
-    from cfmkit.specs.units import read_number
-
     try:
         return read_number(text.strip())
     except QuantityError:

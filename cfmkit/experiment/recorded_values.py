@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
-from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.branches import span_text
 from cfmkit.metrics.metric_definitions import split_name
 from cfmkit.numerics.holes_in_samples import HOLE_STEP_RATIO, MAX_HOLE_SHARE, holes_between
 from cfmkit.results import Finding, Quantity
@@ -95,7 +95,7 @@ def holes_of(curves: Sequence[Curve], window: Window) -> tuple[UnrecordedInterva
     """Return the holes of all branches of all cycles in a window, in their order."""
     holes = []
     for curve in curves:
-        cycle = int(curve.label["cycle"][0]) if len(curves) > 1 else None
+        cycle = number_of(curve)
         for branch in curve.branches:
             places = np.sort(curve.select_branch(branch).motion)
             holes += [

@@ -15,10 +15,10 @@ import numpy as np
 
 from cfmkit.designing.rounded_and_reported_values import range_about
 from cfmkit.errors import CfmError, SolutionError
+from cfmkit.experiment.calibration import analyze_part
 from cfmkit.experiment.errors_of_made_part import is_thickness
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE_METRICS
-from cfmkit.families.run_control import Run
 from cfmkit.metrics import Undefined, Window, check, frame_of, values_of_family, window_of
 from cfmkit.metrics.compare import effort_at
 from cfmkit.specs.units import format_short, from_border, to_border
@@ -88,17 +88,6 @@ def middle(curve: Curve, branches: Sequence[str], places: FloatArray) -> FloatAr
     except Undefined:
         raise SolutionError("the force has several values at one place: such a curve is not corrected") from None
     return effort
-
-
-def analyze_part(spec: Spec) -> Result:
-    """Return the result of a part.
-
-    Raises SolutionError if it has no curve.
-    """
-    result: Result = family(spec.family).analyze(spec, Run())
-    if not result.curves:
-        raise SolutionError(f"there is no curve to correct: {result.message}")
-    return result
 
 
 def aim_of(nominal: Result) -> AimedCurve:

@@ -74,7 +74,9 @@ def _bodies(drawing: Drawing, drawn: Sequence[Outline], tolerance: float, format
 
         extruded = bodies(plates(drawn, drawing.sheet, tolerance))
         writers = {"stl": stl_bytes, "3mf": threemf_bytes}
-        contents |= {f"{drawing.name}.{one}": writers[one](drawing.name, extruded) for one in writers if one in formats}
+        contents |= {
+            f"{drawing.name}.{kind}": writers[kind](drawing.name, extruded) for kind in writers if kind in formats
+        }
     if "step" in formats:
         from cfmkit.export.bodies_stl_3mf_step import step_bytes
 

@@ -61,9 +61,9 @@ def outlines(
     if not drawing.contours:
         raise GeometryError(f"the drawing {drawing.name!r} has no contours")
     tolerance = drawing.tolerance if tolerance is None else tolerance
-    found = tuple(_outline(contour, number, tolerance) for number, contour in enumerate(drawing.contours, start=1))
-    check_outlines(found)
-    return found
+    outlined = tuple(_outline(contour, number, tolerance) for number, contour in enumerate(drawing.contours, start=1))
+    check_outlines(outlined)
+    return outlined
 
 
 def _outline(contour: Contour, number: int, tolerance: float) -> Outline:

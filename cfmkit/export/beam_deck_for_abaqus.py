@@ -90,11 +90,11 @@ class _Lines:
         rows: list[tuple[str, list[tuple[int, int, int]]]] = []
         for name, chain in chains.items():
             beam, inner = self.network.beams[name], len(chain.places) - 2
-            own = [self.number[beam.start], *range(self.spare, self.spare + inner), self.number[beam.end]]
+            numbers = [self.number[beam.start], *range(self.spare, self.spare + inner), self.number[beam.end]]
             self.spare += inner
-            for k, place in zip(own[1:-1], chain.places[1:-1], strict=True):
+            for k, place in zip(numbers[1:-1], chain.places[1:-1], strict=True):
                 yield _place(k, place)
-            rows.append((name, [tuple(own[k : k + 3]) for k in range(0, len(own) - 2, 2)]))
+            rows.append((name, [tuple(numbers[k : k + 3]) for k in range(0, len(numbers) - 2, 2)]))
         yield from self._elements(chains, rows)
         yield from self._links()
         for name, node in self.network.nodes.items():
@@ -118,7 +118,7 @@ class _Lines:
 
     def _elements(self, chains: dict[str, _Chain], rows: list[tuple[str, list[tuple[int, int, int]]]]) -> Iterator[str]:
         number = 1
-        for index, (name, own) in enumerate(rows, start=1):
+        for index, (name, numbers) in enumerate(rows, start=1):
             chain = chains[name]
             yield f"** beam {name}"
             material = f"MATERIAL-{index}"
@@ -126,7 +126,7 @@ class _Lines:
             yield "*ELASTIC"
             yield f"{to_border(chain.modulus, 'stress'):.10g}, 0"
             uniform = bool(np.ptp(chain.thickness) <= 1e-12 * chain.thickness.max())
-            groups = [own] if uniform else [[row] for row in own]
+            groups = [numbers] if uniform else [[row] for row in numbers]
             for piece, group in enumerate(groups, start=1):
                 elset = f"BEAM-{index}-{piece}"
                 yield f"*ELEMENT, TYPE=B32, ELSET={elset}"
@@ -142,7 +142,7 @@ class _Lines:
     def _chain(self, name: str) -> _Chain:
         """Return a beam's nodes and thicknesses: pieces end at corners of the shape and steps of the section."""
         fit, beam = self.fits[name], self.network.beams[name]
-        stations = [fit.parameter(float(one)) for one in beam.section.stations[1:-1]]
+        stations = [fit.parameter(float(station)) for station in beam.section.stations[1:-1]]
         breaks = np.unique(np.round(np.concatenate([np.real(fit.course.breaks), stations]), 13))
         marks = [0.0]
         for left, right in pairwise(breaks.tolist()):
@@ -150,10 +150,10 @@ class _Lines:
             marks += np.linspace(left, right, max(4, math.ceil(share * MIN_ELEMENTS_PER_BEAM)) + 1)[1:].tolist()
         halves = np.interp(np.arange(2 * len(marks) - 1) / 2, np.arange(len(marks)), marks)
         start = np.array(beam_end_at(self.network, name, 0), float)
-        places = np.concatenate([[start], start + np.cumsum([_run(fit, *one) for one in pairwise(halves)], axis=0)])
+        places = np.concatenate([[start], start + np.cumsum([_run(fit, *half) for half in pairwise(halves)], axis=0)])
         middles = 0.5 * (np.array(marks[1:]) + np.array(marks[:-1]))
-        arcs = [float(np.real(fit.arc(float(one)))) for one in middles]
-        thickness = np.array([float(np.real(beam.section.thickness_at(one, one))) for one in arcs])
+        arcs = [float(np.real(fit.arc(float(middle)))) for middle in middles]
+        thickness = np.array([float(np.real(beam.section.thickness_at(arc, arc))) for arc in arcs])
         return _Chain(places, thickness, float(beam.section.width), float(beam.section.youngs_modulus))
 
     def _links(self) -> Iterator[str]:
@@ -212,7 +212,7 @@ class _Lines:
         node, number = self.network.nodes[name], self.number[name]
         section = max((beam.section for beam in self.network.beams.values()), key=_rigidity)
         size = to_border(float(np.max(section.thickness_at(np.linspace(0.0, 1.0, 33), 0.5))), "length")
-        x, y = (to_border(float(one), "length") for one in (node.x, node.y))
+        x, y = (to_border(float(coordinate), "length") for coordinate in (node.x, node.y))
         arm, (middle, end, pulling) = LEVER_LENGTH * size, (self.spare, self.spare + 1, self.spare + 2)
         self.spare += 3
         yield (
@@ -232,7 +232,7 @@ class _Lines:
         yield "*BEAM SECTION, ELSET=LEVER, MATERIAL=LEVER, SECTION=RECT"
         yield f"{to_border(float(section.width), 'length'):.10g}, {size:.10g}"
         yield "0, 0, 1"
-        for axis, way in ((1, np.cos), (2, np.sin)):
+        for axis, function in ((1, np.cos), (2, np.sin)):
             yield f"*ELEMENT, TYPE=SPRING2, ELSET=FIRM-{axis}"
             yield f"{self.spare_element + axis}, {end}, {pulling}"
             yield f"*SPRING, ELSET=FIRM-{axis}"
@@ -240,7 +240,7 @@ class _Lines:
             yield DRIVE_STIFFNESS
             yield f"*AMPLITUDE, NAME=ARC-{axis}"
             shares = np.linspace(0.0, 1.0, N_ARC_LINES + 1)
-            places = arm * (way(shares * angle) - way(0.0))
+            places = arm * (function(shares * angle) - function(0.0))
             yield from (f"{share:.10g}, {place:.10g}" for share, place in zip(shares, places, strict=True))
             self.led.append((f"ARC-{axis}", f"{pulling}, {axis}, {axis}, 1."))
         self.spare_element += 3
@@ -257,7 +257,7 @@ class _Lines:
         yield "*EQUATION"
         yield str(len(terms) + 1)
         factors = [(number, axis, factor) for axis, factor in terms]
-        yield ", ".join(f"{one}, {axis}, {factor:.12g}" for one, axis, factor in [*factors, (leader, 1, -1.0)])
+        yield ", ".join(f"{node}, {axis}, {factor:.12g}" for node, axis, factor in [*factors, (leader, 1, -1.0)])
         self.moves.append(f"{leader}, 2, 3, 0")
         if driven:
             yield from self._write_force_drive(leader, end, (node.x, node.y))
@@ -296,7 +296,7 @@ def _rigidity(section: Section) -> float:
 
 
 def _place(number: int, place: tuple[float, float] | FloatArray) -> str:
-    x, y = (to_border(float(one), "length") for one in place)
+    x, y = (to_border(float(coordinate), "length") for coordinate in place)
     return f"{number}, {x:.10g}, {y:.10g}, 0"
 
 

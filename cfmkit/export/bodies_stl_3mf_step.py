@@ -80,17 +80,17 @@ def plates(
     if sheet.thickness is None:
         where = f"give {sheet.key!r}, such as 5 mm" if sheet.key else "its family has no such key"
         raise GeometryError(f"nothing says how thick the part is: {where}")
-    cut = [one for one in drawn if one.layer == "cut" and one.closed]
-    chains = [(one, one.chain.flatten(tolerance)) for one in cut]
-    rings = [(one, Polygon(np.column_stack([points.real, points.imag]))) for one, points in chains]
-    solids = [ring for one, ring in rings if not one.hole]
+    cut = [contour for contour in drawn if contour.layer == "cut" and contour.closed]
+    chains = [(contour, contour.chain.flatten(tolerance)) for contour in cut]
+    rings = [(contour, Polygon(np.column_stack([points.real, points.imag]))) for contour, points in chains]
+    solids = [ring for contour, ring in rings if not contour.hole]
     if not solids:
         raise GeometryError("there is nothing to cut, and so no body")
-    found = []
+    layered = []
     for solid in solids:
-        holes = [ring.exterior for one, ring in rings if one.hole and solid.contains(ring)]
-        found.append(_faces(Polygon(solid.exterior, holes), sheet))
-    return tuple(found)
+        holes = [ring.exterior for contour, ring in rings if contour.hole and solid.contains(ring)]
+        layered.append(_faces(Polygon(solid.exterior, holes), sheet))
+    return tuple(layered)
 
 
 def volume(drawing: Drawing) -> float:
@@ -111,8 +111,8 @@ def _faces(part: Any, sheet: Sheet) -> LayeredPolygon:
     x0, y0, x1, y1 = part.bounds
     size = x1 - x0 + y1 - y0
     part = set_precision(part, POINT_RTOL * size)
-    other = [one for one in sheet.regions if one.thickness != usual]
-    areas = [(set_precision(Polygon(one.polygon), POINT_RTOL * size), one.thickness) for one in other]
+    regions = [region for region in sheet.regions if region.thickness != usual]
+    areas = [(set_precision(Polygon(region.polygon), POINT_RTOL * size), region.thickness) for region in regions]
     areas = [(area, thickness) for area, thickness in areas if area.intersection(part).area > MIN_FACE_AREA * size**2]
     if not areas:
         return LayeredPolygon(((part, usual),))
@@ -128,12 +128,12 @@ def _faces(part: Any, sheet: Sheet) -> LayeredPolygon:
     return LayeredPolygon(tuple(faces))
 
 
-def bodies(found: Sequence[LayeredPolygon]) -> tuple[Body, ...]:
+def bodies(layered: Sequence[LayeredPolygon]) -> tuple[Body, ...]:
     """Return parts as closed surfaces.
 
     Raises GeometryError if a surface is not closed.
     """
-    return tuple(_body(plate) for plate in found)
+    return tuple(_body(plate) for plate in layered)
 
 
 def _body(plate: LayeredPolygon) -> Body:
@@ -153,9 +153,9 @@ def _triangles(plate: LayeredPolygon) -> tuple[FloatArray, NDArray[np.int64], Fl
 
     places, halves = [], []
     for face, thickness in plate.faces:
-        found = constrained_delaunay_triangles(face).geoms
-        places.append(get_coordinates(list(found)).reshape(-1, 4, 2)[:, :3])
-        halves.append(np.full(len(found), 0.5 * thickness))
+        triangles = constrained_delaunay_triangles(face).geoms
+        places.append(get_coordinates(list(triangles)).reshape(-1, 4, 2)[:, :3])
+        halves.append(np.full(len(triangles), 0.5 * thickness))
     points, which = np.unique(np.concatenate(places).reshape(-1, 2), axis=0, return_inverse=True)
     corners = which.reshape(-1, 3)
     a, b, c = points[corners].swapaxes(0, 1)
@@ -302,7 +302,7 @@ def step_bytes(name: str, drawn: Sequence[Outline], sheet: Sheet) -> bytes:
         where = f"give {sheet.key!r}, such as 5 mm" if sheet.key else "its family has no such key"
         raise GeometryError(f"nothing says how thick the part is: {where}")
     try:
-        return _step(kernel, name, [one for one in drawn if one.layer == "cut" and one.closed], sheet)
+        return _step(kernel, name, [contour for contour in drawn if contour.layer == "cut" and contour.closed], sheet)
     except CfmError:
         raise
     except Exception as error:  # the kernel has dozens of its own
@@ -311,9 +311,9 @@ def step_bytes(name: str, drawn: Sequence[Outline], sheet: Sheet) -> bytes:
 
 
 def _step(kernel: Any, name: str, cut: Sequence[Outline], sheet: Sheet) -> bytes:
-    wires = [(one, kernel.Wire(_edges(kernel, one))) for one in cut]
-    faces = [kernel.Face(wire) for one, wire in wires if not one.hole]
-    holes = [kernel.Face(wire) for one, wire in wires if one.hole]
+    wires = [(contour, kernel.Wire(_edges(kernel, contour))) for contour in cut]
+    faces = [kernel.Face(wire) for contour, wire in wires if not contour.hole]
+    holes = [kernel.Face(wire) for contour, wire in wires if contour.hole]
     solids = [_solid(kernel, face, holes, sheet) for face in faces]
     if not solids or not all(solid.is_valid for solid in solids):
         raise GeometryError("the CAD kernel cannot make a valid body from the outline")
@@ -342,17 +342,20 @@ def _edges(kernel: Any, outline: Outline) -> list[Any]:
         points_on(chain.nodes[:-1], chain.chords, chain.turns, np.full(len(chain.bulges), 0.5)), "length"
     )
     rise = np.abs(chain.bulges * to_border(chain.chords, "length")) / 2
-    found = []
+    shapes = []
     for k in range(len(middles)):
         a, m, b = ((float(z.real), float(z.imag)) for z in (nodes[k], middles[k], nodes[k + 1]))
         straight = rise[k] < LINE_RISE
-        found.append(kernel.Edge.make_line(a, b) if straight else kernel.Edge.make_three_point_arc(a, m, b))
-    return found
+        shapes.append(kernel.Edge.make_line(a, b) if straight else kernel.Edge.make_three_point_arc(a, m, b))
+    return shapes
 
 
 def _solid(kernel: Any, face: Any, holes: Sequence[Any], sheet: Sheet) -> Any:
     """Return the body on z = 0 of one outline with its holes."""
-    usual, other = float(sheet.thickness or 0.0), [one for one in sheet.regions if one.thickness != sheet.thickness]
+    usual, regions = (
+        float(sheet.thickness or 0.0),
+        [region for region in sheet.regions if region.thickness != sheet.thickness],
+    )
     whole = _prism(kernel, face, usual)
     around = whole.bounding_box()
     for hole in holes:
@@ -366,12 +369,12 @@ def _solid(kernel: Any, face: Any, holes: Sequence[Any], sheet: Sheet) -> Any:
             face = face - hole
     whole = body = _prism(kernel, face, usual)
     thickest = usual
-    for one in sorted(other, key=lambda one: one.thickness):
-        stencil = _prism(kernel, _face(kernel, one), 2 * max(usual, one.thickness))
+    for region in sorted(regions, key=lambda region: region.thickness):
+        stencil = _prism(kernel, _face(kernel, region), 2 * max(usual, region.thickness))
         if not (whole & stencil):
             continue
-        thickest = max(thickest, one.thickness)
-        body = (body - stencil) + (_prism(kernel, face, one.thickness) & stencil)
+        thickest = max(thickest, region.thickness)
+        body = (body - stencil) + (_prism(kernel, face, region.thickness) & stencil)
     height = float(body.bounding_box().size.Z) * 1e-3
     lift = 0.5 * to_border(min(thickest, height), "length")
     return body.moved(kernel.Location((0.0, 0.0, float(lift))))

@@ -90,9 +90,9 @@ class BeamSection:
     def cut(self, starts: FloatArray, ends: FloatArray) -> tuple[float, float]:
         """Return how far the material goes to both sides, as bounded by lines (n, 2) [m]; infinite without a bound."""
         along = np.array([self.across[1], -self.across[0]])
-        one, other = ((points - self.at) @ along for points in (starts, ends))
-        met = (one > 0) != (other > 0)
-        share = one[met] / (one[met] - other[met])
+        first, second = ((points - self.at) @ along for points in (starts, ends))
+        met = (first > 0) != (second > 0)
+        share = first[met] / (first[met] - second[met])
         away = ((starts[met] + share[:, None] * (ends[met] - starts[met])) - self.at) @ self.across
         return (
             float(-away[away < 0].max(initial=-np.inf)),
@@ -110,10 +110,10 @@ class BeamSection:
         """
         if abs((measured / self.thickness) ** 2 - 1.0) <= SECTION_RTOL:
             return
-        x, y = (format_short(float(one), "length") for one in self.at)
-        found = f"{format_short(measured, 'length')} thick" if np.isfinite(measured) else "endless"
+        x, y = (format_short(float(coordinate), "length") for coordinate in self.at)
+        reported = f"{format_short(measured, 'length')} thick" if np.isfinite(measured) else "endless"
         raise GeometryError(
-            f"beam {self.beam!r} is {found} in the {what} at ({x}, {y}), but "
+            f"beam {self.beam!r} is {reported} in the {what} at ({x}, {y}), but "
             f"{format_short(self.thickness, 'length')} in the specification: {remedy}"
         )
 
@@ -241,8 +241,8 @@ class Contour:
 
         On arcs neighbouring lines differ by `turn` [rad] at most.
         """
-        found = [_points_along(edge, sagitta, turn) for edge in self.edges]
-        return np.concatenate([piece[:-1] for piece in found])
+        pieces = [_points_along(edge, sagitta, turn) for edge in self.edges]
+        return np.concatenate([piece[:-1] for piece in pieces])
 
 
 def _corners(edge: Edge) -> FloatArray:
@@ -285,9 +285,9 @@ def _points_between(edge: Smooth, sagitta: float) -> FloatArray:
     k = np.repeat(np.arange(len(count)), count)
     share = (np.arange(len(k)) - np.repeat(np.cumsum(count) - count, count)) / count[k]
     inner = cubic(z[k], t[k], z[k + 1], t[k + 1], share)
-    found = np.column_stack([inner.real, inner.imag])
-    found[share == 0.0] = edge.points[:-1]
-    return np.vstack([found, edge.points[-1]])
+    points = np.column_stack([inner.real, inner.imag])
+    points[share == 0.0] = edge.points[:-1]
+    return np.vstack([points, edge.points[-1]])
 
 
 UNCUT_LAYERS = ("path", "reference", HELD_LAYER, DRIVEN_LAYER)  # layers that nothing is cut along
@@ -397,7 +397,7 @@ class Drawing(ShortRepr):
     @property
     def extents(self) -> tuple[float, float, float, float]:
         """Smallest x and y, largest x and y of what is cut [m]."""
-        boxes = np.array([one.box for one in self.contours if one.layer not in UNCUT_LAYERS])
+        boxes = np.array([contour.box for contour in self.contours if contour.layer not in UNCUT_LAYERS])
         return (*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist())
 
     def with_reference_square(self, size: float = 0.05) -> Drawing:
@@ -433,11 +433,11 @@ def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list
         Counter-clockwise, holes clockwise [m].
     """
     chosen = [contour for contour in contours if contour.closed and contour.layer == layer]
-    found = []
+    rings = []
     for contour in chosen:
         chain = np.concatenate([_few_points_of(edge, points) for edge in contour.edges])
-        found.append(chain if (signed_area(chain) > 0.0) != contour.hole else chain[::-1])
-    return found
+        rings.append(chain if (signed_area(chain) > 0.0) != contour.hole else chain[::-1])
+    return rings
 
 
 def _few_points_of(edge: Edge, most_of_smooth: int) -> FloatArray:

@@ -270,38 +270,45 @@ def check_outline(
     """
     from shapely import LineString, STRtree, polygons
 
-    rings = [one.points(MEASURING_TOLERANCE * thinnest) for one in contours]
+    rings = [contour.points(MEASURING_TOLERANCE * thinnest) for contour in contours]
     areas: list[FloatArray] = []
     owner: list[int] = []
     for number, piece in enumerate(pieces):
         areas += piece.areas
         owner += [number] * len(piece.areas)
     starts, ends = lines_of(rings)
-    tree, found = STRtree([polygons(area) for area in areas]), []
+    tree, different = STRtree([polygons(area) for area in areas]), []
     for number, section in _measurable(pieces, fillet):
         cut = section.cut(starts, ends)
         if np.isfinite(cut).all():
             met = {owner[k] for k in tree.query(LineString(section.line(cut)), "intersects").tolist()}
-            if any(abs(k - number) > 1 or all(other.beam != section.beam for other in pieces[k].sections) for k in met):
+            if any(
+                abs(k - number) > 1 or all(neighbour.beam != section.beam for neighbour in pieces[k].sections)
+                for k in met
+            ):
                 continue
         smaller = format_short(min(0.5 * section.thickness, 0.125 * section.length, 0.5 * fillet), "length", 2)
         remedy = f"--set 'mechanism.part.fillet={smaller}'" if fillet > 0 else "move its neighbours away"
         section.check(sum(cut), "outline", remedy)
-        found.append(section)
+        different.append(section)
     enclosed = sum(
-        (-1.0 if one.hole else 1.0) * abs(signed_area(ring)) for one, ring in zip(contours, rings, strict=True)
+        (-1.0 if contour.hole else 1.0) * abs(signed_area(ring)) for contour, ring in zip(contours, rings, strict=True)
     )
     _check_area(enclosed, *_areas(areas, holes, fillet, GRID_DISTANCE * thinnest))
-    return tuple(found)
+    return tuple(different)
 
 
 def _measurable(pieces: Sequence[SpecifiedPiece], fillet: float) -> Iterator[tuple[int, BeamSection]]:
     """Yield the sections that fillets leave free, with the number of their piece: at least the longest of a beam."""
-    sections = [(number, one) for number, piece in enumerate(pieces) for one in piece.sections]
+    sections = [(number, section) for number, piece in enumerate(pieces) for section in piece.sections]
     longest: dict[str, float] = {}
-    for _, one in sections:
-        longest[one.beam] = max(one.length, longest.get(one.beam, 0.0))
-    return ((number, one) for number, one in sections if one.length >= min(longest[one.beam], MIN_FREE_RADII * fillet))
+    for _, section in sections:
+        longest[section.beam] = max(section.length, longest.get(section.beam, 0.0))
+    return (
+        (number, section)
+        for number, section in sections
+        if section.length >= min(longest[section.beam], MIN_FREE_RADII * fillet)
+    )
 
 
 def _check_area(measured: float, least: float, largest: float) -> None:
@@ -329,7 +336,7 @@ def _areas(
     # without a grid the union of strips that only just overlap may lose one of them
     shapes = ([Polygon(area).buffer(0.0) for area in areas] for areas in (pieces, holes))
     try:
-        whole, cut = (union_all(own, grid_size=grid) for own in shapes)
+        whole, cut = (union_all(shape, grid_size=grid) for shape in shapes)
     except GEOSException:
         raise GeometryError("the outline has pieces that are too thin to be joined: make its beams thicker") from None
     filled = whole.buffer(fillet, quad_segs=32).buffer(-fillet, quad_segs=32) if fillet > 0 else whole

@@ -186,17 +186,17 @@ def _texts(labels: Sequence[EngravedText]) -> list[str]:
     """Return engraved texts, centred about their points; y is turned over, and with it the direction."""
     if not labels:
         return []
-    found = [
+    placed = [
         f'<g id="{ENGRAVED_LAYER}" fill="{looks([ENGRAVED_LAYER])[ENGRAVED_LAYER].rgb}" '
         f'font-family="sans-serif" text-anchor="middle">'
     ]
-    for one in labels:
-        x, y, size = (float(to_border(value, "length")) for value in (*one.at, one.height))
-        turn = f"translate({_svg_text(x)} {_svg_text(-y)}) rotate({_svg_text(-math.degrees(one.angle))})"
+    for label in labels:
+        x, y, size = (float(to_border(value, "length")) for value in (*label.at, label.height))
+        turn = f"translate({_svg_text(x)} {_svg_text(-y)}) rotate({_svg_text(-math.degrees(label.angle))})"
         # capitals are 0.7 of a font's size high
         look = f'y="{_svg_text(0.5 * size)}" font-size="{_svg_text(size / 0.7)}"'
-        found.append(f'<text transform="{turn}" {look}>{escape(one.text, quote=False)}</text>')
-    return [*found, "</g>"]
+        placed.append(f'<text transform="{turn}" {look}>{escape(label.text, quote=False)}</text>')
+    return [*placed, "</g>"]
 
 
 def _shape(outline: Outline, digits: int) -> str:

@@ -44,10 +44,10 @@ def round_inside_corners(
         before, after = edges[k - 1], edges[k]
         if turn * side > -TANGENT_ANGLE:
             continue
-        if (found := _round_corner(before, after, radius, side)) is None:
+        if (corner := _round_corner(before, after, radius, side)) is None:
             sharp.append(after.ends[0])
         else:
-            edges[k - 1], arcs[k], edges[k] = found
+            edges[k - 1], arcs[k], edges[k] = corner
     rounded = [piece for k, edge in enumerate(edges) for piece in ((arcs[k], edge) if k in arcs else (edge,))]
     return replace(contour, edges=tuple(edge for edge in rounded if not _used_up(edge))), tuple(sharp)
 
@@ -62,8 +62,8 @@ def _direction(edge: Edge, end: int) -> complex:
     if isinstance(edge, Smooth):
         return complex(*edge.tangents[end])
     if isinstance(edge, Line):
-        way = edge.ends[1] - edge.ends[0]
-        return way / abs(way)
+        along = edge.ends[1] - edge.ends[0]
+        return along / abs(along)
     angle = edge.start if end == 0 else edge.end
     return complex(-math.sin(angle), math.cos(angle)) * (1 if edge.end > edge.start else -1)
 
@@ -78,32 +78,32 @@ def _round_corner(before: Edge, after: Edge, radius: float, side: float) -> tupl
         return _round_onto_smooth(before, after, radius, side)
     if isinstance(before, Smooth) and isinstance(after, Line):
         # the mirror image of the same, run backwards: the waste is then on the other hand
-        if (found := _round_onto_smooth(after.reverse(), before.reverse(), radius, -side)) is None:
+        if (rounded := _round_onto_smooth(after.reverse(), before.reverse(), radius, -side)) is None:
             return None
-        line, arc, smooth = found
+        line, arc, smooth = rounded
         return smooth.reverse(), arc.reverse(), line.reverse()
     return None
 
 
 def _round_between_lines(before: Line, after: Line, radius: float, side: float) -> tuple[Line, Arc, Line] | None:
-    one, other = _direction(before, -1), _direction(after, 0)
+    incoming, outgoing = _direction(before, -1), _direction(after, 0)
     corner = after.ends[0]
-    trim = radius * math.tan(0.5 * abs(float(np.angle(other / one))))
+    trim = radius * math.tan(0.5 * abs(float(np.angle(outgoing / incoming))))
     shortest = min(abs(before.ends[1] - before.ends[0]), abs(after.ends[1] - after.ends[0]))
     if trim > shortest * (1 + 1e-9):  # a line as long as the trim is used up, whatever its rounding
         return None
-    center = corner - trim * one - 1j * side * radius * one
-    arc = _arc(center, radius, corner - trim * one, corner + trim * other, side)
+    center = corner - trim * incoming - 1j * side * radius * incoming
+    arc = _arc(center, radius, corner - trim * incoming, corner + trim * outgoing, side)
     first, last = arc.ends
     return Line(before.start, pair(first)), arc, Line(pair(last), after.end)
 
 
 def _round_onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -> tuple[Line, Arc, Smooth] | None:
     """Return the arc from a line to the smooth edge that begins at its end."""
-    way, start = _direction(line, -1), line.ends[0]
+    heading, start = _direction(line, -1), line.ends[0]
     points, tangents = (np.asarray(values[:, 0] + 1j * values[:, 1]) for values in (smooth.points, smooth.tangents))
     centers = points - 1j * side * radius * tangents  # of arcs that touch the smooth edge
-    over = ((centers - start) / way).imag + side * radius  # how far these are from touching the line
+    over = ((centers - start) / heading).imag + side * radius  # how far these are from touching the line
     beyond = np.flatnonzero(over[:-1] * over[1:] <= 0)
     if not len(beyond):
         return None
@@ -115,12 +115,12 @@ def _round_onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -
         along = complex(slope(*pair)[0])
         along /= abs(along)
         center = complex(cubic(*pair)[0]) - 1j * side * radius * along
-        return center, along, ((center - start) / way).imag + side * radius
+        return center, along, ((center - start) / heading).imag + side * radius
 
     share = _zero(lambda share: touching(share)[2])
     center, tangent, _ = touching(share)
-    touch = start + way * ((center - start) / way).real
-    if ((touch - start) / way).real < 0:
+    touch = start + heading * ((center - start) / heading).real
+    if ((touch - start) / heading).real < 0:
         return None
     arc = _arc(center, radius, touch, center + 1j * side * radius * tangent, side)
     first, last = arc.ends

@@ -48,7 +48,7 @@ def add_fixing_holes(
         places = _places_of_heads(outline.points(OUTLINE_TOLERANCE), size.head)
         bare += not places
         for place in places:
-            if all(np.hypot(*(place - other)) >= size.head for other in (*centers, *stated)):
+            if all(np.hypot(*(place - center)) >= size.head for center in (*centers, *stated)):
                 centers.append(place)
     holes = (circle((float(x), float(y)), 0.5 * size.hole, "cut", hole=True) for x, y in centers)
     note = f"{bare} of the pads and walls are too small for the head of an {screw}: {NO_HOLES}"
@@ -105,18 +105,18 @@ def _labels(drawing: Drawing, name: str) -> Iterator[EngravedText]:
     from shapely import Polygon
 
     cut = [
-        (one, Polygon(one.points(FLATTENING_TOLERANCE)))
-        for one in drawing.contours
-        if one.layer == "cut" and one.closed
+        (contour, Polygon(contour.points(FLATTENING_TOLERANCE)))
+        for contour in drawing.contours
+        if contour.layer == "cut" and contour.closed
     ]
-    holes = [shape for one, shape in cut if one.hole]
-    marks = [one for one in drawing.contours if one.layer in (HELD_LAYER, DRIVEN_LAYER) and one.closed]
-    for body in (shape for one, shape in cut if not one.hole):
-        found: list[Any] = []
+    holes = [shape for contour, shape in cut if contour.hole]
+    marks = [contour for contour in drawing.contours if contour.layer in (HELD_LAYER, DRIVEN_LAYER) and contour.closed]
+    for body in (shape for contour, shape in cut if not contour.hole):
+        pads: list[Any] = []
         for layer in (HELD_LAYER, DRIVEN_LAYER):
-            own = [Polygon(one.points(FLATTENING_TOLERANCE)) for one in marks if one.layer == layer]
-            found = found or [one for one in own if body.contains(one.centroid)]
-        spots = sorted(found, key=lambda one: -one.area)
+            marked = [Polygon(mark.points(FLATTENING_TOLERANCE)) for mark in marks if mark.layer == layer]
+            pads = pads or [polygon for polygon in marked if body.contains(polygon.centroid)]
+        spots = sorted(pads, key=lambda polygon: -polygon.area)
         for spot in spots:
             thick = _thickness(drawing.sheet, spot.centroid)
             text = name if thick is None else f"{name}, sheet {format_short(thick, 'length')}"
@@ -130,8 +130,8 @@ def _labels(drawing: Drawing, name: str) -> Iterator[EngravedText]:
 def _thickness(sheet: Sheet, at: Any) -> float | None:
     from shapely import Polygon
 
-    own = [one.thickness for one in sheet.regions if Polygon(one.polygon).contains(at)]
-    return max(own) if own else sheet.thickness
+    thicknesses = [region.thickness for region in sheet.regions if Polygon(region.polygon).contains(at)]
+    return max(thicknesses) if thicknesses else sheet.thickness
 
 
 def _place_text(text: str, spot: Any) -> EngravedText | None:

@@ -79,9 +79,9 @@ def _opening(
     """Return the lower left and the upper right corner of the opening: pads may touch the frame, nothing else."""
     x0, y0, x1, y1 = moving.bounds
     loose = np.concatenate([np.array([[x0, y0], [x1, y1]]), *covered])
-    own = np.concatenate(list(pads.values()))
-    low = np.minimum(loose.min(axis=0) - clearance, own.min(axis=0))
-    return low, np.maximum(loose.max(axis=0) + clearance, own.max(axis=0))
+    points = np.concatenate(list(pads.values()))
+    low = np.minimum(loose.min(axis=0) - clearance, points.min(axis=0))
+    return low, np.maximum(loose.max(axis=0) + clearance, points.max(axis=0))
 
 
 def _sides(low: FloatArray, high: FloatArray, thickness: float) -> tuple[FloatArray, ...]:
@@ -109,22 +109,22 @@ def _bar(
     if (middle < low).any() or (middle > high).any():
         raise GeometryError(f"the pad of {name} is not within 'mechanism.part.frame.inside'")
     sizes = np.hypot(*(pad[1] - pad[0])), np.hypot(*(pad[2] - pad[1]))
-    free, near, tried = moving.buffer(clearance * (1 - 1e-6)), Polygon(pad).buffer(clearance), None
+    free, forbidden, tried = moving.buffer(clearance * (1 - 1e-6)), Polygon(pad).buffer(clearance), None
     ways = (
         (middle[1] - low[1], (0.0, -1.0)),
         (high[1] - middle[1], (0.0, 1.0)),
         (middle[0] - low[0], (-1.0, 0.0)),
         (high[0] - middle[0], (1.0, 0.0)),
     )
-    for length, way in sorted(ways, key=lambda one: one[0]):
+    for length, path in sorted(ways, key=lambda item: item[0]):
         for breadth in sorted({min(sizes), 0.5 * min(sizes)}, reverse=True):
             reach, half = length + BAR_OVERLAP_SHARE * thickness, 0.5 * breadth
-            along, across = np.array(way), half * np.array([-way[1], way[0]])
+            along, across = np.array(path), half * np.array([-path[1], path[0]])
             end = middle + reach * along
             bar = np.array([middle - across, end - across, end + across, middle + across])
             shape = Polygon(bar).difference(Polygon(pad))
             inside_way = shape.intersection(moving)
-            beside = shape.difference(near).intersection(free)
+            beside = shape.difference(forbidden).intersection(free)
             if inside_way.area <= ROOT_SIDE**2 and beside.area <= ROOT_SIDE**2:
                 return bar
             tried = tried or _place(inside_way if inside_way.area > beside.area else beside)
@@ -139,8 +139,8 @@ def swept(lines: Sequence[FloatArray], half: float, shapes: Sequence[FloatArray]
     """Return what lines (n, 2) of a half thickness, and polygons, cover together [m]."""
     from shapely import LineString, Polygon, union_all
 
-    found = [LineString(line).buffer(half, cap_style="flat") for line in lines if len(line) > 1]
-    return union_all([*found, *(Polygon(shape).buffer(0) for shape in shapes if len(shape) > 2)])
+    strips = [LineString(line).buffer(half, cap_style="flat") for line in lines if len(line) > 1]
+    return union_all([*strips, *(Polygon(shape).buffer(0) for shape in shapes if len(shape) > 2)])
 
 
 def find_outside(
@@ -149,8 +149,8 @@ def find_outside(
     """Return which places [m] do not lie in a frame; what is also in a pad does not count as in the frame."""
     from shapely import Point, Polygon, union_all
 
-    own = union_all([Polygon(one) for one in frame]).difference(union_all([Polygon(one) for one in pads]))
-    return [not own.contains(Point(place)) for place in places]
+    ground = union_all([Polygon(ring) for ring in frame]).difference(union_all([Polygon(ring) for ring in pads]))
+    return [not ground.contains(Point(place)) for place in places]
 
 
 def move_polygon(shape: FloatArray, by: FloatArray, turn: float = 0.0, about: FloatArray | None = None) -> FloatArray:

@@ -96,11 +96,11 @@ def _follows(chain: ArcChain, outline: Outline, half: float, region: Any, error:
     source = shapely.LinearRing(edge)
     shapely.prepare(source)
     points = shapely.points(track)
-    near = shapely.dwithin(points, source, half - error).any()
+    is_near = shapely.dwithin(points, source, half - error).any()
     far = not shapely.dwithin(points, source, half + error).all()
     moved = shapely.Polygon(track)
     slack = region.length * (_GEOS_ERROR * half + error)
-    return bool(not near and not far and moved.is_valid and abs(moved.area - region.area) < slack)
+    return bool(not is_near and not far and moved.is_valid and abs(moved.area - region.area) < slack)
 
 
 _TANGENT_ANGLE = 1e-7  # a turn below this [rad] is no corner; a fraction of an arc below it is no piece

@@ -114,14 +114,14 @@ def band(line: FloatArray, half: Any) -> FloatArray:
     return np.concatenate([line + aside, (line - aside)[::-1]])
 
 
-def join_poses(each: Sequence[Sequence[PosedBody]]) -> tuple[PosedBody, ...]:
+def join_poses(poses: Sequence[Sequence[PosedBody]]) -> tuple[PosedBody, ...]:
     """Return the bodies of several poses, each given as the same bodies in the same order, as bodies in all poses."""
-    found = []
-    for same in zip(*each, strict=True):
-        cores = np.concatenate([one.core for one in same])
+    joined = []
+    for same in zip(*poses, strict=True):
+        cores = np.concatenate([body.core for body in same])
         still = bool((cores == cores[:1]).all())
-        found.append(replace(same[0], core=cores[:1] if still else cores))
-    return tuple(found)
+        joined.append(replace(same[0], core=cores[:1] if still else cores))
+    return tuple(joined)
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,11 +52,11 @@ def facing_lines(
 
     tree = STRtree(linestrings(np.stack([starts, starts + along], 1)))
     ray, line = tree.query(linestrings(np.stack([places, places + reach * normals], 1)))
-    way, side = starts[line] - places[ray], along[line]
+    ray_to_start, side = starts[line] - places[ray], along[line]
     with np.errstate(divide="ignore", invalid="ignore"):
         det = normals[ray, 0] * side[:, 1] - normals[ray, 1] * side[:, 0]
-        depth = (way[:, 0] * side[:, 1] - way[:, 1] * side[:, 0]) / det
-        share = (way[:, 0] * normals[ray, 1] - way[:, 1] * normals[ray, 0]) / det
+        depth = (ray_to_start[:, 0] * side[:, 1] - ray_to_start[:, 1] * side[:, 0]) / det
+        share = (ray_to_start[:, 0] * normals[ray, 1] - ray_to_start[:, 1] * normals[ray, 0]) / det
         # a wall looks back: lines that the ray meets at less than 45 degrees belong to a corner, not to a wall
         steep = np.abs(det) > MIN_FACING_SINE * np.hypot(*side.T)
     met = steep & (share >= 0) & (share <= 1) & (depth > 1e-8 * reach) & (depth <= reach)
@@ -112,7 +112,7 @@ def thin_walls(
     tolerance: float = OUTLINE_TOLERANCE,
 ) -> tuple[ThinWall, ...]:
     """Return the walls of a part that are thinner than can be made, the thinnest first."""
-    cut = [one for one in contours if one.layer == "cut" and one.closed]
+    cut = [contour for contour in contours if contour.layer == "cut" and contour.closed]
     if not cut or least <= 2.0 * tolerance:
         return ()
     edges = EdgeLines.from_contours(cut, 0.2 * tolerance)
@@ -128,9 +128,9 @@ def thin_walls(
     first = np.diff(ray, prepend=-1) > 0
     ray, met, depth = ray[first], met[first], depth[first]
     ends = places[ray] + depth[:, None] * normals[ray]
-    here = edges.at[line[ray]] + share[ray] * lengths[line[ray]]
-    there = edges.at[met] + np.hypot(*(ends - edges.starts[met]).T)
-    apart, around = np.abs(there - here), edges.around[edges.ring[met]]
+    arc_of_ray = edges.at[line[ray]] + share[ray] * lengths[line[ray]]
+    arc_met = edges.at[met] + np.hypot(*(ends - edges.starts[met]).T)
+    apart, around = np.abs(arc_met - arc_of_ray), edges.around[edges.ring[met]]
     tip = (edges.ring[met] == edges.ring[line[ray]]) & (np.minimum(apart, around - apart) < MIN_WAY_AROUND * depth)
     return tuple(_walls(places[ray][~tip], ends[~tip], depth[~tip], least))
 

@@ -75,15 +75,15 @@ class TracedEdge:
         """Return the unit tangent."""
         edge = self.edge
         if isinstance(edge, Line):
-            way = edge.ends[1] - edge.ends[0]
+            along = edge.ends[1] - edge.ends[0]
         elif isinstance(edge, Arc):
             angle = edge.start + (edge.end - edge.start) * u / (len(self.z) - 1)
-            way = complex(-math.sin(angle), math.cos(angle)) * (1.0 if edge.end > edge.start else -1.0)
+            along = complex(-math.sin(angle), math.cos(angle)) * (1.0 if edge.end > edge.start else -1.0)
         elif u == int(u) and 0 <= u < len(self.z):
-            way = complex(*edge.tangents[int(u)])
+            along = complex(*edge.tangents[int(u)])
         else:
-            way = complex(slope(*self._select_piece(u))[0])
-        return way / abs(way)
+            along = complex(slope(*self._select_piece(u))[0])
+        return along / abs(along)
 
     def _select_piece(self, u: float) -> tuple[Any, ...]:
         """Return ends and tangents of the piece of a smooth edge that holds a parameter, and the share there."""

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.findings import Finder
-    from cfmkit.metrics.metrics_of_rows import CurveRows
+    from cfmkit.metrics.curve_rows import CurveRows
     from cfmkit.results import Finding
 
 SolutionT = TypeVar("SolutionT")

@@ -1,14 +1,14 @@
 """Constant-force metrics by name, over a stated window, per branch; and requirements on them.
 
 `metric_definitions` lists what there is and what a name may mean, `window_metrics` and `ranges` compute it,
-`branches` cuts windows, `branch_views` is what a metric looks at, `metric_values` runs the definitions
-over a curve, `requirements` compares with bounds, `metric_values` writes border units.
+`branches` cuts windows, `curve_rows` and `rows_in_window` are what a metric looks at, `metric_values` runs the
+definitions over a curve, `requirements` compares with bounds, `metric_values` writes border units.
 """
 
-from cfmkit.metrics.branch_views import Branch, MeasuringFrame
 from cfmkit.metrics.branches import BranchTrace, Undefined, Window, restrict, traces
 from cfmkit.metrics.compare import MetricChange
 from cfmkit.metrics.definition import Definition
+from cfmkit.metrics.measuring_frame import MeasuringFrame
 from cfmkit.metrics.metric_definitions import (
     METRIC_TABLE,
     definition_of,
@@ -38,13 +38,12 @@ from cfmkit.metrics.metric_values import (
     windows_judged,
 )
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
-from cfmkit.metrics.usable_interval_of_all_branches import Cycle
+from cfmkit.metrics.usable_interval_of_all_branches import CycleRows, metric_of_rows
 
 __all__ = [
     "METRIC_TABLE",
-    "Branch",
     "BranchTrace",
-    "Cycle",
+    "CycleRows",
     "Definition",
     "MeasuringFrame",
     "MetricChange",
@@ -64,6 +63,7 @@ __all__ = [
     "left_of",
     "mean_effort",
     "measure",
+    "metric_of_rows",
     "metrics_by_name",
     "metrics_json",
     "other_name",

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.curves import Curve
+    from cfmkit.curves import Curve, Kind
     from cfmkit.results import WindingPath
 
     Interval = tuple[float, float]
@@ -123,6 +123,14 @@ def traces(curve: Curve) -> tuple[BranchTrace, ...]:
 def _trace(curve: Curve, name: str, where: slice | NDArray[np.intp]) -> BranchTrace:
     read = (lambda: curve.extra["max_stress"].values[where]) if "max_stress" in curve.extra else None
     return BranchTrace(name, curve.motion[where], curve.effort[where], read)
+
+
+def span_text(lo: float, hi: float, kind: Kind) -> str:
+    """Return an interval of the motion as text in border units, rounded to six digits: ``2 ... 240 mm``."""
+    from cfmkit.specs.units import border_unit, to_border
+
+    dimension = "length" if kind == "force" else "angle"
+    return f"{float(to_border(lo, dimension)):.6g} ... {float(to_border(hi, dimension)):.6g} {border_unit(dimension)}"
 
 
 def covers(extent: tuple[float, float], window: Window) -> bool:

@@ -1,9 +1,9 @@
-"""Definition of a metric: its name, unit, meaning, and the functions that compute it of one curve and of many."""
+"""Definition of a metric: its name, unit, meaning, and the function that computes it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -29,12 +29,9 @@ class Definition:
     name: str  # as requirements and tables call it
     dimension: str  # a name of `cfmkit.specs.units`, or "effort", "motion", "work": what that is depends on the curve
     definition: str  # one sentence with the source; ``{effort}`` and ``{motion}`` stand for the curve's words
-    # takes a `Branch` (or the `Cycle`, see `scope`), returns SI or raises `Undefined`; None: the family computes it and
-    # puts it into `Result.values`
-    function: Callable[..., float] | None = None
-    # takes a `RowsInWindow` (or the `CycleRows`), returns the same of many curves, (d,), NaN where there is none; None:
-    # studies analyse each curve alone
-    of_rows: Callable[[Any], FloatArray] | None = None
+    # takes `RowsInWindow` (or `CycleRows`, see `scope`), returns SI, (d,), NaN where there is none; of one curve raises
+    # `Undefined` with the reason; None: the family computes it and puts it into `Result.values`
+    function: Callable[..., FloatArray] | None = None
     worst: Worst = "largest"  # which branch counts where none is named; without a target the farthest is the smallest
     # what it belongs to: one branch; all branches together, or one of them alone; the closed loop only; or no curve at
     # all
@@ -44,6 +41,11 @@ class Definition:
     of_material: bool = False  # whether it is there only where the material says something about use
     of_curve: bool = False  # whether it is there only where a target curve is
     of_parts: bool = False  # whether it is there only where the model knows the efforts of single springs and members
+
+    @property
+    def is_known_in_rows(self) -> bool:
+        """Whether rows of many mechanisms have it: what a material says of its use stands with single curves."""
+        return self.function is not None and not self.of_material
 
     @property
     def per_branch(self) -> bool:

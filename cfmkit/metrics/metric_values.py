@@ -16,9 +16,10 @@ import numpy as np
 
 from cfmkit.arrays import LazySequence
 from cfmkit.errors import UsageError
-from cfmkit.metrics.branch_views import MeasuringFrame, span_text
-from cfmkit.metrics.branches import Undefined, Window, covers, traces
+from cfmkit.metrics.branches import Undefined, Window, covers, span_text, traces
+from cfmkit.metrics.curve_rows import rows_of_curve
 from cfmkit.metrics.fatigue_and_relaxation import hold_text
+from cfmkit.metrics.measuring_frame import MeasuringFrame
 from cfmkit.metrics.metric_definitions import (
     definitions,
     metrics_by_name,
@@ -26,12 +27,12 @@ from cfmkit.metrics.metric_definitions import (
     time_of,
     unknown_metric,
 )
-from cfmkit.metrics.usable_interval_of_all_branches import Cycle, cycle
+from cfmkit.metrics.usable_interval_of_all_branches import CycleRows
 from cfmkit.results import WINDOW_OUTSIDE, Finding, Quantity, Status
 from cfmkit.specs.units import TravelShare, border_unit, to_border, window_places
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -144,7 +145,8 @@ class Value(NamedTuple):
 class Survey:
     """All metrics of one curve over one window; each is computed when it is needed."""
 
-    subject: Cycle
+    subject: CycleRows
+    frame: MeasuringFrame
     _known: dict[tuple[Definition, str | None], tuple[Value, ...]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
@@ -152,7 +154,7 @@ class Survey:
     @property
     def branches(self) -> tuple[str, ...]:
         """The names of the branches."""
-        return tuple(branch.name for branch in self.subject.branches)
+        return tuple(self.subject.branches)
 
     def evaluate_each(self, definition: Definition, branch: str | None = None) -> tuple[Value, ...]:
         """Return the values of a metric: of one branch, of every branch, or of the cycle as a whole."""
@@ -164,17 +166,18 @@ class Survey:
         function = definition.function
         if function is None:
             return (Value(None, "it was not computed"),)
+        chosen = self.subject.branches
         if definition.argument:
             if branch is None:
                 return (Value(None, f"it needs a {definition.argument} in brackets: {definition.name}[1000 h]"),)
-            time = time_of(branch)
-            return tuple(_value(partial(function, time=time), item) for item in self.subject.branches)
-        chosen = tuple(item for item in self.subject.branches if branch in (None, item.name))
+            function = partial(function, time=time_of(branch))
+        elif branch is not None:
+            chosen = {name: rows for name, rows in chosen.items() if name == branch}
         if not chosen:
             return (Value(None, self._no_branch(branch)),)
         if definition.scope == "branch":
-            return tuple(_value(function, item) for item in chosen)
-        return (_value(function, self.subject if branch is None else Cycle(chosen, self.subject.frame)),)
+            return tuple(_value(function, rows) for rows in chosen.values())
+        return (_value(function, self.subject if branch is None else CycleRows(chosen)),)
 
     def _no_branch(self, name: str | None) -> str:
         if not self.branches:
@@ -189,7 +192,7 @@ class Survey:
         if len(with_value) < len(values):
             return next(item for item in values if item.value is None)
         heights = np.array([[item.value] for item in with_value])
-        return with_value[worst_branch(definition.worst, heights, self.subject.frame.target).item()]
+        return with_value[worst_branch(definition.worst, heights, self.frame.target).item()]
 
 
 def worst_branch(
@@ -205,9 +208,9 @@ def worst_branch(
     return np.asarray(np.abs(values - target).argmax(axis=0))
 
 
-def _value(function: Callable[..., float], subject: object) -> Value:
+def _value(function: Callable[..., FloatArray], subject: object) -> Value:
     try:
-        value = float(function(subject))
+        (value,) = function(subject).tolist()
     except Undefined as gap:
         return Value(None, gap.reason)
     return Value(value) if isfinite(value) else Value(None, "it is not finite")
@@ -215,7 +218,8 @@ def _value(function: Callable[..., float], subject: object) -> Value:
 
 def survey(curve: Curve, frame: MeasuringFrame, window: Window | None = None) -> Survey:
     """Return the metrics of a curve, measured in a frame over a window."""
-    return Survey(cycle(curve, frame, window))
+    ends = None if window is None else (np.array([window.lo]), np.array([window.hi]))
+    return Survey(CycleRows.from_curves(rows_of_curve(curve, frame), ends), frame)
 
 
 def measure(
@@ -244,12 +248,12 @@ def _all(view: Survey, table: Iterable[Definition]) -> dict[str, Quantity]:
 
 def _entries(view: Survey, definition: Definition) -> Iterator[tuple[str, Quantity]]:
     """Yield the worst branch's value under the plain name, then each branch's."""
-    durability = view.subject.frame.durability
+    durability = view.frame.durability
     if definition.function is None or (definition.of_material and durability is None):
         return
-    if definition.of_curve and view.subject.frame.curve is None:
+    if definition.of_curve and view.frame.curve is None:
         return
-    if definition.of_parts and view.subject.frame.part_efforts is None:
+    if definition.of_parts and view.frame.part_efforts is None:
         return
     if definition.argument:
         for text in map(hold_text, durability.holds if durability else ()):
@@ -418,16 +422,22 @@ def gaps(result: Result) -> tuple[UncoveredWindow, ...]:
     """Return each window of the specification that some branch of the nominal curve does not cover."""
     if not result.curves or not len(result.curves[0]):
         return ()
-    extents = [trace.extent for trace in traces(result.curves[0])]
+    windows = ((path, window_of(result, ends)) for path, ends in result.spec.windows())
+    return find_uncovered(windows, [trace.extent for trace in traces(result.curves[0])], result.curves[0].kind)
+
+
+def find_uncovered(
+    windows: Iterable[tuple[Sequence[Any], Window | None]],  # path in the specification, and the window in places
+    extents: Sequence[tuple[float, float]],  # of the branches of a curve
+    kind: Kind,  # of the curve
+) -> tuple[UncoveredWindow, ...]:
+    """Return each window that some branch of a curve does not cover."""
     paths: dict[Window, list[str]] = {}
-    for path, ends in result.spec.windows():
-        window = window_of(result, ends)
+    for path, window in windows:
         if window is not None and not all(covers(extent, window) for extent in extents):
             paths.setdefault(window, []).append(".".join(map(str, path)))
     common = max(low for low, _ in extents), min(high for _, high in extents)
-    return tuple(
-        UncoveredWindow(window, tuple(where), common, result.curves[0].kind) for window, where in paths.items()
-    )
+    return tuple(UncoveredWindow(window, tuple(where), common, kind) for window, where in paths.items())
 
 
 def windows_judged(result: Result) -> Result:

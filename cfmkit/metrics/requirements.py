@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import Problem, QuantityError, SpecError
-from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.branches import span_text
 from cfmkit.metrics.metric_definitions import (
     branch_fault,
     known_metrics,

@@ -2,259 +2,169 @@
 
 Each has its function and, in the tables at the end, its definition.
 
-A branch whose mean is negative is judged in its own direction (the opposite sign
-convention gives the same ripple). Each function takes a `Branch` (or the
-`Cycle`) and returns SI, or raises `Undefined` with the reason.
+A branch whose mean is negative is judged in its own direction (the opposite sign convention gives the same ripple).
+Each function takes `RowsInWindow` (or `CycleRows`) and returns SI, (d,): NaN where a row has no value. One row by
+itself raises `Undefined` with the reason. A share of something that is not above the numerical error of the effort is
+NaN: rounding over rounding says nothing.
 """
 
 from __future__ import annotations
 
-from functools import partial
-from math import isnan, sqrt
-from operator import attrgetter, methodcaller
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics import branches, ranges_many, spread
-from cfmkit.metrics.branches import BranchTrace, Undefined, Window
-from cfmkit.metrics.continuous_means_and_extremes import extremes
+from cfmkit.metrics.branches import Undefined
 from cfmkit.metrics.definition import Definition
-from cfmkit.metrics.ranges_many import UNIFORM_POINTS
-from cfmkit.results import LargestStress, OwnStress
+from cfmkit.metrics.ranges import rms_about, uniform_places
+from cfmkit.metrics.rows_in_window import restrict_to_window
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from cfmkit.arrays import FloatArray
-    from cfmkit.metrics.branch_views import Branch
-    from cfmkit.metrics.usable_interval_of_all_branches import Cycle
+    from cfmkit.metrics.rows_in_window import RowsInWindow
+    from cfmkit.metrics.usable_interval_of_all_branches import CycleRows
 
 
+EXTREME_RTOL = 1e-7
+"""A sum of both extremes that is smaller than this part of their distance is what their search leaves, with room."""
 NO_STRESS = 1e-12  # share of the allowable stress that rounding leaves where nothing is stressed
-UNKNOWN_BESIDE = "the stress of another load case is not known everywhere in the window"
-"""Why there is no largest stress, and no life."""
+STATIC_BALANCE = "static_balance"
 
 
-def mean(branch: Branch) -> float:
+def mean(rows: RowsInWindow) -> FloatArray:
     """Return the mean effort over the points in the window."""
-    return float(spread.level(branch.spread))
+    return rows.mean
 
 
-def standard_deviation(branch: Branch) -> float:
+def standard_deviation(rows: RowsInWindow) -> FloatArray:
     """Return the sample standard deviation (n - 1) of the effort over the points in the window."""
-    effort = branch.inside.effort
-    if len(effort) < 2:
-        raise Undefined("a standard deviation needs two points")
-    if branch.frame.over_motion:
-        return sqrt(branch.mean_over_motion((effort - mean(branch)) ** 2))
-    return float(spread.deviation(effort, mean(branch)))
+    rows.require(rows.inside.count > 1, "a standard deviation needs two points")
+    return rows.deviation
 
 
-def largest(branch: Branch) -> float:
+def largest(rows: RowsInWindow) -> FloatArray:
     """Return the largest effort in the window."""
-    return float(spread.largest(branch.spread))
+    return rows.extremes[0]
 
 
-def smallest(branch: Branch) -> float:
+def smallest(rows: RowsInWindow) -> FloatArray:
     """Return the smallest effort in the window."""
-    return float(spread.smallest(branch.spread))
+    return rows.extremes[1]
 
 
-def ripple(branch: Branch) -> float:
+def ripple(rows: RowsInWindow) -> FloatArray:
     """Return (max - min) / max."""
-    return _require_value(spread.ripple(branch.spread), branch)
+    return _share(rows, rows.spread.max - rows.spread.min, rows.spread.max)
 
 
-def half_band(branch: Branch) -> float:
+def half_band(rows: RowsInWindow) -> FloatArray:
     """Return (max - min) / (max + min)."""
-    return _require_value(spread.half_band(branch.spread), branch)
+    width, whole = rows.spread.max - rows.spread.min, rows.spread.max + rows.spread.min
+    return _share(rows, width, np.where(whole > EXTREME_RTOL * width, whole, 0.0))
 
 
-def deviation_from_mean(branch: Branch) -> float:
+def deviation_from_mean(rows: RowsInWindow) -> FloatArray:
     """Return the largest ``|F - mean| / mean``."""
-    return _require_value(spread.deviation_from_mean(branch.spread), branch)
+    middle, high, low, _ = rows.spread
+    return _share(rows, np.maximum(high - middle, middle - low), middle)
 
 
-def _require_value(share: float, branch: Branch) -> float:
-    if isnan(share):
-        raise Undefined(branch.vanishes)
-    return float(share)
+def _share(rows: RowsInWindow, part: FloatArray, whole: FloatArray) -> FloatArray:
+    known = rows.require(whole > rows.curves.error, rows.describe_gap)
+    return np.where(known, part / np.where(known, whole, 1.0), np.nan)
 
 
-def static_balance(branch: Branch) -> float:
+def static_balance(rows: RowsInWindow) -> FloatArray:
     """Return the largest ``|F|`` over the largest of one spring or member in the window."""
-    part = branch.largest_part
-    if part <= branch.error:
-        raise Undefined(f"no spring or member bears more than the numerical error, {branch.error_text}")
-    return float(spread.static_balance(branch.spread, part))
+    part = rows.largest_part
+    text = "no spring or member bears more than the numerical error"
+    known = rows.require(part > rows.curves.error, lambda: f"{text}, {rows.error_text}")
+    return np.where(known, np.abs(rows.extremes).max(axis=0) / np.where(known, part, 1.0), np.nan)
 
 
-def deviation_from_target(branch: Branch) -> float:
+def deviation_from_target(rows: RowsInWindow) -> FloatArray:
     """Return the largest ``|F - target| / target``."""
-    return float(spread.deviation_from_target(branch.spread, branch.frame.needed_target()))
+    extremes, target = rows.extremes, rows.require_target()
+    return np.asarray(np.abs(np.subtract(extremes, target)).max(axis=0) / np.abs(target))
 
 
-@np.errstate(all="ignore")
-def rms_to_target(branch: Branch) -> float:
+def rms_to_target(rows: RowsInWindow) -> FloatArray:
     """Return the root mean square of F - target at places uniform in the motion, the window's start excluded."""
-    target = np.array([branch.frame.needed_target()])
-    branch.inside  # noqa: B018  (raises where the window is not covered)
-    return float(ranges_many.rms_to_target(branch.many, target)[0])
+    target = rows.require_target()
+    rows.inside  # noqa: B018  (raises where the window is not covered)
+    return rms_about(rows, target[:, None])
 
 
-@np.errstate(all="ignore")
-def _uniform(branch: Branch) -> tuple[FloatArray, FloatArray]:
-    """Return places uniform in the motion, the start of the window left out, and the efforts there."""
-    branch.inside  # noqa: B018  (raises where the window is not covered)
-    places = ranges_many.uniform_places(branch.many)
-    return places[0], branch.many.interpolate(places)[0]
-
-
-def deviation_from_curve(branch: Branch) -> float:
+def deviation_from_curve(rows: RowsInWindow) -> FloatArray:
     """Return the largest ``|F - F*|`` over the largest ``|F*|`` in the window; of a model, next to the points, too."""
-    (low, high), part, model = branch.ends, branch.inside, branch.frame.closed
-    curve = branch.frame.needed_curve(low, high, branch.kind)
-    size = curve.largest(low, high)
-    if size <= branch.error:
-        raise Undefined("the target curve is zero in the window")
-    offset = part.effort - curve.evaluate(part.motion)
-    top, bottom = offset.max(), offset.min()
-    if model is not None:
-
-        def measure_deviation(places: FloatArray) -> FloatArray:
-            return np.asarray(model.effort(branch.name, places) - curve.evaluate(places))
-
-        top, bottom = (float(one[0]) for one in extremes(measure_deviation, part.motion[None, :], offset[None, :]))
-    return float(max(top, -bottom)) / size
+    inside, curve, curves = rows.inside, rows.require_followed(), rows.curves
+    size = rows.largest_followed(*rows.ends)
+    rows.require(~np.isnan(size), "the target curve is zero in the window")
+    if curve is None:
+        return size
+    offsets = inside.change(inside.values - curve.evaluate(inside.motion))
+    if curves.effort is None:
+        top, bottom = offsets.values.max(axis=1), offsets.values.min(axis=1)
+    else:
+        top, bottom = offsets.extremes(lambda places: curves.all_at(places) - curve.evaluate(places))
+    return np.asarray(np.maximum(top, -bottom) / size)
 
 
-def rms_to_curve(branch: Branch) -> float:
+def rms_to_curve(rows: RowsInWindow) -> FloatArray:
     """Return the root mean square of F - F* at places uniform in the motion, the window's start excluded."""
-    places, effort = _uniform(branch)
-    offset = effort - branch.frame.needed_curve(*branch.ends, branch.kind).evaluate(places)
-    return sqrt(float(offset @ offset) / UNIFORM_POINTS)
+    rows.inside  # noqa: B018  (raises where the window is not covered)
+    rows.require_straight()
+    curve = rows.require_followed()
+    if curve is None:
+        return np.full(len(rows), np.nan)
+    return np.where(rows.is_followed(*rows.ends), rms_about(rows, curve.evaluate(uniform_places(rows))), np.nan)
 
 
-def hysteresis_area(cycle: Cycle) -> float:
+def hysteresis_area(cycle: CycleRows) -> FloatArray:
     """Return the area between the branches ``load`` and ``unload`` in the window, positive where load lies above.
 
     The trapezoids of each branch on its own points add up to those of their
     difference on the union of the points, so no common grid is needed.
     """
-    by_name = {branch.name: branch for branch in cycle.branches}
-    if not {"load", "unload"} <= set(by_name):
+    if not {"load", "unload"} <= set(cycle.branches):
         raise Undefined("a hysteresis loop needs the branches 'load' and 'unload'")
-    load, unload = by_name["load"], by_name["unload"]
-    window = load.window or _common(load, unload)
-    return _area(load, window) - _area(unload, window)
+    load, unload = (cycle.branches[name] for name in ("load", "unload"))
+    if load.window is None and not np.array_equal(load.ends, unload.ends):
+        common = np.maximum(load.ends[0], unload.ends[0]), np.minimum(load.ends[1], unload.ends[1])
+        load.require(common[0] < common[1], "the branches 'load' and 'unload' have no travel in common")
+        load, unload = (restrict_to_window(rows.curves, common) for rows in (load, unload))
+    return np.where(load.covered & unload.covered, load.work - unload.work, np.nan)
 
 
-def _common(one: Branch, other: Branch) -> Window:
-    """Return the travel that both branches cover."""
-    lo, hi = max(one.extent[0], other.extent[0]), min(one.extent[1], other.extent[1])
-    if not lo < hi:
-        raise Undefined("the branches 'load' and 'unload' have no travel in common")
-    return Window(lo, hi)
-
-
-def _area(branch: Branch, window: Window) -> float:
-    """Return the area under a branch, whichever way it runs."""
-    part = branch.inside if window == branch.window else branch.part(window)
-    if not isinstance(part, BranchTrace):
-        raise Undefined(part)
-    way = np.sign(branch.trace.motion[-1] - branch.trace.motion[0])
-    return float(way) * part.work()
-
-
-def stress_max(branch: Branch) -> float:
+def stress_max(rows: RowsInWindow) -> FloatArray:
     """Return the largest stress in the window, in whatever load case it is; of a model, next to the points, too."""
-    model, beside = branch.frame.closed, [one.stress for one in branch.inside_beside if one.stress is not None]
-    if any(np.isnan(one).any() for one in beside):
-        raise Undefined(UNKNOWN_BESIDE)
-    branch.inside  # noqa: B018  (raises where the window is not covered)
-    own: float | None = None
-    if isinstance(model, LargestStress):
-        own = model.largest_stress(branch.name, *branch.ends)
-    return max([_stress_range(branch)[1] if own is None else own, *(float(one.max()) for one in beside)])
+    return rows.largest_stress()
 
 
-def _stress_range(branch: Branch, alone: bool = False) -> tuple[float, float]:
-    """Return the least and the largest stress of a branch in the window [Pa].
-
-    `alone`: its own load case only, where a model knows the largest stress of all of them.
-    """
-    own, model = _stress(branch.inside), branch.frame.closed
-    if (path := branch.frame.winding) is not None:
-        top, bottom = branches.stress_extremes(path, *branch.ends_on_way)
-        return bottom, top
-    if model is None:
-        return float(own.min()), float(own.max())
-    law, motion = partial(model.stress, branch.name), branch.inside.motion
-    if alone and branch.frame.load_cases and isinstance(model, OwnStress):
-        law = partial(model.own_stress, branch.name)
-        own = law(motion)  # ends of the window between two points have the stress of all load cases
-    tops, bottoms = extremes(law, motion[None, :], own[None, :])
-    return float(bottoms[0]), float(tops[0])
-
-
-def safety_factor(branch: Branch) -> float:
+def safety_factor(rows: RowsInWindow) -> FloatArray:
     """Return the allowable stress over the largest stress in the window."""
-    allowable = branch.frame.allowable_stress
-    if allowable is None:
-        raise Undefined("there is no allowable stress to compare with")
-    stress = stress_max(branch)
-    if stress <= NO_STRESS * allowable:
-        raise Undefined("nothing is stressed")
-    return allowable / stress
+    stress, stated = rows.curves.stress, rows.curves.frame.allowable_stress
+    allowable = np.array([np.nan if stated is None else stated]) if stress is None else stress.allowable
+    rows.require(~np.isnan(allowable), "there is no allowable stress to compare with")
+    top = rows.largest_stress()
+    return np.where(rows.require(top > NO_STRESS * allowable, "nothing is stressed"), allowable / top, np.nan)
 
 
-def _stress(trace: BranchTrace) -> FloatArray:
-    if trace.stress is None:
-        raise Undefined("the curve has no column 'max_stress'")
-    if unknown := int(np.isnan(trace.stress).sum()):
-        raise Undefined(f"the stress is unbounded at {unknown} of {len(trace.stress)} points in the window")
-    return trace.stress
-
-
-def fatigue_life(branch: Branch) -> float:
+def fatigue_life(rows: RowsInWindow) -> FloatArray:
     """Return the cycles to failure between the least and the largest stress in the window, of all load cases."""
-    known = branch.frame.durability
+    known = rows.curves.frame.durability
     if known is None or known.fatigue is None:
         raise Undefined("the material has no fatigue data: add 'fatigue' to it")
-    ranges = [_stress_range(branch, alone=True)]
-    for part in branch.inside_beside:
-        if part.stress is None or np.isnan(part.stress).any():
-            raise Undefined(UNKNOWN_BESIDE)
-        ranges.append((float(part.stress.min()), float(part.stress.max())))
-    return min(known.fatigue.life(largest, least) for least, largest in ranges)
+    ranges = [rows.find_stress_range(alone=True), *rows.list_stress_ranges_beside()]
+    return np.array([min(known.fatigue.life(most, least) for (least,), (most,) in ranges if least <= most)])
 
 
-def effort_after(branch: Branch, time: float) -> float:
+def effort_after(rows: RowsInWindow, time: float) -> FloatArray:
     """Return the mean effort in the window after a hold of a time [s]."""
-    known = branch.frame.durability
+    known = rows.curves.frame.durability
     if known is None or known.relaxation is None:
         raise Undefined("the material has no relaxation data: add 'relaxation' to it")
-    return float(branch.spread.mean * branch.spread.sign * known.relaxation.ratio(time))
-
-
-# --- the same of many curves, `RowsInWindow`, (d,) each; functions with names, since studies are pickled --------------
-
-
-def _extreme(which: int, rows: Any) -> FloatArray:
-    return np.asarray(rows.many.extremes[which])
-
-
-def _read_spread(function: Callable[[spread.Spread], FloatArray], rows: Any) -> FloatArray:
-    return function(rows.many.spread)
-
-
-def _deviations_from_target(rows: Any) -> FloatArray:
-    return np.asarray(spread.deviation_from_target(rows.many.spread, rows.curves.target))
-
-
-def _where_known(function: Callable[[Any], FloatArray], rows: Any) -> FloatArray:
-    return np.asarray(rows.where_known(function(rows)))
+    return np.asarray(rows.mean * known.relaxation.ratio(time))
 
 
 _TABLE_3 = "[Sanchez-Salinas 2022, Table 3]"
@@ -265,7 +175,6 @@ IN_WINDOW = (
         "effort",
         f"mean {{effort}} over the points in the window, its ends included {_TABLE_3}",
         mean,
-        attrgetter("many.mean"),
         worst="farthest-from-target",
     ),
     Definition(
@@ -273,21 +182,18 @@ IN_WINDOW = (
         "effort",
         f"standard deviation (n - 1) of the {{effort}} over the points in the window {_TABLE_3}",
         standard_deviation,
-        attrgetter("many.deviation"),
     ),
     Definition(
         "force_max",
         "effort",
         f"largest {{effort}} in the window {_TABLE_3}",
         largest,
-        partial(_extreme, 0),
     ),
     Definition(
         "force_min",
         "effort",
         f"smallest {{effort}} in the window {_TABLE_3}",
         smallest,
-        partial(_extreme, 1),
         worst="smallest",
     ),
     Definition(
@@ -295,28 +201,24 @@ IN_WINDOW = (
         "ratio",
         f"(max - min)/max of the {{effort}} in the window: the fluctuation of {_DING_SECTION}",
         ripple,
-        partial(_read_spread, spread.ripple),
     ),
     Definition(
         "half_band",
         "ratio",
         "(max - min)/(max + min) of the {effort} in the window: half the width of the narrowest band that holds it",
         half_band,
-        partial(_read_spread, spread.half_band),
     ),
     Definition(
         "deviation_from_mean",
         "ratio",
         f"largest |F - mean|/mean of the {{effort}} in the window {_DING_SECTION}",
         deviation_from_mean,
-        partial(_read_spread, spread.deviation_from_mean),
     ),
     Definition(
         "deviation_from_target",
         "ratio",
         "largest |F - target|/target of the {effort} in the window",
         deviation_from_target,
-        _deviations_from_target,
     ),
     Definition(
         "rms_to_target",
@@ -324,7 +226,6 @@ IN_WINDOW = (
         "sqrt(mean((F - target)^2)) of the {effort} at 100 places uniform in the {motion}, "
         "the start of the window excluded [Bilancia 2019, eq. 8]",
         rms_to_target,
-        partial(_where_known, methodcaller("rms_to_target")),
     ),
     Definition(
         "deviation_from_curve",
@@ -332,7 +233,6 @@ IN_WINDOW = (
         "largest |F - F*| of the {effort} over the largest |F*| in the window, F* the curve of `design.target` or "
         "`analysis.target`",
         deviation_from_curve,
-        partial(_where_known, methodcaller("deviation_from_curve")),
         of_curve=True,
     ),
     Definition(
@@ -341,16 +241,14 @@ IN_WINDOW = (
         "sqrt(mean((F - F*)^2)) of the {effort} at 100 places uniform in the {motion}, the start of the window "
         "excluded, F* the curve of `design.target` or `analysis.target`",
         rms_to_curve,
-        partial(_where_known, methodcaller("rms_to_curve")),
         of_curve=True,
     ),
     Definition(
-        spread.STATIC_BALANCE,
+        STATIC_BALANCE,
         "ratio",
         "largest |F| of the {effort} in the window over the largest {effort} of one spring or member there, which is "
         "the derivative of its energy by the {motion}; 0 is a perfect balancer",
         static_balance,
-        partial(_where_known, methodcaller("static_balance")),
         of_parts=True,
     ),
 )
@@ -362,7 +260,6 @@ LOSS_AND_STRESS_METRICS = (
         "closed integral of the {effort} over the {motion} in the window, positive where 'load' lies above 'unload' "
         "[Sanchez-Salinas 2022, sec. 3]",
         hysteresis_area,
-        attrgetter("loop_area"),
         scope="loop",
     ),
     Definition(
@@ -370,14 +267,12 @@ LOSS_AND_STRESS_METRICS = (
         "stress",
         "largest stress in the window, of all load cases",
         stress_max,
-        partial(_where_known, methodcaller("stress_max")),
     ),
     Definition(
         "safety_factor",
         "factor",
         "allowable stress over the largest stress in the window, of all load cases; 1 or more is within the limit",
         safety_factor,
-        partial(_where_known, methodcaller("safety_factor")),
         worst="smallest",
     ),
 )

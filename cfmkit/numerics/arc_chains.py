@@ -382,13 +382,13 @@ class _Curve:
                 knots.append(knots[-1] + sense * length)
         return forward, backward[::-1]
 
-    def _longest(self, knot: int, way: int, share: float, guess: int) -> int:
+    def _longest(self, knot: int, direction: int, share: float, guess: int) -> int:
         """Return how many samples the longest fitting piece spans; one is always taken."""
-        room = len(self.points) - 1 - knot if way > 0 else knot
+        room = len(self.points) - 1 - knot if direction > 0 else knot
         fits, fails, length, tries = 1, room + 1, guess, 0
         while fails - fits > 1:
             length = min(max(length, fits + 1), fails - 1, 4 * fits + 8 * guess)
-            used = self.usage(*sorted((knot, knot + way * length)))
+            used = self.usage(*sorted((knot, knot + direction * length)))
             fits, fails = (length, fails) if used <= share else (fits, length)
             tries += 1
             # the deviation grows with the cube of the length; where it does not, halve the bracket

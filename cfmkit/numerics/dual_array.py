@@ -84,8 +84,8 @@ class DualArray:
             value = self.value * other
             return DualArray(value, self.aligned_slopes(value.ndim) * other)
         value = self.value * other.value
-        own, others = self.aligned_slopes(value.ndim), other.aligned_slopes(value.ndim)
-        return DualArray(value, own * other.value + others * self.value)
+        slopes, others = self.aligned_slopes(value.ndim), other.aligned_slopes(value.ndim)
+        return DualArray(value, slopes * other.value + others * self.value)
 
     __rmul__ = __mul__
 
@@ -94,8 +94,8 @@ class DualArray:
             value = self.value / other
             return DualArray(value, self.aligned_slopes(value.ndim) / other)
         value = self.value / other.value
-        own, others = self.aligned_slopes(value.ndim), other.aligned_slopes(value.ndim)
-        return DualArray(value, (own - others * value) / other.value)
+        slopes, others = self.aligned_slopes(value.ndim), other.aligned_slopes(value.ndim)
+        return DualArray(value, (slopes - others * value) / other.value)
 
     def __rtruediv__(self, other: Any) -> DualArray:
         value = other / self.value
@@ -109,8 +109,8 @@ class DualArray:
         return self.map_linear(lambda rows: rows @ matrix)
 
     def __getitem__(self, index: Any) -> DualArray:
-        own = index if isinstance(index, tuple) else (index,)
-        return DualArray(self.value[own], self.all_slopes[(slice(None), *own)])
+        places = index if isinstance(index, tuple) else (index,)
+        return DualArray(self.value[places], self.all_slopes[(slice(None), *places)])
 
     def sum(self, axis: int) -> DualArray:
         """Return the sum along an axis, which is counted from the end."""

@@ -37,10 +37,10 @@ def usual_steps(places: FloatArray) -> FloatArray:
 def is_hole_after(places: FloatArray) -> NDArray[np.bool_]:
     """Return after which of (n,) places in increasing order there is a hole, (n - 1,)."""
     distinct, last = np.unique(places[::-1], return_index=True)
-    found = np.zeros(max(len(places) - 1, 0), dtype=bool)
+    is_hole = np.zeros(max(len(places) - 1, 0), dtype=bool)
     steps = np.diff(distinct)
-    found[len(places) - 1 - last[:-1]] = steps > HOLE_STEP_RATIO * usual_steps(distinct)
-    return found
+    is_hole[len(places) - 1 - last[:-1]] = steps > HOLE_STEP_RATIO * usual_steps(distinct)
+    return is_hole
 
 
 def holes_between(places: FloatArray, low: float, high: float) -> list[tuple[float, float]]:
@@ -56,9 +56,9 @@ def sample_weights(
 ) -> FloatArray:
     """Return the length that each sample represents, half of each step beside it, (n,); holes count as usual steps."""
     steps = np.diff(places)
-    found = np.zeros(len(places))
+    weights = np.zeros(len(places))
     if len(steps):
         steps = np.where(is_hole_after(places), np.minimum(steps, usual_steps(places)), steps)
-        found[1:] += 0.5 * steps
-        found[:-1] += 0.5 * steps
-    return found
+        weights[1:] += 0.5 * steps
+        weights[:-1] += 0.5 * steps
+    return weights

@@ -50,13 +50,13 @@ def value_at(x: FloatArray, y: FloatArray, place: float) -> float:
     """
     count = min(4, len(x))
     first = min(max(int(np.searchsorted(x, place)) - 2, 0), len(x) - count)
-    near, values = x[first : first + count].tolist(), y[first : first + count].tolist()
+    places_of_row, values = x[first : first + count].tolist(), y[first : first + count].tolist()
     total = 0.0
     for i in range(count):
         weight = 1.0
         for j in range(count):
             if j != i:
-                weight *= (float(place) - near[j]) / (near[i] - near[j])
+                weight *= (float(place) - places_of_row[j]) / (places_of_row[i] - places_of_row[j])
         total += weight * values[i]
     return total
 
@@ -96,39 +96,39 @@ def inner_extremes_of_rows(rows: Sequence[tuple[FloatArray, FloatArray]]) -> lis
     row = np.repeat(np.arange(len(long)), counts - 1)
     left = np.arange(len(row)) + row  # the last sample of a row begins no step
     first = np.clip(left - 1, (ends - counts)[row], ends[row] - 4)[:, None] + np.arange(4)
-    near, values = x[first], y[first]
-    t = near - x[left][:, None]
-    one = np.diff(values, axis=1) / np.diff(t, axis=1)
-    two = np.diff(one, axis=1) / (t[:, 2:] - t[:, :-2])
-    three = (two[:, 1] - two[:, 0]) / (t[:, 3] - t[:, 0])
+    neighbours, values = x[first], y[first]
+    t = neighbours - x[left][:, None]
+    slopes = np.diff(values, axis=1) / np.diff(t, axis=1)
+    second = np.diff(slopes, axis=1) / (t[:, 2:] - t[:, :-2])
+    third = (second[:, 1] - second[:, 0]) / (t[:, 3] - t[:, 0])
     # Newton's form as powers of t: the slope is c + 2 b t + 3 a t^2
-    a, b = three, two[:, 0] - three * t[:, :3].sum(axis=1)
-    c = one[:, 0] - two[:, 0] * (t[:, 0] + t[:, 1])
-    c += three * (t[:, 0] * t[:, 1] + t[:, 0] * t[:, 2] + t[:, 1] * t[:, 2])
+    a, b = third, second[:, 0] - third * t[:, :3].sum(axis=1)
+    c = slopes[:, 0] - second[:, 0] * (t[:, 0] + t[:, 1])
+    c += third * (t[:, 0] * t[:, 1] + t[:, 0] * t[:, 2] + t[:, 1] * t[:, 2])
     width = x[left + 1] - x[left]
     with np.errstate(invalid="ignore", divide="ignore"):
         root = -(b + np.copysign(np.sqrt(b * b - 3.0 * a * c), b))
         places = np.stack([root / (3.0 * a), c / root], axis=1)
         inside = (places > 0.0) & (places < width[:, None])
     step, which = np.nonzero(inside)
-    found = x[left[step]] + places[step, which]
-    heights = _cubics(near[step], values[step], found)
+    roots = x[left[step]] + places[step, which]
+    heights = _cubics(neighbours[step], values[step], roots)
     least = (EXTREME_RTOL * np.maximum.reduceat(np.abs(y), ends - counts))[row[step]]
     before, behind = y[left[step]], y[left[step] + 1]
     turns = (heights > np.maximum(before, behind) + least) | (heights < np.minimum(before, behind) - least)
-    found, row = found[turns], row[step][turns]
-    each = iter([distinct(found[row == k]) for k in range(len(long))])
-    return [next(each) if len(x) >= 4 else np.zeros(0) for x, _ in rows]
+    roots, row = roots[turns], row[step][turns]
+    roots_of_rows = iter([distinct(roots[row == k]) for k in range(len(long))])
+    return [next(roots_of_rows) if len(x) >= 4 else np.zeros(0) for x, _ in rows]
 
 
-def _cubics(near: FloatArray, values: FloatArray, places: FloatArray) -> FloatArray:
+def _cubics(neighbours: FloatArray, values: FloatArray, places: FloatArray) -> FloatArray:
     """Return the polynomials through some samples each, (n, k), at one place each, (n,)."""
-    total, count = np.zeros((len(places), *values.shape[2:])), near.shape[1]
+    total, count = np.zeros((len(places), *values.shape[2:])), neighbours.shape[1]
     for i in range(count):
         weight = np.ones(len(places))
         for j in range(count):
             if j != i:
-                weight *= (places - near[:, j]) / (near[:, i] - near[:, j])
+                weight *= (places - neighbours[:, j]) / (neighbours[:, i] - neighbours[:, j])
         total += weight.reshape(-1, *[1] * (values.ndim - 2)) * values[:, i]
     return total
 
@@ -189,11 +189,11 @@ def first_extreme(
     low, high = float(x[index - 1]), float(x[index + 1])
     ratio = 0.5 * (np.sqrt(5.0) - 1)
     for _ in range(_N_HALVINGS):
-        one, other = high - ratio * (high - low), low + ratio * (high - low)
-        if sign * value_at(x, y, one) > sign * value_at(x, y, other):
-            high = other
+        left, right = high - ratio * (high - low), low + ratio * (high - low)
+        if sign * value_at(x, y, left) > sign * value_at(x, y, right):
+            high = right
         else:
-            low = one
+            low = left
     place = 0.5 * (low + high)
     return place, value_at(x, y, place)
 
@@ -267,8 +267,8 @@ class ThroughPoints:
         piece, t = self._piece(x)
         a, b, c, d = (term[piece] for term in self._terms)
         beyond = np.asarray(x) - np.clip(x, self._knots[0], self._knots[-1])
-        own = t * (a + t * (b / 2.0 + t * (c / 3.0 + t * d / 4.0)))
-        return self._before[piece] + own + beyond * (a + t * (b + t * (c + t * d)))
+        areas = t * (a + t * (b / 2.0 + t * (c / 3.0 + t * d / 4.0)))
+        return self._before[piece] + areas + beyond * (a + t * (b + t * (c + t * d)))
 
     def invert_integral(
         self,
@@ -291,12 +291,12 @@ class ThroughPoints:
         a, b, c, d = (term[piece] for term in self._terms)
         a, left, width = a - less, np.maximum(values - starts[piece], 0.0), widths[piece]
         root = np.sqrt(np.maximum(a * a + 2.0 * b * left, 0.0))  # of a straight line it is this
-        way = np.minimum(2.0 * left / np.maximum(a + root, 1e-300), width)
+        step = np.minimum(2.0 * left / np.maximum(a + root, 1e-300), width)
         for _ in range(NEWTON_STEPS):
-            rate = np.maximum(a + way * (b + way * (c + way * d)), 1e-300)
-            excess = way * (a + way * (b / 2.0 + way * (c / 3.0 + way * d / 4.0))) - left
-            way = np.minimum(np.maximum(way - excess / rate, 0.0), width)
-        return self._knots[piece] + way
+            rate = np.maximum(a + step * (b + step * (c + step * d)), 1e-300)
+            excess = step * (a + step * (b / 2.0 + step * (c / 3.0 + step * d / 4.0))) - left
+            step = np.minimum(np.maximum(step - excess / rate, 0.0), width)
+        return self._knots[piece] + step
 
     def extremes(self, low: float, high: float) -> tuple[float, float]:
         """Return the smallest and the largest value between two places: these functions have no extreme off a point."""
@@ -369,10 +369,10 @@ class ChebyshevPanels(ShortRepr):
         panel = np.searchsorted(self.ends[1:-1], x, side="right")
         low, high = self.spans[panel].T
         t = (2.0 * x - low - high) / (high - low)
-        c, one, two = self.coefficients[panel], np.zeros(x.shape), np.zeros(x.shape)
+        c, b, b_before = self.coefficients[panel], np.zeros(x.shape), np.zeros(x.shape)
         for k in range(N_PANEL_NODES - 1, 0, -1):
-            one, two = c[..., k] + 2.0 * t * one - two, one
-        return np.asarray(c[..., 0] + t * one - two)
+            b, b_before = c[..., k] + 2.0 * t * b - b_before, b
+        return np.asarray(c[..., 0] + t * b - b_before)
 
 
 def nodes_of(panel: tuple[float, float]) -> FloatArray:
@@ -425,9 +425,9 @@ def resolve_panels(
         largest = np.fmax(largest, np.nanmax(np.abs(values), axis=1, initial=0.0))
         rough: dict[tuple[float, float], list[FloatArray]] = {}
         for panel in wanted:
-            found = [coefficients(panel, places, row) for row in values]
-            tails = np.array([np.abs(one[-3:]).max() for one in found])
-            (rough if left and len(places) <= MAX_PLACES and (tails > close * largest).any() else done)[panel] = found
+            series = [coefficients(panel, places, row) for row in values]
+            tails = np.array([np.abs(values[-3:]).max() for values in series])
+            (rough if left and len(places) <= MAX_PLACES and (tails > close * largest).any() else done)[panel] = series
         if not rough:
             break
         middles = {panel: 0.5 * (panel[0] + panel[1]) for panel in rough}

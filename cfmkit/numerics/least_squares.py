@@ -54,20 +54,20 @@ class LeastSquares:
 
         At a bound, or where the residuals beyond are not finite, the difference is one-sided.
         """
-        here = self.residuals(values)
-        return np.column_stack([self._column(values, here, k) for k in range(len(values))])
+        start = self.residuals(values)
+        return np.column_stack([self._column(values, start, k) for k in range(len(values))])
 
-    def _column(self, values: FloatArray, here: FloatArray, k: int) -> FloatArray:
+    def _column(self, values: FloatArray, start: FloatArray, k: int) -> FloatArray:
         ends = []
-        for way in (1.0, -1.0):
+        for sign in (1.0, -1.0):
             moved = np.array(values)
-            moved[k] = np.clip(values[k] + way * DIFFERENCE_STEP * self.size[k], self.low[k], self.high[k])
-            found = self.residuals(moved) if moved[k] != values[k] else here
-            good = bool(np.isfinite(found).all())
-            ends.append((moved[k], found) if good else (values[k], here))
+            moved[k] = np.clip(values[k] + sign * DIFFERENCE_STEP * self.size[k], self.low[k], self.high[k])
+            shifted = self.residuals(moved) if moved[k] != values[k] else start
+            good = bool(np.isfinite(shifted).all())
+            ends.append((moved[k], shifted) if good else (values[k], start))
         (above, upper), (below, lower) = ends
         if above == below:
-            return np.zeros_like(here)
+            return np.zeros_like(start)
         return np.asarray((upper - lower) * (self.size[k] / (above - below)))
 
 

@@ -144,9 +144,9 @@ def register(
     for weighted in (False, True) if robust else (False,):
         for _ in range(_MAX_STEPS):
             moved = [turn_points(item, state[0], state[1:3]) for item in points]
-            found = [feet(curve, item, u) for curve, item, u in zip(curves, moved, guess, strict=True)]
-            guess = [*found]
-            rows, residuals, weights = _equations(curves, moved, found, weighted, state[3])
+            nearest = [feet(curve, item, u) for curve, item, u in zip(curves, moved, guess, strict=True)]
+            guess = [*nearest]
+            rows, residuals, weights = _equations(curves, moved, nearest, weighted, state[3])
             step = _step(rows[:, : 4 if width else 3], residuals - state[3], weights, size)
             state[:3] = state[0] + step[0], *turn_points(state[None, 1:3], step[0], step[1:3])[0]
             state[3] += step[3] if width else 0.0
@@ -159,17 +159,17 @@ def registered_where_it_is(
     points: Sequence[FloatArray], curves: Sequence[SmoothCurve], like: Registration
 ) -> Registration:
     """Return points that are in the part's datum already: nothing is moved, outliers are those of `like`."""
-    found = [feet(curve, item) for curve, item in zip(curves, points, strict=True)]
-    _, residuals, weights = _equations(curves, points, found, False, 0.0)
+    nearest = [feet(curve, item) for curve, item in zip(curves, points, strict=True)]
+    _, residuals, weights = _equations(curves, points, nearest, False, 0.0)
     cuts = np.cumsum([len(item) for item in points])[:-1]
     inside = np.split(weights, cuts)
     return Registration(
         angle=0.0,
         shift=np.zeros(2),
         points=tuple(points),
-        parameters=tuple(found),
+        parameters=tuple(nearest),
         errors=tuple(np.split(residuals, cuts)),
-        weights=tuple(weight * one for weight, one in zip(like.weights, inside, strict=True)),
+        weights=tuple(weight * is_inside for weight, is_inside in zip(like.weights, inside, strict=True)),
         covariance=np.zeros((3, 3)),
         growth=np.zeros(2),
     )
@@ -222,8 +222,8 @@ def _registration(
     state: FloatArray, points: Sequence[FloatArray], curves: Sequence[SmoothCurve], robust: bool, width: bool
 ) -> Registration:
     moved = [turn_points(item, state[0], state[1:3]) for item in points]
-    found = [feet(curve, item) for curve, item in zip(curves, moved, strict=True)]
-    rows, residuals, weights = _equations(curves, moved, found, robust, state[3])
+    nearest = [feet(curve, item) for curve, item in zip(curves, moved, strict=True)]
+    rows, residuals, weights = _equations(curves, moved, nearest, robust, state[3])
     rows = rows[:, : 4 if width else 3]
     cuts = np.cumsum([len(item) for item in points])[:-1]
     errors, shares = np.split(residuals, cuts), np.split(weights, cuts)
@@ -239,7 +239,7 @@ def _registration(
     x, y = np.concatenate(moved).mean(axis=0)
     growth = answer[1:3] + answer[0] * np.array([-y, x])
     return Registration(
-        float(state[0]), state[1:3], tuple(moved), tuple(found), tuple(errors), tuple(shares), covariance[:3, :3],
+        float(state[0]), state[1:3], tuple(moved), tuple(nearest), tuple(errors), tuple(shares), covariance[:3, :3],
         growth, float(state[3]), float(np.sqrt(covariance[3, 3])) if width else 0.0,
     )  # fmt: skip
 
@@ -261,5 +261,5 @@ def gaps_across(
     return np.asarray(points[:, axis] - curve.frame(u).points[:, axis])
 
 
-def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
-    return np.asarray((one * other).sum(axis=1))
+def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
+    return np.asarray((first * second).sum(axis=1))

@@ -78,5 +78,5 @@ def spikes(
         2.0 * _MEDIAN_REACH * float(np.percentile(steps, 75)),
         0.005 * float(high - low),
     )
-    found = off > max(limit, 1e-9 * float(np.abs(values).max()))
-    return np.where(found & (found.sum() <= _MAX_SPIKE_SHARE * len(values)), height, 0.0)
+    is_spike = off > max(limit, 1e-9 * float(np.abs(values).max()))
+    return np.where(is_spike & (is_spike.sum() <= _MAX_SPIKE_SHARE * len(values)), height, 0.0)

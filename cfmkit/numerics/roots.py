@@ -212,39 +212,39 @@ def last_places(
     >>> last_places(lambda x, _ends: x * x - 2.0, np.array([[0.0]]), np.array([[2.0]])).round(12)
     array([[1.41421356]])
     """
-    found = np.array(inside).ravel()
+    roots = np.array(inside).ravel()
     ends = np.flatnonzero(inside != outside)
-    near, far = found[ends, None], np.ravel(outside)[ends, None]
-    least = BRACKET_RTOL * np.abs(far - near) + 2.0 * _FLOAT_EPS * np.maximum(np.abs(near), np.abs(far))
-    places = near + (far - near) * _BRACKET_GRID
+    inner, far = roots[ends, None], np.ravel(outside)[ends, None]
+    least = BRACKET_RTOL * np.abs(far - inner) + 2.0 * _FLOAT_EPS * np.maximum(np.abs(inner), np.abs(far))
+    places = inner + (far - inner) * _BRACKET_GRID
     places[:, -1:] = far
     heights = np.array(excess(places, ends)) if len(ends) else places
     # What is known of both ends holds, whatever the last bit is here.
     heights[:, 0] = np.where(heights[:, 0] <= 0.0, heights[:, 0], 0.0)
     heights[:, -1] = np.where(heights[:, -1] <= 0.0, _FLOAT_TINY, heights[:, -1])
     expected = _inverse(places, heights)
-    places, heights = (np.concatenate([one[:, :1], one, one[:, -1:]], axis=1) for one in (places, heights))
+    places, heights = (np.concatenate([values[:, :1], values, values[:, -1:]], axis=1) for values in (places, heights))
     for _ in range(rounds):
         # The last place that holds, the first that does not, and their neighbours outside of these.
         first = (~(heights <= 0.0)).argmax(axis=1)[:, None] + _NEIGHBOUR_OFFSETS
-        places, heights = (np.take_along_axis(one, first, axis=1) for one in (places, heights))
-        found[ends] = places[:, 1]
-        way = places[:, 2:3] - places[:, 1:2]
-        going = ((np.abs(way) > least) & (heights[:, 1:2] < -4.0 * _FLOAT_EPS))[:, 0]
+        places, heights = (np.take_along_axis(values, first, axis=1) for values in (places, heights))
+        roots[ends] = places[:, 1]
+        width = places[:, 2:3] - places[:, 1:2]
+        going = ((np.abs(width) > least) & (heights[:, 1:2] < -4.0 * _FLOAT_EPS))[:, 0]
         if not going.any():
             break
-        ends, least, places, heights, way = (one[going] for one in (ends, least, places, heights, way))
-        share = (expected[going] - places[:, 1:2]) / way
+        ends, least, places, heights, width = (values[going] for values in (ends, least, places, heights, width))
+        share = (expected[going] - places[:, 1:2]) / width
         share = np.where((share > 0.0) & (share < 1.0), share, _share(places, heights))
         # A step that is at least so long leads across the end, and so narrows the bracket from both sides.
-        margin = np.minimum(0.5 * least / np.abs(way), 0.5)
+        margin = np.minimum(0.5 * least / np.abs(width), 0.5)
         share = np.where((share > 0.0) & (share < 1.0), share + _OFFSETS_AROUND, _EVEN_GRID)
-        more = places[:, 1:2] + way * np.minimum(np.maximum(share, margin), 1.0 - margin)
-        known = excess(more, ends)
+        more = places[:, 1:2] + width * np.minimum(np.maximum(share, margin), 1.0 - margin)
+        computed = excess(more, ends)
         places = np.concatenate([places[:, :2], more, places[:, 2:]], axis=1)
-        heights = np.concatenate([heights[:, :2], known, heights[:, 2:]], axis=1)
+        heights = np.concatenate([heights[:, :2], computed, heights[:, 2:]], axis=1)
         expected = np.full((len(ends), 1), np.nan)
-    return found.reshape(inside.shape)
+    return roots.reshape(inside.shape)
 
 
 def _inverse(places: FloatArray, heights: FloatArray) -> FloatArray:
@@ -256,13 +256,13 @@ def _inverse(places: FloatArray, heights: FloatArray) -> FloatArray:
 
 def _share(places: FloatArray, heights: FloatArray) -> FloatArray:
     """Return where between the second and the third of four places the end is expected; NaN: nothing is known."""
-    (before, near, far, beyond), (low, under, over, high) = (
-        [one[:, k : k + 1] for k in range(4)] for one in (places, heights)
+    (before, inner, far, beyond), (low, under, over, high) = (
+        [values[:, k : k + 1] for k in range(4)] for values in (places, heights)
     )
-    to_before, to_beyond = np.abs(near - before), np.abs(beyond - far)
+    to_before, to_beyond = np.abs(inner - before), np.abs(beyond - far)
     ahead = (to_before == 0.0) | ((to_beyond > 0.0) & (to_beyond < to_before))
     # Chandrupatla's rule: a and the third point c on one side, b on the other.
-    a, b, c = np.where(ahead, far, near), np.where(ahead, near, far), np.where(ahead, beyond, before)
+    a, b, c = np.where(ahead, far, inner), np.where(ahead, inner, far), np.where(ahead, beyond, before)
     fa, fb, fc = np.where(ahead, over, under), np.where(ahead, under, over), np.where(ahead, high, low)
     xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
     safe = (phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi)
@@ -270,4 +270,4 @@ def _share(places: FloatArray, heights: FloatArray) -> FloatArray:
     share = np.where(safe, np.where(ahead, 1.0 - share, share), np.nan)
     # Towards a pole it is the reciprocal that runs straight.
     pole = far - (beyond - far) * high / (over - high)
-    return np.where(np.isinf(under), (pole - near) / (far - near), share)
+    return np.where(np.isinf(under), (pole - inner) / (far - inner), share)

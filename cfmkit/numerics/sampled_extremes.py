@@ -72,8 +72,8 @@ def monotone(
         return Monotone(place, value)
     more = np.repeat(place[:, -1:], count.max(), axis=1)
     more[row, np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)] = turns
-    known = np.where(more == place[:, -1:], value[:, -1:], function(more))
-    both, values = np.hstack([place, more]), np.hstack([value, known])
+    computed = np.where(more == place[:, -1:], value[:, -1:], function(more))
+    both, values = np.hstack([place, more]), np.hstack([value, computed])
     order = np.argsort(both, axis=1, kind="stable")
     return Monotone(np.take_along_axis(both, order, 1), np.take_along_axis(values, order, 1))
 

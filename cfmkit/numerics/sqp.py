@@ -122,7 +122,7 @@ def _run_solver(memory: _Memory, z: FloatArray, bounds: FloatArray) -> tuple[Flo
     """Run the solver; return where it ends and why. Its answers are in the memory."""
     from scipy.optimize import minimize as slsqp
 
-    found = slsqp(  # type: ignore[call-overload]
+    ending = slsqp(  # type: ignore[call-overload]
         memory.objective,
         z,
         jac=lambda z: memory.slopes_at(z)[0],
@@ -131,7 +131,7 @@ def _run_solver(memory: _Memory, z: FloatArray, bounds: FloatArray) -> tuple[Flo
         constraints=[{"type": "ineq", "fun": memory.constraints, "jac": lambda z: memory.slopes_at(z)[1]}],
         options={"maxiter": memory.effort.steps, "ftol": memory.effort.tolerance},
     )
-    return np.clip(found.x, *bounds.T), _ENDING_BY_MODE.get(int(found.status), SearchEnding.STUCK)
+    return np.clip(ending.x, *bounds.T), _ENDING_BY_MODE.get(int(ending.status), SearchEnding.STUCK)
 
 
 _ENDING_BY_MODE = {0: SearchEnding.OPTIMUM, 4: SearchEnding.INCOMPATIBLE, 9: SearchEnding.STEPS}
@@ -217,9 +217,9 @@ class _Memory:
 
     def slopes_at(self, z: FloatArray) -> Any:
         if self.sloped is None or not np.array_equal(z, self.sloped):
-            found = self.program.slopes(z)
-            if found is None and self.slope is None:
+            slopes = self.program.slopes(z)
+            if slopes is None and self.slope is None:
                 raise _Enough(SearchEnding.STUCK)
-            self.slope = self.slope if found is None else found
+            self.slope = self.slope if slopes is None else slopes
             self.sloped = z.copy()
         return self.slope

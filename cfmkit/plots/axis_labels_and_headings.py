@@ -223,11 +223,11 @@ def _round_values(low: float, high: float) -> list[float]:
     """Return round numbers from `low` to `high`, finer towards `low`."""
     span = high - low
     steps = 10.0 ** np.floor(np.log10(span)) * np.array([1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1, 2, 5])
-    found = {0.0} if low <= 0 <= high else set()
+    ticks = {0.0} if low <= 0 <= high else set()
     for step in steps:
-        near = step * np.arange(np.ceil(low / step), np.floor(min(high, low + 6 * step) / step) + 1)
-        found |= {float(f"{value:.6g}") for value in near}
-    return sorted(found)
+        multiples = step * np.arange(np.ceil(low / step), np.floor(min(high, low + 6 * step) / step) + 1)
+        ticks |= {float(f"{value:.6g}") for value in multiples}
+    return sorted(ticks)
 
 
 def finite_range(values: Any) -> tuple[float, float] | None:

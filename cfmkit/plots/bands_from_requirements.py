@@ -11,20 +11,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.metrics import Undefined, Window, check, frame_of, split_name
-from cfmkit.metrics.usable_interval_of_all_branches import cycle
+from cfmkit.metrics import Undefined, Window, check, frame_of, split_name, survey
 from cfmkit.plots.axis_labels_and_headings import value_text
 from cfmkit.plots.stacked_line_diagrams import Limit
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from cfmkit.metrics import Outcome
-    from cfmkit.metrics.branch_views import Branch
-    from cfmkit.metrics.spread import Spread
+    from cfmkit.metrics.rows_in_window import RowsInWindow
     from cfmkit.results import Result
 
 Bounds = tuple[float | None, float | None]
+OneSpread = tuple[float, float, float]  # mean, largest and smallest effort in the effort's own direction
 BandNeed = tuple[float, float, float]  # the ends of a band, and what ranks branches: how much of it they need
 
 
@@ -48,20 +47,20 @@ def bands_of(result: Result) -> tuple[Band, ...]:
         return ()
     kind = result.curves[0].kind
     wanted = [item for item in result.spec.requirements if _plain(item.metric, kind) in _BAND_LABELS]
-    found = (_band(outcome, result) for outcome in check(wanted, result))
-    return tuple(band for band in found if band is not None)
+    bands = (_band(outcome, result) for outcome in check(wanted, result))
+    return tuple(band for band in bands if band is not None)
 
 
 def limits_on(result: Result, metric: str) -> tuple[Limit, ...]:
     """Return what the requirements allow of one of the family's values, as lines for a diagram of it."""
     wanted = [item for item in result.spec.requirements if item.metric == metric]
-    found = []
+    limits = []
     for outcome in check(wanted, result):
         for bound, sign in ((outcome.min, "≥"), (outcome.max, "≤")):
             if bound is not None:
                 text = f"required {sign} {value_text(bound, outcome.dimension)}"
-                found.append(Limit(bound, text, trouble=not outcome.ok))
-    return tuple(found)
+                limits.append(Limit(bound, text, trouble=not outcome.ok))
+    return tuple(limits)
 
 
 def _plain(metric: str, kind: str) -> str:
@@ -73,8 +72,8 @@ def _band(outcome: Outcome, result: Result) -> Band | None:
     metric, branch = split_name(outcome.metric)
     metric = _plain(metric, outcome.kind)
     window = Window(*outcome.over) if outcome.over else None
-    subjects = cycle(result.curves[0], frame_of(result), window).branches
-    chosen = [item for item in subjects if branch in (None, item.name)]
+    subjects = survey(result.curves[0], frame_of(result), window).subject.branches
+    chosen = {name: rows for name, rows in subjects.items() if branch in (None, name)}
     if not chosen:
         return None
     rule = _BAND_RULES.get(metric)
@@ -90,22 +89,24 @@ def _band(outcome: Outcome, result: Result) -> Band | None:
     if bounds is None:
         return None
     which = f" ({worst})" if worst and len(subjects) > 1 else ""
-    start, stop = chosen[0].ends
+    start, stop = (float(end[0]) for end in next(iter(chosen.values())).ends)
     return Band(*bounds, start, stop, _sentence(outcome, _BAND_LABELS[metric].format(outcome.kind) + which), outcome.ok)
 
 
-def _ripple(spread: Spread, limit: float) -> BandNeed:
-    return (1.0 - limit) * spread.max, spread.max, (spread.max - spread.min) / spread.max
+def _ripple(spread: OneSpread, limit: float) -> BandNeed:
+    _, high, low = spread
+    return (1.0 - limit) * high, high, (high - low) / high
 
 
-def _half_band(spread: Spread, limit: float) -> BandNeed:
-    middle = 0.5 * (spread.max + spread.min)
-    return (1.0 - limit) * middle, (1.0 + limit) * middle, (spread.max - spread.min) / spread.max
+def _half_band(spread: OneSpread, limit: float) -> BandNeed:
+    _, high, low = spread
+    middle = 0.5 * (high + low)
+    return (1.0 - limit) * middle, (1.0 + limit) * middle, (high - low) / high
 
 
-def _band_about_mean(spread: Spread, limit: float) -> BandNeed:
-    away = max(spread.max - spread.mean, spread.mean - spread.min) / spread.mean
-    return (1.0 - limit) * spread.mean, (1.0 + limit) * spread.mean, away
+def _band_about_mean(spread: OneSpread, limit: float) -> BandNeed:
+    mean, high, low = spread
+    return (1.0 - limit) * mean, (1.0 + limit) * mean, max(high - mean, mean - low) / mean
 
 
 _BAND_LABELS = {
@@ -121,21 +122,21 @@ _BAND_RULES = {"ripple": _ripple, "half_band": _half_band, "deviation_from_mean"
 
 
 def _worst(
-    subjects: list[Branch], rule: Callable[[Spread, float], BandNeed], limit: float
+    subjects: Mapping[str, RowsInWindow], rule: Callable[[OneSpread, float], BandNeed], limit: float
 ) -> tuple[Bounds | None, str]:
     """Return the band of the branch that needs most of it, and that branch's name."""
-    found = []
-    for branch in subjects:
+    candidates = []
+    for name, rows in subjects.items():
         try:
-            spread = branch.spread
+            mean, largest, least, sign = (value.item() for value in rows.spread)
         except Undefined:
             continue
-        if spread.max > 0:
-            low, high, need = rule(spread, limit)
-            found.append((need, sorted((spread.sign * low, spread.sign * high)), branch.name))
-    if not found:
+        if largest > 0:
+            low, high, need = rule((mean, largest, least), limit)
+            candidates.append((need, sorted((sign * low, sign * high)), name))
+    if not candidates:
         return None, ""
-    _, (low, high), name = max(found, key=lambda item: item[0])
+    _, (low, high), name = max(candidates, key=lambda item: item[0])
     return (low, high), name
 
 

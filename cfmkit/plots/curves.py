@@ -149,8 +149,8 @@ def plot_curve(
 def _draw_events(ax: Axes, curve: Curve) -> None:
     """Draw a tick where something changes on the path of a curve: its column `event` says what."""
     if "event" in curve.extra:
-        there = curve.extra["event"].values != ""
-        at = to_border(curve.motion[there], curve.motion_dimension), to_border(curve.effort[there], curve.kind)
+        is_event = curve.extra["event"].values != ""
+        at = to_border(curve.motion[is_event], curve.motion_dimension), to_border(curve.effort[is_event], curve.kind)
         ax.plot(*at, linestyle="", marker="|", markersize=8.0, color=TEXT_GREY, zorder=3.5, gid="events")
 
 
@@ -171,12 +171,12 @@ def _lines(curves: tuple[Curve, ...]) -> list[_Line]:
         ]
     count = len(curves)  # of many, the first, the last and some between are named
     colors, named = _colors(count), np.linspace(0, count - 1, min(count, MOST_NAMED)).astype(int)
-    found = []
+    lines = []
     for index, curve in enumerate(curves):
         first, *others = curve.branches
-        found.append(_line(curve, first, colors[index], _curve_name(curve, index) if index in named else ""))
-        found += [_line(curve, name, colors[index], "" if index else f"thin: {name}", faint=True) for name in others]
-    return found
+        lines.append(_line(curve, first, colors[index], _curve_name(curve, index) if index in named else ""))
+        lines += [_line(curve, name, colors[index], "" if index else f"thin: {name}", faint=True) for name in others]
+    return lines
 
 
 def _line(curve: Curve, branch: str, color: str, name: str, faint: bool = False) -> _Line:
@@ -208,8 +208,8 @@ def _draw_line(ax: Axes, line: _Line) -> None:
     for start, stop, stable in _runs(line.stable):
         look: Look = {"linestyle": "-" if stable else "--", "linewidth": 0.8 if line.faint else 1.4}
         ax.plot(*line.points[start:stop].T, color=line.color, zorder=3, **look)
-    known = np.concatenate([[False], np.isfinite(line.points).all(axis=1), [False]])
-    alone = line.points[known[1:-1] & ~known[:-2] & ~known[2:]]
+    is_drawn = np.concatenate([[False], np.isfinite(line.points).all(axis=1), [False]])
+    alone = line.points[is_drawn[1:-1] & ~is_drawn[:-2] & ~is_drawn[2:]]
     if len(alone):
         ax.plot(*alone.T, color=line.color, linestyle="", marker=".", zorder=3)
 
@@ -310,14 +310,14 @@ def _name_at_end(line: _Line) -> Label:
 
 
 def _all_coincide(ax: Axes, lines: list[_Line]) -> bool:
-    return len(lines) > 1 and all(_coincide(ax, lines[0], other) for other in lines[1:])
+    return len(lines) > 1 and all(_coincide(ax, lines[0], line) for line in lines[1:])
 
 
-def _coincide(ax: Axes, one: _Line, other: _Line) -> bool:
-    if one.points.shape != other.points.shape:
+def _coincide(ax: Axes, first: _Line, second: _Line) -> bool:
+    if first.points.shape != second.points.shape:
         return False
     allowed = BRANCH_RTOL * np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
-    ways = (np.abs(one.points - points) for points in (other.points, other.points[::-1]))
+    ways = (np.abs(first.points - points) for points in (second.points, second.points[::-1]))
     return any(bool((np.isnan(gap) | (gap < allowed)).all()) for gap in ways)
 
 

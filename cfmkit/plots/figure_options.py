@@ -73,8 +73,8 @@ class FigureForm:
     ) -> dict[str, Figure]:
         """Return figures as a page shows them: with its own headings and width, whatever is drawn for print."""
         form = FigureForm(overlay=self.overlay)
-        known = drawn if replace(self, formats=("png",)).is_default else {}
-        return {stem: known[stem] if stem in known else form.draw(make) for stem, make in makers.items()}
+        figures = drawn if replace(self, formats=("png",)).is_default else {}
+        return {stem: figures[stem] if stem in figures else form.draw(make) for stem, make in makers.items()}
 
 
 DEFAULT_FORM = FigureForm()  # PNG, as each figure is drawn

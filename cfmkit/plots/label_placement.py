@@ -68,7 +68,7 @@ def place_labels(
     ground = _Ground(ax)
     lines = [ground.to_points(label.points) for label in labels]
     written = (
-        _write(ground, label, size, [line for other, line in enumerate(lines) if other != number])
+        _write(ground, label, size, [line for k, line in enumerate(lines) if k != number])
         for number, label in enumerate(labels)
     )
     return [text for text in written if text is not None]
@@ -90,10 +90,10 @@ def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray])
         chosen, cost = label.text, cost + 2.0 * COVERING_COST * covered
         for words in (label.text, _break_in_two(label.text)):
             text.set_text(words)
-            other = ground.size_of(text)
-            place, price = _best(ground, label, (points, together), other, FINER_GAPS)
+            size_of_label = ground.size_of(text)
+            place, price = _best(ground, label, (points, together), size_of_label, FINER_GAPS)
             if price < cost:
-                center, cost, box, chosen = place, price, other, words
+                center, cost, box, chosen = place, price, size_of_label, words
         text.set_text(chosen)
     text.set_transform(ground.ax.transAxes)
     text.set_position(tuple(center / ground.extent))
@@ -132,11 +132,11 @@ def _thin_points(points: FloatArray, most: int = 80) -> FloatArray:
 
 def _together(points: FloatArray, others: list[FloatArray]) -> NDArray[np.bool_]:
     """Return at which points [pt] another named line is so near that a name there would be taken for that of either."""
-    found = np.zeros(len(points), dtype=bool)
+    is_near = np.zeros(len(points), dtype=bool)
     for line in others:
         away = points[:, None, :] - _thin_points(line, 200)[None, :, :]
-        found |= (np.hypot(away[..., 0], away[..., 1]) < MIN_LINE_DISTANCE).any(axis=1)
-    return found
+        is_near |= (np.hypot(away[..., 0], away[..., 1]) < MIN_LINE_DISTANCE).any(axis=1)
+    return is_near
 
 
 def _best(
@@ -186,12 +186,12 @@ def _ways(tried: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
 def _cost_between(ground: _Ground, centers: FloatArray, box: FloatArray, anchors: FloatArray) -> FloatArray:
     """Return what it costs that something lies between boxes and their anchors (n, 2) [pt]."""
     starts = _edges(centers, box, anchors)
-    way = anchors - starts
-    length = np.hypot(way[:, 0], way[:, 1])
+    leaders = anchors - starts
+    length = np.hypot(leaders[:, 0], leaders[:, 1])
     # the line that is named ends the way: its own cells are no obstacle
     reach = np.maximum(1.0 - 2.0 * CELL_SIZE / np.maximum(length, CELL_SIZE), 0.0)
     shares = np.linspace(0.0, 1.0, N_SIGHT_PLACES) * reach[:, None]
-    places = starts[:, None, :] + shares[:, :, None] * way[:, None, :]
+    places = starts[:, None, :] + shares[:, :, None] * leaders[:, None, :]
     return 15.0 * ground.any_at(places, ground.taken) + 60.0 * ground.any_at(places, ground.named)
 
 
@@ -267,8 +267,8 @@ class _Ground:
         keep = np.isfinite(step).all(axis=1)
         start, step = start[keep], step[keep]
         # clip far ends first, or one long segment would take a million cells
-        near = (np.maximum(start, start + step) > -50) & (np.minimum(start, start + step) < self.extent + 50)
-        start, step = start[near.all(axis=1)], step[near.all(axis=1)]
+        is_inside = (np.maximum(start, start + step) > -50) & (np.minimum(start, start + step) < self.extent + 50)
+        start, step = start[is_inside.all(axis=1)], step[is_inside.all(axis=1)]
         # of a segment that leaves the axes by far, as many cells; the limit comes first, or the integer overflows
         count = np.minimum(np.ceil(np.abs(step).max(axis=1, initial=0.0) / CELL_SIZE) + 1, 2000).astype(int)
         if not len(count):

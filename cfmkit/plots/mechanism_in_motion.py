@@ -79,12 +79,12 @@ def poses(moving: Moving, numbers: Iterable[int]) -> list[ElementTree.Element]:
     figure = new_figure((right - left) * scale, (top - bottom) * scale)
     ax = axes_mm(figure, (0.0, 0.0, (right - left) * scale, (top - bottom) * scale))
     ax.set_axis_off()
-    own = set(ax.get_children())
+    artists = set(ax.get_children())
     drawn = []
     for number in numbers:
         moving.draw(ax, number)
         drawn.append(ElementTree.fromstring(inline(svg(figure), "film")))
-        for artist in set(ax.get_children()) - own:
+        for artist in set(ax.get_children()) - artists:
             artist.remove()
     return drawn
 
@@ -93,13 +93,13 @@ def _merge_poses(poses: Sequence[ElementTree.Element], title: str) -> str:
     """Return poses as one: runs of what differs between pieces that all of them have, in the order of drawing."""
     ElementTree.register_namespace("", _SVG_NAMESPACE)
     ElementTree.register_namespace("xlink", _XLINK_NAMESPACE)
-    each = [[_plain(element) for element in _pieces(pose)] for pose in poses]
-    common = _common(each)
+    elements = [[_plain(element) for element in _pieces(pose)] for pose in poses]
+    common = _common(elements)
     body: list[str] = []
-    at = [0] * len(each)
+    at = [0] * len(elements)
     for anchor in [*common, None]:
         runs = []
-        for number, pieces in enumerate(each):
+        for number, pieces in enumerate(elements):
             end = pieces.index(anchor, at[number]) if anchor is not None else len(pieces)
             runs.append(pieces[at[number] : end])
             at[number] = end + 1
@@ -134,12 +134,12 @@ def _plain(piece: ElementTree.Element) -> str:
     return re.sub(r"\s+", " ", re.sub(r' xmlns(:\w+)?="[^"]*"', "", text)).replace(" />", "/>").strip()
 
 
-def _common(each: Sequence[Sequence[str]]) -> list[str]:
+def _common(elements: Sequence[Sequence[str]]) -> list[str]:
     """Return what every pose has once, in the one order that all have it in."""
-    once = [{piece for piece in pieces if pieces.count(piece) == 1} for pieces in each]
+    once = [{piece for piece in pieces if pieces.count(piece) == 1} for pieces in elements]
     shared = set.intersection(*once)
-    first = [piece for piece in each[0] if piece in shared]
-    same = all([piece for piece in pieces if piece in shared] == first for pieces in each)
+    first = [piece for piece in elements[0] if piece in shared]
+    same = all([piece for piece in pieces if piece in shared] == first for pieces in elements)
     return first if same else []
 
 
@@ -167,8 +167,8 @@ def frames(result: Result, moving: Moving) -> list[NDArray[np.uint8]]:
         diagram.plot(motion[on], effort[on], color=LINE_COLOURS[number % len(LINE_COLOURS)], label=name)
     if len(names) > 1:
         diagram.legend(frameon=False)
-    known = effort[np.isfinite(effort)]
-    low, high = np.percentile(known, [1, 99]) if len(known) else (0.0, 1.0)
+    finite = effort[np.isfinite(effort)]
+    low, high = np.percentile(finite, [1, 99]) if len(finite) else (0.0, 1.0)
     room = 0.1 * (max(high, 0.0) - min(low, 0.0)) or 1.0
     diagram.set_ylim(min(low, 0.0) - (room if low < 0 else 0.0), max(high, 0.0) + room)
     diagram.set_xlabel(f"{curve.motion_name} [{border_unit(curve.motion_dimension)}]")

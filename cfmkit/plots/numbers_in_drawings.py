@@ -65,10 +65,10 @@ def digits_that_differ(low: float, high: float) -> int:
 
 def widen(axes: Axes, values: FloatArray) -> None:
     """Show more of the vertical axis where the values that it shows hardly vary: they are drawn as level then."""
-    known = values[np.isfinite(values)]
-    if not len(known):
+    finite = values[np.isfinite(values)]
+    if not len(finite):
         return
-    low, high = float(known.min()), float(known.max())
+    low, high = float(finite.min()), float(finite.max())
     least = MIN_RANGE_SHARE * max(abs(low), abs(high))
     if 0.0 < high - low < least:
         middle = 0.5 * (low + high)
@@ -82,8 +82,8 @@ sums of a thousand terms lose (1e-13), and far below what a picture shows."""
 
 def is_level(values: FloatArray) -> bool:
     """Return whether the finite ones of some values differ by rounding only, or there are none."""
-    known = values[np.isfinite(values)]
-    return not len(known) or bool(np.ptp(known) <= NOISE_SHARE * np.abs(known).max())
+    finite = values[np.isfinite(values)]
+    return not len(finite) or bool(np.ptp(finite) <= NOISE_SHARE * np.abs(finite).max())
 
 
 def remove_rounding(values: FloatArray) -> FloatArray:
@@ -98,8 +98,8 @@ def remove_rounding(values: FloatArray) -> FloatArray:
     """
     if not is_level(values):
         return values
-    known = np.isfinite(values)
-    return np.where(known, values[known][0], values) if known.any() else values
+    is_finite = np.isfinite(values)
+    return np.where(is_finite, values[is_finite][0], values) if is_finite.any() else values
 
 
 def zero_rounding(values: FloatArray, size: float) -> FloatArray:

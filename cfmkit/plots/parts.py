@@ -146,7 +146,7 @@ def area(ax: Axes, outline: Any, gid: str, **options: Any) -> None:
 def bodies(ax: Axes, shown: Sequence[PosedBody], pose: int, colors: Mapping[str, str]) -> None:
     """Draw bodies in a pose: in their colours by name, rigid ones without a colour as one plate."""
     rigid = [body.outline(pose) for body in shown if body.name not in colors]
-    plate(ax, [one if signed_area(one) > 0.0 else one[::-1] for one in rigid], "rigid")
+    plate(ax, [ring if signed_area(ring) > 0.0 else ring[::-1] for ring in rigid], "rigid")
     for body in shown:
         if body.name in colors:
             area(ax, body.outline(pose), body.name, color=colors[body.name])
@@ -206,11 +206,11 @@ def panels(figure: Figure, size_mm: tuple[float, float], titles: Sequence[str], 
     across = 0.0 if stacked else (free - size_mm[0]) / max(last, 1)
     up = size_mm[1] + TITLE_HEIGHT if stacked else 0.0
     corners = [(left + number * across, bottom + (last - number) * up) for number in range(len(titles))]
-    found = [axes_mm(figure, (*corner, *size_mm)) for corner in corners]
-    for ax, title in zip(found, titles, strict=True):
+    axes = [axes_mm(figure, (*corner, *size_mm)) for corner in corners]
+    for ax, title in zip(axes, titles, strict=True):
         ax.set_title(title, fontsize=SMALL_FONT)
         ax.locator_params("x", nbins=4)
-    return found
+    return axes
 
 
 @apply_style
@@ -220,12 +220,12 @@ def poses(heading: Heading, box: Box, titles: Sequence[str]) -> tuple[Figure, li
     size = (min(43.5, 120.0 / slender), min(43.5 * slender, 120.0))
     figure = new_figure(160.0, 10.0 + size[1] + TITLE_HEIGHT + heading.height_mm)
     write_heading(figure, heading)
-    found = panels(figure, size, titles)
-    for ax in found:
+    axes = panels(figure, size, titles)
+    for ax in axes:
         to_scale(ax, box)
-        ax.tick_params(labelleft=ax is found[0])
-    found[0].set_ylabel("y [mm]")
-    return figure, found
+        ax.tick_params(labelleft=ax is axes[0])
+    axes[0].set_ylabel("y [mm]")
+    return figure, axes
 
 
 def part_name(text: str, points: Any, toward: Point, color: str = TEXT_INK, prefer: float = 0.5) -> Label:

@@ -57,26 +57,26 @@ def _head(figure: Figure, title: str) -> None:
 
 
 @apply_style
-def draw_histogram(found: Findings, number: int) -> Figure:
+def draw_histogram(findings: Findings, number: int) -> Figure:
     """Return how one metric scatters over the parts that were drawn."""
-    setup = found.setup
+    setup = findings.setup
     metric = setup.study.metrics[number]
-    drawn = found.outputs[:, 0, number] if found.outputs is not None else np.empty(0)
-    known = metric_values(drawn[np.isfinite(drawn)], metric.dimension)
+    drawn = findings.outputs[:, 0, number] if findings.outputs is not None else np.empty(0)
+    finite = metric_values(drawn[np.isfinite(drawn)], metric.dimension)
     figure = new_figure(140, 84)
     axes = axes_mm(figure, (18, 14, 116, 56))
-    _head(figure, _title(found, metric))
+    _head(figure, _title(findings, metric))
     width, height = size_mm(figure)
     allowed = () if is_plain() else setup.limits(metric)
     if not is_plain():
         place = (LEFT_MARGIN / width, 1.0 - (7.6 if has_titles() else 1.6) / height)
-        figure.text(*place, _summary(drawn, known, allowed), va="top", size=SMALL_FONT, color=TEXT_INK)
-    if len(known):
-        axes.hist(known, _edges(known).tolist(), color=LINE_BLUE, alpha=0.85)
+        figure.text(*place, _summary(drawn, finite, allowed), va="top", size=SMALL_FONT, color=TEXT_INK)
+    if len(finite):
+        axes.hist(finite, _edges(finite).tolist(), color=LINE_BLUE, alpha=0.85)
     axes.set_ylim(0, 1.22 * max(1.0, axes.get_ylim()[1]))
     ends = [_ends(limits) for limits in allowed]
     nominal = float(metric_values(setup.nominal.values[number], metric.dimension))
-    shown = [*known.tolist(), *(end for pair in ends for end in pair if end is not None), nominal]
+    shown = [*finite.tolist(), *(end for pair in ends for end in pair if end is not None), nominal]
     low, high = min(shown), max(shown)
     room = 0.06 * (high - low) or 0.05 * abs(high) or 1.0
     axes.set_xlim(low - room, high + room)
@@ -114,16 +114,16 @@ def _shade_allowed(axes: Axes, ends: list[float | None]) -> None:
             axes.annotate(f"{words} {end:.6g}", (end, 0.88), (side, 0), ha=align, color=TROUBLE_RED, **look)
 
 
-def _summary(drawn: FloatArray, known: FloatArray, limits: tuple[Bounds, ...]) -> str:
+def _summary(drawn: FloatArray, finite: FloatArray, limits: tuple[Bounds, ...]) -> str:
     """Return number, mean, deviation and the share inside the limits, in one line."""
-    missing = len(drawn) - len(known)
+    missing = len(drawn) - len(finite)
     reported = [f"{len(drawn)} parts" + (f", {missing} without a result" if missing else "")]
-    if len(known) > 1:
-        reported.append(f"mean {known.mean():.5g}, sd {known.std(ddof=1):.3g}")
-        low, high = np.percentile(known, (2.5, 97.5))
+    if len(finite) > 1:
+        reported.append(f"mean {finite.mean():.5g}, sd {finite.std(ddof=1):.3g}")
+        low, high = np.percentile(finite, (2.5, 97.5))
         reported.append(f"95 % in {low:.5g} ... {high:.5g}")
-    if limits and len(known):
-        inside = sum(all(one.is_met(value) for one in limits) for value in drawn[np.isfinite(drawn)].tolist())
+    if limits and len(finite):
+        inside = sum(all(bounds.is_met(value) for bounds in limits) for value in drawn[np.isfinite(drawn)].tolist())
         reported.append(f"{100 * inside / len(drawn):.1f} % within limits")
     return ";  ".join(reported)
 
@@ -151,17 +151,17 @@ BAR_CHARTS = {
 }
 
 
-def figures(found: Findings) -> dict[str, Callable[[], Figure]]:
+def figures(findings: Findings) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a study, by name."""
     pictures: dict[str, Callable[[], Figure]] = {}
-    if found.outputs is None:
+    if findings.outputs is None:
         return pictures
-    if found.all_met is not None and found.setup.method == "tolerance":
-        pictures["yield_gain"] = lambda: draw_gains(found)
-    for number, metric in enumerate(found.setup.study.metrics):
+    if findings.all_met is not None and findings.setup.method == "tolerance":
+        pictures["yield_gain"] = lambda: draw_gains(findings)
+    for number, metric in enumerate(findings.setup.study.metrics):
         stem = re.sub("[^a-z0-9]+", "_", metric.label.lower()).strip("_")
-        for name, function in found.setup.record.pictures.items():
-            pictures[f"{stem}{name}"] = partial(globals()[function], found, number)
+        for name, function in findings.setup.record.pictures.items():
+            pictures[f"{stem}{name}"] = partial(globals()[function], findings, number)
     return pictures
 
 
@@ -176,7 +176,7 @@ def short(path: str) -> str:
     'springs stiffness (2)'
     """
     several = path.split(", ")
-    shared = takewhile(lambda parts: len(set(parts)) == 1, zip(*(one.split(".") for one in several), strict=False))
+    shared = takewhile(lambda parts: len(set(parts)) == 1, zip(*(path.split(".") for path in several), strict=False))
     text = ".".join(parts[0] for parts in shared)
     if len(several) > 1 and not text.partition(".")[2]:
         return ", ".join(map(short, several))
@@ -192,9 +192,9 @@ def _wrap(path: str, width: int) -> str:
     return "\n".join(textwrap.wrap(short(path), width))
 
 
-def _lines(found: Findings, metric: str, index: str) -> list[IndexLine]:
+def _lines(findings: Findings, metric: str, index: str) -> list[IndexLine]:
     """Return one index of all parameters, in the order of the study."""
-    return [line for line in found.lines if (line.metric, line.index) == (metric, index)]
+    return [line for line in findings.lines if (line.metric, line.index) == (metric, index)]
 
 
 def _rank_parameters(lines: Sequence[IndexLine]) -> list[int]:
@@ -237,16 +237,16 @@ def _draw_bars(
 
 
 @apply_style
-def draw_bars(found: Findings, number: int) -> Figure:
+def draw_bars(findings: Findings, number: int) -> Figure:
     """Return the indices of one metric as bars with their intervals."""
-    metric, kinds = found.setup.study.metrics[number], BAR_CHARTS[found.setup.method]
-    each = [_lines(found, metric.label, kind.index) for kind in kinds]
-    order = _rank_parameters(each[0])
-    figure, axes = _bar_axes(len(order), _title(found, metric), len(kinds) > 1)
+    metric, kinds = findings.setup.study.metrics[number], BAR_CHARTS[findings.setup.method]
+    lines_of_kinds = [_lines(findings, metric.label, kind.index) for kind in kinds]
+    order = _rank_parameters(lines_of_kinds[0])
+    figure, axes = _bar_axes(len(order), _title(findings, metric), len(kinds) > 1)
     height = 0.7 / len(kinds)
-    for k, (kind, lines) in enumerate(zip(kinds, each, strict=True)):
+    for k, (kind, lines) in enumerate(zip(kinds, lines_of_kinds, strict=True)):
         _draw_bars(axes, lines, order, (kind.colour, kind.words, (k - (len(kinds) - 1) / 2) * height, 0.9 * height))
-    _rows(axes, [each[0][k].parameter for k in order])
+    _rows(axes, [lines_of_kinds[0][k].parameter for k in order])
     axes.set_xlabel("share of the variance [1]" if len(kinds) > 1 else f"{kinds[0].words} [1]")
     if len(kinds) > 1 and axes.get_legend_handles_labels()[1]:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=SMALL_FONT)
@@ -254,14 +254,16 @@ def draw_bars(found: Findings, number: int) -> Figure:
 
 
 @apply_style
-def draw_gains(found: Findings) -> Figure:
+def draw_gains(findings: Findings) -> Figure:
     """Return what the yield gains if a tolerance is halved."""
-    lines = _lines(found, "yield", "yield_gain_when_halved")
+    lines = _lines(findings, "yield", "yield_gain_when_halved")
     order = _rank_parameters(lines)
-    share = found.all_met
+    share = findings.all_met
     stated = share is not None and share.value == share.value
     reported = f"yield {100 * share.value:.1f} %" if share is not None and stated else "yield not stated"
-    figure, axes = _bar_axes(len(order), f"{found.setup.study.spec.name}: {reported}; which tolerance to tighten first")
+    figure, axes = _bar_axes(
+        len(order), f"{findings.setup.study.spec.name}: {reported}; which tolerance to tighten first"
+    )
     _draw_bars(axes, lines, order, (LINE_BLUE, "", 0.0, 0.6))
     _rows(axes, [lines[k].parameter for k in order])
     from matplotlib.ticker import PercentFormatter
@@ -271,21 +273,21 @@ def draw_gains(found: Findings) -> Figure:
     return figure
 
 
-def _title(found: Findings, metric: Metric) -> str:
-    return f"{found.setup.study.spec.name}: {metric.label.replace('_', ' ')}"
+def _title(findings: Findings, metric: Metric) -> str:
+    return f"{findings.setup.study.spec.name}: {metric.label.replace('_', ' ')}"
 
 
 @apply_style
-def draw_oat(found: Findings, number: int) -> Figure:
+def draw_oat(findings: Findings, number: int) -> Figure:
     """Return one metric over each parameter's range, and what the ends of the range do."""
-    metric, setup = found.setup.study.metrics[number], found.setup
-    swings = _lines(found, metric.label, "swing")
+    metric, setup = findings.setup.study.metrics[number], findings.setup
+    swings = _lines(findings, metric.label, "swing")
     order = _rank_parameters(swings)
     room = max(60.0, _ROW_HEIGHT * len(order) + 10.0)
     figure = new_figure(190, room + 24)
     curves, bars = (axes_mm(figure, (left, 14, width, room)) for left, width in ((18, 72), (132, 52)))
-    _head(figure, _title(found, metric))
-    every_output = np.empty((len(swings), 0)) if found.outputs is None else found.outputs[:, :, number]
+    _head(figure, _title(findings, metric))
+    every_output = np.empty((len(swings), 0)) if findings.outputs is None else findings.outputs[:, :, number]
     shown = remove_rounding(metric_values(np.append(setup.nominal.values[number], every_output), metric.dimension))
     nominal, outputs = float(shown[0]), shown[1:].reshape(every_output.shape)
     bars.axvline(nominal, color=TEXT_GREY, linewidth=0.8)
@@ -321,13 +323,13 @@ def _unit(metric: Metric) -> str:
 
 
 @apply_style
-def draw_morris(found: Findings, number: int) -> Figure:
+def draw_morris(findings: Findings, number: int) -> Figure:
     """Return mean size and scatter of the effects: far right matters, high up is curved or interacts."""
-    metric = found.setup.study.metrics[number]
-    sizes, scatters = (_lines(found, metric.label, name) for name in ("mu_star", "sigma"))
+    metric = findings.setup.study.metrics[number]
+    sizes, scatters = (_lines(findings, metric.label, name) for name in ("mu_star", "sigma"))
     figure = new_figure(160, 90)
     axes = axes_mm(figure, (20, 14, 84, 66))
-    _head(figure, _title(found, metric))
+    _head(figure, _title(findings, metric))
     top, factor = 0.0, 100.0 if metric.dimension == "ratio" else 1.0
     for row, k in enumerate(_rank_parameters(sizes)):
         size, scatter = sizes[k], scatters[k]
@@ -352,20 +354,20 @@ def draw_morris(found: Findings, number: int) -> Figure:
 
 
 @apply_style
-def draw_convergence(found: Findings, number: int) -> Figure:
+def draw_convergence(findings: Findings, number: int) -> Figure:
     """Return the total order indices over the number of samples, with their intervals."""
-    metric = found.setup.study.metrics[number]
-    mine = [line for line in found.convergence if (line.metric, line.index) == (metric.label, "total_order")]
+    metric = findings.setup.study.metrics[number]
+    mine = [line for line in findings.convergence if (line.metric, line.index) == (metric.label, "total_order")]
     figure = new_figure(160, 90)
     axes = axes_mm(figure, (18, 14, 86, 66))
-    _head(figure, f"{_title(found, metric)}, convergence")
-    order = [found.setup.paths[k] for k in _rank_parameters(_lines(found, metric.label, "total_order"))]
+    _head(figure, f"{_title(findings, metric)}, convergence")
+    order = [findings.setup.paths[k] for k in _rank_parameters(_lines(findings, metric.label, "total_order"))]
     for row, path in enumerate(order):
-        own = np.array([_numbers(line) for line in mine if line.parameter == path and line.value is not None])
-        if not len(own):
+        points = np.array([_numbers(line) for line in mine if line.parameter == path and line.value is not None])
+        if not len(points):
             axes.plot([], [], linestyle="", label=f"{short(path)}\n(not stated)")
             continue
-        sizes, values, low, high = own.T
+        sizes, values, low, high = points.T
         sizes = sizes * 1.03 ** (row - len(order) / 2)
         colour = LINE_COLOURS[row % len(LINE_COLOURS)]
         axes.plot(sizes, values, color=colour, marker=MARKER_SHAPES[row], markersize=4, label=_wrap(path, 26))

@@ -118,10 +118,10 @@ def diagram_figure(
     """Return a figure of diagrams below each other, over one common axis."""
     figure = new_figure()
     write_heading(figure, heading)
-    each = (100.0 - heading.height_mm - 1.5 - top_mm - 12.0 + 4.0) / len(diagrams)
+    height = (100.0 - heading.height_mm - 1.5 - top_mm - 12.0 + 4.0) / len(diagrams)
     for index, diagram in enumerate(diagrams):
-        bottom = 12.0 + each * (len(diagrams) - 1 - index)
-        ax = draw_diagram(diagram, axes_mm(figure, (17.0, bottom, 143.0 - right_mm, each - 4.0)))
+        bottom = 12.0 + height * (len(diagrams) - 1 - index)
+        ax = draw_diagram(diagram, axes_mm(figure, (17.0, bottom, 143.0 - right_mm, height - 4.0)))
         if index + 1 < len(diagrams):
             ax.set_xlabel("")
             ax.tick_params(labelbottom=False)

@@ -65,10 +65,12 @@ class StressView:
         """Yield the numbers of fillets, to stand beside them on the side of the waste; moved: nodes (n, 2) [m]."""
         nodes = self.solved.problem.elements.mesh.nodes
         for number, arc in self.fillets.items():
-            near = np.hypot(*(nodes - arc.middle).T).argsort()[:N_NEAREST_NODES]
-            before, after = ((places[near] - places[near].mean(axis=0)) @ [1.0, 1.0j] for places in (nodes, moved))
+            nearest = np.hypot(*(nodes - arc.middle).T).argsort()[:N_NEAREST_NODES]
+            before, after = (
+                (places[nearest] - places[nearest].mean(axis=0)) @ [1.0, 1.0j] for places in (nodes, moved)
+            )
             turned = complex(*(arc.center - arc.middle)) * complex(np.vdot(before, after))
-            yield parts.part_name(str(number), moved[near[0]], (turned.real, turned.imag))
+            yield parts.part_name(str(number), moved[nearest[0]], (turned.real, turned.imag))
 
     @property
     def _balance(self) -> Any:

@@ -59,16 +59,16 @@ MOST_PANELS = 8
 """More values of the first parameter than this are left to the maps: smaller panels have no room for their numbers."""
 
 
-def fit_panels(found: StudyMarks, lines: Sequence[StudyCurve]) -> bool:
+def fit_panels(marks: StudyMarks, lines: Sequence[StudyCurve]) -> bool:
     """Return whether the curves of a study can be told apart in panels."""
     panels, named = ({line.panel for line in lines}, {line.parameter for line in lines})
-    return len(found.shape) == 2 and 0 < len(panels) <= MOST_PANELS and len(named) <= len(LINE_COLOURS)
+    return len(marks.shape) == 2 and 0 < len(panels) <= MOST_PANELS and len(named) <= len(LINE_COLOURS)
 
 
 @apply_style
-def draw_panels(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
+def draw_panels(marks: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
     """Return the curves of a study of two parameters; each panel has its own vertical scale."""
-    first, second = found.varied
+    first, second = marks.varied
     panels = sorted({line.panel for line in lines if line.panel is not None})
     rows = -(-len(panels) // 2)
     figure = new_figure(160.0, 20.0 + 52.0 * rows)
@@ -78,7 +78,7 @@ def draw_panels(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
         _draw_panel(ax, [line for line in lines if line.panel == value], second)
         ax.set_title(f"{first.plain}: {first.text(value)}", fontsize=SMALL_FONT, loc="left")
         ax.set(xlabel=labels[0] if number + 2 >= len(panels) else "", ylabel=labels[1] if column == 0 else "")
-    head(figure, found, f"curves by {first.plain}, each line a value of {second.plain}")
+    head(figure, marks, f"curves by {first.plain}, each line a value of {second.plain}")
     return figure
 
 
@@ -109,37 +109,37 @@ MISSED_COLOUR = "#D5D5D5"
 
 
 def figures(
-    found: StudyMarks,  # the points
+    marks: StudyMarks,  # the points
     lines: Sequence[StudyCurve] = (),  # curves, for a study of one or two parameters
     labels: tuple[str, str] = ("", ""),  # (str, str): of the curves' axes
 ) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture, by name."""
-    if len(found.varied) != 1 and len(found.shape) != 2:
-        return {"parallel": partial(draw_parallel, found)} if found.metrics else {}
+    if len(marks.varied) != 1 and len(marks.shape) != 2:
+        return {"parallel": partial(draw_parallel, marks)} if marks.metrics else {}
     pictures: dict[str, Callable[[], Figure]] = {}
-    one = len(found.varied) == 1
-    if lines and (one or fit_panels(found, lines)):
-        pictures["curves"] = partial(draw_curves if one else draw_panels, found, lines, labels)
-    for metric in found.metrics:
+    has_one_parameter = len(marks.varied) == 1
+    if lines and (has_one_parameter or fit_panels(marks, lines)):
+        pictures["curves"] = partial(draw_curves if has_one_parameter else draw_panels, marks, lines, labels)
+    for metric in marks.metrics:
         stem = metric.name.replace("[", "_").replace("]", "")
-        pictures[stem] = partial(draw_metric if one else draw_map, found, metric)
+        pictures[stem] = partial(draw_metric if has_one_parameter else draw_map, marks, metric)
     return pictures
 
 
 @apply_style
-def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
+def draw_curves(marks: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
     """Return the curves of a study of one parameter, coloured by it."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    (parameter,) = found.varied
-    given = [line.parameter for line in lines]
-    if len(given) <= MOST_NAMED:
-        return _draw_named(found, lines, labels)
+    (parameter,) = marks.varied
+    values = [line.parameter for line in lines]
+    if len(values) <= MOST_NAMED:
+        return _draw_named(marks, lines, labels)
     figure = new_figure(160.0, 100.0 + HEAD_HEIGHT)
     axes = axes_mm(figure, (16, 14, 112, 82))
-    scale = Normalize(min(given), max(given) if max(given) > min(given) else min(given) + 1)
+    scale = Normalize(min(values), max(values) if max(values) > min(values) else min(values) + 1)
     for line in lines:
         _draw_line(axes, line, colormaps[COLOUR_MAP](scale(line.parameter)), None, 1.0)
     axes.set(xlabel=labels[0], ylabel=labels[1])
@@ -147,7 +147,7 @@ def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
     bar = color_bar(ScalarMappable(scale, COLOUR_MAP), axes_mm(figure, (133, 14, 4, 82)), parameter.axis)
     if parameter.words:
         bar.set_ticks(range(len(parameter.words)), labels=list(parameter.words))
-    head(figure, found, f"curves, coloured by {parameter.plain}")
+    head(figure, marks, f"curves, coloured by {parameter.plain}")
     return figure
 
 
@@ -156,13 +156,13 @@ DASH_STYLES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (8, 2, 2, 2
 """Line styles in turn, so that curves differ without their colours, too."""
 
 
-def _draw_named(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
+def _draw_named(marks: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
     """Return a few curves of a study of one parameter, each with its value beside it."""
     from matplotlib import colormaps
 
     figure = new_figure(160.0, 100.0 + HEAD_HEIGHT - 6.0)
     axes = axes_mm(figure, (16, 14, 138, 82))
-    (parameter,) = found.varied
+    (parameter,) = marks.varied
     ordered = sorted(lines, key=lambda line: line.parameter)
     names = []
     for number, line in enumerate(ordered):
@@ -174,7 +174,7 @@ def _draw_named(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
     axes.set(xlabel=labels[0], ylabel=labels[1])
     _clear_of_poles(axes, ordered)
     place_labels(axes, names)
-    head(figure, found, f"curves, each a value of {parameter.plain}")
+    head(figure, marks, f"curves, each a value of {parameter.plain}")
     return figure
 
 
@@ -190,22 +190,22 @@ def _clear_of_poles(axes: Axes, lines: Sequence[StudyCurve]) -> None:
 
 
 @apply_style
-def draw_metric(found: StudyMarks, metric: DrawnScale) -> Figure:
+def draw_metric(marks: StudyMarks, metric: DrawnScale) -> Figure:
     """Return one metric over the only parameter."""
     figure = new_figure(120, 75 + HEAD_HEIGHT)
     axes = axes_mm(figure, (28, 13, 86, 56) if metric.words else (20, 13, 94, 56))
-    (parameter,) = found.varied
+    (parameter,) = marks.varied
     order = np.argsort(parameter.values, kind="stable")
     x, y = parameter.values[order], remove_rounding(metric.values)[order]
     axes.plot(x, y, color=LINE_BLUE, marker="o" if len(x) <= 60 else "", markersize=3)
-    _hatch_spans(axes, x, found.meets[order])
+    _hatch_spans(axes, x, marks.meets[order])
     axes.set(xlabel=parameter.axis, ylabel="" if metric.words else metric.label)
     widen(axes, y)
     ticks(axes.xaxis, parameter)
     ticks(axes.yaxis, metric)
-    best = found.best
+    best = marks.best
     starred = best is not None and star(axes, parameter.values[best], remove_rounding(metric.values)[best])
-    head(figure, found, f"{metric.plain} over {parameter.plain}", key_of(found, starred, not found.meets.all()))
+    head(figure, marks, f"{metric.plain} over {parameter.plain}", key_of(marks, starred, not marks.meets.all()))
     return figure
 
 
@@ -218,56 +218,56 @@ def _hatch_spans(axes: Axes, x: FloatArray, meets: NDArray[np.bool_]) -> None:
 
 
 @apply_style
-def draw_parallel(found: StudyMarks) -> Figure:
+def draw_parallel(marks: StudyMarks) -> Figure:
     """Return every point as a line over parallel axes, parameters then metrics, coloured by the first metric."""
     from matplotlib import colormaps
 
-    scales = (*found.varied, *found.metrics)
+    scales = (*marks.varied, *marks.metrics)
     width = max(120.0, 26.0 * len(scales) + 30)
     figure = new_figure(width, 100 + HEAD_HEIGHT)
     axes = axes_mm(figure, (14, 22, width - 28, 66))
     heights = np.column_stack([_share(scale) for scale in scales])
-    chosen = np.flatnonzero(np.isfinite(heights[:, len(found.varied)]))
+    chosen = np.flatnonzero(np.isfinite(heights[:, len(marks.varied)]))
     if len(chosen) > MOST_LINES:
         chosen = chosen[np.linspace(0, len(chosen) - 1, MOST_LINES).astype(int)]
-    for k in sorted(chosen.tolist(), key=lambda k: bool(found.meets[k])):
-        colour = colormaps[COLOUR_MAP](heights[k, len(found.varied)]) if found.meets[k] else MISSED_COLOUR
+    for k in sorted(chosen.tolist(), key=lambda k: bool(marks.meets[k])):
+        colour = colormaps[COLOUR_MAP](heights[k, len(marks.varied)]) if marks.meets[k] else MISSED_COLOUR
         axes.plot(heights[k], color=colour, linewidth=0.6, alpha=0.7)
-    if found.best is not None:
-        axes.plot(heights[found.best], color=LINE_VERMILLION, linewidth=2.0)
+    if marks.best is not None:
+        axes.plot(heights[marks.best], color=LINE_VERMILLION, linewidth=2.0)
     _parallel_axes(axes, scales)
-    head(figure, found, f"coloured by {found.metrics[0].plain}", _parallel_key(found))
+    head(figure, marks, f"coloured by {marks.metrics[0].plain}", _parallel_key(marks))
     return figure
 
 
-def _parallel_key(found: StudyMarks) -> list[Artist]:
+def _parallel_key(marks: StudyMarks) -> list[Artist]:
     from matplotlib.lines import Line2D
 
     entries: list[Artist] = []
-    if found.best is not None:
-        entries.append(Line2D([], [], color=LINE_VERMILLION, linewidth=2.0, label=found.best_words or "best point"))
-    if not found.meets.all():
+    if marks.best is not None:
+        entries.append(Line2D([], [], color=LINE_VERMILLION, linewidth=2.0, label=marks.best_words or "best point"))
+    if not marks.meets.all():
         entries.append(Line2D([], [], color=MISSED_COLOUR, label="requirement missed, or not solved"))
     return entries
 
 
 def _share(scale: DrawnScale) -> FloatArray:
     """Return where the values lie between the smallest and the largest of them; in the middle if they are the same."""
-    known = scale.values[np.isfinite(scale.values)]
+    finite = scale.values[np.isfinite(scale.values)]
     if is_level(scale.values):
         return np.where(np.isfinite(scale.values), 0.5, np.nan)
-    return np.asarray((scale.values - known.min()) / (known.max() - known.min()))
+    return np.asarray((scale.values - finite.min()) / (finite.max() - finite.min()))
 
 
 def _parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
     for k, scale in enumerate(scales):
         axes.axvline(k, color=TEXT_INK, linewidth=0.8)
-        known = scale.values[np.isfinite(scale.values)]
-        if not len(known):
+        finite = scale.values[np.isfinite(scale.values)]
+        if not len(finite):
             continue
-        ends = ((0.0, known.min()), (1.0, known.max()))
-        digits = digits_that_differ(known.min(), known.max())
-        for height, value in ends if not is_level(known) else ends[1:]:
+        ends = ((0.0, finite.min()), (1.0, finite.max()))
+        digits = digits_that_differ(finite.min(), finite.max())
+        for height, value in ends if not is_level(finite) else ends[1:]:
             text = scale.words[int(value)] if scale.words else f"{value:.{digits}g}"
             y, align = (-0.02, "top") if height == 0.0 else (1.02, "bottom")
             axes.annotate(text, (k, y), ha="center", va=align, fontsize=SMALL_FONT, annotation_clip=False)
@@ -284,14 +284,14 @@ N_LEVEL_LINE_PLACES = 80
 
 
 @apply_style
-def draw_map(found: StudyMarks, metric: DrawnScale) -> Figure:
+def draw_map(marks: StudyMarks, metric: DrawnScale) -> Figure:
     """Return one metric over two parameters: colours and level lines."""
     figure = new_figure(140, 100 + HEAD_HEIGHT)
     axes = axes_mm(figure, (18, 14, 92, 80))
-    down, across = found.varied
-    up, along = _places(down, found.shape[0], found.shape[1]), _places(across, found.shape[1], 1)
-    values = remove_rounding(metric.values).reshape(found.shape)[np.ix_(up.order, along.order)]
-    meets = found.meets.reshape(found.shape)[np.ix_(up.order, along.order)]
+    down, across = marks.varied
+    up, along = _places(down, marks.shape[0], marks.shape[1]), _places(across, marks.shape[1], 1)
+    values = remove_rounding(metric.values).reshape(marks.shape)[np.ix_(up.order, along.order)]
+    meets = marks.meets.reshape(marks.shape)[np.ix_(up.order, along.order)]
     x, y = along.borders, up.borders
     axes.set_facecolor(EMPTY_COLOUR)
     axes.grid(False)
@@ -307,10 +307,10 @@ def draw_map(found: StudyMarks, metric: DrawnScale) -> Figure:
     axes.set(xlabel=across.axis, ylabel=down.axis)
     along.dress(axes, "x")
     up.dress(axes, "y")
-    best = found.best
+    best = marks.best
     starred = best is not None and star(axes, across.values[best], down.values[best])
-    key = key_of(found, starred, not meets.all(), not np.isfinite(values).all())
-    head(figure, found, f"{metric.plain} over {across.plain} and {down.plain}", key)
+    key = key_of(marks, starred, not meets.all(), not np.isfinite(values).all())
+    head(figure, marks, f"{metric.plain} over {across.plain} and {down.plain}", key)
     return figure
 
 
@@ -320,15 +320,15 @@ def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric
     from matplotlib.colors import ListedColormap
 
     across, up, values = map_
-    there = np.unique(values[np.isfinite(values)]).astype(int)
+    levels = np.unique(values[np.isfinite(values)]).astype(int)
     index = np.full(len(metric.words), -1.0)
-    index[there] = np.arange(len(there))
+    index[levels] = np.arange(len(levels))
     shown = np.where(np.isfinite(values), index[np.where(np.isfinite(values), values, 0).astype(int)], np.nan)
-    colours = ListedColormap([colormaps[COLOUR_MAP](0.15 + 0.8 * k / max(len(metric.words) - 1, 1)) for k in there])
-    last = len(there) - 0.5
+    colours = ListedColormap([colormaps[COLOUR_MAP](0.15 + 0.8 * k / max(len(metric.words) - 1, 1)) for k in levels])
+    last = len(levels) - 0.5
     mesh = axes.pcolormesh(across, up, np.ma.masked_invalid(shown), cmap=colours, vmin=-0.5, vmax=last, rasterized=True)
     bar = color_bar(mesh, key)
-    bar.set_ticks(range(len(there)), labels=[metric.words[k] for k in there])
+    bar.set_ticks(range(len(levels)), labels=[metric.words[k] for k in levels])
     bar.ax.tick_params(length=0)
 
 
@@ -388,15 +388,15 @@ def _places(parameter: DrawnScale, count: int, stride: int) -> MapPlaces:
 
 def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArray) -> None:
     """Draw lines of equal value; on a coarse grid along a smooth surface through its values."""
-    known = values[np.isfinite(values)]
-    if min(values.shape) < 3 or up.words or across.words or not len(known):
+    finite = values[np.isfinite(values)]
+    if min(values.shape) < 3 or up.words or across.words or not len(finite):
         return
-    low, high = float(known.min()), float(known.max())
+    low, high = float(finite.min()), float(finite.max())
     levels = _round_values_between(low, high)
-    if is_level(known) or not len(levels):
+    if is_level(finite) or not len(levels):
         return
     x, y = across.positions, up.positions
-    if len(known) == values.size:
+    if len(finite) == values.size:
         y, values = _finer(y, values, 0)
         x, values = _finer(x, values, 1)
     from matplotlib import patheffects

@@ -49,8 +49,8 @@ class DrawnScale(ShortRepr):
         short = self.short or self.name.rpartition(".")[2]
         if self.dimension == PERCENT_DIMENSION:
             return f"{short.replace('_', ' ')} [%]"
-        known = self.dimension not in ("text", "count")
-        return axis_label(short, self.dimension) if known else short.replace("_", " ")
+        has_unit = self.dimension not in ("text", "count")
+        return axis_label(short, self.dimension) if has_unit else short.replace("_", " ")
 
     @property
     def axis(self) -> str:
@@ -82,12 +82,12 @@ def short_names(paths: Sequence[str]) -> tuple[str, ...]:
     ('bistable length', 'positive length', 'stiffness 0')
     """
     parts = [path.split(".") for path in paths]
-    counts = [2 if one[-1].isdigit() else 1 for one in parts]
+    counts = [2 if words[-1].isdigit() else 1 for words in parts]
     while True:
-        names = [" ".join(one[-count:]) for one, count in zip(parts, counts, strict=True)]
+        names = [" ".join(words[-count:]) for words, count in zip(parts, counts, strict=True)]
         longer = [
-            count + (names.count(name) > 1 and count < len(one))
-            for one, name, count in zip(parts, names, counts, strict=True)
+            count + (names.count(name) > 1 and count < len(words))
+            for words, name, count in zip(parts, names, counts, strict=True)
         ]
         if longer == counts:
             return tuple(names)
@@ -127,9 +127,9 @@ MISSED_HATCH = "////"  # where a requirement is missed
 HEAD_HEIGHT = 12.0  # room at the top of a picture of a study for its heading and its key [mm]
 
 
-def head(figure: Figure, found: StudyMarks, subject: str, key: Sequence[Artist] = ()) -> None:
+def head(figure: Figure, marks: StudyMarks, subject: str, key: Sequence[Artist] = ()) -> None:
     """Write above a picture whose study it is, what it shows, and what its marks mean."""
-    write_heading(figure, Heading(found.name, subject) if found.name else Heading(subject, "all points"))
+    write_heading(figure, Heading(marks.name, subject) if marks.name else Heading(subject, "all points"))
     if not is_plain() and key and _key(figure, key, len(key)).get_window_extent().x1 > figure.bbox.x1:
         figure.legends[-1].remove()
         _key(figure, key, 1)
@@ -145,7 +145,7 @@ def _key(figure: Figure, entries: Sequence[Artist], columns: int) -> Legend:
     return figure.legend(handles=list(entries), ncols=columns, **look, **tight)
 
 
-def key_of(found: StudyMarks, starred: bool, hatched: bool, empty: bool = False) -> list[Artist]:
+def key_of(marks: StudyMarks, starred: bool, hatched: bool, empty: bool = False) -> list[Artist]:
     """Return what stands in the key: those marks that occur."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -153,7 +153,7 @@ def key_of(found: StudyMarks, starred: bool, hatched: bool, empty: bool = False)
     entries: list[Artist] = []
     if starred:
         mark: Look = {"marker": "*", "markersize": 9, "color": LINE_VERMILLION, "markeredgecolor": "white"}
-        entries.append(Line2D([], [], linestyle="", label=found.best_words or "best point", **mark))
+        entries.append(Line2D([], [], linestyle="", label=marks.best_words or "best point", **mark))
     if hatched:
         look: Look = {"facecolor": EMPTY_COLOUR, "edgecolor": TEXT_GREY, "hatch": MISSED_HATCH, "linewidth": 0}
         entries.append(Patch(label="requirement missed, or not solved", **look))

@@ -36,9 +36,9 @@ def svg(figure: Figure) -> bytes:
 
     def keep_first(match: re.Match[str]) -> str:
         """Return a name, nothing if it was there before: an id twice is no valid document."""
-        known = match[1] in seen
+        is_kept = match[1] in seen
         seen.add(match[1])
-        return "" if known else match[0]
+        return "" if is_kept else match[0]
 
     text = written.decode().replace("'DejaVu Sans'", _FONT_FALLBACKS)
     return re.sub(r' id="([^"]*)"', keep_first, text).encode()

@@ -91,9 +91,11 @@ def drawing_figure(
     figure = new_figure(*PAPER_SIZE)
     x0, y0, x1, y1 = mm(drawing.extents).tolist()
     overall = _overall(drawing)
-    dimensions = [own for own in drawing.dimensions if not any(_same(own, whole) for whole in overall)]
+    dimensions = [
+        dimension for dimension in drawing.dimensions if not any(_same(dimension, whole) for whole in overall)
+    ]
     dimensions += overall
-    below, beside = (DIMENSION_STEP * (1 + sum(own.along == axis for own in dimensions)) for axis in "xy")
+    below, beside = (DIMENSION_STEP * (1 + sum(dimension.along == axis for dimension in dimensions)) for axis in "xy")
     room = PAPER_SIZE[0] - COLUMN_WIDTH - beside - 6.0, PAPER_SIZE[1] - below - 12.0
     scale = _scale(min(room[0] / max(x1 - x0, 1e-9), room[1] / max(y1 - y0, 1e-9)))
     width, height = scale * (x1 - x0), scale * (y1 - y0)

@@ -52,10 +52,10 @@ class BatchWork:
     @property
     def deciding(self) -> list[Any]:
         """Everything in it that decides what a run finds and writes."""
-        given = self.common
-        page = ["report"] if given.page else []  # without a page: as it always was, so that earlier batches are reused
-        form = [] if given.form.is_default else [repr(given.form), repr(given.form.settings)]
-        return [list(given.changes), given.fidelity, given.seed, not given.plots, self.verb, *page, *form]
+        common = self.common
+        page = ["report"] if common.page else []  # without a page: as it always was, so that earlier batches are reused
+        form = [] if common.form.is_default else [repr(common.form), repr(common.form.settings)]
+        return [list(common.changes), common.fidelity, common.seed, not common.plots, self.verb, *page, *form]
 
     def __call__(self, job: BatchJob) -> Entry:
         """Return what becomes of one specification; nothing is raised but what ends the process."""
@@ -82,12 +82,12 @@ class BatchWork:
         spec = read(wanted)[1]
         verb = _verb(self.verb or _natural(spec), self.fresh)
         name = " ".join(spec.name.split())
-        known = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec, entry.spec))
+        described = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec, entry.spec))
         try:
             outcome = carry_out_run(verb, wanted, self.arguments)
         except CfmError as error:
-            return _failed_entry(known, error)
-        return _entry_of(known, outcome)
+            return _failed_entry(described, error)
+        return _entry_of(described, outcome)
 
 
 def _natural(spec: Spec) -> str:
@@ -119,7 +119,7 @@ def _verb(name: str, fresh: bool) -> Verb:
 def _entry_of(entry: Entry, outcome: FinishedRun) -> Entry:
     """Return the outcome of a specification that was computed."""
     data, code = outcome.report.as_json(), ExitCode(outcome.report.exit_code)
-    sentences = [one["sentence"] for one in data["requirements"] if not one["ok"]]
+    sentences = [requirement["sentence"] for requirement in data["requirements"] if not requirement["ok"]]
     if code not in (ExitCode.OK, ExitCode.REQUIREMENT_MISSED):
         sentences = [data["message"]]
     return replace(
@@ -170,14 +170,14 @@ def carry_out(work: BatchWork, jobs: Sequence[BatchJob], execution: BatchExecuti
 
     What an earlier batch has finished and nobody has changed since is not computed again.
     """
-    found: dict[int, Entry] = {}
+    entries_by_number: dict[int, Entry] = {}
 
     def stopping() -> bool:
-        failed = execution.fail_fast and any(one.code is not ExitCode.OK for one in found.values())
+        failed = execution.fail_fast and any(entry.code is not ExitCode.OK for entry in entries_by_number.values())
         return failed or execution.progress.stopping()
 
     def note(job: BatchJob, entry: Entry) -> None:
-        found[job.index] = entry
+        entries_by_number[job.index] = entry
         execution.progress.add_finished(1, int(entry.code is not ExitCode.OK), entry.reused)
 
     def new() -> Iterator[BatchJob]:
@@ -198,7 +198,7 @@ def carry_out(work: BatchWork, jobs: Sequence[BatchJob], execution: BatchExecuti
         execution.kept.keep(entry)
         note(job, entry)
     message = "not run: interrupted" if execution.progress.stopping() else SKIPPED_MESSAGE
-    return tuple(found.get(job.index) or Entry(job.spec, job.folder, message=message) for job in jobs)
+    return tuple(entries_by_number.get(job.index) or Entry(job.spec, job.folder, message=message) for job in jobs)
 
 
 def choose_executor(jobs: int | None, count: int, timeout: float | None) -> Executor:
@@ -224,12 +224,12 @@ def exit_code(entries: Sequence[Entry], interrupted: bool, compared: BatchCompar
 
 def complaints(entries: Sequence[Entry], tracebacks: bool) -> Iterator[str]:
     """Yield what belongs on standard error: faults of files with their places, bugs."""
-    for one in entries:
-        yield from one.errors
-        if one.bug and not one.errors:
-            yield f"error    {visible(one.spec)}: {one.message}"
-        if one.bug and tracebacks:
-            yield from one.bug.rstrip("\n").split("\n")
+    for entry in entries:
+        yield from entry.errors
+        if entry.bug and not entry.errors:
+            yield f"error    {visible(entry.spec)}: {entry.message}"
+        if entry.bug and tracebacks:
+            yield from entry.bug.rstrip("\n").split("\n")
 
 
 @dataclass(frozen=True)
@@ -262,8 +262,8 @@ class BatchResult:
     @property
     def summary(self) -> Mapping[str, Any]:
         """Content of metrics.json."""
-        found: Mapping[str, Any] = shorten_values(batch_files.data(self.entries, self.exit_code, self.compared))
-        return found
+        summary: Mapping[str, Any] = shorten_values(batch_files.data(self.entries, self.exit_code, self.compared))
+        return summary
 
     @property
     def table(self) -> Table:
@@ -376,9 +376,9 @@ def batch(
     from cfmkit.studies.earlier_batch import KeptRuns
 
     place, named = os.fspath(out), _list_named(specs)
-    given = (changes,) if isinstance(changes, str) else tuple(changes)
-    _check_options(place, verb, given)
-    common = RunTask("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or DEFAULT_FORM)
+    stated = (changes,) if isinstance(changes, str) else tuple(changes)
+    _check_options(place, verb, stated)
+    common = RunTask("", place, stated, fidelity, seed, plots, of_many=True, page=page, form=form or DEFAULT_FORM)
     work = BatchWork(common, verb, tuple(arguments), fresh)
     todo = _list_jobs(named, place)
     executor = choose_executor(jobs, len(todo), timeout_per_point)
@@ -430,18 +430,18 @@ def _list_named(specs: Any) -> list[str]:
     if isinstance(specs, str | os.PathLike):
         specs = [specs]
     named = list(specs) if isinstance(specs, Iterable) else [specs]
-    if odd := [one for one in named if not isinstance(one, str | os.PathLike)]:
+    if odd := [name for name in named if not isinstance(name, str | os.PathLike)]:
         raise UsageError(f"a batch reads files: a path is needed, not {type(odd[0]).__name__}; cfmkit.dumps writes one")
     if not named:
         raise UsageError("there is no specification: name files, folders or patterns")
-    return [str(os.fspath(one)) for one in named]
+    return [str(os.fspath(name)) for name in named]
 
 
 def list_unreached_options(entries: Sequence[Entry], changes: Iterable[str]) -> Iterator[str]:
     """Yield the options that are for a family of which there is no specification."""
     from cfmkit.runs.specfile import split_address
 
-    families = {one.family for one in entries}
+    families = {entry.family for entry in entries}
     for change in changes if "" not in families else ():  # what is not valid may be of any family
         family, _ = split_address(change)
         if family is not None and family not in families:

@@ -127,13 +127,13 @@ def write(
 
 def data(entries: Sequence[Entry], code: ExitCode, compared: BatchComparison | None = None) -> dict[str, Any]:
     """Return what metrics.json says."""
-    required = [{"spec": one.spec, **requirement} for one in entries for requirement in one.requirements]
+    required = [{"spec": entry.spec, **requirement} for entry in entries for requirement in entry.requirements]
     return {
         "status": "complete" if code is ExitCode.OK else code.name.lower(),
         "message": message(entries),
         "metrics": {},
         "requirements": required,
-        "warnings": [{"spec": one.spec, **item} for one in entries for item in one.warnings],
-        "specs": [one.as_json() for one in entries],
+        "warnings": [{"spec": entry.spec, **item} for entry in entries for item in entry.warnings],
+        "specs": [entry.as_json() for entry in entries],
         **({"compared": compared.as_json()} if compared is not None else {}),
     }

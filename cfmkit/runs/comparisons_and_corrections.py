@@ -42,20 +42,20 @@ def extend_by_recording(
     report: Report,  # on the model
     comparison: Comparison,  # of the model with the recording
     source: MeasuredCurves,  # the recording
-    own: Supplement,  # more, about what was found: its files come first, its lines last
+    supplement: Supplement,  # more, about what was found: its files come first, its lines last
     before: Comparison | None = None,  # with the model as it was before a fit
 ) -> Report:
     """Return the report on a model beside a recording."""
     from cfmkit.experiment import measurement_and_calibration_outputs as add
 
     beside = Supplement(
-        add.comparison_data(comparison, source) | dict(own.data),
-        {**own.files, **add.comparison_files(source)},
-        (*add.comparison_lines(comparison, source), *own.lines),
-        (*add.comparison_warnings(comparison, source), *own.warnings),
+        add.comparison_data(comparison, source) | dict(supplement.data),
+        {**supplement.files, **add.comparison_files(source)},
+        (*add.comparison_lines(comparison, source), *supplement.lines),
+        (*add.comparison_warnings(comparison, source), *supplement.warnings),
         shortfall=add.shortfall(comparison),
         figures=add.comparison_figures(comparison, report.result.spec.name, before),
-        tables=own.tables,
+        tables=supplement.tables,
     )
     return report.extend(comparison.metrics() | comparison.loss(), beside)
 
@@ -106,12 +106,12 @@ def _draw_models(compared: FidelityComparison) -> Figure:
             index,
             "" if number else f"{item.name} \N{MINUS SIGN} {compared.finest}",
             compared.differences(item).places,
-            each.values,
+            difference.values,
         )
         for index, item in enumerate(solved)
         if item.name != compared.finest
-        for number, each in enumerate(compared.differences(item).curves.values())
-        if len(each.values)
+        for number, difference in enumerate(compared.differences(item).curves.values())
+        if len(difference.values)
     ]
     heading = Heading(compared.variants[0].result.spec.name, "one mechanism by several models", compared.shortfall)
     return fidelity_figure(heading, [item.curves[0] for item in solved], gaps)
@@ -122,7 +122,7 @@ def report_on_calibration(calibration: Calibration, source: MeasuredCurves) -> R
     from cfmkit.experiment import measurement_and_calibration_outputs as add
     from cfmkit.tables import to_csv
 
-    own = Supplement(
+    supplement = Supplement(
         add.calibration_data(calibration),
         {
             "calibrated.yaml": lambda: api.dumps(calibration.spec).encode(),
@@ -132,7 +132,7 @@ def report_on_calibration(calibration: Calibration, source: MeasuredCurves) -> R
         add.calibration_lines(calibration, source.recording),
         calibration.warnings,
     )
-    return extend_by_recording(report_on(calibration.result), calibration.after, source, own, calibration.before)
+    return extend_by_recording(report_on(calibration.result), calibration.after, source, supplement, calibration.before)
 
 
 WITHIN_SCATTER = "within the scatter: nothing to correct"
@@ -206,7 +206,7 @@ def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: 
     heads = ("", "before (95 %)", "after", "predicted (95 %)")
     shown = rows if correction.changes else rows[:1]  # else every value is as before
     table = PageTable("", tuple(map(GridColumn, heads)), tuple(row.cells for row in shown), N_ROWS_ON_PAGE)
-    own = Supplement(
+    supplement = Supplement(
         add.calibration_data(calibration) | {"correction": _data(correction, rows)},
         files,
         warnings=(*calibration.warnings, *correction.warnings),
@@ -214,7 +214,7 @@ def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: 
     )
     before = calibration.before if calibration.parameters else None
     report = report_on(made, Design(correction.corrected, Status.COMPLETE))
-    report = extend_by_recording(report, calibration.after, source, own, before)
+    report = extend_by_recording(report, calibration.after, source, supplement, before)
     # how the file was read and the residuals are no news here
     return replace(report, supplement=replace(report.supplement, lines=tuple(_lines(correction, zero_known))))
 

@@ -27,13 +27,13 @@ def schema(
     records: Iterable[Family],  # one: its specifications alone; several: any of theirs
 ) -> dict[str, Any]:
     """Return the schema of the specifications of some families; metrics are a closed list of names."""
-    known = {record.name: record for record in records}
-    found = plain_schema({name: record.spec_type for name, record in known.items()})
-    for choice in found.get("oneOf", [found]):
+    families = {record.name: record for record in records}
+    schema = plain_schema({name: record.spec_type for name, record in families.items()})
+    for choice in schema.get("oneOf", [schema]):
         _allow_base(choice)
-    for title, block in found.get("$defs", {}).items():
+    for title, block in schema.get("$defs", {}).items():
         prefix, dot, name = title.rpartition(".")
-        names = [*metric_names(known[prefix] if dot else next(iter(known.values())))]
+        names = [*metric_names(families[prefix] if dot else next(iter(families.values())))]
         properties = block.get("properties", {})
         if name in ("Requirement", "PartRequirement") and "metric" in properties:
             properties["metric"] = _close_names(properties["metric"], names)
@@ -41,7 +41,7 @@ def schema(
             properties["metrics"] = properties["metrics"] | {
                 "items": _close_names(properties["metrics"]["items"], names)
             }
-    return found
+    return schema
 
 
 def _allow_base(choice: dict[str, Any]) -> None:

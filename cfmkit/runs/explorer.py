@@ -107,29 +107,29 @@ class Explorer:
         from cfmkit.specs.yamlio import read_document
 
         spec = self.spec()
-        known = {key.path: key for key in keys(type(spec))}
+        keys_by_path = {key.path: key for key in keys(type(spec))}
         tree = read_document(api.dumps(spec, complete=True), "spec").tree
-        found = []
+        sliders = []
         for path, value in _leaves({key: tree[key] for key in tree if key not in LEFT_OUT}):
-            key = known.get(re.sub(r"\.\d+", "[]", path)) or known.get(re.sub(r"\.\d+$", "", path))
+            key = keys_by_path.get(re.sub(r"\.\d+", "[]", path)) or keys_by_path.get(re.sub(r"\.\d+$", "", path))
             about, whole = (key.description, key.kind == "whole number") if key else ("", False)
             if (slider := _slider(path, value, about, whole)) is not None:
-                found.append(slider)
-        return tuple(found)
+                sliders.append(slider)
+        return tuple(sliders)
 
     def answer(self, changes: Sequence[str]) -> dict[str, Any]:
         """Return what a page shows of the changed specification: curve, metrics, requirements, or what is wrong."""
         start = time.perf_counter()
         try:
-            found = _page_data(api.analyze(self.spec(changes)))
+            page = _page_data(api.analyze(self.spec(changes)))
         except CfmError as error:
-            found = {"problem": [line.removeprefix("error    ") for line in lines_of(error)]}
+            page = {"problem": [line.removeprefix("error    ") for line in lines_of(error)]}
             if isinstance(error, SpecError):
-                found["places"] = [
+                page["places"] = [
                     {"path": problem.path or problem.source.removeprefix("--set "), "message": problem.message}
                     for problem in error.problems
                 ]
-        return found | {"seconds": time.perf_counter() - start}
+        return page | {"seconds": time.perf_counter() - start}
 
     def influence(self, path: str) -> dict[str, Any]:
         """Return the share of its bounds by which 1 % more of a value moves the requirements, or the mean effort.
@@ -279,23 +279,25 @@ def _page_data(result: Result) -> dict[str, Any]:
 
     report = report_on(result)
     document = document_of(report)
-    found: dict[str, Any] = {
+    page: dict[str, Any] = {
         "tone": document.tone,
         "verdict": document.verdict,
         "summary": document.summary,
         "message": "" if result.status is Status.COMPLETE else report.message,
-        "requirements": [{"sentence": one.sentence, "ok": one.ok} for one in report.requirements],
+        "requirements": [{"sentence": outcome.sentence, "ok": outcome.ok} for outcome in report.requirements],
         "rows": [
-            {"label": one.label, "value": one.value, "bound": one.bound, "ok": one.ok, "about": one.about}
-            for one in document.headline
+            {"label": row.label, "value": row.value, "bound": row.bound, "ok": row.ok, "about": row.about}
+            for row in document.headline
         ],
-        "notes": [[one.word, one.text] for one in document.notes if one.text != report.message],
-        "warnings": [{"name": one.name, "short": one.short, "text": one.text} for one in document.warnings],
+        "notes": [[note.word, note.text] for note in document.notes if note.text != report.message],
+        "warnings": [
+            {"name": warning.name, "short": warning.short, "text": warning.text} for warning in document.warnings
+        ],
     }
     if result.curves:
         curve = result.curves[0]
         window, motion = shown_window(report), curve.motion_dimension
-        found["curve"] = {
+        page["curve"] = {
             "x": f"{curve.motion_name} [{border_unit(motion)}]",
             "y": f"{curve.kind} [{border_unit(curve.kind)}]",
             "branches": dict(_branches(curve)),
@@ -307,7 +309,7 @@ def _page_data(result: Result) -> dict[str, Any]:
                 for band in bands_of(result)
             ],
         }
-    return found
+    return page
 
 
 def _judge(result: AnalysisView) -> dict[str, tuple[float, float]]:

@@ -108,7 +108,7 @@ class ExplorerServer(ThreadingHTTPServer):
         """Answer in a thread; if there are too many, the one that has waited longest without a request is closed."""
         with self._counting:
             if len(self._connections) >= MAX_CONNECTIONS:
-                oldest = next((one for one, came in self._connections.items() if came is not None), None)
+                oldest = next((connection for connection, came in self._connections.items() if came is not None), None)
                 if oldest is None:
                     super().shutdown_request(request)
                     return
@@ -126,7 +126,9 @@ class ExplorerServer(ThreadingHTTPServer):
         """Close the connections whose request has not arrived in time, however steadily its pieces come."""
         with self._counting:
             first = time.monotonic() - MAX_READ_SECONDS
-            for late in [one for one, came in self._connections.items() if came is not None and came < first]:
+            for late in [
+                connection for connection, came in self._connections.items() if came is not None and came < first
+            ]:
                 self._hang_up(late)
 
     def shutdown_request(self, request: Any) -> None:
@@ -190,8 +192,8 @@ class _Handler(BaseHTTPRequestHandler):
             return
         self.server.note_arrival(self.connection)
         with self.server.turn:
-            status, found = self._answer(self.path, *asked)
-        self._send(status, json.dumps(found, allow_nan=False).encode())
+            status, answer = self._answer(self.path, *asked)
+        self._send(status, json.dumps(answer, allow_nan=False).encode())
 
     def _read_request(self) -> tuple[list[str], str]:
         """Return the changes and the name in a request."""
@@ -205,11 +207,11 @@ class _Handler(BaseHTTPRequestHandler):
         if len(body) < size:
             raise ValueError("shorter than it said")
         try:
-            found = json.loads(body.decode())
+            request = json.loads(body.decode())
         except RecursionError:
             raise ValueError("too deep") from None
-        changes, name = (found.get("changes"), found.get("name", "")) if isinstance(found, dict) else (None, "")
-        if not isinstance(changes, list) or not all(isinstance(one, str) for one in [*changes, name]):
+        changes, name = (request.get("changes"), request.get("name", "")) if isinstance(request, dict) else (None, "")
+        if not isinstance(changes, list) or not all(isinstance(text, str) for text in [*changes, name]):
             raise ValueError("no changes")
         for text in [*changes, name]:
             text.encode()  # half of a surrogate pair is no text
@@ -242,7 +244,7 @@ class _Handler(BaseHTTPRequestHandler):
         return (
             len(hosts) == 1
             and hosts[0] in names
-            and all(one in {f"http://{name}" for name in names} for one in origins)
+            and all(origin in {f"http://{name}" for name in names} for origin in origins)
         )
 
     def _knows(self, token: str) -> bool:

@@ -111,11 +111,11 @@ def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
     """Return the process by which a part is usually made and what it is assumed to hold, where nothing is stated."""
     from cfmkit.studies.parts.parts import assume_errors
 
-    found = assume_errors(spec)
-    if found is None:
+    assumed = assume_errors(spec)
+    if assumed is None:
         return ()
-    process = found.process
-    kinds = [kind for kind in ("thickness", "position") if kind in found.kinds.values()]
+    process = assumed.process
+    kinds = [kind for kind in ("thickness", "position") if kind in assumed.kinds.values()]
     held = [f"{kind} +- {1e3 * getattr(process, kind):g} mm (standard deviation)" for kind in kinds]
     kerf = f"kerf {1e3 * process.kerf:g} mm, " if process.kerf else ""
     return (
@@ -162,9 +162,9 @@ def export_files(
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
     kerf_width, max_deviation = read_length(kerf, "--kerf"), read_length(tolerance, "--tolerance")
     outlines = drawing_of(spec, family(spec.family), max_deviation)
-    exported = files(outlines, kerf_width, max_deviation, [one for one in wanted if one in DEFAULT_FORMATS])
+    exported = files(outlines, kerf_width, max_deviation, [name for name in wanted if name in DEFAULT_FORMATS])
     failed: dict[str, CfmError] = {}
-    for name in (one for one in wanted if one not in DEFAULT_FORMATS):
+    for name in (name for name in wanted if name not in DEFAULT_FORMATS):
         try:
             if name in DRAWING_FORMATS:
                 exported |= _drawing_on_paper(outlines, spec, name)
@@ -183,8 +183,8 @@ def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Dr
 
     if record.outline is None:
         raise UsageError(f"{record.phrase} has no part to draw")
-    given = () if tolerance is None else (tolerance,)
-    outlines = record.outline(spec, *given)
+    limits = () if tolerance is None else (tolerance,)
+    outlines = record.outline(spec, *limits)
     outlines = replace(outlines, warnings=(*outlines.warnings, *_thin_walls(outlines, spec)))
     return engrave_labels(outlines, spec.name)
 
@@ -206,10 +206,10 @@ def _thin_walls(outlines: Drawing, spec: Spec) -> Iterator[Finding]:
     ):
         return
     first, *others = [
-        f"{format_short(one.thickness, 'length', 3)}{{}} at ({', '.join(format_short(x, 'length') for x in one.at)})"
-        for one in walls[:MAX_NAMED_WALLS]
+        f"{format_short(wall.thickness, 'length', 3)}{{}} at ({', '.join(format_short(x, 'length') for x in wall.at)})"
+        for wall in walls[:MAX_NAMED_WALLS]
     ]
-    named = "; ".join([first.format(" thick"), *(one.format("") for one in others)])
+    named = "; ".join([first.format(" thick"), *(text.format("") for text in others)])
     more = len(walls) - MAX_NAMED_WALLS
     beyond = f", and thin in {more} other place{'s' if more > 1 else ''}" if more > 0 else ""
     key = "process" if process.least_feature is None else "process.least_feature"
@@ -236,22 +236,22 @@ def _decks(spec: Spec) -> dict[str, bytes]:
     from cfmkit.solid.mesh_deck_for_abaqus import deck
 
     parts = record.elastic.solids(spec)
-    found = {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in parts}
-    steps = {one.name: len(one.stops) for one in parts}
+    decks = {f"{piece.name}.inp": deck(f"{spec.name}, {piece.name}", piece) for piece in parts}
+    steps = {piece.name: len(piece.stops) for piece in parts}
     for network in record.elastic.beams(spec):
         title = f"{spec.name}, {network.name} as beams"
-        found[f"{network.name}-as-beams.inp"] = beam_deck(title, network, steps[network.name])
-    return found
+        decks[f"{network.name}-as-beams.inp"] = beam_deck(title, network, steps[network.name])
+    return decks
 
 
-def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
+def _formats(stated: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
     """Return the formats that are requested; of a text those between commas."""
     from cfmkit.export import FILE_FORMATS as OUTLINE_FORMATS
 
-    known = (*OUTLINE_FORMATS, DECK_FORMAT, *DRAWING_FORMATS)
-    words = usual if given is None else given.split(",") if isinstance(given, str) else given
+    formats = (*OUTLINE_FORMATS, DECK_FORMAT, *DRAWING_FORMATS)
+    words = usual if stated is None else stated.split(",") if isinstance(stated, str) else stated
     names = tuple(dict.fromkeys(word.strip().lower() for word in words))
     for name in names:
-        if name not in known:
-            raise UsageError(f"--format: {name!r} is not known; there are {', '.join(known)}")
+        if name not in formats:
+            raise UsageError(f"--format: {name!r} is not known; there are {', '.join(formats)}")
     return names

@@ -208,9 +208,9 @@ def calibrate(
         raise UsageError(f"--loss: there is no {loss!r}; there are {', '.join(LOSS_NAMES)}")
     start = resolve(spec)
     source = _read_curves(data, units, tare, zero, flip, cycles, group)
-    given = bounds or {}
-    texts = [f"{path}={ends}" for path, ends in given.items() if isinstance(ends, str)]
-    numbers = {path: ends for path, ends in given.items() if not isinstance(ends, str)}
+    limits_by_path = bounds or {}
+    texts = [f"{path}={ends}" for path, ends in limits_by_path.items() if isinstance(ends, str)]
+    numbers = {path: ends for path, ends in limits_by_path.items() if not isinstance(ends, str)}
     limits = read_bounds(texts, start, source.recording) | numbers
     paths = fit.split(",") if isinstance(fit, str) else fit
     chosen = parameters(start, paths, limits, source.recording)

@@ -93,10 +93,10 @@ def rows() -> tuple[PrintedRow, ...]:
 
 
 def _row(paper: str, family: str, entry: Mapping[str, Any]) -> PrintedRow:
-    given: dict[str, Any] = dict(entry)
+    keys: dict[str, Any] = dict(entry)
     for name in ("printed", "ask", "here"):
-        given[name] = _texts(given.get(name, ()))
-    return PrintedRow(paper=paper, family=family, changes=_texts(given.pop("set", ())), **given)
+        keys[name] = _texts(keys.get(name, ()))
+    return PrintedRow(paper=paper, family=family, changes=_texts(keys.pop("set", ())), **keys)
 
 
 def _texts(value: Any) -> tuple[str, ...]:
@@ -115,8 +115,8 @@ def choose_rows(name: str | None) -> tuple[PrintedRow, ...]:
         return every
     if wanted := tuple(row for row in every if name.lower() in (row.paper, row.family)):
         return wanted
-    known = dict.fromkeys([*(row.paper for row in every), *(row.family for row in every)])
-    hint = did_you_mean(name, list(known)) or f"there are {', '.join(known)}"
+    names = dict.fromkeys([*(row.paper for row in every), *(row.family for row in every)])
+    hint = did_you_mean(name, list(names)) or f"there are {', '.join(names)}"
     raise UsageError(f"there is no paper {visible(name)!r}; {hint}")
 
 
@@ -142,8 +142,10 @@ def _check_row(row: PrintedRow) -> ComputedRow:
 
 def _values(row: PrintedRow) -> tuple[float, ...]:
     scope = _Scope(row.spec, row.changes, row.verb)
-    found = [_evaluate(text, scope) for text in row.ask]
-    values = tuple(float(one) for value in found for one in (value if isinstance(value, tuple | list) else (value,)))
+    answers = [_evaluate(text, scope) for text in row.ask]
+    values = tuple(
+        float(number) for value in answers for number in (value if isinstance(value, tuple | list) else (value,))
+    )
     if len(values) != len(row.printed):
         raise ValueError(f"{len(values)} values for {len(row.printed)} numbers")
     return values
@@ -160,9 +162,9 @@ def _faults(row: PrintedRow, values: Sequence[float]) -> Iterator[str]:
             yield f"{_report_value(value, printed)} is not {printed}"
         if row.verdict in ("misprint", "disagrees") and _is_quantity(printed) and _matches(value, printed):
             yield f"{_report_value(value, printed)} is what is printed"
-    for value, here in zip(values, row.here, strict=bool(row.here)):
-        if not _matches(value, here):
-            yield f"{_report_value(value, here)} is not {here}"
+    for value, expected in zip(values, row.here, strict=bool(row.here)):
+        if not _matches(value, expected):
+            yield f"{_report_value(value, expected)} is not {expected}"
 
 
 @dataclass(frozen=True)
@@ -320,7 +322,7 @@ def _value(node: ast.expr, scope: _Scope) -> Any:
         case ast.Call(func=ast.Name(id="varied"), args=[ast.Constant(value=str(path))]):
             return _varied_values(_specification(scope), path)
         case ast.Call(func=ast.Name(id=name), args=args) if name in _MATH_FUNCTIONS:
-            return _MATH_FUNCTIONS[name](*(_value(one, scope) for one in args))
+            return _MATH_FUNCTIONS[name](*(_value(argument, scope) for argument in args))
         case ast.Call(func=ast.Name(id=column), args=[place, *branch]):
             return _value_on_curve(
                 _result(scope).curves[0], column, _value(place, scope), *map(ast.literal_eval, branch)

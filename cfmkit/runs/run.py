@@ -221,15 +221,15 @@ def carry_out(
     with RunFolder(wanted.out) as folder:
         folder.check(*COMMON_FILES, *(["report.html"] if wanted.page else []))
         with verb.running(folder, Run(wanted.seed, progress, wanted.time_budget)) as run:
-            found = _options_judged(_compute(verb, spec, run, document), spec, document)
+            report = _options_judged(_compute(verb, spec, run, document), spec, document)
         command = shlex.join(["cfmkit", *arguments])
         started = RunCommand(verb.name, wanted.spec, wanted.all_changes, verb.words, wanted.out)
-        for name, data in files(found, wanted.plots, wanted.page, command, wanted.form, wanted.animate, started):
+        for name, data in files(report, wanted.plots, wanted.page, command, wanted.form, wanted.animate, started):
             folder.write(name, data)
         origin = provenance(verb.name, spec, wanted.spec, arguments)
-        ending = {"status": found.status.key, "exit_code": int(found.exit_code)}
+        ending = {"status": report.status.key, "exit_code": int(report.exit_code)}
         manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | ending)
-    return FinishedRun(found, started, manifest, dict(folder.kept), time.perf_counter() - start)
+    return FinishedRun(report, started, manifest, dict(folder.kept), time.perf_counter() - start)
 
 
 def _make_ready(spec: Spec) -> None:
@@ -258,31 +258,31 @@ def placing(document: YamlDocument, options: Collection[str] = ()) -> Iterator[N
     try:
         yield
     except SpecError as error:
-        raise SpecError([_place_problem(document, one, options) for one in error.problems]) from None
+        raise SpecError([_place_problem(document, problem, options) for problem in error.problems]) from None
 
 
-def _place_problem(document: YamlDocument, one: Problem, options: Collection[str]) -> Problem:
-    if one.source or any(f"{one.path}.".startswith(f"{path}.") for path in options):
-        return one
-    return document.problem(one.path, one.message)
+def _place_problem(document: YamlDocument, problem: Problem, options: Collection[str]) -> Problem:
+    if problem.source or any(f"{problem.path}.".startswith(f"{path}.") for path in options):
+        return problem
+    return document.problem(problem.path, problem.message)
 
 
 def _compute(verb: Verb, spec: Spec, run: Run, document: YamlDocument) -> Report:
     with placing(document):
-        found = verb.compute(spec, run)
-    if found.result.status is Status.INVALID:
-        raise SpecError([place_problem(document, verb.name, found.result.message)])
-    return found
+        report = verb.compute(spec, run)
+    if report.result.status is Status.INVALID:
+        raise SpecError([place_problem(document, verb.name, report.result.message)])
+    return report
 
 
-def _options_judged(found: Report, given: Spec, document: YamlDocument) -> Report:
+def _options_judged(report: Report, requested: Spec, document: YamlDocument) -> Report:
     """Return a report that warns of values of ``--set`` that a design has replaced."""
-    made = found.design.spec if found.design else None
+    made = report.design.spec if report.design else None
     if made is None:
-        return found
-    before, after = dict(given.leaves()), dict(made.leaves())
-    stated, written = given.model_dump(mode="json", exclude_unset=True), made.model_dump(mode="json")
-    told = " ".join(warning.message for warning in found.warnings)
+        return report
+    before, after = dict(requested.leaves()), dict(made.leaves())
+    stated, written = requested.model_dump(mode="json", exclude_unset=True), made.model_dump(mode="json")
+    told = " ".join(warning.message for warning in report.warnings)
     warnings = [
         Finding(
             OVERWRITTEN_FINDING,
@@ -295,7 +295,7 @@ def _options_judged(found: Report, given: Spec, document: YamlDocument) -> Repor
         and not isclose(before[path], after.get(path, inf), rel_tol=1e-9)
         and f"'{path}'" not in told
     ]
-    return found.extend({}, run_outcome.Supplement(warnings=tuple(warnings))) if warnings else found
+    return report.extend({}, run_outcome.Supplement(warnings=tuple(warnings))) if warnings else report
 
 
 def _text_at(content: Any, path: str) -> str:
@@ -323,8 +323,8 @@ def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) 
 
 def run_analysis(spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism as it is."""
-    found = run_outcome.report_on(api.analyze(spec, run))
-    return found.extend({}, run_outcome.Supplement(lines=_assumed_lines(spec)))
+    report = run_outcome.report_on(api.analyze(spec, run))
+    return report.extend({}, run_outcome.Supplement(lines=_assumed_lines(spec)))
 
 
 def _assumed_lines(spec: Spec) -> tuple[tuple[str, str], ...]:
@@ -343,41 +343,41 @@ def run_design(spec: Spec, run: Run) -> Report:
     design = api.design(spec, run.part(0.0, 0.6) if many else run)
     result = api.analyze(design.spec, run) if design.spec is not None else run_outcome.empty_result(spec, design)
     tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
-    found = run_outcome.report_on(result, design)
+    report = run_outcome.report_on(result, design)
     drawn = warnings_of_part(result.spec) if design.spec is not None and result.status.usable else ()
-    known = {one.name for one in result.warnings}
-    more = tuple(one for one in drawn if one.name not in known)
+    names = {finding.name for finding in result.warnings}
+    more = tuple(finding for finding in drawn if finding.name not in names)
     lines = (*design.notes, *_assumed_lines(result.spec))
-    found = found.extend({}, run_outcome.Supplement(files=tables, lines=lines, warnings=more))
+    report = report.extend({}, run_outcome.Supplement(files=tables, lines=lines, warnings=more))
     if design.spec is None or result.status is not Status.COMPLETE:
-        return found
+        return report
     # as it was written: what follows from other values follows from those of each part
-    return _judge_many_parts(found, replace(result, spec=design.spec), spec, run.part(0.6, 1.0))
+    return _judge_many_parts(report, replace(result, spec=design.spec), spec, run.part(0.6, 1.0))
 
 
-def _judge_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
+def _judge_many_parts(report: Report, nominal: Result, spec: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, and its test plan."""
     from cfmkit.studies.delivered_design import friction_note
     from cfmkit.studies.parts.near_parts import expected_forces
 
-    found = _with_yield(found, nominal, given, run)
+    report = _with_yield(report, nominal, spec, run)
     lines = ("test plan", expected_forces(nominal, run)), ("friction", friction_note(nominal, run))
-    return found.extend({}, run_outcome.Supplement(lines=tuple((word, text) for word, text in lines if text)))
+    return report.extend({}, run_outcome.Supplement(lines=tuple((word, text) for word, text in lines if text)))
 
 
-def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
+def _with_yield(report: Report, nominal: Result, spec: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, where their tolerances are given."""
     from cfmkit.studies.parts.drawn_parts import no_yields, yields_of
 
-    yields = yields_of(nominal, given, run)
+    yields = yields_of(nominal, spec, run)
     if yields is None:
         from cfmkit.studies.parts.near_parts import expected_yield
 
         reported = expected_yield(nominal, run)
         more = run_outcome.Supplement(lines=(("yield", reported),) if reported else ())
-        return found.extend(no_yields(given), more).judge_yields()
+        return report.extend(no_yields(spec), more).judge_yields()
     more = run_outcome.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
-    return found.extend(yields.quantities(), more).judge_yields()
+    return report.extend(yields.quantities(), more).judge_yields()
 
 
 def _csv(table: Callable[[], Table]) -> bytes:

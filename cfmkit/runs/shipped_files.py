@@ -98,13 +98,13 @@ def example(name: str) -> Example:
     Raises UsageError if there is none of that name.
     """
     listed = examples()
-    known = {one.path.stem: one for one in listed} | {one.name: one for one in listed}
+    files = {file.path.stem: file for file in listed} | {file.name: file for file in listed}
     wanted = name.removesuffix(".yaml")
-    if wanted in known:
-        return known[wanted]
+    if wanted in files:
+        return files[wanted]
     from cfmkit.specs.yamlio import did_you_mean
 
-    hint = did_you_mean(wanted, list(known)) or "`cfmkit examples` lists them"
+    hint = did_you_mean(wanted, list(files)) or "`cfmkit examples` lists them"
     raise UsageError(f"there is no example {visible(name)!r}; {hint}")
 
 

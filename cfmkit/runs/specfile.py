@@ -50,11 +50,13 @@ def apply_options(document: YamlDocument, changes: Iterable[str], of_many: bool 
     """
     for change in changes:
         family, option = split_address(change)
-        own = _family_of(document)
-        if family in (None, own):
+        own_family = _family_of(document)
+        if family in (None, own_family):
             document = document.set(option)
-        elif own is not None and not of_many:
-            raise UsageError(f"--set {visible(change)}: {visible(document.source)} is of the family {visible(own)!r}")
+        elif own_family is not None and not of_many:
+            raise UsageError(
+                f"--set {visible(change)}: {visible(document.source)} is of the family {visible(own_family)!r}"
+            )
     return document
 
 
@@ -75,8 +77,8 @@ def split_address(change: str) -> tuple[str | None, str]:
     from cfmkit import families
 
     if family not in families.names():
-        near = difflib.get_close_matches(family, families.names(), n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else f": there are {', '.join(families.names())}"
+        close = difflib.get_close_matches(family, families.names(), n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else f": there are {', '.join(families.names())}"
         raise UsageError(f"--set {visible(change)}: there is no family {family!r}{hint}")
     return family, change[len(family) + 1 :]
 
@@ -133,13 +135,13 @@ def bind(document: YamlDocument) -> Spec:
     except SpecError as error:
         reported = {problem.path for problem in error.problems}
         raw = _entries(document.tree)
-        more = [found for found in _requirement_faults(document, family, raw) if not _is_below(found.path, reported)]
-        faults = sorted([*error.problems, *more], key=lambda one: (one.line == 0, one.line, one.column))
+        more = [fault for fault in _requirement_faults(document, family, raw) if not _is_below(fault.path, reported)]
+        faults = sorted([*error.problems, *more], key=lambda fault: (fault.line == 0, fault.line, fault.column))
         raise SpecError(faults) from None
-    found = [*_requirement_faults(document, family, enumerate(spec.requirements)), *_sweep_faults(document, spec)]
-    found += [*_sensitivity_faults(document, spec), *_design_faults(document, spec)]
-    if found:
-        raise SpecError(found)
+    problems = [*_requirement_faults(document, family, enumerate(spec.requirements)), *_sweep_faults(document, spec)]
+    problems += [*_sensitivity_faults(document, spec), *_design_faults(document, spec)]
+    if problems:
+        raise SpecError(problems)
     return spec
 
 
@@ -168,9 +170,9 @@ def _requirement_faults(
     """Yield what is wrong with metric names, bounds and windows, each with its place in the file."""
     from cfmkit.metrics import known_metrics, requirement_problems, values_of_family
 
-    known = known_metrics(None, values_of_family(family.outputs.values))
+    metrics = known_metrics(None, values_of_family(family.outputs.values))
     for index, requirement in requirements:
-        for problem in requirement_problems((requirement,), known, branches=family.outputs.branches):
+        for problem in requirement_problems((requirement,), metrics, branches=family.outputs.branches):
             key = problem.path.rpartition(".")[2]
             yield place_problem(document, f"requirements.{index}.{key}", problem.message)
 
@@ -203,7 +205,7 @@ def _design_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
 
     design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys
     lacking = "is a share of manufactured parts: state their tolerances in 'design.tolerances'"
-    asked = [one for one in enumerate(spec.requirements) if one[1].metric in OF_MANY_PARTS]
+    asked = [item for item in enumerate(spec.requirements) if item[1].metric in OF_MANY_PARTS]
     of_parts = {"tolerances", "free", "robust", "yield"}
     if isinstance(design, DesignKeys) and (asked or of_parts & design.model_fields_set):
         from cfmkit.studies.parts.parts import NO_TOLERANCE, errs_nowhere, faults, is_made
@@ -212,14 +214,14 @@ def _design_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
             lacking = f"is a share of manufactured parts: {NO_TOLERANCE}" if errs_nowhere(spec, design) else ""
         for path, message in faults(spec, design):
             yield document.problem(path, message)
-    for index, one in asked if lacking else ():
-        yield document.problem(("requirements", index, "metric"), f"{one.metric!r} {lacking}")
+    for index, requirement in asked if lacking else ():
+        yield document.problem(("requirements", index, "metric"), f"{requirement.metric!r} {lacking}")
 
 
 def place_problem(document: YamlDocument, path: str, message: str) -> Problem:
     """Return a problem with the place of a path in the file, or the option that set it."""
-    found = document.problem(path, message)
-    return found if found.line or found.source.startswith("--set") else Problem("--set", 0, 0, path, message)
+    fault = document.problem(path, message)
+    return fault if fault.line or fault.source.startswith("--set") else Problem("--set", 0, 0, path, message)
 
 
 def _entries(tree: Any) -> Iterator[tuple[int, Requirement]]:
@@ -233,15 +235,17 @@ def _entries(tree: Any) -> Iterator[tuple[int, Requirement]]:
 
 
 def _is_below(path: str, reported: set[str]) -> bool:
-    return any(path == other or path.startswith(f"{other}.") for other in reported if other)
+    return any(path == above or path.startswith(f"{above}.") for above in reported if above)
 
 
 def rename_source(error: SpecError, old: str, new: str) -> SpecError:
     """Return the error with another name for the source of some problems, which stands for its path as well."""
     return SpecError(
         [
-            replace(one, source=new, path="" if old == f"--set {one.path}" else one.path) if one.source == old else one
-            for one in error.problems
+            replace(fault, source=new, path="" if old == f"--set {fault.path}" else fault.path)
+            if fault.source == old
+            else fault
+            for fault in error.problems
         ]
     )
 
@@ -253,8 +257,8 @@ def _similar(name: str) -> str:
         return f" (nor a folder {visible(folder)}){_shipped_hint(base)}"
     # without their endings: those are alike in any two names
     files = {os.path.splitext(file)[0]: file for file in _yaml_files(folder or ".")}
-    near = difflib.get_close_matches(os.path.splitext(base)[0], files, n=1)
-    return f"; did you mean {visible(os.path.join(folder, files[near[0]]))!r}?" if near else _shipped_hint(base)
+    close = difflib.get_close_matches(os.path.splitext(base)[0], files, n=1)
+    return f"; did you mean {visible(os.path.join(folder, files[close[0]]))!r}?" if close else _shipped_hint(base)
 
 
 def _shipped_hint(base: str) -> str:
@@ -262,15 +266,15 @@ def _shipped_hint(base: str) -> str:
     from cfmkit.runs.shipped_folders import shipped_folder
 
     try:
-        there = next(shipped_folder("configs", "cam.yaml").rglob(glob.escape(base)), None) if base else None
+        shipped = next(shipped_folder("configs", "cam.yaml").rglob(glob.escape(base)), None) if base else None
     except UsageError:
         return ""
-    return f"; `cfmkit examples {there.stem}` copies the one that is shipped" if there is not None else ""
+    return f"; `cfmkit examples {shipped.stem}` copies the one that is shipped" if shipped is not None else ""
 
 
 def _path_inside(folder: str) -> str:
-    found = _yaml_files(folder)
-    return f", e.g. {visible(os.path.join(folder, found[0]))}" if found else ""
+    files = _yaml_files(folder)
+    return f", e.g. {visible(os.path.join(folder, files[0]))}" if files else ""
 
 
 def _yaml_files(folder: str) -> list[str]:

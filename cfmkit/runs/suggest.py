@@ -50,11 +50,11 @@ RECORD_COLUMNS: Mapping[str, tuple[str, str]] = {
 """What is reported of each proposal: its dimension and the unit of the files."""
 
 
-def numbers_in_border_units(found: Suggestions, proposal: Proposal) -> dict[str, Any]:
+def numbers_in_border_units(suggestions: Suggestions, proposal: Proposal) -> dict[str, Any]:
     """Return a proposal's numbers in border units, the mean in N or N*mm, by the name of its column."""
     numbers: dict[str, Any] = {}
     for name, value in proposal.numbers.items():
-        dimension = found.request.kind if name == "mean" else RECORD_COLUMNS[name][0]
+        dimension = suggestions.request.kind if name == "mean" else RECORD_COLUMNS[name][0]
         numbers[name] = (
             None if value is None else int(value) if dimension == "count" else float(to_border(value, dimension))
         )
@@ -76,58 +76,64 @@ def folder_name(number: int, proposal: Proposal) -> str:
     return f"{number}-{proposal.family}-" + "-".join(word for word in words.split("-") if word)
 
 
-def as_json(found: Suggestions, block: SuggestBlock) -> dict[str, Any]:
+def as_json(suggestions: Suggestions, block: SuggestBlock) -> dict[str, Any]:
     """Return what metrics.json and ``--json`` say."""
     return {
-        "status": STATUS_BY_CODE[found.exit_code],
-        "message": found.message,
+        "status": STATUS_BY_CODE[suggestions.exit_code],
+        "message": suggestions.message,
         "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
         "order": list(block.prefer),
-        "proposals": [_record(found, one, number) for number, one in enumerate(found.proposals, 1)],
-        "unjudged": [
-            _record(found, one, number) for number, one in enumerate(found.unjudged, len(found.proposals) + 1)
+        "proposals": [
+            _record(suggestions, proposal, number) for number, proposal in enumerate(suggestions.proposals, 1)
         ],
-        "near_misses": [_record(found, one) for one in found.near],
+        "unjudged": [
+            _record(suggestions, proposal, number)
+            for number, proposal in enumerate(suggestions.unjudged, len(suggestions.proposals) + 1)
+        ],
+        "near_misses": [_record(suggestions, proposal) for proposal in suggestions.near],
         "families": [
             {
-                "family": one.family,
-                "candidates": len(one.offer.candidates),
-                "made": one.made,
-                "proposals": sum(each.family == one.family for each in found.proposals),
-                "reason": _reason(found, one.family, one.offer.reason),
-                "nearest": dict(one.nearest),
+                "family": answer.family,
+                "candidates": len(answer.offer.candidates),
+                "made": answer.made,
+                "proposals": sum(proposal.family == answer.family for proposal in suggestions.proposals),
+                "reason": _reason(suggestions, answer.family, answer.offer.reason),
+                "nearest": dict(answer.nearest),
             }
-            for one in found.answers
+            for answer in suggestions.answers
         ],
-        "warnings": list(_warnings(found)),
+        "warnings": list(_warnings(suggestions)),
     }
 
 
-def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:
-    if out_of_reach or any(one.family == name for one in found.listed):
+def _reason(suggestions: Suggestions, name: str, out_of_reach: str) -> str:
+    if out_of_reach or any(proposal.family == name for proposal in suggestions.listed):
         return out_of_reach
-    untried = sum(len(one.offer.candidates) for one in found.answers if one.family == name and not one.made)
+    untried = sum(
+        len(answer.offer.candidates) for answer in suggestions.answers if answer.family == name and not answer.made
+    )
     if untried:
         return f"none of its {untried} candidates was tried in the time"
-    near = [one.missed[0] for one in found.near if one.family == name]
-    return (near or list(found.failed.get(name, ())) or [""])[0]
+    misses = [proposal.missed[0] for proposal in suggestions.near if proposal.family == name]
+    return (misses or list(suggestions.failed.get(name, ())) or [""])[0]
 
 
-def _warnings(found: Suggestions) -> Iterator[dict[str, str]]:
-    if found.late and found.listed:
+def _warnings(suggestions: Suggestions) -> Iterator[dict[str, str]]:
+    if suggestions.late and suggestions.listed:
         yield {
             "name": "search_cut_short",
             "message": "the time budget ended the search: increase it with --time-budget",
         }
 
 
-def _record(found: Suggestions, one: Proposal, number: int | None = None) -> dict[str, Any]:
-    about = {"family": one.family, "variant": one.variant, **numbers_in_border_units(found, one)}
-    place = {} if number is None else {"folder": folder_name(number, one)}
+def _record(suggestions: Suggestions, proposal: Proposal, number: int | None = None) -> dict[str, Any]:
+    about = {"family": proposal.family, "variant": proposal.variant, **numbers_in_border_units(suggestions, proposal)}
+    place = {} if number is None else {"folder": folder_name(number, proposal)}
     judged = {
-        "verdict": one.verdict, "model": one.model, "unjudged": list(one.open), "warnings": list(one.warnings),
+        "verdict": proposal.verdict, "model": proposal.model, "unjudged": list(proposal.open),
+        "warnings": list(proposal.warnings),
     }  # fmt: skip
-    return about | place | judged | {"misses": list(one.missed), "notes": list(one.notes)}
+    return about | place | judged | {"misses": list(proposal.missed), "notes": list(proposal.notes)}
 
 
 def suggest(
@@ -206,7 +212,7 @@ def suggest(
     >>> len(found.proposals), len(found.answers)
     (0, 4)
     """
-    given = locals()
+    arguments = locals()
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import serial
     from cfmkit.studies.suggest.search import suggest as search_families
@@ -214,7 +220,7 @@ def suggest(
     def format_value(value: Any) -> str:
         return "[" + ", ".join(map(format_value, value)) + "]" if isinstance(value, list | tuple) else str(value)
 
-    keys = {key: value for key, value in given.items() if key in SuggestBlock.model_fields and value is not None}
+    keys = {key: value for key, value in arguments.items() if key in SuggestBlock.model_fields and value is not None}
     keys |= {} if min_yield is None else {"yield": min_yield}
     name = None if request is None else os.fspath(request)
     block = read_request(name, {key: format_value(value) for key, value in keys.items()}, mark="")

@@ -101,15 +101,15 @@ class StudyResult:
         axes = list(self.varied)
         size = int(np.prod([frame[name].nunique() for name in axes])) if axes else 0
         if axes and size == len(frame) and not frame.duplicated(axes).any():
-            found = xarray.Dataset.from_dataframe(frame.set_index(axes))
+            dataset = xarray.Dataset.from_dataframe(frame.set_index(axes))
         else:
-            found = xarray.Dataset.from_dataframe(frame.rename_axis("point"))
+            dataset = xarray.Dataset.from_dataframe(frame.rename_axis("point"))
         units = {column.header: column.unit for column in self.table.columns}
-        found = found.rename({header: header.partition(" [")[0] for header in units if header in found.variables})
+        dataset = dataset.rename({header: header.partition(" [")[0] for header in units if header in dataset.variables})
         for header, unit in units.items():
             if unit is not None:
-                found[header.partition(" [")[0]].attrs["units"] = unit
-        return found
+                dataset[header.partition(" [")[0]].attrs["units"] = unit
+        return dataset
 
 
 def sweep(
@@ -267,9 +267,12 @@ def sensitivity(
     )
     if block:
         spec = spec.replace({"sensitivity": with_options(spec.sensitivity, block)})
-    found = carry_out(prepare(spec), partial(_run_work, _executor(jobs)))
+    findings = carry_out(prepare(spec), partial(_run_work, _executor(jobs)))
     return replace(
-        _read(outputs(found)), spec=found.setup.study.spec, findings=found, document=sensitivity_document(found)
+        _read(outputs(findings)),
+        spec=findings.setup.study.spec,
+        findings=findings,
+        document=sensitivity_document(findings),
     )
 
 
@@ -341,7 +344,7 @@ def _read(files: Any) -> StudyResult:
     """Return what the files of a study would say."""
     import json
 
-    found = {name: data if isinstance(data, bytes) else b"".join(data) for name, data in files}
-    tables = {name.removesuffix(".csv"): read_csv(data) for name, data in found.items() if name.endswith(".csv")}
+    contents = {name: data if isinstance(data, bytes) else b"".join(data) for name, data in files}
+    tables = {name.removesuffix(".csv"): read_csv(data) for name, data in contents.items() if name.endswith(".csv")}
     curves, indices, convergence = map(tables.get, ("curves", "indices", "convergence"))
-    return StudyResult(tables["results"], json.loads(found["metrics.json"]), curves, indices, convergence)
+    return StudyResult(tables["results"], json.loads(contents["metrics.json"]), curves, indices, convergence)

@@ -211,23 +211,23 @@ def _largest_beside(solution: MeshSolution, guide: PoseGuide, trial: Sequence[fl
         for pose in solution.course.poses
         if pose.travel in kept
     }
-    known = max((apart.get(travel, 0.0) for travel in trial), default=0.0)
-    return max(1.0, max(apart.values(), default=0.0) / known) if known else 1.0
+    largest = max((apart.get(travel, 0.0) for travel in trial), default=0.0)
+    return max(1.0, max(apart.values(), default=0.0) / largest) if largest else 1.0
 
 
 def _critical_points(solution: MeshSolution, coarse: MeshSolution) -> tuple[CriticalPoint, ...]:
     """Return the bifurcations on a mesh, with what they differ by on the coarser one as their error."""
     span = abs(solution.course.travel[-1] - solution.course.travel[0])
-    found = []
+    points = []
     for travel in solution.course.bifurcations:
         effort, error = float(solution.course.effort(np.array([travel]))[0]), math.nan
-        near = [place for place in coarse.course.bifurcations if abs(place - travel) < SAME_BIFURCATION * span]
-        if near and travel and effort:
-            other = min(near, key=lambda place: abs(place - travel))
-            apart = abs(float(coarse.course.effort(np.array([other]))[0]) - effort)
-            error = max(apart / abs(effort), abs(other - travel) / abs(travel), CRITICAL_LEAST)
-        found.append(CriticalPoint(travel, effort, error))
-    return tuple(found)
+        nearby = [place for place in coarse.course.bifurcations if abs(place - travel) < SAME_BIFURCATION * span]
+        if nearby and travel and effort:
+            nearest = min(nearby, key=lambda place: abs(place - travel))
+            apart = abs(float(coarse.course.effort(np.array([nearest]))[0]) - effort)
+            error = max(apart / abs(effort), abs(nearest - travel) / abs(travel), CRITICAL_LEAST)
+        points.append(CriticalPoint(travel, effort, error))
+    return tuple(points)
 
 
 SAME_BIFURCATION = 0.05
@@ -293,21 +293,21 @@ class Level:
         split = children > 1
         largest = max(abs(state.pose.effort) for state in states)
         shares = np.where(meshed.singular, SINGULAR_LEFT, SMOOTH_LEFT)
-        found = np.zeros((len(states), len(split)))
+        differences = np.zeros((len(states), len(split)))
         for row, (state, before) in enumerate(zip(states, coarse, strict=True)):
             missing, slope = (
-                own - refinement.interpolate(other)
-                for own, other in ((state.moved, before.moved), (state.slope, before.slope))
+                mine - refinement.interpolate(theirs)
+                for mine, theirs in ((state.moved, before.moved), (state.slope, before.slope))
             )
             energy = np.zeros(len(split))
             energy[meshed.moving] = np.abs(meshed.problem.elements.tangent_energies(state.moved, missing, slope))
             energy[~split] = 0.0
             whole = float(energy.sum())
             apart = abs(state.pose.effort - before.pose.effort) / largest if largest else 0.0
-            found[row] = shares * energy * (apart / whole if whole else 0.0)
+            differences[row] = shares * energy * (apart / whole if whole else 0.0)
             if left is not None:
-                found[row, ~split] = left[row, refinement.parents[~split]]
-        return cls(meshed, states, found)
+                differences[row, ~split] = left[row, refinement.parents[~split]]
+        return cls(meshed, states, differences)
 
     def mark(self, allowed: float) -> NDArray[np.bool_]:
         """Return the triangles to split, (m,): those with the most error left, so that a part of `allowed` remains."""

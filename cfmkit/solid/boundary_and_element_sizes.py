@@ -54,8 +54,8 @@ class Ring:
         """
         ring = np.asarray(points, float)
         ring = ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring
-        found = cls(read_only(_merge_steps(ring, step)))
-        return found if (found.area > 0) != hole else cls(read_only(found.points[::-1]))
+        ring_of_steps = cls(read_only(_merge_steps(ring, step)))
+        return ring_of_steps if (ring_of_steps.area > 0) != hole else cls(read_only(ring_of_steps.points[::-1]))
 
     @property
     def area(self) -> float:
@@ -187,7 +187,7 @@ def place_text(place: Sequence[float] | FloatArray) -> str:
     >>> place_text([0.005, -3e-19])
     '(5 mm, 0 mm)'
     """
-    return f"({', '.join(format_short(round(float(one), 9) + 0.0, 'length') for one in place)})"
+    return f"({', '.join(format_short(round(float(coordinate), 9) + 0.0, 'length') for coordinate in place)})"
 
 
 def _wanted_sizes(
@@ -227,9 +227,9 @@ def _thickness(rings: tuple[Ring, ...], places: FloatArray, normals: FloatArray,
     starts = np.concatenate([ring.points for ring in rings])
     along = np.concatenate([np.roll(ring.points, -1, axis=0) - ring.points for ring in rings])
     ray, _, depth = facing_lines(starts, along, places, normals, reach)
-    found = np.full(len(places), math.inf)
-    np.minimum.at(found, ray, depth)
-    return found
+    thickness = np.full(len(places), math.inf)
+    np.minimum.at(thickness, ray, depth)
+    return thickness
 
 
 def _grade_sizes(places: FloatArray, wanted: FloatArray) -> FloatArray:
@@ -246,8 +246,8 @@ def _grade_sizes(places: FloatArray, wanted: FloatArray) -> FloatArray:
         if not len(some):
             continue
         met = tree.query_ball_point(places[some], (top - sizes[some]) / SIZE_GRADING)
-        source = np.repeat(some, [len(one) for one in met])
-        near = np.concatenate([np.asarray(one, np.int64) for one in met])
-        away = np.hypot(*(places[near] - places[source]).T)
-        np.minimum.at(sizes, near, wanted[source] + SIZE_GRADING * away)
+        source = np.repeat(some, [len(numbers) for numbers in met])
+        targets = np.concatenate([np.asarray(numbers, np.int64) for numbers in met])
+        away = np.hypot(*(places[targets] - places[source]).T)
+        np.minimum.at(sizes, targets, wanted[source] + SIZE_GRADING * away)
     return sizes

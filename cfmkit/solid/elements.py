@@ -137,9 +137,9 @@ class Elements:
     def _assemble_forces(self, p: FloatArray) -> FloatArray:
         """Return nodal forces (n, 2) [N] from the first Piola-Kirchhoff stress times volume (2, 2, k) [N m]."""
         gradient, _ = self._parent
-        each = np.einsum("ijk,ajk->aik", p, gradient).reshape(6, 2, len(GAUSS_POINTS), -1).sum(2)
+        forces = np.einsum("ijk,ajk->aik", p, gradient).reshape(6, 2, len(GAUSS_POINTS), -1).sum(2)
         nodes, count = self.mesh.triangles.T.ravel(), len(self.mesh.nodes)
-        return np.column_stack([np.bincount(nodes, each[:, k].ravel(), count) for k in (0, 1)])
+        return np.column_stack([np.bincount(nodes, forces[:, k].ravel(), count) for k in (0, 1)])
 
     def tangent(self, moved: FloatArray) -> tuple[FloatArray, csc_array]:
         """Return forces (n, 2) [N] and their derivative (2n, 2n) [N/m] with respect to the displacements."""
@@ -189,13 +189,13 @@ class Elements:
         det = (f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]) * across
         full = np.stack([np.stack([s[0], s[2]]), np.stack([s[2], s[1]])])
         sigma = np.einsum("iak,abk,jbk->ijk", f, full, f) / det
-        each = np.stack([sigma[0, 0], sigma[1, 1], sigma[0, 1]])
+        components = np.stack([sigma[0, 0], sigma[1, 1], sigma[0, 1]])
         # the points at nodes come node by node, all elements each
         nodes, count = self.mesh.triangles.T.ravel(), len(self.mesh.nodes)
         met = np.bincount(nodes, minlength=count)
-        mean = np.stack([np.bincount(nodes, one, count) / np.maximum(met, 1) for one in each])
+        mean = np.stack([np.bincount(nodes, component, count) / np.maximum(met, 1) for component in components])
         spread = np.zeros(count)
-        np.maximum.at(spread, nodes, equivalent(each - mean[:, nodes]))
+        np.maximum.at(spread, nodes, equivalent(components - mean[:, nodes]))
         return mean, spread
 
     def evaluate_edge_stress(self, moved: FloatArray, held: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -207,14 +207,14 @@ class Elements:
         mean, _ = self.stress(moved)
         edges = self.mesh.edges[~held[self.mesh.edges].any(axis=1)]
         a, b, m = (self.mesh.nodes + moved)[edges].swapaxes(0, 1)
-        found, nodes = [], []
+        stresses, nodes = [], []
         # slopes of the parabola through the three nodes, at its first, last and middle one
         for column, along in ((0, 4 * m - 3 * a - b), (1, 3 * b + a - 4 * m), (2, b - a)):
             c, s = (along / np.hypot(*along.T)[:, None]).T
             xx, yy, xy = mean[:, edges[:, column]]
-            found.append(c * c * xx + s * s * yy + 2 * c * s * xy)
+            stresses.append(c * c * xx + s * s * yy + 2 * c * s * xy)
             nodes.append(edges[:, column])
-        return np.concatenate(found), np.concatenate(nodes)
+        return np.concatenate(stresses), np.concatenate(nodes)
 
 
 def _strain_change(f: FloatArray, df: FloatArray) -> FloatArray:
@@ -254,9 +254,9 @@ class Pattern:
         keys = np.sort(np.concatenate([above, below]))  # column by column
         keys = keys[np.diff(keys, prepend=-1) > 0]
         column, row = keys // size, keys % size
-        found = np.searchsorted(pairs, np.maximum(row, column) * size + np.minimum(row, column))
+        positions = np.searchsorted(pairs, np.maximum(row, column) * size + np.minimum(row, column))
         starts = np.searchsorted(keys, np.arange(size + 1) * size)
-        return cls(slots, found, row.astype(np.int32), starts.astype(np.int32))
+        return cls(slots, positions, row.astype(np.int32), starts.astype(np.int32))
 
     def assemble(self, entries: FloatArray) -> csc_array:
         """Return the matrix with the sums of the entries (k,), each of its pair."""

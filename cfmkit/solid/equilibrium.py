@@ -72,9 +72,9 @@ class Factors:
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the solution of a system."""
-        found = np.empty_like(right)
-        found[self.order] = self.lower_upper.solve(right[self.order])
-        return found
+        solution = np.empty_like(right)
+        solution[self.order] = self.lower_upper.solve(right[self.order])
+        return solution
 
     @property
     def negative(self) -> int:
@@ -96,8 +96,8 @@ class LinearisedPart:
     def factors(self) -> Factors:
         """The tangent's factors; RuntimeError where it is singular."""
         options = {"SymmetricMode": True}
-        found = splu(self.matrix, "NATURAL", diag_pivot_thresh=0.0, panel_size=PANEL_COLUMNS, options=options)
-        return Factors(found, self.order)
+        factors = splu(self.matrix, "NATURAL", diag_pivot_thresh=0.0, panel_size=PANEL_COLUMNS, options=options)
+        return Factors(factors, self.order)
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,8 @@ class Selection:
     @classmethod
     def from_matrix(cls, stiffness: csc_array, loose: NDArray[np.int64]) -> Selection:
         """Return the selection of some displacements of a matrix, whose pattern stays."""
-        own = csc_array(stiffness[loose][:, loose])
-        first = splu(own, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        block = csc_array(stiffness[loose][:, loose])
+        first = splu(block, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         order = np.argsort(first.perm_c)
         count = np.arange(1.0, stiffness.nnz + 1)  # numbers of the entries: none is 0, none is lost
         numbers = csc_array((count, stiffness.indices, stiffness.indptr), shape=stiffness.shape)
@@ -170,27 +170,27 @@ class SolidProblem:
         with np.errstate(all="ignore"):
             for _ in range(MAX_NEWTON_STEPS):
                 try:
-                    here = self.linearise(place[:-1], place[-1])
-                    rate = np.empty(0) if border is None else -here.factors.solve(here.slope)
-                    correct = _Correction(here.factors, border, rate)
+                    linear = self.linearise(place[:-1], place[-1])
+                    rate = np.empty(0) if border is None else -linear.factors.solve(linear.slope)
+                    correct = _Correction(linear.factors, border, rate)
                 except RuntimeError:  # exactly singular
                     return None
-                step = correct(here.residual, place)
-                if not self._is_credible(here.forces, step):
+                step = correct(linear.residual, place)
+                if not self._is_credible(linear.forces, step):
                     return None
-                left = float(np.abs(here.residual).max(initial=0.0) / np.abs(here.forces).max())
+                left = float(np.abs(linear.residual).max(initial=0.0) / np.abs(linear.forces).max())
                 rounded = 0.5 * least < left <= ROUGH_RESIDUAL and self._still(step, ROUGH_CORRECTION)
-                if on_border and (self._is_balanced(here.residual, here.forces) or self._still(step) or rounded):
-                    return self._balance(place, here.factors)
+                if on_border and (self._is_balanced(linear.residual, linear.forces) or self._still(step) or rounded):
+                    return self._balance(place, linear.factors)
                 place, least, on_border = place - step, min(least, left), True
                 for _ in range(MAX_CORRECTIONS):
                     forces = self.elements.forces(self.supports.evaluate_displacements(place[:-1], place[-1]))
                     residual = self.supports.residual(place[:-1], place[-1], forces)
                     if self._is_balanced(residual, forces):
-                        return self._balance(place, here.factors)
+                        return self._balance(place, linear.factors)
                     more = correct(residual, place)
                     if self._still(more):
-                        return self._balance(place, here.factors)
+                        return self._balance(place, linear.factors)
                     if not np.abs(more[:-1]).max() <= CORRECTION_RATIO * np.abs(step[:-1]).max():
                         break
                     place, step = place - more, more
@@ -239,7 +239,9 @@ class SolidProblem:
 
     def _effort(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> float:
         reactions = self.supports.reactions(unknowns, travel, forces)
-        return float(sum(group.driven @ one for group, one in zip(self.supports.groups, reactions, strict=True)))
+        return float(
+            sum(group.driven @ reaction for group, reaction in zip(self.supports.groups, reactions, strict=True))
+        )
 
 
 @dataclass(frozen=True)

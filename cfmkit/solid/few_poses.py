@@ -87,9 +87,11 @@ class PoseGuide:
     def travels(self) -> tuple[float, ...]:
         """Travels of the poses that are not close to a bifurcation [m or rad]: it is elsewhere on each mesh."""
         course = self.coarse.course
-        near = BIFURCATION_DISTANCE * abs(course.poses[-1].travel - course.poses[0].travel)
+        distance = BIFURCATION_DISTANCE * abs(course.poses[-1].travel - course.poses[0].travel)
         travels = (pose.travel for pose in course.poses)
-        return tuple(travel for travel in travels if all(abs(travel - place) > near for place in course.bifurcations))
+        return tuple(
+            travel for travel in travels if all(abs(travel - place) > distance for place in course.bifurcations)
+        )
 
 
 BIFURCATION_DISTANCE = 0.01
@@ -113,10 +115,10 @@ class Correction:
         """The cubics through them, of the travel times the sense of the path: unknowns, then the effort."""
         from scipy.interpolate import CubicHermiteSpline
 
-        found = self.differences
-        values = np.array([np.append(one.unknowns, one.effort) for one in found])
-        slopes = np.array([np.append(one.slope, one.stiffness) for one in found])
-        return CubicHermiteSpline([self._sense * one.travel for one in found], values, self._sense * slopes)
+        poses = self.differences
+        values = np.array([np.append(pose.unknowns, pose.effort) for pose in poses])
+        slopes = np.array([np.append(pose.slope, pose.stiffness) for pose in poses])
+        return CubicHermiteSpline([self._sense * pose.travel for pose in poses], values, self._sense * slopes)
 
     @property
     def _sense(self) -> float:
@@ -145,10 +147,10 @@ class Correction:
         if missed.max() > MAX_CURVE_ERROR:
             return travels[int(missed.argmax())]
         for k in np.argsort(-missed_by_cubics(self.differences), kind="stable"):
-            inside = [one for one in travels if places[k] < self._sense * one < places[k + 1]]
+            inside = [travel for travel in travels if places[k] < self._sense * travel < places[k + 1]]
             if inside:
                 middle = 0.5 * (places[k] + places[k + 1])
-                return min(inside, key=lambda one: abs(self._sense * one - middle))
+                return min(inside, key=lambda travel: abs(self._sense * travel - middle))
         return None
 
     def _measure_coarse_error(self, travels: Sequence[float]) -> FloatArray:
@@ -160,21 +162,21 @@ class Correction:
         return np.abs(drawn.effort(np.array(travels)) - effort) / size if size else np.zeros(len(travels))
 
 
-def _difference(pose: Balance, other: Balance) -> Balance:
+def _difference(pose: Balance, reference: Balance) -> Balance:
     fields = ("unknowns", "effort", "stiffness", "slope")
-    return replace(pose, **{name: getattr(pose, name) - getattr(other, name) for name in fields})
+    return replace(pose, **{name: getattr(pose, name) - getattr(reference, name) for name in fields})
 
 
 def solve_some(guide: PoseGuide, travels: Sequence[float]) -> tuple[Balance, ...]:
     """Return the poses on a fine mesh at some travels of the coarse one, as far as they are found and as stable."""
-    found: list[Balance] = []
+    poses: list[Balance] = []
     for travel in travels:
         coarse = guide.interpolate(travel)
-        more = _difference(found[-1], guide.interpolate(found[-1].travel)).unknowns if found else 0.0
+        more = _difference(poses[-1], guide.interpolate(poses[-1].travel)).unknowns if poses else 0.0
         pose = guide.meshed.problem.solve(coarse.unknowns + more, travel)
         if pose is not None and pose.unstable <= coarse.unstable:
-            found.append(pose.drop_factors())
-    return tuple(found)
+            poses.append(pose.drop_factors())
+    return tuple(poses)
 
 
 def follow_some(
@@ -202,11 +204,11 @@ def follow_some(
         if pose is None or pose.unstable > guess.unstable:
             return None
         off.append(abs(pose.effort - guess.effort) / size if size else 0.0)
-        along = sorted([*correction.solved, pose.drop_factors()], key=lambda one: travels.index(one.travel))
+        along = sorted([*correction.solved, pose.drop_factors()], key=lambda item: travels.index(item.travel))
         correction = Correction(guide, tuple(along))
         report(len(along) / len(travels))
-    known = {pose.travel: pose for pose in correction.solved}
-    whole = tuple(known.get(travel) or correction.pose_at(travel) for travel in travels)
+    by_travel = {pose.travel: pose for pose in correction.solved}
+    whole = tuple(by_travel.get(travel) or correction.pose_at(travel) for travel in travels)
     between = float(np.nan_to_num(guide.coarse.between)) + max(off[-CORRECTION_CHECKS:], default=0.0)
     return MeshSolution(
         guide.meshed.part, guide.meshed.problem, replace(course, poses=whole), guide.meshed.unjudged, between

@@ -42,24 +42,24 @@ class PathGuide(Protocol):
 class ScaledTangent:
     """Residual and tangent of a part at one place, for scaled unknowns."""
 
-    here: LinearisedPart
+    linear: LinearisedPart
     rate: FloatArray  # (q,) of the residual by the drive
     scale: FloatArray  # (q,)
 
     @property
     def residual(self) -> FloatArray:
         """Forces out of balance, (q,)."""
-        return self.here.residual
+        return self.linear.residual
 
     @property
     def unstable(self) -> int:
         """Number of unstable directions while the drive is held."""
-        return self.here.factors.negative
+        return self.linear.factors.negative
 
     def solve(self, right: FloatArray) -> FloatArray | None:
         """Return the tangent's inverse times columns (q, k), or None if it is singular."""
         try:
-            factors = self.here.factors
+            factors = self.linear.factors
         except RuntimeError:
             return None
         return np.column_stack([factors.solve(column) / self.scale for column in right.T])
@@ -117,48 +117,48 @@ class FollowedPart:
         """Return an equilibrium of the path over the travel as a pose."""
         unknowns, slope = at.x * self.scale, at.rate * self.scale
         if math.isnan(at.effort) or math.isnan(at.stiffness):  # not quite at its drive, or singular
-            found = self.problem.solve(unknowns, at.drive)
-            if found is not None and found.unstable <= at.unstable:
-                return found.drop_factors()
+            balance = self.problem.solve(unknowns, at.drive)
+            if balance is not None and balance.unstable <= at.unstable:
+                return balance.drop_factors()
             return self.problem.measure(unknowns, at.drive, slope, at.unstable)
         return Balance(at.drive, unknowns, at.effort, at.stiffness, at.unstable, slope, None)
 
     def linearise(self, x: FloatArray, drive: float) -> ScaledTangent:
         """Return residual and tangent at any place."""
         if self.held_at is None:
-            here = self.problem.linearise(x * self.scale, drive)
-            return ScaledTangent(here, here.slope, self.scale)
-        here = self.problem.scale_loads(drive).linearise(x * self.scale, self.held_at)
-        return ScaledTangent(here, -self._load, self.scale)
+            linear = self.problem.linearise(x * self.scale, drive)
+            return ScaledTangent(linear, linear.slope, self.scale)
+        linear = self.problem.scale_loads(drive).linearise(x * self.scale, self.held_at)
+        return ScaledTangent(linear, -self._load, self.scale)
 
     def solve(self, x: FloatArray, drive: float, border: Border | None = None) -> PathEquilibrium | None:
         """Return the equilibrium near a guess; under growing loads at their share only."""
         if self.held_at is None:
             if border is not None:
                 border = Border(np.append(border.row[:-1] / self.scale, border.row[-1]), border.level)
-            found = self.problem.solve(x * self.scale, drive, border)
+            balance = self.problem.solve(x * self.scale, drive, border)
         else:
-            found = None if border else self.problem.scale_loads(drive).solve(x * self.scale, self.held_at)
-        if found is None or found.factors is None:
+            balance = None if border else self.problem.scale_loads(drive).solve(x * self.scale, self.held_at)
+        if balance is None or balance.factors is None:
             return None
-        at = self.equilibrium(found)
-        self.recent = at.x, found.factors
+        at = self.equilibrium(balance)
+        self.recent = at.x, balance.factors
         if self.held_at is None:
             return at
-        return PathEquilibrium(at.x, drive, found.factors.solve(self._load) / self.scale, at.unstable)
+        return PathEquilibrium(at.x, drive, balance.factors.solve(self._load) / self.scale, at.unstable)
 
-    def predict(self, here: PathEquilibrium, goal: float) -> FloatArray | None:
+    def predict(self, at: PathEquilibrium, goal: float) -> FloatArray | None:
         """Return the unknowns at a drive by what they change by as the guide says; None if it does not know both."""
-        if self.guide is None or (known := self.guide(here.drive)) is None or (there := self.guide(goal)) is None:
+        if self.guide is None or (guessed := self.guide(at.drive)) is None or (target := self.guide(goal)) is None:
             return None
-        return here.x + (there - known) / self.scale
+        return at.x + (target - guessed) / self.scale
 
     # -- modes ---------------------------------------------------------------------------------------------------------
     def _flexibility(self, at: PathEquilibrium) -> LinearOperator:
         """Return the inverse of the tangent for scaled unknowns, or of one as close as Newton's method ended with."""
         if self.recent is None or self.recent[0] is not at.x:
             tangent = self.linearise(at.x, at.drive)
-            self.recent = at.x, tangent.here.factors
+            self.recent = at.x, tangent.linear.factors
         factors, size = self.recent[1], len(at.x)
         return LinearOperator((size, size), lambda v: factors.solve(v.ravel() / self.scale) / self.scale, dtype=float)
 
@@ -169,11 +169,11 @@ class FollowedPart:
         order = np.argsort(-np.abs(inverse))
         return 1.0 / inverse[order], vectors[:, order]
 
-    def softest(self, at: PathEquilibrium, near: FloatArray | None = None) -> tuple[float, FloatArray]:
+    def softest(self, at: PathEquilibrium, guess: FloatArray | None = None) -> tuple[float, FloatArray]:
         """Return the size of the smallest eigenvalue and its mode, better where another is known that is near."""
         operator = self._flexibility(at)
-        mode = self._any_vector if near is None else near
-        for _ in range(N_FIRST_POWERS if near is None else N_POWERS):
+        mode = self._any_vector if guess is None else guess
+        for _ in range(N_FIRST_POWERS if guess is None else N_POWERS):
             mode = mode / np.linalg.norm(mode)
             last, mode = mode, operator.matvec(mode)
         return 1.0 / abs(float(last @ mode)), mode

@@ -73,7 +73,8 @@ def mesh(
     across: float = 2.0,  # elements across the thickness at least
     # sequence of (2, 2): ends of lines through the part along which elements meet [m]: where a clamp begins
     seams: Sequence[FloatArray] = (),
-    near: float = 0.0,  # a node stands where a smooth edge that comes along a seam is farther from it than this [m]
+    # a node stands where a smooth edge that comes along a seam is farther from it than this [m]
+    seam_distance: float = 0.0,
     seed: int = 0,  # of the points that are thrown
 ) -> TriangleMesh:
     """Return a mesh of the part within some rings.
@@ -85,7 +86,7 @@ def mesh(
     if (around := sum(float(ring.places[-1]) for ring in rings)) > size * MOST_NODES:
         raise _too_many(int(around / size))
     field = sizes(rings, size, share, across)
-    laid = [_boundary_nodes(ring, field, _crossings(ring, seams, field, near)) for ring in rings]
+    laid = [_boundary_nodes(ring, field, _crossings(ring, seams, field, seam_distance)) for ring in rings]
     fixed = np.concatenate([ring.locate(arc) for ring, arc in zip(rings, laid, strict=True)])
     on_seams = [_points_on_seam(region, field, seam) for seam in seams]
     sewn = np.concatenate([np.zeros((0, 2)), *on_seams])
@@ -99,7 +100,7 @@ def mesh(
         points = np.concatenate([fixed, *on_seams, inside])
         corners = _triangles(region, points)
         missing = _missing(corners, laid)
-        crossed = [_crossed_pieces(region, corners, points, seam, near) for seam in seams]
+        crossed = [_crossed_pieces(region, corners, points, seam, seam_distance) for seam in seams]
         if not any(len(pieces) for pieces in (*missing, *crossed)):
             return _six_nodes(points, corners, rings, laid)
         first = next(
@@ -155,7 +156,7 @@ MIN_CROSSING_SINE = 0.5  # sine of the angle at which a seam must cross an edge 
 def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, tolerance: float) -> FloatArray:
     """Return the arc lengths (k,) [m] at which a ring crosses or leaves seams, but for those next to its corners."""
     along = np.roll(ring.points, -1, axis=0) - ring.points
-    found = []
+    crossings = []
     for start, end in seams:
         seam, to_ring = end - start, start - ring.points
         det = along[:, 0] * seam[1] - along[:, 1] * seam[0]
@@ -165,9 +166,9 @@ def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, tolerance:
         on_seam = (to_ring[:, 0] * along[:, 1] - to_ring[:, 1] * along[:, 0]) / det
         slack = max(1e-6, tolerance / float(np.hypot(*seam)))  # ends of seams are on edges as closely as they are drawn
         met = steep & (share >= 0) & (share < 1) & (on_seam >= -slack) & (on_seam <= 1 + slack)
-        found.append(ring.places[:-1][met] + share[met] * ring.lengths[met])
-        found.append(ring.places[:-1][_leaving(ring, start, end, tolerance)])
-    arcs = np.unique(np.concatenate([np.zeros(0), *found]))
+        crossings.append(ring.places[:-1][met] + share[met] * ring.lengths[met])
+        crossings.append(ring.places[:-1][_leaving(ring, start, end, tolerance)])
+    arcs = np.unique(np.concatenate([np.zeros(0), *crossings]))
     if not len(arcs):
         return arcs
     corners = ring.locate(ring.places[ring.corners]) if len(ring.corners) else np.full((1, 2), np.inf)

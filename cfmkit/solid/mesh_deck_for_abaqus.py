@@ -68,10 +68,10 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
         yield f"{k}, {x:.10g}, {y:.10g}, 0"
     start = 1
     for index, width in enumerate(widths, start=1):
-        own = number[grid.triangles[elements.width == width]]
+        of_width = number[grid.triangles[elements.width == width]]
         yield f"*ELEMENT, TYPE=CPS6, ELSET=WIDTH-{index}"
-        yield from (f"{start + k}, {', '.join(map(str, row))}" for k, row in enumerate(own.tolist()))
-        start += len(own)
+        yield from (f"{start + k}, {', '.join(map(str, row))}" for k, row in enumerate(of_width.tolist()))
+        start += len(of_width)
     yield "*MATERIAL, NAME=MATERIAL"
     yield from _elastic(part.law)
     for index, width in enumerate(widths, start=1):
@@ -116,7 +116,7 @@ def _step(sets: list[str], nodes: list[str], moves: list[str], poses: int) -> It
     yield f"{1 / poses:.10g}, 1., 1e-6, {1 / poses:.10g}"
     yield "*BOUNDARY"
     yield from moves
-    for word in (*(f"{one}, TOTALS=ONLY" for one in sets), *nodes):
+    for word in (*(f"{name}, TOTALS=ONLY" for name in sets), *nodes):
         yield f"*NODE PRINT, NSET={word}"
         yield "RF"
     yield from ("*NODE FILE", "U, RF", "*EL FILE", "S", "*END STEP")
@@ -174,24 +174,24 @@ class Hub:
 
         Nodes on a line across a beam have one more on each side of it.
         """
-        own = np.array(list(places.values()))
-        along, across = np.linalg.svd(own - own.mean(axis=0), full_matrices=False)[2]
-        size = float(np.ptp(own @ along))
+        places_of_group = np.array(list(places.values()))
+        along, across = np.linalg.svd(places_of_group - places_of_group.mean(axis=0), full_matrices=False)[2]
+        size = float(np.ptp(places_of_group @ along))
         middle = min(places, key=lambda node: float(np.hypot(*(places[node] - center))))
         added = {}
         if np.hypot(*(places[middle] - center)) > LINE_RTOL * size:
             middle, added = spare, {spare: center}
-        if np.ptp(own @ across) < LINE_RTOL * size:
+        if np.ptp(places_of_group @ across) < LINE_RTOL * size:
             added |= {spare + 1: center + 0.5 * size * across, spare + 2: center - 0.5 * size * across}
         every = np.array([*places, *added])
-        at = np.array([*own, *added.values()])
-        found = Delaunay(at).simplices
-        a, b, c = at[found].swapaxes(0, 1)
+        at = np.array([*places_of_group, *added.values()])
+        triangles = Delaunay(at).simplices
+        a, b, c = at[triangles].swapaxes(0, 1)
         twice = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-        found[twice < 0] = found[twice < 0][:, [0, 2, 1]]
-        found = found[np.abs(twice) > LINE_RTOL * size**2 / len(at)]
+        triangles[twice < 0] = triangles[twice < 0][:, [0, 2, 1]]
+        triangles = triangles[np.abs(twice) > LINE_RTOL * size**2 / len(at)]
         far = int(np.hypot(*(at - center).T).argmax())
-        return cls(middle, (int(every[far]), at[far] - center), added, max([spare, *added]) + 1, every[found])
+        return cls(middle, (int(every[far]), at[far] - center), added, max([spare, *added]) + 1, every[triangles])
 
 
 def _stiff(word: str, hub: Hub, start: int, width: float, modulus: float) -> Iterator[str]:
@@ -208,8 +208,8 @@ def _stiff(word: str, hub: Hub, start: int, width: float, modulus: float) -> Ite
 
 def _nodes(places: dict[int, FloatArray]) -> list[str]:
     """Return the lines of nodes at places [m]."""
-    found = [(node, to_border(at, "length").tolist()) for node, at in places.items()]
-    return ["*NODE", *(f"{node}, {x:.10g}, {y:.10g}, 0" for node, (x, y) in found)] if found else []
+    rows = [(node, to_border(at, "length").tolist()) for node, at in places.items()]
+    return ["*NODE", *(f"{node}, {x:.10g}, {y:.10g}, 0" for node, (x, y) in rows)] if rows else []
 
 
 def _rigid(word: str, group: Group, travel: float, spare: int) -> Lines:
@@ -223,11 +223,11 @@ def _rigid(word: str, group: Group, travel: float, spare: int) -> Lines:
 def _guide_lines(group: Group, travel: float, center: int, carrier: int) -> Lines:
     """Return what moves a centre along every direction that is not free, by nodes from `carrier` on."""
     model, moves = _nodes(dict.fromkeys(range(carrier, carrier + MAX_GUIDE_NODES), group.center)), []
-    for way in _prescribed_directions(group.free):
-        terms = [(center, 1 + k, float(way[k])) for k in (0, 1) if abs(way[k]) > 1e-12]
+    for direction in _prescribed_directions(group.free):
+        terms = [(center, 1 + k, float(direction[k])) for k in (0, 1) if abs(direction[k]) > 1e-12]
         terms.sort(key=lambda term: -abs(term[2]))  # the first is eliminated: it must not vanish
         model += _equation(*terms, (carrier, 1, -1.0))
-        moves += [f"{carrier}, 1, 1, {to_border(travel * float(way @ group.driven[:2]), 'length'):.10g}"]
+        moves += [f"{carrier}, 1, 1, {to_border(travel * float(direction @ group.driven[:2]), 'length'):.10g}"]
         moves += [f"{carrier}, 2, 3, 0"]
         carrier += 1
     return Lines(model, moves)
@@ -253,10 +253,10 @@ def _turn_lines(word: str, hub: Hub, angle: float, carrier: int, poses: int) -> 
     model += [f"** and (x, y) = ({x:.9g}, {y:.9g}) mm turned by {angle:.9g} rad times the time"]
     model += _nodes(dict.fromkeys((carrier, carrier + 1), hub.arm[1]))
     moves = []
-    for axis, way in ((1, x * (c - 1) - y * s), (2, x * s + y * (c - 1))):
+    for axis, arm in ((1, x * (c - 1) - y * s), (2, x * s + y * (c - 1))):
         node = carrier + axis - 1
         model += _equation((hub.arm[0], axis, 1.0), (hub.center, axis, -1.0), (node, axis, -1.0))
-        model += [f"*AMPLITUDE, NAME={word}-{axis}", *(f"{t:.10g}, {u:.10g}" for t, u in zip(time, way, strict=True))]
+        model += [f"*AMPLITUDE, NAME={word}-{axis}", *(f"{t:.10g}, {u:.10g}" for t, u in zip(time, arm, strict=True))]
         moves += [f"*BOUNDARY, AMPLITUDE={word}-{axis}", f"{node}, {axis}, {axis}, 1"]
         moves += ["*BOUNDARY", f"{node}, {3 - axis}, {3 - axis}, 0", f"{node}, 3, 3, 0"]
     model += [f"*NSET, NSET={word}-ARM", f"{hub.arm[0]},"]

@@ -53,12 +53,12 @@ class RefinedMesh:
     def transfer_selection(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return which nodes (n,) are chosen ones of the other mesh, or in the middle of a side between two of them."""
         corners = self.mesh.triangles[:, :3].max(initial=-1) + 1
-        found = np.zeros(len(self.mesh.nodes), bool)
-        found[:corners] = chosen[self.origins]
+        is_marked = np.zeros(len(self.mesh.nodes), bool)
+        is_marked[:corners] = chosen[self.origins]
         for first, last, middle in ((0, 1, 3), (1, 2, 4), (2, 0, 5)):
             ends = self.mesh.triangles[:, [first, last]]
-            found[self.mesh.triangles[:, middle]] = found[ends].all(axis=1)
-        return found
+            is_marked[self.mesh.triangles[:, middle]] = is_marked[ends].all(axis=1)
+        return is_marked
 
     def interpolate(self, values: FloatArray) -> FloatArray:
         """Return values (n, ...) at the nodes from values at the nodes of the other mesh."""
@@ -141,8 +141,8 @@ def _with_side_nodes(
     owners = np.concatenate([mesh.rings[kept] for _, _, kept in pieces])
     on_edge = side_of(edges[:, 0], edges[:, 1])
     for owner, ring in enumerate(rings):
-        own = owners == owner
-        middles[on_edge[own]] = ring.locate(arcs[own].mean(axis=1))
+        is_own = owners == owner
+        middles[on_edge[is_own]] = ring.locate(arcs[is_own].mean(axis=1))
     triangles = np.column_stack([number[corners], len(used) + which.reshape(-1, 3)])
     refined = TriangleMesh(
         read_only(np.concatenate([points, middles])),

@@ -141,15 +141,15 @@ class Part:
         """
         from shapely import LineString, MultiPoint
 
-        found = []
+        lines = []
         for place in self.places:
             pads = [shape for shape in place.shapes if len(shape) > 2]
             edges = [np.array(edge) for pad in pads for edge in zip(pad, np.roll(pad, -1, axis=0), strict=True)]
             for seam in place.seams:
                 ends = MultiPoint(seam)
                 close = (edge for edge in edges if max(map(LineString(edge).distance, ends.geoms)) <= self.near)
-                found.append(next(close, seam))
-        return tuple(found)
+                lines.append(next(close, seam))
+        return tuple(lines)
 
     def create_mesh(self, size: float | None = None) -> Meshed:
         """Return the part with elements of a size [m]; by default `ELEMENTS_ACROSS` across the thinnest place.
@@ -181,7 +181,7 @@ class Part:
         """Return the nodes (k,) at which an edge runs into the face of a rigid piece, not along it."""
         from shapely import LineString
 
-        found = []
+        nodes = []
         for edge in grid.edges[held[grid.edges[:, 0]] != held[grid.edges[:, 1]]]:
             ends = grid.nodes[edge[:2]]
             along = ends[1] - ends[0]
@@ -189,17 +189,17 @@ class Part:
                 face = seam[1] - seam[0]
                 sine = abs(face[0] * along[1] - face[1] * along[0]) / (np.hypot(*face) * np.hypot(*along))
                 if sine > TANGENT_SINE and LineString(seam).distance(LineString(ends)) < self.near:
-                    found.append(edge[0] if held[edge[0]] else edge[1])
-        return np.array(found, np.int64)
+                    nodes.append(edge[0] if held[edge[0]] else edge[1])
+        return np.array(nodes, np.int64)
 
     def _find_nodes_beside_clamps(self, grid: TriangleMesh, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return which nodes are close to where an edge runs into the face of a rigid piece, not along it."""
         from scipy.spatial import cKDTree
 
-        near, tree = np.zeros(len(grid.nodes), bool), cKDTree(grid.nodes)
+        is_near, tree = np.zeros(len(grid.nodes), bool), cKDTree(grid.nodes)
         for place in grid.nodes[self.clamp_ends(grid, held)]:
-            near[tree.query_ball_point(place, CLAMP_CLEARANCE * self.thinnest)] = True
-        return near
+            is_near[tree.query_ball_point(place, CLAMP_CLEARANCE * self.thinnest)] = True
+        return is_near
 
     def _widths(self, grid: TriangleMesh) -> FloatArray:
         """Return the width of every element [m], by where its middle is."""
@@ -215,15 +215,15 @@ class Part:
     def _groups(self, nodes: FloatArray, holdable: NDArray[np.bool_]) -> tuple[tuple[Group, ...], NDArray[np.bool_]]:
         """Return the groups of nodes that are held or driven, and which nodes are in one."""
         taken = ~holdable
-        found: list[Group] = []
+        groups: list[Group] = []
         for place in self.places:
             inside = np.flatnonzero(find_within(nodes, place.shapes, self.near) & ~taken)
             if len(inside):
-                found.append(Group(place.name, inside, place.at, place.driven, place.free, place.load))
+                groups.append(Group(place.name, inside, place.at, place.driven, place.free, place.load))
                 taken[inside] = True
-            elif not any(one.name == place.name.rstrip("'") for one in found):
+            elif not any(group.name == place.name.rstrip("'") for group in groups):
                 raise GeometryError(f"no node of the mesh lies where {place.name} is held")
-        return tuple(found), taken & holdable
+        return tuple(groups), taken & holdable
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,9 +255,9 @@ class Meshed:
         corners = [ring.points[ring.corners[ring.turns[ring.corners] < 0.0]] for ring in self.part.rings]
         ends = self.part.clamp_ends(self.grid, self.held)
         places = np.concatenate([*corners, self.grid.nodes[ends]])
-        found = np.zeros(len(self.grid.nodes), bool)
-        found[cKDTree(self.grid.nodes).query(places)[1]] = True
-        return found
+        is_singular = np.zeros(len(self.grid.nodes), bool)
+        is_singular[cKDTree(self.grid.nodes).query(places)[1]] = True
+        return is_singular
 
     def collect_poses(self, *poses: Balance) -> MeshSolution:
         """Return some poses as a solution."""
@@ -292,11 +292,11 @@ class MeshSolution:
     @cached_property
     def along_edges(self) -> tuple[FloatArray, NDArray[np.int64]]:
         """Stress along the free edges at each pose (k, e) [Pa], and at which nodes (e,)."""
-        found = [
+        results = [
             self.problem.elements.evaluate_edge_stress(self.evaluate_displacements(pose), self.unjudged)
             for pose in self.course.poses
         ]
-        return read_only([stress for stress, _ in found]), found[0][1]
+        return read_only([stress for stress, _ in results]), results[0][1]
 
     @cached_property
     def peaks(self) -> tuple[FloatArray, FloatArray]:
@@ -311,10 +311,10 @@ class MeshSolution:
 
         Both in parts of this one's largest. All poses count: at a single one two meshes may agree by chance.
         """
-        _, own, other = np.intersect1d(self.course.travel, coarse.course.travel, return_indices=True)
-        force = np.array([self.course.poses[k].effort for k in own])
-        there = np.array([coarse.course.poses[k].effort for k in other])
-        return _apart(force, there), _apart(self.peaks[0][own], coarse.peaks[0][other])
+        _, places, places_of_coarse = np.intersect1d(self.course.travel, coarse.course.travel, return_indices=True)
+        force = np.array([self.course.poses[k].effort for k in places])
+        efforts = np.array([coarse.course.poses[k].effort for k in places_of_coarse])
+        return _apart(force, efforts), _apart(self.peaks[0][places], coarse.peaks[0][places_of_coarse])
 
     def evaluate_displacements(self, pose: Any) -> FloatArray:
         """Return the displacements of all nodes at a pose (n, 2) [m]."""
@@ -376,10 +376,10 @@ def refine_path(problem: SolidProblem, course: PosePath, allowed: float = MAX_EF
     off: list[float] = []
     skipped: set[float] = set()
     for _ in range(len(course.poses)):
-        found = _check_interval(problem, course, skipped)
-        if found is None:
+        refined = _check_interval(problem, course, skipped)
+        if refined is None:
             break
-        course, difference = found
+        course, difference = refined
         off.append(difference / size)
         if len(off) >= N_CHECKS and max(off[-N_CHECKS:]) <= allowed:
             break

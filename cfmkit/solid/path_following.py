@@ -197,10 +197,10 @@ def _end_at_contact(problem: SolidProblem, path: PosePath, pose: Balance, spot: 
         middle = pose_between(problem, poses[-1], pose, 0.5 * (poses[-1].travel + pose.travel))
         if middle is None:
             break
-        if (found := touching(problem, middle)) is None:
+        if (met := touching(problem, middle)) is None:
             poses.append(middle)
         else:
-            pose, spot = middle, found
+            pose, spot = middle, met
     return replace(path, poses=tuple(poses), ending=PathEnd.CONTACT, touching=spot)
 
 
@@ -230,17 +230,19 @@ def _add_corner(part: FollowedPart, path: PosePath, event: PathEvent, pose: Bala
         unknowns = first.unknowns + (place - first.travel) * first.slope
     else:
         corner, onto = part.pose(event.near), event.before < event.after
-        near, far = (first, pose) if onto else (last, path.poses[-1])  # on the path that crosses, and on the branch
+        pose_near, far = (
+            (first, pose) if onto else (last, path.poses[-1])
+        )  # on the path that crosses, and on the branch
         goal = place + BESIDE_CORNER * (far.travel - place)
         far = part.pose(find_beside(part, event.near.x, place, part.equilibrium(far), goal, far.unstable))
-        effort, unknowns = corner.effort + (place - corner.travel) * near.stiffness, corner.unknowns
+        effort, unknowns = corner.effort + (place - corner.travel) * pose_near.stiffness, corner.unknowns
         opening = 2 * (effort - far.effort) / (place - far.travel) - far.stiffness  # of a parabola
-        before, behind = (near.stiffness, opening) if onto else (opening, near.stiffness)
-        first, last = (near, far) if onto else (far, near)
+        before, behind = (pose_near.stiffness, opening) if onto else (opening, pose_near.stiffness)
+        first, last = (pose_near, far) if onto else (far, pose_near)
     path = replace(path, bifurcations=(*path.bifurcations, place))
     if min(abs(place - first.travel), abs(place - last.travel)) < 2.0 * abs(width):
         return path
-    poses = [one for one in path.poses if (one.travel - first.travel) * width < 0.0]
+    poses = [item for item in path.poses if (item.travel - first.travel) * width < 0.0]
     for end, travel, stiffness in ((first, place, before), (last, place + width, behind)):
         slope = (end.unknowns - unknowns) / (end.travel - place)
         poses.append(Balance(travel, unknowns, effort, stiffness, pose.unstable, slope, None))
@@ -255,22 +257,24 @@ def _meet(part: FollowedPart, path: PosePath, event: PathEvent, later: Balance) 
     assert event.within is not None
     first, last = (part.pose(at) for at in event.within)
     place, sense = event.drive, np.sign(last.travel - first.travel)
-    earlier = next((one for one in path.poses[::-1] if (one.travel - first.travel) * sense < 0.0), first)
+    earlier = next((item for item in path.poses[::-1] if (item.travel - first.travel) * sense < 0.0), first)
     curves = _curve_beside(first, earlier, place), _curve_beside(last, later, place)
     roots = np.asarray((curves[0] - curves[1]).roots(), complex)
     inside = (roots.imag == 0.0) & ((roots.real > first.travel - place) != (roots.real > last.travel - place))
-    way = min(roots.real[inside].tolist(), key=abs, default=0.0)
-    before, behind = (float(curve.deriv()(way)) for curve in curves)
-    return place + way, float(curves[0](way)), before, behind
+    offset = min(roots.real[inside].tolist(), key=abs, default=0.0)
+    before, behind = (float(curve.deriv()(offset)) for curve in curves)
+    return place + offset, float(curves[0](offset)), before, behind
 
 
-def _curve_beside(pose: Balance, other: Balance, place: float) -> Polynomial:
+def _curve_beside(pose: Balance, neighbour: Balance, place: float) -> Polynomial:
     """Return the effort near a pose and another by a cubic, over the travel behind a place."""
-    way = other.travel - pose.travel
+    distance = neighbour.travel - pose.travel
     cubic = Polynomial([pose.effort, pose.stiffness])
-    if way:
-        gap, change = other.effort - float(cubic(way)), other.stiffness - pose.stiffness
-        cubic += Polynomial([0.0, 0.0, (3 * gap - way * change) / way**2, (way * change - 2 * gap) / way**3])
+    if distance:
+        gap, change = neighbour.effort - float(cubic(distance)), neighbour.stiffness - pose.stiffness
+        cubic += Polynomial(
+            [0.0, 0.0, (3 * gap - distance * change) / distance**2, (distance * change - 2 * gap) / distance**3]
+        )
     return cubic(Polynomial([place - pose.travel, 1.0]))
 
 
@@ -293,15 +297,15 @@ def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:
     lines = linestrings(places[pieces])
     if (spot := _find_obstacle(problem, pieces, lines)) is not None:
         return spot
-    own, others = STRtree(lines).query(lines)
-    apart = (own < others) & ((of[own] < 0) | (of[own] != of[others]))
-    own, others = own[apart], others[apart]
-    apart = (pieces[own][:, :, None] != pieces[others][:, None, :]).all(axis=(1, 2))  # neighbours share a node
-    own, others = own[apart], others[apart]
-    met = np.flatnonzero(crosses(lines[own], lines[others]))
+    first, others = STRtree(lines).query(lines)
+    apart = (first < others) & ((of[first] < 0) | (of[first] != of[others]))
+    first, others = first[apart], others[apart]
+    apart = (pieces[first][:, :, None] != pieces[others][:, None, :]).all(axis=(1, 2))  # neighbours share a node
+    first, others = first[apart], others[apart]
+    met = np.flatnonzero(crosses(lines[first], lines[others]))
     if not len(met):
         return None
-    return np.asarray(lines[own[met[0]]].intersection(lines[others[met[0]]]).coords[0])
+    return np.asarray(lines[first[met[0]]].intersection(lines[others[met[0]]]).coords[0])
 
 
 def _find_obstacle(problem: SolidProblem, pieces: Any, lines: Any) -> FloatArray | None:
@@ -310,7 +314,7 @@ def _find_obstacle(problem: SolidProblem, pieces: Any, lines: Any) -> FloatArray
         return None
     from shapely import Polygon, intersects, linestrings, union_all
 
-    stands = union_all([Polygon(one) for one in problem.obstacles])
+    stands = union_all([Polygon(ring) for ring in problem.obstacles])
     entered = intersects(lines, stands)
     entered[entered] = ~intersects(linestrings(problem.elements.mesh.nodes[pieces[entered]]), stands)
     if not entered.any():

@@ -56,10 +56,10 @@ class LoadPath:
         sense = float(np.sign(load))
         law = course.law(sense)
         last = float(law.x[-1] if through_maxima else first_maximum(course, sense))
-        there = law.solve(abs(load), extrapolate=False)
-        there = there[np.isfinite(there) & (there > 0.0) & (there <= last)]
-        if len(there):
-            return cls(sense * float(there.min()), load, LoadEnd.REACHED)
+        roots = law.solve(abs(load), extrapolate=False)
+        roots = roots[np.isfinite(roots) & (roots > 0.0) & (roots <= last)]
+        if len(roots):
+            return cls(sense * float(roots.min()), load, LoadEnd.REACHED)
         how = LoadEnd.MAXIMUM if last < law.x[-1] else LoadEnd.SHORT
         return cls(sense * last, sense * float(law(last)), how)
 
@@ -86,9 +86,9 @@ def travel_for(
         course = follow(meshed.problem, stops, report, lambda effort: sense * effort >= abs(load))
         if len(course.poses) < 2:
             break
-        found = LoadPath.from_course(course, load, through_maxima)
-        travel = found.end
-        if found.how is not LoadEnd.SHORT or course.ended:
+        path = LoadPath.from_course(course, load, through_maxima)
+        travel = path.end
+        if path.how is not LoadEnd.SHORT or course.ended:
             break
     return TRAVEL_MARGIN * travel
 
@@ -96,22 +96,22 @@ def travel_for(
 def follow_to_load(solved: MeshSolution, load: float, through_maxima: bool) -> tuple[MeshSolution, LoadPath]:
     """Return the part's path up to a load [N or N m] or to where it leads, with a pose there, and what that is."""
     course = solved.course
-    found = LoadPath.from_course(course, load, through_maxima)
-    if found.how is LoadEnd.SHORT:
-        return solved, found
-    poses = [pose for pose in course.poses if abs(pose.travel) < abs(found.end) * (1 - 1e-12)]
+    path = LoadPath.from_course(course, load, through_maxima)
+    if path.how is LoadEnd.SHORT:
+        return solved, path
+    poses = [pose for pose in course.poses if abs(pose.travel) < abs(path.end) * (1 - 1e-12)]
     beyond = course.poses[len(poses)]
-    last, travel = None, found.end
+    last, travel = None, path.end
     for _ in range(MAX_NEWTON_STEPS):
         last = pose_between(solved.problem, poses[-1], beyond, travel)
-        if last is None or found.how is LoadEnd.MAXIMUM or abs(last.effort - load) <= LOAD_RTOL * abs(load):
+        if last is None or path.how is LoadEnd.MAXIMUM or abs(last.effort - load) <= LOAD_RTOL * abs(load):
             break
         travel += (load - last.effort) / last.stiffness
     if last is None:
         ended = replace(course, poses=tuple(poses), ending=PathEnd.LOST)
         return replace(solved, course=ended), LoadPath(poses[-1].travel, poses[-1].effort, LoadEnd.SHORT)
     ended = replace(course, poses=(*poses, last), ending=PathEnd.COMPLETE, touching=None)
-    return replace(solved, course=ended), LoadPath(last.travel, last.effort, found.how)
+    return replace(solved, course=ended), LoadPath(last.travel, last.effort, path.how)
 
 
 def with_poses(solved: MeshSolution, travels: Iterable[float]) -> MeshSolution:
@@ -121,8 +121,8 @@ def with_poses(solved: MeshSolution, travels: Iterable[float]) -> MeshSolution:
     for travel in travels:
         after = next((k for k, pose in enumerate(poses) if abs(pose.travel) > abs(travel) - slack), 0)
         if after and abs(poses[after].travel - travel) > slack:
-            found = pose_between(solved.problem, poses[after - 1], poses[after], travel)
-            poses[after:after] = [] if found is None else [found]
+            reached = pose_between(solved.problem, poses[after - 1], poses[after], travel)
+            poses[after:after] = [] if reached is None else [reached]
     return replace(solved, course=replace(solved.course, poses=tuple(poses)))
 
 

@@ -46,12 +46,12 @@ def motion(solved: MeshSolution, place: FloatArray, name: str) -> Callable[[Floa
             return np.array([*(np.array([x, y]) + (rotation_matrix(turn) - np.eye(2)) @ arm), turn])
 
         return _reading_between(solved, read_group)
-    found = MaterialPoint.from_place(solved.problem.elements, place)
-    if found is None:
+    point = MaterialPoint.from_place(solved.problem.elements, place)
+    if point is None:
         return lambda travel: np.full((len(travel), 3), np.nan)
     supports = solved.problem.supports
     return _reading_between(
-        solved, lambda unknowns, travel: found.motion(supports.evaluate_displacements(unknowns, travel)), turns=True
+        solved, lambda unknowns, travel: point.motion(supports.evaluate_displacements(unknowns, travel)), turns=True
     )
 
 
@@ -67,10 +67,10 @@ def reaction(
     if name not in groups:
         return lambda travel: np.full((len(travel), 3), np.nan)
     number = groups.index(name)
-    own = elements if counted is None else elements.only(counted)
+    counted_elements = elements if counted is None else elements.only(counted)
 
     def read(unknowns: FloatArray, travel: float) -> FloatArray:
-        forces = own.forces(supports.evaluate_displacements(unknowns, travel))
+        forces = counted_elements.forces(supports.evaluate_displacements(unknowns, travel))
         return np.asarray(supports.reactions(unknowns, travel, forces)[number])
 
     return _reading_between(solved, read)
@@ -85,8 +85,8 @@ def _reading_between(
     travel = solved.course.travel
     step = DIFFERENCE_STEP * float(np.ptp(travel))
     values, ahead, behind = (
-        np.array([read(pose.unknowns + way * pose.slope, pose.travel + way) for pose in solved.course.poses])
-        for way in (0.0, step, -step)
+        np.array([read(pose.unknowns + offset * pose.slope, pose.travel + offset) for pose in solved.course.poses])
+        for offset in (0.0, step, -step)
     )
     change = ahead - behind
     if turns:  # known but for whole turns
@@ -110,8 +110,8 @@ class MaterialPoint:
         """Return the point at a place (2,) [m]; None if no element is."""
         triangles = elements.mesh.triangles
         corners = elements.mesh.nodes[triangles]  # (m, 6, 2)
-        near = np.hypot(*(corners[:, :3].mean(axis=1) - place).T).argsort()[:20]
-        for nodes, x in zip(triangles[near], corners[near], strict=True):
+        nearest = np.hypot(*(corners[:, :3].mean(axis=1) - place).T).argsort()[:20]
+        for nodes, x in zip(triangles[nearest], corners[nearest], strict=True):
             at = np.full(2, 1.0 / 3.0)
             for _ in range(MAX_NEWTON_STEPS):
                 jacobian = slopes(at[None])[0].T @ x  # rows: by r, by s
@@ -123,6 +123,6 @@ class MaterialPoint:
 
     def motion(self, moved: FloatArray) -> FloatArray:
         """Return x, y [m] and turn [rad], between -pi and pi, at displacements of all nodes (n, 2) [m]."""
-        own = moved[self.nodes]
-        f = np.eye(2) + own.T @ self.gradient
-        return np.array([*(self.shares @ own), np.arctan2(f[1, 0] - f[0, 1], f[0, 0] + f[1, 1])])
+        places = moved[self.nodes]
+        f = np.eye(2) + places.T @ self.gradient
+        return np.array([*(self.shares @ places), np.arctan2(f[1, 0] - f[0, 1], f[0, 0] + f[1, 1])])

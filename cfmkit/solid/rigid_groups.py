@@ -37,12 +37,12 @@ class Group:
     load: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
-def find_within(nodes: FloatArray, shapes: Sequence[FloatArray], near: float) -> NDArray[np.bool_]:
-    """Return which nodes (n, 2) [m] lie in polygons, or on lines of two points, or within `near` [m] of them."""
+def find_within(nodes: FloatArray, shapes: Sequence[FloatArray], max_distance: float) -> NDArray[np.bool_]:
+    """Return which nodes (n, 2) [m] are in polygons, or on lines of two points, or within `max_distance` [m]."""
     from shapely import LineString, Polygon, distance, points, union_all
 
-    covered = union_all([Polygon(one) if len(one) > 2 else LineString(one) for one in shapes])
-    return np.asarray(distance(covered, points(nodes)) <= near)
+    covered = union_all([Polygon(shape) if len(shape) > 2 else LineString(shape) for shape in shapes])
+    return np.asarray(distance(covered, points(nodes)) <= max_distance)
 
 
 def rotation_matrix(angle: float, derivative: int = 0) -> FloatArray:
@@ -73,12 +73,12 @@ class Supports:
 
     def motions(self, unknowns: FloatArray, travel: float) -> list[FloatArray]:
         """Return x, y [m] and turn [rad] of every group."""
-        found, first = [], len(self.loose)
+        motions, first = [], len(self.loose)
         for group in self.groups:
             last = first + group.free.shape[1]
-            found.append(group.driven * travel + group.free @ unknowns[first:last])
+            motions.append(group.driven * travel + group.free @ unknowns[first:last])
             first = last
-        return found
+        return motions
 
     def evaluate_displacements(self, unknowns: FloatArray, travel: float) -> FloatArray:
         """Return the displacements (n, 2) [m] of all nodes."""
@@ -91,14 +91,14 @@ class Supports:
 
     def _levers(self, motions: list[FloatArray]) -> list[FloatArray]:
         """Return, for every group, how its nodes' displacements follow its motions, (2k, 3)."""
-        found = []
+        levers = []
         for group, motion in zip(self.groups, motions, strict=True):
             arm = (self.places[group.nodes] - group.center) @ rotation_matrix(motion[2], 1).T
             lever = np.zeros((len(group.nodes), 2, 3))
             lever[:, 0, 0] = lever[:, 1, 1] = 1.0
             lever[:, :, 2] = arm
-            found.append(lever.reshape(-1, 3))
-        return found
+            levers.append(lever.reshape(-1, 3))
+        return levers
 
     def reactions(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> FloatArray:
         """Return force x, y [N] and moment about its centre [N m] on every group, (groups, 3), that hold it there.
@@ -107,8 +107,8 @@ class Supports:
         """
         levers = self._levers(self.motions(unknowns, travel))
         pairs = zip(self.groups, levers, strict=True)
-        found = [lever.T @ forces[group.nodes].ravel() - group.load for group, lever in pairs]
-        return np.array(found).reshape(-1, 3)
+        reactions = [lever.T @ forces[group.nodes].ravel() - group.load for group, lever in pairs]
+        return np.array(reactions).reshape(-1, 3)
 
     @property
     def loaded(self) -> bool:

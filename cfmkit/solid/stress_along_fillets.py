@@ -58,10 +58,10 @@ class FilletArc:
 
     def covers(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return which points (n, 2) [m] are on it."""
-        way, middle = points - self.center, self.middle - self.center
-        off = np.abs(np.arctan2(middle[0] * way[:, 1] - middle[1] * way[:, 0], way @ middle))
+        radial, middle = points - self.center, self.middle - self.center
+        off = np.abs(np.arctan2(middle[0] * radial[:, 1] - middle[1] * radial[:, 0], radial @ middle))
         return np.asarray(
-            (np.abs(np.hypot(*way.T) - self.radius) < RADIUS_DISTANCE_TOL * self.radius)
+            (np.abs(np.hypot(*radial.T) - self.radius) < RADIUS_DISTANCE_TOL * self.radius)
             & (off <= 0.5 * self.turn + ARC_EXTENSION)
         )
 
@@ -69,10 +69,10 @@ class FilletArc:
         """Return the names of the pieces, closed polygons (n, 2) [m] each, on whose edges it begins or ends."""
         from shapely import LinearRing, Point
 
-        near, ends = RADIUS_DISTANCE_TOL * self.radius, [Point(end) for end in self.ends]
+        distance, ends = RADIUS_DISTANCE_TOL * self.radius, [Point(end) for end in self.ends]
 
         def touches(polygon: FloatArray) -> bool:
-            return any(LinearRing(polygon).distance(end) < near for end in ends)
+            return any(LinearRing(polygon).distance(end) < distance for end in ends)
 
         return tuple(name for name, polygons in pieces.items() if any(map(touches, polygons)))
 
@@ -100,10 +100,10 @@ class FilletStress:
         if not len(places):
             return None
         size = np.abs(self.stress)
-        found = np.concatenate([size[inside], PchipInterpolator(self.travel, size)(ends)])
-        worst = int(found.argmax())
+        stress = np.concatenate([size[inside], PchipInterpolator(self.travel, size)(ends)])
+        worst = int(stress.argmax())
         nearest = int(np.abs(self.travel - places[worst]).argmin())
-        return float(np.copysign(found[worst], self.stress[nearest])), float(places[worst])
+        return float(np.copysign(stress[worst], self.stress[nearest])), float(places[worst])
 
 
 def stressed_fillets(
@@ -115,15 +115,15 @@ def stressed_fillets(
     stress, nodes = solved.along_edges
     ring_of = np.zeros(len(grid.nodes), int)
     ring_of[grid.edges] = grid.rings[:, None]
-    found = []
+    stressed = []
     for number, ring in enumerate(solved.part.rings):
         for arc in arcs(ring, number, radius):
-            own = (ring_of[nodes] == number) & arc.covers(grid.nodes[nodes])
-            if np.abs(stress[:, own]).max(initial=0.0) > MIN_STRESS_SHARE * np.abs(stress).max():
-                worst = np.abs(stress[:, own]).argmax(axis=1)
-                largest = stress[:, own][np.arange(len(stress)), worst]
-                found.append(FilletStress(arc, solved.course.travel[rising], read_only(largest[rising])))
-    return tuple(found)
+            is_on_arc = (ring_of[nodes] == number) & arc.covers(grid.nodes[nodes])
+            if np.abs(stress[:, is_on_arc]).max(initial=0.0) > MIN_STRESS_SHARE * np.abs(stress).max():
+                worst = np.abs(stress[:, is_on_arc]).argmax(axis=1)
+                largest = stress[:, is_on_arc][np.arange(len(stress)), worst]
+                stressed.append(FilletStress(arc, solved.course.travel[rising], read_only(largest[rising])))
+    return tuple(stressed)
 
 
 def arcs(ring: Ring, number: int, radius: float) -> Iterator[FilletArc]:

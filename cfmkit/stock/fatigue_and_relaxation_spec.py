@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
 from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw, RelaxationLaw
 from cfmkit.specs.spec import Model
 from cfmkit.specs.units import Ratio, Stress, Time, format_short
-from cfmkit.stock.materials import ASSUMED_DATA
-
-if TYPE_CHECKING:
-    from cfmkit.stock.materials import AssumedCreep, AssumedFatigue
+from cfmkit.stock.materials import ASSUMED_DATA, LastingData
 
 PositiveStress = Annotated[Stress, Field(gt=0)]
 PositiveTime = Annotated[Time, Field(gt=0)]
@@ -71,11 +68,6 @@ class Fatigue(Model):
         return FatigueLaw(self.points or (), line, self.ultimate_strength)
 
     @classmethod
-    def from_assumed(cls, result: AssumedFatigue) -> Self:
-        """Return what is assumed of a material."""
-        return cls(points=result.points, ultimate_strength=result.ultimate_strength, source=result.source)
-
-    @classmethod
     def from_law(cls, law: FatigueLaw) -> Self:
         """Return a law as a specification says it."""
         coefficient, exponent = law.basquin or (None, None)
@@ -110,11 +102,6 @@ class Relaxation(Model):
                 raise ValueError("'points' must have increasing times and moduli that do not rise")
         return self
 
-    @classmethod
-    def from_assumed(cls, result: AssumedCreep) -> Self:
-        """Return what is assumed of a material."""
-        return cls(points=result.points, temperature=result.temperature, source=result.source)
-
     @property
     def law(self) -> RelaxationLaw:
         """The same as numbers."""
@@ -123,12 +110,9 @@ class Relaxation(Model):
 
 def assumed_laws(name: str) -> dict[str, Fatigue | Relaxation]:
     """Return what is assumed of a material of the library, by the key that states it."""
-    result = ASSUMED_DATA.get(name)
-    if result is None:
-        return {}
-    laws: dict[str, Fatigue | Relaxation] = {}
-    if result.fatigue is not None:
-        laws["fatigue"] = Fatigue.from_assumed(result.fatigue)
-    if result.relaxation is not None:
-        laws["relaxation"] = Relaxation.from_assumed(result.relaxation)
+    result, laws = ASSUMED_DATA.get(name, LastingData()), dict[str, Fatigue | Relaxation]()
+    if (last := result.fatigue) is not None:
+        laws["fatigue"] = Fatigue(points=last.points, ultimate_strength=last.ultimate_strength, source=last.source)
+    if (creep := result.relaxation) is not None:
+        laws["relaxation"] = Relaxation(points=creep.points, temperature=creep.temperature, source=creep.source)
     return laws

@@ -33,6 +33,8 @@ def link_stress(axial: Any, moment: Any, width: Any, thickness: Any, hole: Any) 
     --------
     >>> round(float(link_stress(100.0, 0.0, 0.012, 0.002, 0.002)) / 1e6, 6)  # 100 N on 10 mm x 2 mm
     5.0
+    >>> round(float(link_stress(0.0, 0.3, 0.012, 0.003, 0.004)) / 1e6, 3)  # 0.3 N m on (12^3 - 4^3)/12 3/6 mm3
+    4.327
     """
     return np.abs(axial) / ((width - hole) * thickness) + 6.0 * width * np.abs(moment) / (
         thickness * (width**3 - hole**3)

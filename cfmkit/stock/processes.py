@@ -122,7 +122,9 @@ _PROCESS_LIST = (
     ProcessAccuracy("mill", 2.0e-3, 0.02e-3, 0.02e-3, 0.5e-3, 1.0e-3,
             "a thin leaf yields to the cutter; inside corners have the radius of a 2 mm one"),
 )  # fmt: skip
-PROCESSES_BY_NAME: Mapping[str, ProcessAccuracy] = MappingProxyType({one.name: one for one in _PROCESS_LIST})
+PROCESSES_BY_NAME: Mapping[str, ProcessAccuracy] = MappingProxyType(
+    {process.name: process for process in _PROCESS_LIST}
+)
 """All by name."""
 SPRING_RATE = 0.05
 """Half width of the range in which the rate of a spring is found, over its nominal rate: all values are equally likely.

@@ -77,8 +77,8 @@ def origin(
 
     It belongs into the identity of every result that is kept for a later run.
     """
-    found = {"cfmkit": __version__, "content": code_stamp(), "python": platform.python_version()}
-    return found | {name: installed_version(name) or "not installed" for name in libraries}
+    versions = {"cfmkit": __version__, "content": code_stamp(), "python": platform.python_version()}
+    return versions | {name: installed_version(name) or "not installed" for name in libraries}
 
 
 @lru_cache(maxsize=32)
@@ -91,11 +91,13 @@ def installed_version(name: str) -> str | None:
     start = name.lower().replace("-", "_") + "-"
     for place in sys.path:
         with contextlib.suppress(OSError), os.scandir(place or ".") as entries:
-            found = [each.name for each in entries if each.name.lower().startswith(start)]
-            versions = [each[len(start) :].removesuffix(".dist-info") for each in found if each.endswith(".dist-info")]
-            if len(versions) == 1 and len(found) == 1:
+            folders = [entry.name for entry in entries if entry.name.lower().startswith(start)]
+            versions = [
+                folder[len(start) :].removesuffix(".dist-info") for folder in folders if folder.endswith(".dist-info")
+            ]
+            if len(versions) == 1 and len(folders) == 1:
                 return versions[0]
-            if found:  # something unusual is there: the standard library knows
+            if folders:  # something unusual is there: the standard library knows
                 break
     from importlib.metadata import PackageNotFoundError, version
 

@@ -169,11 +169,11 @@ def _refuse_changed(root: Path, change: Change) -> None:
 
 def _resume(root: Path, plan: CommitPlan) -> None:
     """Roll forward if every new file is there, as it is after any kill; else roll back."""
-    found = (
+    hashes = (
         hash_in(root / TRANSACTION_FOLDER / NEW_FOLDER, change.name) or hash_in(root, change.name)
         for change in plan.changes
     )
-    if all(change.new in (None, there) for change, there in zip(plan.changes, found, strict=True)):
+    if all(change.new in (None, hash_there) for change, hash_there in zip(plan.changes, hashes, strict=True)):
         _roll_forward(root, plan)
         return
     _turn_back(root, plan)
@@ -198,11 +198,11 @@ def _roll_back(root: Path, plan: CommitPlan) -> None:
 
 def _restore(root: Path, change: Change) -> None:
     place, kept = root / change.name, root / TRANSACTION_FOLDER / OLD_FOLDER / change.name
-    there = hash_in(root, change.name)
+    hash_there = hash_in(root, change.name)
     if change.old is None:
-        if there is not None and there == change.new:
+        if hash_there is not None and hash_there == change.new:
             safe_disk_changes.system.unlink(place)
-    elif there != change.old and mode_of(kept) is not None:
+    elif hash_there != change.old and mode_of(kept) is not None:
         safe_disk_changes.make_folders(place.parent)
         safe_disk_changes.system.replace(kept, place)
 

@@ -3,7 +3,7 @@
 A study sees a specification, dotted paths and names of metrics; it knows no family.
 
 `variations` and `variations` say what may vary and how, `plan` enumerates the points,
-`point_evaluation` evaluates one of them, `variants_in_rows` many at once where the family solves them together,
+`point_evaluation` says what is noted of each, `variants_in_rows` evaluates them as rows,
 `serial_and_cluster_executors` and `pool` are ways to get that done, `journal` and `row_blocks_for_journal`
 remember what is finished, `engine` puts these together, `point_evaluation` names what is
 noted, `summary_and_tables` writes it, `summary_and_tables` sums it up, and `sweep_request_and_files` is the study that
@@ -21,6 +21,6 @@ __getattr__, __all__ = lazy_names(
         "earlier_batch": "BatchComparison",
         "serial_and_cluster_executors": "Lost serial",
         "variations": "FIXED_BLOCKS CannotVary leaf paths",
-        "variants_in_rows": "are_solved_together evaluate_rows",
+        "variants_in_rows": "evaluate_rows points_at_once",
     },
 )

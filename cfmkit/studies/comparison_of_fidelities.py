@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from cfmkit.errors import CfmError, Problem, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import window_of, windows_judged
-from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.branches import span_text
 from cfmkit.metrics.compare import N_COMPARED_PLACES, Compared, largest, mean, rms
 from cfmkit.metrics.compare import compare as compare_sides
 from cfmkit.results import Finding, Status

@@ -6,25 +6,23 @@ import hashlib
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import groupby
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from cfmkit.errors import OutputError, UsageError
 from cfmkit.families import family
-from cfmkit.studies.point_evaluation import Row
+from cfmkit.families.variant_rows import MIN_BLOCK_SIZES
 from cfmkit.studies.row_blocks_for_journal import (
     ResultRows,
     cut_rows,
-    gather_rows,
+    failed_rows,
     join_rows,
     recall_rows,
-    recalled_row,
     record,
 )
 from cfmkit.studies.serial_and_cluster_executors import Lost, serial
-from cfmkit.studies.variants_in_rows import BLOCK_SIZE, MIN_BLOCK_SIZES, are_solved_together, evaluate_rows
+from cfmkit.studies.variants_in_rows import BLOCK_SIZE, evaluate_rows, points_at_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -67,19 +65,17 @@ class Work:
 
     def __call__(self, job: Job) -> ResultRows:
         """Return the rows of a job."""
-        if job.stop - job.start > 1 or self.vectorised:
-            return evaluate_rows(self.study, self.plan, job.start, job.stop)
-        return self.gather(self.study.evaluate(self.plan.point(job.start)))
+        return evaluate_rows(self.study, self.plan, job.start, job.stop, self.vectorised)
 
     @cached_property
     def smallest(self) -> int:
-        """Number of points that a block has at least; 0 where points are done one by one."""
-        return are_solved_together(self.study, self.plan)
+        """Number of points that a block has at least; 1 where each is analysed by itself."""
+        return points_at_once(self.study, self.plan)
 
     @property
     def vectorised(self) -> bool:
         """Whether points are done in blocks."""
-        return self.smallest > 0
+        return self.smallest > 1
 
     @property
     def step(self) -> int:
@@ -119,9 +115,10 @@ class Work:
             digest.update(repr(column.tolist()).encode() if column.dtype == object else column.tobytes())
         return Job(start, stop, digest.hexdigest()[:32])
 
-    def gather(self, *rows: Row) -> ResultRows:
-        """Return single rows as the rows of this study."""
-        return gather_rows(rows, len(self.study.metrics), len(self.study.spec.part_requirements))
+    def fail(self, count: int, lost: Lost) -> ResultRows:
+        """Return rows of points that were lost."""
+        shape = count, len(self.study.metrics), len(self.study.spec.part_requirements)
+        return failed_rows(shape, lost.status, lost.message, lost.bug)
 
     def recall(self, reported: Any) -> ResultRows:
         """Return the rows that are stored in a record of the journal."""
@@ -207,28 +204,17 @@ class Records:
     def batches(self, size: int = BLOCK_SIZE) -> Iterator[tuple[NDArray[np.int64], ResultRows]]:
         """Yield (indices of points, their rows) in order, about `size` at a time; unfinished points are left out."""
         starts: list[NDArray[np.int64]] = []
-        parts: list[ResultRows | Row] = []
-        count = 0
+        parts: list[ResultRows] = []
         for start, part in self._pieces():
-            length = 1 if isinstance(part, Row) else len(part)
-            starts.append(np.arange(start, start + length))
+            starts.append(np.arange(start, start + len(part)))
             parts.append(part)
-            count += length
-            if count >= size:
-                yield np.concatenate(starts), self._together(parts)
-                starts, parts, count = [], [], 0
+            if sum(map(len, parts)) >= size:
+                yield np.concatenate(starts), join_rows(parts)
+                starts, parts = [], []
         if parts:
-            yield np.concatenate(starts), self._together(parts)
+            yield np.concatenate(starts), join_rows(parts)
 
-    def _together(self, parts: list[ResultRows | Row]) -> ResultRows:
-        """Return pieces as one; single rows that follow each other are gathered at once."""
-        runs = groupby(parts, key=lambda part: isinstance(part, Row))
-        whole: list[ResultRows] = []
-        for single, run_of in runs:
-            whole += [self.work.gather(*run_of)] if single else run_of  # type: ignore[arg-type]
-        return join_rows(whole)
-
-    def _pieces(self) -> Iterator[tuple[int, ResultRows | Row]]:
+    def _pieces(self) -> Iterator[tuple[int, ResultRows]]:
         at = 0
         while at < len(self._places):
             place = int(self._places[at])
@@ -237,7 +223,7 @@ class Records:
                 continue
             part = self._held[at] if place == ROW_IN_MEMORY else self._read(at)
             yield at, part
-            at += 1 if isinstance(part, Row) else len(part)
+            at += len(part)
 
     def noted_keys(self) -> Iterator[bytes]:
         """Yield the keys of all rows that are in the journal; rows of one block have the same."""
@@ -249,20 +235,16 @@ class Records:
         key: bytes = self._keys[index].tobytes()
         return key.hex()
 
-    def _read_record(self, index: int) -> Any:
+    def _read(self, index: int) -> ResultRows:
         assert self._journal is not None  # some row is in it
-        return self._journal.read(self._key(index))
-
-    def _read(self, index: int) -> ResultRows | Row:
-        reported = self._read_record(index)
-        return self.work.recall(reported) if "n" in reported else recalled_row(reported)
+        return self.work.recall(self._journal.read(self._key(index)))
 
     def row(self, index: int) -> ResultRows:
         """Return the row of one finished point."""
         if int(self._places[index]) == ROW_IN_MEMORY:
             start = max(at for at in self._held if at <= index)
             return cut_rows(self._held[start], index - start, index - start + 1)
-        rows, start = self.work.recall(self._read_record(index)), index - index % self.work.step
+        rows, start = self._read(index), index - index % self.work.step
         return rows if len(rows) == 1 else cut_rows(rows, index - start, index - start + 1)
 
 
@@ -298,7 +280,7 @@ def _round(records: Records, executor: Executor, queue: Iterator[Job], watch: Mo
                 if job.stop - job.start > 1:
                     lost.append(job)
                     continue
-                outcome = work.gather(Row(outcome.status, message=outcome.message, bug=outcome.bug))
+                outcome = work.fail(1, outcome)
             for block in job.blocks or (job,):
                 records.keep(block, cut_rows(outcome, block.start - job.start, block.stop - job.start))
             watch.add_finished(len(outcome), outcome.failed, False)

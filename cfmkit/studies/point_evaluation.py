@@ -1,12 +1,7 @@
-"""Evaluation of one point of a study (sweep, sensitivity, manufactured parts): varied values in, a row of metrics out.
+"""Study of a specification (sweep, sensitivity, parts): how a point is solved, and what is noted of it.
 
-A `Study` holds everything that decides the result of a point but the varied values.
-Whatever goes wrong at a point becomes a row with a status and without values: an
-invalid value, a mechanism that cannot exist, a design that fails, a solver that gives
-up. An exception that cfmkit does not raise on purpose is a bug; it costs its own
-point only (status ``crashed``), and the row keeps the traceback.
-
-A study notes the metrics that are requested, or all that the mechanism can have.
+A `Study` holds everything that decides the row of a point but the varied values. It notes the metrics that are
+requested, or all that the mechanism can have.
 """
 
 from __future__ import annotations
@@ -23,27 +18,26 @@ from cfmkit.families import origin as family_origin
 from cfmkit.families.base import ENVELOPE_METRICS
 from cfmkit.families.run_control import Run
 from cfmkit.metrics import (
-    check,
     definition_of,
     definitions,
     evaluate,
-    gaps,
     metrics_by_name,
+    requirement_problems,
     values_of_family,
     window_of,
     windows_judged,
 )
-from cfmkit.metrics.spread import STATIC_BALANCE
-from cfmkit.results import Result, Status
+from cfmkit.metrics.window_metrics import STATIC_BALANCE
+from cfmkit.results import Result
 from cfmkit.specs.data_file_paths import list_data_files
 from cfmkit.specs.units import to_border
 from cfmkit.store import file_hash, origin, stable_hash
-from cfmkit.studies.serial_and_cluster_executors import lost_to
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from cfmkit.curves import Curve, Kind
+    from cfmkit.errors import Problem
     from cfmkit.metrics import Definition
     from cfmkit.metrics.metric_values import Surveys
     from cfmkit.results import Design, Quantity
@@ -57,8 +51,7 @@ if TYPE_CHECKING:
 
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
-RECORD_VERSION = 4  # how records of the journal are written: those of another number are computed again
-_STATUS_OF = {3: Status.INVALID, 4: Status.NO_EQUILIBRIUM, 70: Status.CRASHED}
+RECORD_VERSION = 5  # how records of the journal are written: those of another number are computed again
 
 
 @dataclass(frozen=True)
@@ -76,19 +69,6 @@ class Metric:
     def __post_init__(self) -> None:
         if not self.label:
             object.__setattr__(self, "label", self.name.replace("[", "_").replace("]", ""))
-
-
-@dataclass(frozen=True)
-class Row:
-    """Outcome of one point."""
-
-    status: Status  # how its analysis ended
-    values: tuple[float | None, ...] = ()  # one for each metric of the study [SI]; all None if nothing was solved
-    met: tuple[bool, ...] = ()  # one for each requirement; empty where nothing was solved
-    message: str = ""  # what went wrong; empty for a complete point
-    curve: bytes = b""  # the point's curves as CSV, if the study keeps them
-    bug: str = ""  # the traceback, if a bug ended it
-    warnings: tuple[str, ...] = ()  # names of what the user must know, sorted
 
 
 def design_without_margins(spec: Spec, designer: Designer, run: Run) -> Design:
@@ -174,17 +154,6 @@ class Study:
         """The specification without what is said of studies, which each variant would read again."""
         return self.spec.model_copy(update={"sweep": None, "sensitivity": None})
 
-    def evaluate(self, values: Sequence[Any]) -> Row:
-        """Return the row of one point; nothing is raised but what ends the process."""
-        try:
-            return self.row(self.solve(self.variant(values)))
-        except CfmError as error:
-            if _STATUS_OF.get(error.exit_code) is Status.CRASHED:
-                return _bug(error)
-            return Row(_STATUS_OF.get(error.exit_code, Status.INVALID), message=_error_line(error))
-        except Exception as error:
-            return _bug(error)
-
     def solve(self, spec: Spec) -> Result:
         """Return the result of a variant, designed first if the study says so, with the warnings of both."""
         record, run = family(spec.family), Run(self.seed)
@@ -196,27 +165,21 @@ class Study:
         result = windows_judged(record.with_envelope(record.analyze(design.spec, run), self.names))
         return replace(result, warnings=(*design.warnings, *result.warnings))
 
-    def row(self, result: Result) -> Row:
-        """Return what is noted about a result."""
-        warnings = tuple(sorted({item.name for item in result.warnings})) if self.findings else ()
-        if not result.status.usable:
-            return Row(result.status, message=result.message, warnings=warnings)
-        extra = values_of_family(family(result.spec.family).outputs.values)
+    def check_requirements(self, kind: Kind) -> None:
+        """Raise SpecError if a requirement is not well put for curves of a kind."""
+        if kind not in self._checked:
+            known = self.definitions(kind).values()
+            self._checked[kind] = tuple(requirement_problems(self.spec.part_requirements, known, kind))
+        if problems := self._checked[kind]:
+            raise SpecError(problems)
+
+    @cached_property
+    def _checked(self) -> dict[Kind, tuple[Problem, ...]]:
+        return {}
+
+    def quantities(self, result: Result) -> tuple[Quantity, ...]:
+        """Return what each metric of the study is on a result, with the reason where it has no value."""
         surveys: Surveys = {}
-        values = tuple(_finite(item.value) for item in self.quantities(result, surveys))
-        met = tuple(outcome.ok for outcome in check(result.spec.part_requirements, result, extra, surveys))
-        message = result.message
-        if result.status is Status.COMPLETE:  # windows that its curve does not cover: cells without a value
-            message = "; ".join(gap.short for gap in gaps(result))
-        curve = _curve(result) if self.curves else b""
-        return Row(result.status, values, met, message, curve, warnings=warnings)
-
-    def quantities(self, result: Result, surveys: Surveys | None = None) -> tuple[Quantity, ...]:
-        """Return what each metric of the study is on a result, with the reason where it has no value.
-
-        `surveys` is a cache of values derived from the curve, shared between calls.
-        """
-        surveys = {} if surveys is None else surveys
         extra = values_of_family(family(result.spec.family).outputs.values)
         quantities: dict[tuple[str, Ends | None], Quantity] = {}
         for over in dict.fromkeys(metric.over for metric in self.metrics):
@@ -224,28 +187,6 @@ class Study:
             window = None if over is None else window_of(result, over)
             quantities |= {(name, over): item for name, item in evaluate(result, names, window, extra, surveys).items()}
         return tuple(quantities[metric.name, metric.over] for metric in self.metrics)
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and isfinite(value) else None
-
-
-def _curve(result: Result) -> bytes:
-    from cfmkit.tables import curve_table, to_csv
-
-    return to_csv(curve_table(result.curves))
-
-
-def _error_line(error: CfmError) -> str:
-    """Return an error in one line; of a specification, paths and messages without the empty source."""
-    if isinstance(error, SpecError):
-        return "; ".join(": ".join(filter(None, (problem.path, problem.message))) for problem in error.problems)
-    return " ".join(str(error).split())
-
-
-def _bug(error: Exception) -> Row:
-    lost = lost_to(error)
-    return Row(lost.status, message=lost.message, bug=lost.bug)
 
 
 NEED_STRESS = ("stress_max", "safety_factor")

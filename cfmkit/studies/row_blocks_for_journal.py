@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 from zlib import compress, decompress
@@ -11,7 +10,6 @@ from zlib import compress, decompress
 import numpy as np
 
 from cfmkit.results import Status
-from cfmkit.studies.point_evaluation import Row
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -55,22 +53,18 @@ class ResultRows:
         return self.odd.get(index, (Status.COMPLETE, ""))
 
 
-def gather_rows(rows: Sequence[Row], metrics: int, requirements: int) -> ResultRows:
-    """Return single rows as one."""
-    nothing, none_met = (math.nan,) * metrics, (False,) * requirements
-    values = np.array([row.values or nothing for row in rows], dtype=np.float64).reshape(len(rows), metrics)
-    met = np.array([row.met or none_met for row in rows], dtype=bool).reshape(len(rows), requirements)
-    odd, curves, bugs = {}, {}, {}
-    for k, row in enumerate(rows):
-        if row.status is not Status.COMPLETE or row.message:
-            odd[k] = row.status, row.message
-        if row.curve:
-            curves[k] = row.curve
-        if row.bug:
-            bugs[k] = row.bug
-    names = sorted({name for row in rows for name in row.warnings})
-    warned = {name: np.array([name in row.warnings for row in rows], dtype=bool) for name in names}
-    return ResultRows(values, met, odd, curves, bugs, warned)
+def failed_rows(
+    shape: tuple[int, int, int],  # rows, metrics and requirements
+    status: Status,
+    message: str,
+    bug: str = "",
+    warned: Mapping[str, NDArray[np.bool_]] | None = None,
+) -> ResultRows:
+    """Return rows without values, all for one reason."""
+    rows = range(shape[0])
+    values, met = np.full(shape[:2], np.nan), np.zeros((shape[0], shape[2]), dtype=bool)
+    odd, bugs = dict.fromkeys(rows, (status, message)), dict.fromkeys(rows, bug) if bug else {}
+    return ResultRows(values, met, odd, bugs=bugs, warned=warned or {})
 
 
 def record(rows: ResultRows) -> Any:
@@ -78,49 +72,22 @@ def record(rows: ResultRows) -> Any:
 
     Many rows together take a tenth of the room: what one has in common with the one before is left out.
     """
-    if len(rows) != 1:
-        odd = {str(k): [status.key, message] for k, (status, message) in rows.odd.items()}
-        reported = {"n": len(rows), "v": squeeze(rows.values), "q": _pack(np.packbits(rows.met)), "o": odd}
-        if rows.warned:
-            reported["w"] = {name: _pack(np.packbits(mask)) for name, mask in sorted(rows.warned.items())}
-        return reported | ({"u": {str(k): _text(curve) for k, curve in rows.curves.items()}} if rows.curves else {})
-    status, message = rows.status(0)
-    reported = {"s": status.key}
-    if message:
-        reported["m"] = message
-    if status.usable:
-        reported["v"] = _pack(rows.values)
-        reported["q"] = "".join("01"[met] for met in rows.met[0].tolist())
-    if names := [name for name, mask in sorted(rows.warned.items()) if mask[0]]:
-        reported["w"] = names
-    if rows.curves:
-        reported["u"] = _text(rows.curves[0])
-    return reported
+    odd = {str(k): [status.key, message] for k, (status, message) in rows.odd.items()}
+    reported = {"n": len(rows), "v": squeeze(rows.values), "q": _pack(np.packbits(rows.met)), "o": odd}
+    if rows.warned:
+        reported["w"] = {name: _pack(np.packbits(mask)) for name, mask in sorted(rows.warned.items())}
+    return reported | ({"u": {str(k): _text(curve) for k, curve in rows.curves.items()}} if rows.curves else {})
 
 
 def recall_rows(reported: Any, metrics: int, requirements: int) -> ResultRows:
     """Return the rows that are stored in a record."""
-    if "n" not in reported:
-        return gather_rows([recalled_row(reported)], metrics, requirements)
-    values = unsqueeze(reported["v"], reported["n"], metrics)
-    met = _mask(reported["q"], reported["n"] * requirements).reshape(reported["n"], requirements)
+    count = reported["n"]
+    values = unsqueeze(reported["v"], count, metrics)
+    met = _mask(reported["q"], count * requirements).reshape(count, requirements)
     curves = {int(k): _bytes(text) for k, text in reported.get("u", {}).items()}
     odd = {int(k): (_STATUS_BY_KEY[s], m) for k, (s, m) in reported["o"].items()}
-    masks = {
-        name: np.unpackbits(_unpack(bits, np.uint8), count=reported["n"])
-        for name, bits in reported.get("w", {}).items()
-    }
-    return ResultRows(values, met, odd, curves, warned={name: mask.astype(bool) for name, mask in masks.items()})
-
-
-def recalled_row(reported: Any) -> Row:
-    """Return the single row that is stored in a record."""
-    curve = _bytes(reported["u"]) if "u" in reported else b""
-    noted = tuple(_unpack(reported["v"], np.float64).tolist()) if "v" in reported else ()
-    met = tuple(map("1".__eq__, reported.get("q", "")))
-    return Row(
-        _STATUS_BY_KEY[reported["s"]], noted, met, reported.get("m", ""), curve, warnings=tuple(reported.get("w", ()))
-    )
+    warned = {name: _mask(bits, count) for name, bits in reported.get("w", {}).items()}
+    return ResultRows(values, met, odd, curves, warned=warned)
 
 
 def join_rows(parts: Sequence[ResultRows]) -> ResultRows:
@@ -148,17 +115,29 @@ def _joined_masks(parts: Sequence[ResultRows]) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def cut_rows(rows: ResultRows, start: int, stop: int) -> ResultRows:
-    """Return some of the rows."""
-    if (start, stop) == (0, len(rows)):
+def scatter_rows(count: int, parts: Sequence[tuple[NDArray[np.intp], ResultRows]]) -> ResultRows:
+    """Return rows in order of pieces that are some of them each: (which they are, the piece)."""
+    order = np.concatenate([members for members, _ in parts])
+    assert len(order) == count
+    return select_rows(join_rows([part for _, part in parts]), np.argsort(order))
+
+
+def select_rows(rows: ResultRows, chosen: NDArray[np.intp]) -> ResultRows:
+    """Return some of the rows, in the order in which they are chosen."""
+    if np.array_equal(chosen, np.arange(len(rows))):
         return rows
 
-    def select_block(items: Mapping[int, Any]) -> dict[int, Any]:
-        return {k - start: item for k, item in items.items() if start <= k < stop}
+    def pick(items: Mapping[int, Any]) -> dict[int, Any]:
+        return {place: items[k] for place, k in enumerate(chosen.tolist()) if k in items} if items else {}
 
-    odd, curves, bugs = select_block(rows.odd), select_block(rows.curves), select_block(rows.bugs)
-    warned = {name: mask[start:stop] for name, mask in rows.warned.items()}
-    return ResultRows(rows.values[start:stop], rows.met[start:stop], odd, curves, bugs, warned)
+    warned = {name: mask[chosen] for name, mask in rows.warned.items() if mask[chosen].any()}
+    odd, curves, bugs = pick(rows.odd), pick(rows.curves), pick(rows.bugs)
+    return ResultRows(rows.values[chosen], rows.met[chosen], odd, curves, bugs, warned)
+
+
+def cut_rows(rows: ResultRows, start: int, stop: int) -> ResultRows:
+    """Return the rows from one up to another."""
+    return select_rows(rows, np.arange(start, stop))
 
 
 def _pack(values: NDArray[Any]) -> str:

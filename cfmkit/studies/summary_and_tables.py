@@ -20,6 +20,7 @@ from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import WINDOW_OUTSIDE, Status
 from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.row_blocks_for_journal import WARNINGS_JOINT
+from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.variations import write_value
 from cfmkit.tables import Table, TableColumn, border_column, csv_chunks, read_csv, text_column
 
@@ -49,7 +50,8 @@ def results_csv(
         yield from _pieces(results_table(records, indices, rows), first)
         first = False
     if first:
-        yield from _pieces(results_table(records, np.arange(0), records.work.gather()), first)
+        nothing = records.work.fail(0, Lost(Status.COMPLETE, ""))
+        yield from _pieces(results_table(records, np.arange(0), nothing), first)
 
 
 def results_table(records: Records, indices: NDArray[np.int64], rows: ResultRows) -> Table:

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import cfmkit
-from cfmkit.families.cam.geometry.designed_and_built_flanks import DesignFlank, arc_lengths
+from cfmkit.families.cam.geometry.flank_from_roller_path import DesignFlank, arc_lengths
 from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.numerics.rigid_point_registration import turn_points
 

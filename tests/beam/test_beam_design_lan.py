@@ -9,12 +9,9 @@ import cfmkit
 import cfmkit.metrics
 from cfmkit import Run
 from cfmkit.families.beam.shaping.design import missed_by, task_of
-from cfmkit.families.beam.shaping.multistart import (
-    NetworkScatter,
-    audit_design,
-    scatter_within_tolerances,
-)
+from cfmkit.families.beam.shaping.multistart import audit_design, scatter_within_tolerances
 from cfmkit.families.beam.shaping.search import ShapeCandidate
+from cfmkit.families.beam.shaping.spec import Tolerances
 from cfmkit.families.beam.shaping.task_and_variables import Variables
 from cfmkit.results import Status
 
@@ -27,7 +24,7 @@ def test_the_shapes_of_the_config_meet_all_limits_and_pass_the_audit() -> None:
     variables = Variables(task, 3)
     found = ShapeCandidate(variables.read(), 3, 3.37e-3, 0.0, 0.0, "", 0)
     assert missed_by(task, found) == {}
-    assert audit_design(variables, found).sound
+    assert audit_design(task, found).sound
     window = cfmkit.metrics.Window(3.37e-3, 13.6e-3)
     assert spec.fidelity == "reissner"
     result, bends = cfmkit.analyze(spec), cfmkit.analyze(spec.replace({"analysis.fidelity": "inextensible"}))
@@ -35,7 +32,7 @@ def test_the_shapes_of_the_config_meet_all_limits_and_pass_the_audit() -> None:
     assert cfmkit.evaluate(result, ["stress_max"], window)["stress_max"].value < 76e6 / 1.58
     band = cfmkit.evaluate(bends, ["half_band"], window)["half_band"].value
     assert band == pytest.approx(0.058, abs=2e-3)  # stretching and shear move the force by more than the band is wide
-    drawn = scatter_within_tolerances(variables, found, NetworkScatter(1e-4, 0.02, 40))
+    drawn = scatter_within_tolerances(task, found, Tolerances(samples=40))
     assert float(np.median(drawn.ranges)) == pytest.approx(0.45, abs=0.15)
     assert float(np.median(drawn.bands)) == pytest.approx(0.045, abs=0.01)
 

@@ -12,7 +12,7 @@ import cfmkit
 from cfmkit.elastica import Control, Displacement, gradient, trace
 from cfmkit.errors import InputError, SpecError
 from cfmkit.families.beam import model
-from cfmkit.families.beam.force_at_few_poses import _replace_values
+from cfmkit.families.beam.force_at_few_poses import replace_values
 from cfmkit.families.beam.network_from_spec import assemble
 from cfmkit.families.beam.shaping.design import task_of
 from cfmkit.families.beam.shaping.report import judge_design
@@ -60,7 +60,7 @@ def test_forces_with_closed_contacts_have_the_derivatives_of_differences(spec, n
     drive = Displacement(assembly.driven, assembly.direction, np.linspace(0.0, spec.extent, 4))
 
     def build(values):
-        return assemble(_replace_values(spec, dict(zip(names, values, strict=True)))).network
+        return assemble(replace_values(spec, dict(zip(names, values, strict=True)))).network
 
     def forces(values):
         path = trace(build(values), drive, CLOSE)
@@ -111,7 +111,7 @@ def test_the_force_that_a_design_sees_is_the_column_of_the_contact():
     assert judged.half_band == pytest.approx(ripple / (2 - ripple), rel=1e-9)
     assert column.max() - column.min() <= ripple * column.max() * (1 + 1e-9)
     poses = np.array([0.0, 9e-3, 14e-3])
-    force = respond(Variables(task, 1), found.x, poses).state.force
+    force = respond(Variables(task, 1), found.x, poses).force
     assert force[1:] == pytest.approx(column[[0, -1]], rel=1e-3)
     assert judged.spec.mechanism.obstacles == spec.mechanism.obstacles
 

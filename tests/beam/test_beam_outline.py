@@ -14,9 +14,9 @@ from cfmkit.cli import run_command
 from cfmkit.export import Drawing, OutlinePiece, files, merge_pieces, outlines
 from cfmkit.families import family
 from cfmkit.families.beam import strips_and_gaps as strip_module
-from cfmkit.families.beam.network_from_spec import assemble, is_on_axis
+from cfmkit.families.beam.network_from_spec import Mirror, assemble, is_on_axis
 from cfmkit.families.beam.part import strips_of
-from cfmkit.families.beam.strips_and_gaps import mirror_points, smallest_gap
+from cfmkit.families.beam.strips_and_gaps import smallest_gap
 from cfmkit.numerics import points_on
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * 10 * MM
@@ -120,8 +120,8 @@ def test_near_a_common_end_there_is_no_gap():
 
 def test_mirroring_twice_is_nothing():
     points = np.random.default_rng(1).normal(size=(7, 2))
-    again = mirror_points(mirror_points(points, 0.3 + 0.1j, 0.7), 0.3 + 0.1j, 0.7)
-    np.testing.assert_allclose(again, points, atol=1e-14)
+    mirror = Mirror(0.3 + 0.1j, 0.7)
+    np.testing.assert_allclose(mirror.reflect(mirror.reflect(points)), points, atol=1e-14)
 
 
 def cuts(spec):
@@ -171,7 +171,7 @@ def test_elastica_shorter_than_they_are_thick_that_meet_at_both_ends_have_no_gap
 def test_the_smallest_gap_is_found_without_looking_at_beams_far_away(monkeypatch):
     rng = np.random.default_rng(5)
     lines = {f"b{k}": rng.normal(size=(1, 2)) * 9 + np.cumsum(rng.normal(size=(40, 2)), axis=0) for k in range(12)}
-    lines |= {f"{name}'": mirror_points(line, 30, np.pi / 2) for name, line in lines.items()}
+    lines |= {f"{name}'": Mirror(30, np.pi / 2).reflect(line) for name, line in lines.items()}
     halves = {f"b{k}": 0.02 + 0.01 * k for k in range(12)}
     looked, true = [], strip_module._gap
     every = [true(lines, halves, *pair) for pair in strip_module._pairs(lines)]

@@ -17,18 +17,18 @@ from cfmkit.designing import Clock
 from cfmkit.elastica import Polynomial, fit, trace
 from cfmkit.families.beam.shaping import multistart, search
 from cfmkit.families.beam.shaping.design import find_blocking, missed_by, optimise_shape, task_of
+from cfmkit.families.beam.shaping.limits import half_band
 from cfmkit.families.beam.shaping.multistart import (
-    NetworkScatter,
     audit_design,
+    band_and_range,
     explore,
-    half_band,
     lines_cross,
     scatter_within_tolerances,
-    strict_share,
 )
 from cfmkit.families.beam.shaping.report import judge_design, write_design
-from cfmkit.families.beam.shaping.response import looked_at
+from cfmkit.families.beam.shaping.response import view_closely
 from cfmkit.families.beam.shaping.search import ShapeCandidate, StartBudget, flatten, search_start, verify
+from cfmkit.families.beam.shaping.spec import Tolerances
 from cfmkit.families.beam.shaping.sqp_program import Flattest, ForceRatio, Shaping, Widest
 from cfmkit.families.beam.shaping.task_and_variables import (
     STRESS_MARGIN,
@@ -86,7 +86,7 @@ def test_derivatives_of_objective_and_all_limits_are_those_of_differences(goal: 
     z = program.begin(table_3(task))
     assert z is not None
     objective, rows = program.slopes(z)
-    names = [one.name for one in program.limits(program.view(z[:13])) for _ in one.values]
+    names = [one.name for one in program.view(z[:13]).list_limits() for _ in one.values]
     assert {"stress", "envelope", "clearance", "min_radius", "force"} <= set(names)
     rng = np.random.default_rng(0)
     for _ in range(2):
@@ -129,8 +129,8 @@ def test_the_widest_window_has_the_derivative_of_the_force_by_its_start() -> Non
 def test_table_3_has_the_half_band_that_its_range_says() -> None:
     """Computed by two other solvers, with stretching and shear, too."""
     task = lan()
-    found, variables = found_of(task, table_3(task)), Variables(task, 2)
-    assert audit_design(variables, found).sound
+    found = found_of(task, table_3(task))
+    assert audit_design(task, found).sound
     design = judge_design(load("configs/beam_design_lan.yaml", ["analysis.fidelity=inextensible"]), task, found)
     assert design.half_band == pytest.approx(0.0309, abs=1e-4)
     assert metric(design.spec, "strict_range_fraction") == pytest.approx(0.479, abs=1e-3)
@@ -138,7 +138,7 @@ def test_table_3_has_the_half_band_that_its_range_says() -> None:
         0.0344, abs=2e-4
     )
     assert metric(design.spec, "stress_max") == pytest.approx(48.31e6, rel=3e-3)
-    assert (scatter_within_tolerances(variables, found, NetworkScatter(1e-4, 0.02, 4)).bands > 0.02).all()
+    assert (scatter_within_tolerances(task, found, Tolerances(samples=4)).bands > 0.02).all()
 
 
 def metric(spec: Any, name: str) -> float | None:
@@ -149,16 +149,15 @@ def metric(spec: Any, name: str) -> float | None:
 def seen_at(points: int) -> tuple[Task, ShapeCandidate]:
     """Table 3 from 9 mm on as a search with so many poses in the window sees it."""
     task = replace(lan(), points=points)
-    program = Shaping(Variables(task, 2), 9e-3, Flattest())
-    force = program.view(table_3(task)).response.state.force[program.poses.window]
-    band = float(np.ptp(force) / (force.max() + force.min()))
-    return task, replace(found_of(task, table_3(task), 9e-3), objective=band, violation=0.0)
+    found = found_of(task, table_3(task), 9e-3)
+    view = found.view(task)
+    return task, replace(found, objective=half_band(view.response.force[view.poses.window]), violation=0.0)
 
 
 def test_a_design_is_ranked_by_its_force_between_the_poses_too() -> None:
     task, found = seen_at(2)
     kept = verify(replace(task, limits=TaskLimits()), found, StartBudget(), lambda _, design: design)
-    view = looked_at(task, Variables(task, 2).build(kept.x))
+    view = view_closely(task, kept.network(task))
     assert view is not None
     assert kept.objective == view.half_band(found.start)
     assert kept.objective > 1.5 * found.objective  # the largest force lies between the two
@@ -166,7 +165,7 @@ def test_a_design_is_ranked_by_its_force_between_the_poses_too() -> None:
 
 def test_a_design_that_is_to_follow_a_curve_is_ranked_by_how_well_it_does() -> None:
     task, found = seen_at(33)
-    plain = looked_at(task, Variables(task, 2).build(found.x))
+    plain = view_closely(task, found.network(task))
     assert plain is not None
     own = ThroughPoints(tuple(plain.at.tolist()), tuple(plain.force.tolist()))  # what it does is what it is to do
     task = replace(task, limits=TaskLimits(), shape=TargetCurve(own, "force"))
@@ -194,7 +193,7 @@ def test_a_window_that_is_not_kept_between_the_poses_is_cut_to_where_it_is() -> 
     kept = verify(task, replace(found, start=3e-3, objective=0.05), StartBudget(), lambda _, design: design)
     assert 3e-3 < kept.start <= task.window[0]
     assert kept.objective <= 0.05
-    wider = looked_at(task, Variables(task, 2).build(kept.x))
+    wider = view_closely(task, kept.network(task))
     assert wider is not None
     assert wider.half_band(kept.start - 2e-5) > 0.05
 
@@ -229,7 +228,7 @@ def test_the_search_limits_the_stress_that_the_analysis_judges() -> None:
     assert task.total_stress
     program = Shaping(Variables(task, 2), 6.8e-3, Flattest())
     view = program.view(table_3(task))
-    rows = [one for one in program.limits(view) if one.name == "stress"]
+    rows = [one for one in view.list_limits() if one.name == "stress"]
     worst = max(float((1 - one.values).max()) for one in rows) * task.limits.stress
     path = view.response.path
     assert worst == pytest.approx(float(path.peak_stress(axial=True).value.max()), rel=STRESS_MARGIN)
@@ -309,8 +308,8 @@ def test_the_written_design_is_the_one_that_was_found() -> None:
 
 def test_flat_ranges_are_measured_from_the_end() -> None:
     at = np.linspace(0.0, 10.0, 61)
-    assert strict_share(at, np.minimum(at / 4, 1.0) + 1e-9) == pytest.approx(0.62, abs=0.01)
-    assert half_band(at, 1 + 0.02 * np.sin(at), 2.0) == pytest.approx(0.02, abs=1e-4)
+    assert band_and_range(at, np.minimum(at / 4, 1.0) + 1e-9, 2.0)[1] == pytest.approx(0.62, abs=0.01)
+    assert band_and_range(at, 1 + 0.02 * np.sin(at), 2.0)[0] == pytest.approx(0.02, abs=1e-4)
 
 
 def test_lines_cross_but_not_in_the_joint_where_they_end() -> None:
@@ -332,7 +331,7 @@ def test_the_objective_of_the_paper_falls_without_the_force_getting_flatter() ->
     begun = [found_of(task, table_3(task) * (1 + off * shapes)) for off in (-0.01, 0.01)]
     ended = min((flatten(task, one, StartBudget(flattening=15)) for one in begun), key=lambda one: one.objective)
     view = program.view(ended.x)
-    force = view.response.state.force[view.poses.window]
+    force = view.response.force[view.poses.window]
     assert ended.objective < 0.15
     assert np.ptp(force) / (force.max() + force.min()) > 0.04
 
@@ -434,7 +433,7 @@ def test_a_widening_that_more_poses_refute_keeps_the_window_that_they_confirm(mo
     monkeypatch.setattr(search, "_widest", lambda _task, _found, _plan: wide)
     monkeypatch.setattr(search, "_repair", lambda _task, _wide, kept, _plan: kept)
     monkeypatch.setattr(search, "round_design", lambda _task, found: found)
-    monkeypatch.setattr(search, "looked_at", lambda _task, _network: object())
+    monkeypatch.setattr(search, "view_closely", lambda _task, _network: object())
     monkeypatch.setattr(search, "_shows_all", lambda _task, found, _view: found.start == good.start)
     monkeypatch.setattr(
         search, "_as_seen", lambda _task, found, _view: replace(found, start=3.6e-3) if found.start < 4e-3 else found

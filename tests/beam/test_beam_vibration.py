@@ -16,20 +16,14 @@ MODES = ("points: 21", "points: 21\n  modes: 3")
 UNIT = np.sqrt(0.02 / (DENSITY * 1e-4 * 0.4**4)) / (2 * np.pi)
 """EI = 0.02 N m^2, 0.12 kg/m, L = 0.4 m: a frequency is beta^2 times this [Hz]."""
 
-COLUMN = """
-cfmkit: 1
-family: beam
-mechanism:
-  material: {youngs_modulus: 2.4 GPa, density: 1200 kg/m^3}
-  thickness: 1 mm
-  width: 100 mm
-  nodes:
-    root: {at: [0 mm, 0 mm], support: clamped}
-    tip: {at: [400 mm, 0 mm]}
-  beams: {beam: {start: root, end: tip}}
-  drive: {kind: force, node: tip, direction: 180 deg, follows: true}
-analysis: {force: 2.6 N, points: 53}
-"""
+FOLLOWED = (
+    (
+        "{kind: displacement, node: tip, direction: -90 deg}",
+        "{kind: force, node: tip, direction: 180 deg, follows: true}",
+    ),
+    ("travel: 100 mm\n  points: 21", "force: 2.6 N\n  points: 53"),
+)
+"""Beck's column."""
 
 
 def test_frequencies_are_columns_held_and_free():
@@ -108,7 +102,7 @@ def test_frequencies_have_a_picture():
 
 def test_becks_column_is_said_to_flutter_at_its_load():
     """20.051 EI/L^2 = 2.506 N: points are 0.05 N apart."""
-    result = cfmkit.analyze(cfmkit.loads(COLUMN))
+    result = cfmkit.analyze(cantilever(WEIGHS, *FOLLOWED))
     assert "flutter_not_judged" not in warned(result)
     assert "2.55 N" in warned(result)["flutter"]
     assert (result.curve.stable == (result.curve.force < 2.5064)).all()
@@ -117,7 +111,7 @@ def test_becks_column_is_said_to_flutter_at_its_load():
 
 
 def test_without_a_density_flutter_is_not_judged():
-    result = cfmkit.analyze(cfmkit.loads(COLUMN.replace(", density: 1200 kg/m^3", "")))
+    result = cfmkit.analyze(cantilever(*FOLLOWED))
     assert "density" in warned(result)["flutter_not_judged"]
     assert result.curve.stable.all()
 
@@ -138,38 +132,22 @@ def test_stiffness_across_is_a_metric_and_a_column():
     assert value(result, "cross_stiffness") == pytest.approx(wanted, rel=1e-5)
 
 
-STRAIGHT_COLUMN = """
-cfmkit: 1
-family: beam
-name: column
-mechanism:
-  material: {youngs_modulus: 200 GPa}
-  thickness: 2 mm
-  width: 10 mm
-  axial: true
-  nodes:
-    root: {at: [0 mm, 0 mm], support: clamped}
-    tip: {at: [100 mm, 0 mm]}
-  beams:
-    beam: {start: root, end: tip}
-  drive: {kind: displacement, node: tip, direction: 180 deg}
-analysis:
-  travel: 0.1 mm
-  points: 41
-  branch: primary
-  outputs: {cross_stiffness: true}
-"""
+PRESSED = (
+    ("2.4 GPa", "200 GPa"), ("thickness: 1 mm", "thickness: 2 mm"), ("width: 100 mm", "width: 10 mm\n  axial: true"),
+    ("400 mm", "100 mm"), ("direction: -90 deg", "direction: 180 deg"), ("travel: 100 mm", "travel: 0.1 mm"),
+    ("points: 21", "points: 41\n  branch: primary\n  outputs: {cross_stiffness: true}"),
+)  # fmt: skip
 
 
 def test_stiffness_across_an_unstable_column_has_a_pole_where_it_would_buckle_with_its_tip_held():
     """Under a thrust P it is P / (tan(n L)/n - L), n^2 = P/EI: unbounded at n L = 4.4934, Euler's third case."""
-    result = cfmkit.analyze(cfmkit.loads(STRAIGHT_COLUMN))
+    result = cfmkit.analyze(cantilever(*PRESSED))
     bending, length = 200e9 * 10e-3 * 2e-3**3 / 12, 0.1
     thrust, column = result.curve.effort[4:24], result.curve.extra["cross_stiffness"].values[4:24]
     n = np.sqrt(thrust / bending)
     np.testing.assert_allclose(column, thrust / (np.tan(n * length) / n - length), rtol=2e-2)
     assert value(result, "cross_stiffness") is None
-    below = cfmkit.analyze(cfmkit.loads(f"{STRAIGHT_COLUMN}  window: [0.01 mm, 0.05 mm]\n"))
+    below = cfmkit.analyze(cantilever(*PRESSED, ("points: 41", "points: 41\n  window: [0.01 mm, 0.05 mm]")))
     assert -27e3 < value(below, "cross_stiffness") < -25e3
 
 

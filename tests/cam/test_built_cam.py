@@ -180,10 +180,14 @@ def test_a_file_outside_the_folder_or_missing_is_refused_with_its_place(tmp_path
         spec_of(inner, file=name)
 
 
-def test_file_and_noise_belong_together(tmp_path):
+@pytest.mark.parametrize(
+    ("key", "complaint"),
+    [("file: measured.csv", "'file' and 'noise' belong together"), ("registration: datum", "it needs a 'file'")],
+)
+def test_keys_of_measured_points_belong_together(tmp_path, key, complaint):
     write(tmp_path, measured())
-    (tmp_path / "cam.yaml").write_text(CONFIG.replace("stroke: 240 mm}", "stroke: 240 mm, file: measured.csv}", 1))
-    with pytest.raises(SpecError, match="'file' and 'noise' belong together"):
+    (tmp_path / "cam.yaml").write_text(CONFIG.replace("stroke: 240 mm}", f"stroke: 240 mm, {key}}}", 1))
+    with pytest.raises(SpecError, match=complaint):
         cfmkit.load(tmp_path / "cam.yaml")
 
 
@@ -308,12 +312,6 @@ def test_points_in_the_datum_of_the_part_stay_where_they_are(tmp_path):
     normals = np.concatenate([flank.frame(u).normals for flank in flanks()])
     assert found.values["profile_mean"].value == pytest.approx(0.5e-3 * normals[:, 1].mean(), rel=0.02)
     assert not {"registration_weak", "width_error"} & {item.name for item in found.warnings}
-
-
-def test_registration_needs_measured_points(tmp_path):
-    (tmp_path / "cam.yaml").write_text(CONFIG.replace("stroke: 240 mm}", "stroke: 240 mm, registration: datum}", 1))
-    with pytest.raises(SpecError, match="it needs a 'file'"):
-        cfmkit.load(tmp_path / "cam.yaml")
 
 
 def test_without_a_side_column_the_sign_of_x_tells_the_sides(tmp_path):

@@ -12,7 +12,9 @@ from scipy.optimize import root
 
 import cfmkit
 from cfmkit.errors import SpecError
+from cfmkit.export import Arc, polygons
 from cfmkit.families.cam.figures import figures
+from cfmkit.families.cam.part_sizes_and_clearances import BESIDE_FLANKS_PAIR, clearances, nearest_pairs
 from cfmkit.families.cam.scalar_results import SCALAR_QUANTITIES
 from cfmkit.families.cam.statics import Losses, leverage
 
@@ -241,8 +243,6 @@ def test_a_travel_beyond_the_stop_is_told_and_partial():
 
 def test_distances_are_those_of_points_on_the_parts():
     """Brute force: many points on each part, against the gaps of the closed formulas."""
-    from cfmkit.families.cam.part_sizes_and_clearances import clearances
-
     found = analyze(cam(roller_radius="10 mm", envelope=SIZES))
     gaps = {}
     for pair, gap in clearances(found.state):
@@ -261,12 +261,8 @@ def test_distances_are_those_of_points_on_the_parts():
     assert gaps["slider and roller"][at] == pytest.approx(np.hypot(*(box - [x, y]).T).min() - 0.010, abs=1e-6)
     share = np.linspace(0, 1, 20001)[:, None]
     brace = share * [x, y] + (1 - share) * [0.0, pin]
-    from cfmkit.export import Arc
-    from cfmkit.families.cam.outline import drawing
-
-    holes = [
-        edge.center for one in drawing(found.spec).contours if one.hole for edge in one.edges if isinstance(edge, Arc)
-    ]
+    contours = [contour for contour in cfmkit.drawing(found.spec).contours if contour.hole]
+    holes = [edge.center for contour in contours for edge in contour.edges if isinstance(edge, Arc)]
     assert len(holes) == 4
     nearest = min(np.hypot(*(brace - hole).T).min() for hole in holes)
     assert gaps["brace and screw"][at] == pytest.approx(nearest - 0.012, abs=1e-6)
@@ -276,11 +272,8 @@ def test_distances_are_those_of_points_on_the_parts():
 
 
 def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
-    from cfmkit.export import Arc, polygons
-    from cfmkit.families.cam.outline import drawing
-
     def outline(radius):
-        return drawing(cam(roller_radius="10 mm", plate={"tool_radius": radius, "base_width": "60 mm"}))
+        return cfmkit.drawing(cam(roller_radius="10 mm", plate={"tool_radius": radius, "base_width": "60 mm"}))
 
     rounded, sharp = outline("3 mm"), outline("0 mm")
     arcs = [edge for edge in rounded.contours[0].edges if isinstance(edge, Arc)]
@@ -299,16 +292,12 @@ def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
 
 
 def test_a_roller_meets_the_fillet_of_a_corner_not_the_rest_of_its_circle():
-    from cfmkit.export import polygons
-    from cfmkit.families.cam.outline import drawing
-    from cfmkit.families.cam.part_sizes_and_clearances import BESIDE_FLANKS_PAIR, nearest_pairs
-
     wide = {"base_width": "60 mm", "tool_radius": "20 mm"}
     found = analyze(cam(roller_radius="10 mm", plate=wide, envelope={"gap": "1 mm"}))
     assert "parts_touch" not in {one.name for one in found.warnings}
     gap, states = nearest_pairs(found.state)[BESIDE_FLANKS_PAIR], found.state.states
     assert gap.min() > -1e-9
-    outline = polygons(drawing(found.spec).contours[:1], "cut", 4000)[0]
+    outline = polygons(cfmkit.drawing(found.spec).contours[:1], "cut", 4000)[0]
     for at in (0, len(gap) // 8):
         away = np.hypot(*(outline - [states.x[at], states.y[at]]).T).min() - 0.010
         assert gap[at] >= away - 1e-6  # the whole outline has the flank, too, which the roller touches

@@ -9,10 +9,10 @@ from flanks import flanks
 
 import cfmkit
 from cfmkit import Run
-from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, arc_lengths
+from cfmkit.families.cam.geometry.flank_from_roller_path import BuiltFlank, arc_lengths
 from cfmkit.families.cam.manufacturing_scatter import DrawnError, _track, force_band
+from cfmkit.families.cam.measured_cam import Sides
 from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.families.cam.solution_of_measured_cam import Sides
 from cfmkit.families.cam.spec import Manufacturing
 
 TRAVEL = np.linspace(0.005, 0.23, 120)

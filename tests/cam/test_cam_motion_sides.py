@@ -11,7 +11,6 @@ from cam_motion import moving
 from cam_support import analyze
 
 from cfmkit.families.cam.dynamics.machine_from_spec import build
-from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 
 
 @dataclass(frozen=True)
@@ -55,14 +54,6 @@ def test_the_guide_is_so_good_that_each_position_needs_one_evaluation_of_the_cur
         assert [call for piece in pieces for call in piece.calls] == [201]
         drop = np.sqrt(side.parts.brace_length**2 - stance.center.real**2)
         np.testing.assert_allclose(stance.center.imag + drop, slider, rtol=0, atol=1e-15)
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.004, -0.001])
-def test_slope_and_its_derivative_are_the_same_together_and_alone(friction):
-    law, x = SlopeLaw(9.058e-3, 0.068, 0.2, friction, 1.1), np.linspace(0.068, 0.15, 50)
-    together = law.slopes(x)
-    np.testing.assert_allclose(together[0], law.slope(x), rtol=4e-16)
-    np.testing.assert_allclose(together[1], law.slope_derivative(x), rtol=1e-15)
 
 
 def test_a_left_flank_without_a_stroke_is_cut_for_that_of_the_right_one():

@@ -11,6 +11,7 @@ from cfmkit.metrics import Window, evaluate
 
 NAMES = ("usable_stroke", "usable_start", "usable_end", "range_95", "range_95_fraction")
 NAMES += ("band_range_05pct", "band_range_1pct", "band_range_5pct")
+EXTREMES = ("force_max", "force_min", "force_ripple", "rms_to_target")
 SPECS = {
     "friction": cam(roller_radius="10 mm", rolling_friction=0.002),
     "more friction": cam(roller_radius="10 mm", rolling_friction=0.004, analysis__band=0.02),
@@ -23,16 +24,21 @@ SPECS = {
 }
 
 
+@pytest.mark.parametrize(
+    ("names", "ends", "points", "rtol"),
+    [(NAMES, (0.004, 0.23), (31, 301, 3001), 1e-9), (EXTREMES, (0.0021, 0.2299), (31, 3001), 2e-6)],
+)
 @pytest.mark.parametrize("name", SPECS)
-def test_places_do_not_depend_on_the_number_of_points(name):
+def test_places_and_ends_of_windows_do_not_depend_on_the_number_of_points(name, names, ends, points, rtol):
+    """At 31 points the first sample beyond rest stands at 8 mm: a line to it says nothing of the force at 2 mm."""
     found = []
-    for points in (31, 301, 3001):
-        result = analyze(SPECS[name].replace({"analysis.points": points}))
+    for count in points:
+        result = analyze(SPECS[name].replace({"analysis.points": count}))
         start = float(result.curve.displacement.min())
-        metrics = evaluate(result, NAMES, Window(start + 0.004, start + 0.23))
-        found.append([metrics[one].value for one in NAMES])
+        metrics = evaluate(result, names, Window(start + ends[0], start + ends[1]))
+        found.append([metrics[one].value for one in names])
     assert None not in found[0]
-    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found[1:], [found[0]] * (len(points) - 1), rtol=rtol, atol=1e-9)
 
 
 def test_the_usable_stroke_begins_where_friction_lets_the_force_into_its_band():
@@ -52,16 +58,3 @@ def test_a_force_that_leaves_its_band_between_two_samples_is_followed_there():
     coarse, fine = (evaluate(analyze(one), NAMES[:3]) for one in (spec, spec.replace({"analysis.points": 20001})))
     for name in NAMES[:3]:
         assert coarse[name].value == pytest.approx(fine[name].value, rel=1e-9)
-
-
-@pytest.mark.parametrize("name", SPECS)
-def test_ends_of_a_window_between_two_samples_are_those_of_the_cam(name):
-    """At 31 points the first sample beyond rest stands at 8 mm: a line to it says nothing of the force at 2 mm."""
-    names, found = ("force_max", "force_min", "force_ripple", "rms_to_target"), []
-    for points in (31, 3001):
-        result = analyze(SPECS[name].replace({"analysis.points": points}))
-        start = float(result.curve.displacement.min())
-        metrics = evaluate(result, names, Window(start + 0.0021, start + 0.2299))
-        found.append([metrics[one].value for one in names])
-    assert None not in found[0]
-    np.testing.assert_allclose(found[0], found[1], rtol=2e-6, atol=1e-9)

@@ -21,15 +21,6 @@ LEAVES = el.Displacement("d", np.pi, np.linspace(0, 5e-3, 17)[1:])
 DRIVE = el.Displacement("d", -np.pi / 2, np.array([1e-3, 2e-3]))
 
 
-def test_a_batch_gives_each_network_its_own_curve_in_order() -> None:
-    sweeps = [0.3, -0.5, 0.9]
-    found = list(el.trace_many([bent(s) for s in sweeps], DRIVE))
-    for sweep, outcome in zip(sweeps, found, strict=True):
-        path = el.trace(bent(sweep), DRIVE)
-        assert outcome.status == el.PathStatus.COMPLETE.name
-        assert outcome.value.effort == pytest.approx(path.effort[path.at_requested], rel=2e-7)
-
-
 def test_networks_of_one_topology_are_followed_together_within_the_tolerance() -> None:
     rng, tolerance = np.random.default_rng(3), 1e-5
     networks = [two_leaves(*(1 + 0.1 * rng.standard_normal(6))) for _ in range(20)]

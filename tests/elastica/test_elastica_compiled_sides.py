@@ -13,7 +13,7 @@ from contact_paths import THIN
 import cfmkit.elastica as el
 from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.pair_gaps import make_gaps
-from cfmkit.elastica.contact.side_gaps import NEAR_GAP, LoadStage
+from cfmkit.elastica.contact.side_gaps import NEAR_GAP, LoadStage, search_sides
 from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE, load_compiled
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
@@ -156,7 +156,7 @@ def assert_gaps_agree(mesh: Discretisation, states: Any, stage: LoadStage) -> No
             continue
         fast, right = make_gaps(mesh, item, (0,)), make_gaps(mesh, item, (0,))
         vars(right)["packed"] = None
-        assert fast._search(states, stage) is not None
+        assert search_sides(mesh, fast.packed, states, stage) is not None
         least = right.least(states, stage)
         assert fast.least(states, stage) == pytest.approx(least, abs=1e-13)
         watched, near = fast.least(states, stage, watch=True), least < NEAR_GAP

@@ -7,25 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from equilibria import equilibria
-from varied_networks import LAN, lan
+from varied_networks import LAN, lan_pushed
 
 import cfmkit.elastica as el
-from cfmkit.elastica.mechanics.design_derivatives import effort_slopes
-from cfmkit.elastica.mechanics.designs import NetworkDesigns, design_of, set_up
+from cfmkit.elastica.mechanics.designs import design_of, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 
 COMPLEX_STEP = 1e-30  # nothing is subtracted: its square vanishes beside one
-
-
-def stepped(template: Any, build: Any, x: Any) -> NetworkDesigns:
-    """Return a complex step in each variable of a function that builds network and drive."""
-    each = [build(x + 1j * COMPLEX_STEP * unit) for unit in np.eye(len(x))]
-    return set_up(template, build(x), each)
-
-
-def lan_pushed(x: Any) -> Any:
-    return lan(x), el.Displacement("n5", -np.pi / 2, np.array([2e-3, 6e-3]))
 
 
 def hooked(x: Any) -> Any:
@@ -67,11 +55,3 @@ def test_networks_of_plain_beams_are_set_up_together_as_one_by_one(build: Any, x
                         assert np.abs(own.real - right.real).max() < 1e-12 * size, name
                         tiny = max(float(np.abs(right.imag).max()), COMPLEX_STEP * 1e-3)
                         assert np.abs(own.imag - right.imag).max() < 1e-10 * tiny, name
-
-
-def test_the_tangent_of_the_path_is_the_adjoint() -> None:
-    """With slopes of the path, and with one solution a point, the same derivatives."""
-    net, drive = lan_pushed(LAN)
-    at, rates = equilibria(net, drive, 8)
-    designs = stepped(at.mesh, lan_pushed, LAN)
-    np.testing.assert_allclose(effort_slopes(at, designs, rates), effort_slopes(at, designs), rtol=1e-7)

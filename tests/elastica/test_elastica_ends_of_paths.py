@@ -115,6 +115,23 @@ def test_a_path_may_end_or_begin_at_its_bifurcation(last: bool) -> None:
     np.testing.assert_allclose(law.stress("", near), whole.stress("", near), rtol=1e-3)
 
 
+@pytest.mark.parametrize(("bifurcation", "offset"), [(0, -1e-10), (0, -1e-11), (1, 1e-10)])
+def test_a_point_a_hair_beside_a_bifurcation_spoils_nothing_around_it(bifurcation: int, offset: float) -> None:
+    """Newton's method leaves more of the critical mode there than the path moves up to the corner."""
+    points = np.linspace(0, 1.9 * 35e-3 * np.sin(np.radians(7)), 21)[1:]
+    path = el.trace(leaves(thickness=1e-3, angle=7.0), press("d", points))
+    corner = path.events[bifurcation].drive
+    beside = el.trace(leaves(thickness=1e-3, angle=7.0), press("d", np.sort([*points, corner + offset])))
+    law, expected = interpolate_path(beside), interpolate_path(path)
+    assert law is not None
+    assert expected is not None
+    np.testing.assert_allclose(law.corners, expected.corners, rtol=1e-6)
+    near = corner + np.array([-1e-5, -1e-6, 1e-6, 1e-5])
+    np.testing.assert_allclose(law.effort("", near), expected.effort("", near), rtol=1e-9)
+    largest_stress = expected.solve_at(near).beam_stresses()[0].max(axis=0)
+    np.testing.assert_allclose(law.stress("", near), largest_stress, rtol=0.01)
+
+
 @pytest.mark.parametrize(("many", "factor"), [(2, 1.0), (5, 1 + 1e-6), (3, 1 + 1e-3)])
 def test_columns_under_one_platform_bear_its_load_together(many: int, factor: float) -> None:
     """Under a load as under a displacement; were one to buckle alone the others would bear more than they can."""

@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import cfmkit.elastica as el
-from cfmkit.elastica.contact.changes import PieceOfPath
 from cfmkit.elastica.contact.follow import choose_friction
+from cfmkit.elastica.contact.piece import PieceOfPath
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.results.between_points import interpolate_path

@@ -14,7 +14,6 @@ from typing import Any
 import beam_networks
 import numpy as np
 import pytest
-from batch_networks import two_leaves
 from buckling_structures import cantilever
 from contact_layouts import with_pads
 from network_cases import from_json, read_cases
@@ -27,7 +26,7 @@ from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE, load_compiled
 from cfmkit.elastica.mechanics.designs import set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
-from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations, begin
+from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations
 from cfmkit.elastica.mechanics.march import engine, equations
 from cfmkit.elastica.model.beam_fits import is_plain
 from cfmkit.elastica.tracing.accuracy import DEGREES_MORE, NEXT_CORRECTION, compare_states
@@ -44,6 +43,10 @@ def random_state(network: Discretisation, seed: int) -> Any:
 
 def difference(found: Any, right: Any) -> float:
     return float(np.abs(found - right).max() / np.abs(right).max())
+
+
+def at_rest(own: NumpyEquations) -> Any:
+    return own.solve(np.zeros(own.n), 0.0)
 
 
 def assert_same_functional(network: Discretisation, z: Any) -> None:
@@ -211,8 +214,8 @@ def test_marches_of_c_and_numpy_are_equal(seed: int, number: int) -> None:
     ends = []
     for kind in (equations, NumpyEquations):
         ramp, own = kind(network, True), kind(network)
-        loaded = ramp.march(begin(ramp), np.array([1.0]), MarchPlan(0.5, 1.0)).states[-1]
-        start, goals = begin(own, loaded.x), beam_networks.drives(net, seed)[number].points / network.scales.drive
+        loaded = ramp.march(at_rest(ramp), np.array([1.0]), MarchPlan(0.5, 1.0)).states[-1]
+        start, goals = own.solve(loaded.x, 0.0), beam_networks.drives(net, seed)[number].points / network.scales.drive
         ends.append(own.march(start, goals, MarchPlan(0.3 * abs(goals[0]), abs(goals[-1]), branch=PathBranch(0.0, 1))))
     one, other = ends
     assert one.code is other.code is MarchCode.DONE
@@ -231,7 +234,7 @@ def test_several_solutions_and_softest_modes_of_c_and_numpy_are_equal(seed: int,
     net = beam_networks.network(seed, follower=False)
     network = discretise(net, beam_networks.drives(net, seed)[number], 6)
     c, reference = equations(network), NumpyEquations(network)
-    start = begin(c)
+    start = at_rest(c)
     ways = start.drive + np.array([1e-3, 3e-3, 50.0]) * np.sign(beam_networks.drives(net, seed)[number].points[-1])
     found = [own.solve_each(np.tile(start.x, (3, 1)), ways) for own in (c, reference)]
     assert (found[0].converged == found[1].converged).all()
@@ -267,7 +270,7 @@ def test_a_march_stops_before_a_step_that_is_less_stable(kind: Any) -> None:
     )
     critical = 4 * np.pi**2 * 1e-6 / 12 / 0.1  # shortening of a column, both ends clamped, axial strain (t/L)^2 pi^2/3
     own = kind(discretise(net, el.Displacement("b", np.pi, np.array([1.2 * critical])), 8))
-    march = own.march(begin(own), np.array([1.2 * critical]) / 0.1, MarchPlan(0.01 * critical / 0.1, critical / 0.1))
+    march = own.march(at_rest(own), np.array([1.2 * critical]) / 0.1, MarchPlan(0.01 * critical / 0.1, critical / 0.1))
     assert march.code is MarchCode.STABILITY_CHANGES
     assert 0.5 * critical < march.states[-1].drive * 0.1 < critical
 
@@ -293,19 +296,9 @@ def test_a_batch_has_the_efforts_of_single_marches() -> None:
     for thickness, row in zip(np.linspace(0.5e-3, 1e-3, 4), efforts, strict=True):
         own = NumpyEquations(discretise(*leaf(thickness), 8))
         goals = TARGETS / own.mesh.scales.drive
-        march = own.march(begin(own), goals, MarchPlan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
+        march = own.march(at_rest(own), goals, MarchPlan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
         known = march.effort[march.target >= 0] * own.effort_unit
         assert row == pytest.approx(known, rel=1e-7)
-
-
-@needs_c
-def test_a_batch_of_several_beams_has_the_efforts_of_single_marches() -> None:
-    pairs = [(two_leaves(bend=bend), el.Displacement("d", np.pi, TARGETS)) for bend in (0.8, 1.0, 1.3)]
-    efforts, codes, _ = CompiledBatch(set_up(discretise(*pairs[0], 16), pairs[0], pairs)).march(TARGETS)
-    assert (codes == MarchCode.DONE).all()
-    for pair, row in zip(pairs, efforts, strict=True):
-        path = el.trace(*pair, el.Control(tolerance=1e-8))
-        assert row == pytest.approx(path.effort[path.at_requested], rel=1e-6)
 
 
 @needs_c

@@ -84,3 +84,12 @@ def test_a_node_that_a_link_moves_has_no_reaction() -> None:
     path = functional_path(net, beam_networks.drives(net, 3)[3], 8)
     with pytest.raises(InputError, match="moved by a link"):
         path.reaction("bb")
+
+
+def test_displacement_of_a_line_load_counts_from_the_place_before_constant_line_loads() -> None:
+    """Of a bar under w along itself u = w (L s - s^2/2)/EA, its integral w L^3/3EA."""
+    section = el.Section(2e6, 8e-3, 1e-3)
+    nodes = {"a": el.Node(0, 0, el.CLAMPED_SUPPORT), "b": el.Node(0.1, 0)}
+    net = el.Network(nodes, {"ab": el.Beam("a", "b", section)}, loads=(el.LineLoad("ab", 3.0),))
+    path = el.trace(net, el.Loading((el.LineLoad("ab", 2.0),), np.array([1.0, 2.0])))
+    assert path.effort == pytest.approx(2.0 * (3.0 + 2.0 * path.drive) * 0.1**3 / (3 * 2e6 * 8e-6), rel=1e-9)

@@ -1,137 +1,112 @@
-"""Range metrics of many curves at once are those of each curve."""
+"""Metrics of many curves, each a row, are those of each curve by itself."""
 
-from functools import partial
-from types import SimpleNamespace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from cfmkit.curves import Curve
-from cfmkit.metrics import MeasuringFrame, Window
-from cfmkit.metrics.metric_definitions import METRIC_TABLE
-from cfmkit.metrics.metric_values import survey
-from cfmkit.metrics.ranges_many import (
-    BAND_RANGES,
-    ManyBranches,
-    band_range,
-    range_95,
-    range_95_fraction,
-    rms_to_target,
-    usable_interval,
-)
-from cfmkit.metrics.spread import ManyWindows, Spread
+import cfmkit
+from cfmkit.curves import Column, Curve
+from cfmkit.metrics import CycleRows, MeasuringFrame, Window, definitions, measure, metric_of_rows
+from cfmkit.metrics.curve_rows import CurveRows, RowSamples, StressRows
+from cfmkit.metrics.spread import Spread
 
-DEFINED = {item.name: item for item in METRIC_TABLE}
-COUNT, POINTS = 300, 41
-FUNCTIONS = {
-    "range_95": range_95,
-    "range_95_fraction": range_95_fraction,
-    "rms_to_target": partial(rms_to_target, target=np.full(COUNT, 10.0)),
-    **{name: partial(band_range, tolerance=tolerance) for name, tolerance in BAND_RANGES.items()},
-}
+COUNT, MOTION, DENSE = 40, np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.0, 60)
+PEAKS, SHIFTS = np.linspace(0.1, 0.9, 5), {"load": 0.2, "unload": -0.2}
+FOLLOWED = replace(cfmkit.load("configs/cam_linear.yaml").target_curve, function=(10.0, 0.5))
+ERRORS = np.where(np.arange(COUNT) % 10 == 2, 100.0, 1e-9)  # of some all effort is rounding
 
 
-def curves(seed):
-    """Return motions and efforts that rise, wave, cross their bands, and touch them exactly."""
-    rng = np.random.default_rng(seed)
-    motion = np.sort(rng.uniform(0.0, 1.0, (COUNT, POINTS)), axis=1)
-    motion[:, 0] = 0.0
-    waves = rng.uniform(0.0, 0.12, (COUNT, 1)) * np.sin(rng.uniform(1, 40, (COUNT, 1)) * motion)
-    effort = 10.0 * (1.0 + waves + rng.uniform(-0.1, 0.1, (COUNT, 1)) * motion)
-    effort[::3, 0] = 0.0
-    effort[::5] = np.round(effort[::5] * 2.0) / 2.0
-    effort[1::7] = 10.0
-    return motion, effort
+@dataclass
+class Laws:
+    """Efforts that rise, wave, start at zero or are constant: of some rows, or of one (a `ClosedForm`)."""
+
+    wave: np.ndarray  # amplitude, frequency, slope, level, sign: (d, 1) each
+
+    places, peaks = DENSE, PEAKS
+
+    def row(self, k):
+        return Laws(self.wave[:, k])
+
+    def effort(self, branch, x, rows=slice(None)):
+        amplitude, frequency, slope, level, sign = self.wave if self.wave.ndim == 2 else self.wave[:, rows]
+        rise = np.minimum(1.0, level + 8.0 * x)
+        return sign * (10.0 * rise * (1.0 + amplitude * np.sin(frequency * x) + slope * x) + SHIFTS[branch])
+
+    def stress(self, _branch, x, rows=slice(None)):
+        frequency = self.wave[1] if self.wave.ndim == 2 else self.wave[1][rows]
+        return 5.0 + 10.0 * np.abs(np.sin(0.3 * frequency * np.asarray(x)))
 
 
-def alone(motion, efforts, window, name, until=np.inf):
-    """Return a metric of one curve whose branches have one motion, unloading stored backwards."""
-    path = np.concatenate([motion, *(motion[::-1] for _ in efforts[1:])])
-    effort = np.concatenate([efforts[0], *(one[::-1] for one in efforts[1:])])
-    branch = np.repeat(["load", "unload"][: len(efforts)], len(motion))
-    frame = MeasuringFrame(target=10.0, valid=((0.05, min(float(motion[-1]), until)),))
-    view = survey(Curve(path, effort, branch, np.ones(len(path), bool)), frame, window)
-    definition = DEFINED[name]
-    value = view.worst(definition, view.evaluate_each(definition)).value
-    return np.nan if value is None else value
+def draw_laws(seed):
+    draw = np.random.default_rng(seed)
+    wave = np.stack([draw.uniform(low, high, (COUNT, 1)) for low, high in ((0, 0.12), (1, 40), (-0.1, 0.1), (0, 1))])
+    wave[3, ::3], wave[0, 1::7], wave[2, 1::7] = 0.0, 0.0, 0.0
+    return Laws(np.concatenate([wave, draw.choice([-1.0, 1.0], (1, COUNT, 1))]))
 
 
-@pytest.mark.parametrize("window", [None, (0.2, 0.8)])
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_a_range_of_many_curves_is_that_of_each(name, window):
-    motion, effort = curves(1)
-    motion[:, -1] = 1.0
-    low, high = (np.full(COUNT, end) for end in window) if window else (motion[:, 0], motion[:, -1])
-    many = ManyBranches(motion, effort, low, high)
-    with np.errstate(all="ignore"):
-        found = FUNCTIONS[name](many)
-    wanted = [alone(motion[k], [effort[k]], Window(*window) if window else None, name) for k in range(COUNT)]
-    assert np.allclose(found, wanted, rtol=1e-12, atol=1e-13, equal_nan=True)
-    assert np.ptp(found[np.isfinite(found)]) > 0.01
+def rows_of(laws, branch, target, followed):
+    """Return the laws as rows, of which the first has no allowable stress."""
+    motion = np.broadcast_to(MOTION, (COUNT, len(MOTION)))
+    allowable = np.where(np.arange(COUNT) == 0, np.nan, 12.0)
+    stress = laws.stress(branch, motion)
+    return CurveRows(
+        RowSamples(motion, laws.effort(branch, motion), np.full(COUNT, len(MOTION))),
+        lambda: np.broadcast_to(DENSE, (COUNT, len(DENSE))),
+        lambda places, rows: laws.effort(branch, places, slice(None) if rows is None else rows),
+        ERRORS, target, 0.05, (np.full(COUNT, 0.05), np.full(COUNT, 0.9)),
+        lambda places: 3.0 + places,
+        StressRows(
+            lambda: [RowSamples(motion, stress, np.full(COUNT, len(MOTION)))],
+            lambda places, rows: laws.stress(branch, places, rows), allowable,
+        ),
+        peaks=np.broadcast_to(PEAKS, (COUNT, len(PEAKS))), followed=followed,
+    )  # fmt: skip
 
 
-@pytest.mark.parametrize(("seed", "until"), [(2, None), (3, None), (3, 0.7)])
-def test_the_usable_interval_of_many_loops_is_that_of_each(seed, until):
-    motion, load = curves(seed)
-    _, unload = curves(seed + 10)
-    unload[::40] = 20.0
-    branches = [ManyBranches(motion, one, motion[:, 0], motion[:, -1]) for one in (load, unload)]
-    limit = None if until is None else np.full(COUNT, until)
-    start, end = usable_interval(branches, np.full(COUNT, 10.0), 0.05, np.full(COUNT, 0.05), limit)
-    found = {"usable_start": start, "usable_end": end, "usable_stroke": np.nan_to_num(end - start)}
-    for name, values in found.items():
-        wanted = [alone(motion[k], [load[k], unload[k]], None, name, until or np.inf) for k in range(COUNT)]
-        assert np.allclose(values, wanted, rtol=1e-12, atol=1e-13, equal_nan=True)
-    assert 20 < np.isfinite(start).sum() < COUNT
+def measure_row(laws, k, window, target, followed):
+    """Return all metrics of one law, whose unloading is stored backwards."""
+    law = laws.row(k)
+    path = np.concatenate([MOTION, MOTION[::-1]])
+    effort = np.concatenate([law.effort("load", MOTION), law.effort("unload", MOTION)[::-1]])
+    stress = {"max_stress": Column(law.stress("", path), "stress")}
+    frame = MeasuringFrame(
+        target, None, None if k == 0 else 12.0, valid=((0.05, 0.9),), closed=law, curve=followed,
+        effort_error=ERRORS[k], part_efforts=lambda _branch, places: 3.0 + places,
+    )  # fmt: skip
+    curve = Curve(path, effort, np.repeat(["load", "unload"], len(MOTION)), np.ones(len(path), bool), stress)
+    return measure(curve, frame, Window(*window) if window else None)
 
 
-OF_EFFORTS = ("force_mean", "force_sd", "force_max", "force_min", "force_ripple", "half_band", "deviation_from_mean")
+@pytest.mark.parametrize("followed", [None, FOLLOWED])
+@pytest.mark.parametrize("target", [None, 10.0])
+@pytest.mark.parametrize("window", [None, (0.21, 0.8), (-0.1, 0.8)])
+def test_every_metric_of_many_curves_is_that_of_each(window, target, followed):
+    laws = draw_laws(1)
+    aim = np.full(COUNT, np.nan if target is None else target)
+    ends = window and tuple(np.full(COUNT, end) for end in window)
+    cycle = CycleRows.from_curves({name: rows_of(laws, name, aim, followed) for name in SHIFTS}, ends)
+    alone = [measure_row(laws, k, window, target, followed) for k in range(COUNT)]
+    for definition in (item for item in definitions("force") if not item.of_material):
+        for branch, values in metric_of_rows(definition, cycle).items():
+            name = f"{definition.name}[{branch}]" if branch else definition.name
+            if definition.of_curve and followed is None:
+                assert np.isnan(values).all()
+                continue
+            wanted = np.array([found[name].value for found in alone], float)
+            # the ends of one curve are solved for one after the other, of many all at once
+            np.testing.assert_allclose(values, wanted, rtol=3e-11, atol=1e-11, err_msg=name)
 
 
-def metric_of(name, many, target):
-    """Return a metric of many curves by its definition."""
-    (function,) = (one.of_rows for one in METRIC_TABLE if one.name == name)
-    return function(SimpleNamespace(many=many, curves=SimpleNamespace(target=np.full(len(many.effort), target))))
+def spread_of(mean, largest, smallest):
+    return tuple(item.tolist() for item in Spread.from_extremes(*map(np.array, (mean, largest, smallest, 0.0))))
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("name", [*OF_EFFORTS, "deviation_from_target"])
-def test_a_metric_of_many_windows_is_that_of_each_whichever_way_the_force_acts(name, sign):
-    motion, effort = curves(4)
-    effort = sign * effort
-    rows = ManyWindows(motion, effort, lambda _, rows: (rows.max(axis=1), rows.min(axis=1)))
-    found = metric_of(name, rows, 10.0)
-    wanted = [alone(motion[k], [effort[k]], None, name) for k in range(COUNT)]
-    assert np.allclose(found, wanted, rtol=1e-12, atol=0.0)
-    assert np.ptp(found) > 1e-3
-
-
-def test_a_spread_is_judged_in_the_direction_of_its_mean_and_without_a_target_nothing_deviates_from_it():
-    assert Spread.from_extremes(-0.5, 2.0, -3.0)[:4] == (0.5, 3.0, -2.0, -1.0)
-    rows = ManyWindows(np.arange(2.0), np.array([[-1.0, -3.0], [1.0, -3.0]]), lambda _, e: (e.max(1), e.min(1)))
-    assert metric_of("force_ripple", rows, np.nan) == pytest.approx([2 / 3, 4 / 3])
-    assert metric_of("force_max", rows, np.nan).tolist() == [-1.0, 1.0]
-    assert np.isnan(metric_of("deviation_from_target", rows, np.nan)).all()
-
-
-def test_the_first_95_percent_alone_are_those_that_are_solved_for_beside_the_bands():
-    def effort(places, _rows):
-        return np.tanh(places) * (1.0 - 0.02 * places)
-
-    motion = np.linspace(0.0, 4.0, 41)[None]
-    many = ManyBranches(motion, effort(motion, None), np.array([0.0]), np.array([4.0]), exact=effort)
-    with np.errstate(all="ignore"):
-        both = many.solved
-        alone = ManyBranches(motion, many.effort, many.low, many.high, exact=effort)
-        np.testing.assert_allclose(alone.rise, both[0], rtol=1e-11)
-        np.testing.assert_allclose(alone.bands, both[1], rtol=1e-11)
+def test_a_spread_is_judged_in_the_direction_of_its_mean():
+    assert spread_of([-0.5, 0.5], [2.0, 2.0], [-3.0, -3.0]) == ([0.5, 0.5], [3.0, 2.0], [-2.0, -3.0], [-1.0, 1.0])
 
 
 @pytest.mark.parametrize("mean", [-3e-16, 0.0, 3e-16])
 def test_where_the_mean_is_zero_the_larger_extreme_says_the_direction(mean):
     """Over a full turn the rounding of the mean decided: a ripple of 197.5 or 202.6 % by the number of points."""
-    alone = Spread.from_extremes(mean, 1.25, -1.5)
-    many = Spread.from_extremes(np.array([mean, 0.5]), np.array([1.25, 2.0]), np.array([-1.5, -3.0]))
-    assert alone == (0.0, 1.5, -1.25, -1.0, 0.0)
-    assert tuple(float(item[0]) for item in many[:4]) == alone[:4]
-    assert tuple(float(item[1]) for item in many[:4]) == (0.5, 2.0, -3.0, 1.0)
+    assert spread_of([mean], [1.25], [-1.5]) == ([0.0], [1.5], [-1.25], [-1.0])

@@ -10,8 +10,6 @@ import cfmkit
 from cfmkit.cli import run_command
 from cfmkit.errors import ExitCode, SpecError
 from cfmkit.metrics import MeasuringFrame, Window, known_metrics, measure, validate_requirements
-from cfmkit.metrics.ranges_many import ManyBranches, band_range, range_95, range_95_fraction
-from cfmkit.metrics.spread import Spread, deviation_from_mean, half_band, ripple
 from cfmkit.results import Result, Status
 
 RELATIVE = (
@@ -79,19 +77,6 @@ def test_nothing_is_relative_to_what_is_below_the_error_of_the_curve():
 def test_a_target_below_the_error_is_none():
     found = measure(noise(), MeasuringFrame(target=1e-13, effort_error=1e-12))
     assert "the target is zero" in found["deviation_from_target"].reason
-
-
-def test_one_curve_and_many_agree_on_what_is_nothing():
-    many = Spread.from_extremes(np.array([0.5, 5.0]), np.array([1.0, 6.0]), np.array([0.0, 4.0]), np.array([2.0, 2.0]))
-    for metric in (ripple, half_band, deviation_from_mean):
-        assert np.isnan(metric(many)).tolist() == [True, False]
-        assert np.isnan(metric(Spread.from_extremes(0.5, 1.0, 0.0, 2.0)))
-    motion = np.array([[0.0, 1.0, 2.0]] * 2)
-    ends = np.zeros(2), np.full(2, 2.0)
-    rows = ManyBranches(motion, np.array([[0.1, 0.2, 0.3], [1.0, 2.0, 3.0]]), *ends, error=np.array([0.5, 0.5]))
-    with np.errstate(all="ignore"):
-        for metric in (range_95, range_95_fraction, lambda one: band_range(one, 0.01)):
-            assert np.isnan(metric(rows)).tolist() == [True, False]
 
 
 @pytest.mark.parametrize(("rate", "balance"), [(0.5, 0.0), (0.45, 1 / 9), (0.6, 1 / 6)])

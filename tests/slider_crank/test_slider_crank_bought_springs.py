@@ -18,7 +18,7 @@ from cfmkit.families.slider_crank.springs.bought_springs import _why_not as why_
 from cfmkit.families.slider_crank.springs.bought_springs import best_sets
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
-from cfmkit.stock.springs import HelicalSpring
+from cfmkit.stock.springs import HelicalTorsionSpring
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -189,7 +189,7 @@ def test_a_spring_that_does_not_last_its_reversals_is_not_chosen():
     turned = math.radians(55.0)
     assert why_not(offer, (0.0, turned), wanted) is None
     share, reported = why_not(offer, (-turned, turned), wanted)
-    wound = HelicalSpring("torsion", 0.8e-3, 4.8e-3, 5.0)
+    wound = HelicalTorsionSpring(0.8e-3, 4.8e-3, 5.0)
     cycles = 0.5 * (wound.stress(wound.rate * turned) / 2000e6) ** -10.0  # a load that reverses has no mean
     assert share == pytest.approx(1 - cycles / 1000, rel=1e-3)
     assert "cycles" in reported

@@ -82,7 +82,7 @@ def test_springs_at_pins_stay_within_the_depth_required():
     springs, solved = one.spec.mechanism.springs, cfmkit.analyze(one.spec)
     turned = solved.values
     high = {
-        at: springs.coils_at(at)[0].body_length_wound_up(turned[f"{at}_rotation_max"].value)
+        at: springs.coils_at(at)[0].room_for(turned[f"{at}_rotation_max"].value)
         for at in ("pivot", "crank_pin", "slider_pin")
         if springs.coils_at(at)
     }

@@ -433,7 +433,7 @@ def test_a_side_of_an_element_is_not_held_in_its_middle_alone_where_a_fillet_lea
     fillet = 1e-3 * np.column_stack([2.0 + np.cos(turn), 1.0 + np.sin(turn)])  # down a web, out on the face y = 0
     ends = 1e-3 * np.array([[0, 0], [0, 3], [1, 3]]), 1e-3 * np.array([[4, 0], [4, -1], [0, -1]])
     ring = Ring.from_points(np.concatenate([ends[0], fillet, ends[1]]), False)
-    grid = mesh((ring,), size, share=0.15, seams=[np.array([[0.0, 0.0], [4e-3, 0.0]])], near=5e-6)
+    grid = mesh((ring,), size, share=0.15, seams=[np.array([[0.0, 0.0], [4e-3, 0.0]])], seam_distance=5e-6)
     held = grid.nodes[:, 1] <= 5e-6
     first, last, middle = held[grid.edges].T
     assert ((first & last) == middle).all()

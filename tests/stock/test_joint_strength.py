@@ -1,19 +1,15 @@
-"""Links, pins and rods: formulas against hand calculations, and sizes that bear."""
-
-import math
+"""Pins, eyes and rods: sizes that bear. The formulas have hand calculations in their docstrings."""
 
 import pytest
 
 from cfmkit.stock.joint_strength import (
     SHEAR_SHARE,
     bearing_pressure,
-    euler_load,
     eye_that_bears,
     link_stress,
     pin_bending,
     pin_shear,
     pin_that_bears,
-    rod_bending,
     rod_sag,
     rod_that_guides,
     shear_out,
@@ -21,20 +17,6 @@ from cfmkit.stock.joint_strength import (
 from cfmkit.stock.stock_series import series_of
 
 PINS = series_of("pin", "metric").sizes
-
-
-def test_formulas_are_those_of_a_hand_calculation():
-    # a link of 12 x 3 mm with a hole of 4 mm: 24 mm2, and (12^3 - 4^3)/12*3/6 = 69.33 mm3
-    assert link_stress(200.0, 0.0, 0.012, 0.003, 0.004) == pytest.approx(200 / 24e-6)
-    assert link_stress(0.0, 0.3, 0.012, 0.003, 0.004) == pytest.approx(0.3 / (3e-3 * (12e-3**3 - 4e-3**3) / 12 / 6e-3))
-    assert bearing_pressure(200.0, 0.004, 0.003) == pytest.approx(200 / 12e-6)
-    assert shear_out(200.0, 0.012, 0.003, 0.004) == pytest.approx(200 / (2 * 4e-3 * 3e-3))  # two walls of 4 mm
-    assert euler_load(200e9, 0.012, 0.003, 0.1) == pytest.approx(math.pi**2 * 200e9 * (0.012 * 27e-9 / 12) / 0.01)
-    section, inertia = math.pi * 4e-3**3 / 32, math.pi * 4e-3**4 / 64
-    assert pin_bending(200.0, 0.005, 0.004) == pytest.approx(200 * 0.005 / section)
-    assert pin_shear(200.0, 0.004) == pytest.approx(4 / 3 * 200 / (math.pi * 2e-3**2))
-    assert rod_bending(20.0, 0.2, 0.004) == pytest.approx(20 * 0.2 / 4 / section)
-    assert rod_sag(20.0, 0.2, 0.004, 210e9) == pytest.approx(20 * 0.2**3 / (48 * 210e9 * inertia))
 
 
 @pytest.mark.parametrize("force", [1.0, 50.0, 1500.0])

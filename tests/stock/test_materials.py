@@ -90,26 +90,18 @@ def test_printed_plastics_scatter_more_than_any_steel(name: str):
     assert width(material(name)) > 2 * max(map(width, steels))
 
 
-def test_lan_2010_table_2():
-    pom = material("pom-lan-2010")
-    assert (pom.youngs_modulus, pom.yield_strength) == (2e9, 76e6)
-    assert pom.yield_strength is not None
-    assert pom.yield_strength / 1.58 == pytest.approx(48.1013e6, rel=1e-6)  # the stress limit printed in sec. 2
-
-
-def test_ding_2022_section_6():
-    pla = material("pla-ding-2022")
-    assert (pla.youngs_modulus, pla.poisson_ratio, pla.density) == (1.477e9, 0.3, 1250)
-    assert pla.yield_strength is None
-
-
-def test_bilancia_2019_section_2_2():
-    abs_plastic = material("abs-bilancia-2019")
-    assert (abs_plastic.youngs_modulus, abs_plastic.poisson_ratio, abs_plastic.yield_strength) == (1.8e9, 0.35, 42.5e6)
-
-
-def test_li_hao_2019_section_7():
-    assert material("steel-85-li-hao-2019").youngs_modulus == 200e9
+@pytest.mark.parametrize(
+    ("name", "young", "poisson", "strength"),
+    [
+        ("pom-lan-2010", 2e9, 0.35, 76e6),  # Table 2
+        ("pla-ding-2022", 1.477e9, 0.3, None),  # sec. 6
+        ("abs-bilancia-2019", 1.8e9, 0.35, 42.5e6),  # sec. 2.2
+        ("steel-85-li-hao-2019", 200e9, 0.30, 980e6),  # sec. 7, and GB/T 1222
+    ],
+)
+def test_materials_of_papers_have_the_values_printed_there(name, young, poisson, strength):
+    item = material(name)
+    assert (item.youngs_modulus, item.poisson_ratio, item.yield_strength) == (young, poisson, strength)
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,13 @@ from pydantic import ValidationError
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.kinds import HELICAL_KINDS
 from cfmkit.stock.springs.spec import CatalogueSpring
+from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 
 WIRE = {"wire": "1.25 mm", "coil": "12.5 mm", "turns": 40}
-RATE = HelicalSpring("extension", 1.25e-3, 12.5e-3, 40.0).rate
+RATE = ExtensionSpring(1.25e-3, 12.5e-3, 40.0).rate
 BASQUIN = {"coefficient": "1200 MPa", "exponent": -0.1, "ultimate_strength": "1300 MPa"}
 """Made-up numbers, to compare formulas with each other."""
 
@@ -54,7 +56,7 @@ def test_torsion_and_compression_springs_have_their_own_shares():
     """Shigley, eq. 10-57 (78 %) and Table 10-6 (45 %)."""
     strength = 2211e6 / 1.25**0.145
     for kind, share in (("torsion", 0.78), ("compression", 0.45)):
-        spring = HelicalSpring(kind, 1.25e-3, 12.5e-3, 40.0)
+        spring = HELICAL_KINDS[kind](1.25e-3, 12.5e-3, 40.0)
         assert spring.stress(spring.yield_load()) == pytest.approx(share * strength, rel=1e-12)
 
 
@@ -94,7 +96,7 @@ def test_springs_that_contradict_themselves_are_refused(springs, reported):
 
 def test_the_stress_allowed_in_the_wire_limits_the_deflection():
     spring = CatalogueSpring.model_validate({"name": "s", **WIRE, "max_stress": "500 MPa", "initial_tension": "2 N"})
-    wound = HelicalSpring("extension", 1.25e-3, 12.5e-3, 40.0)
+    wound = ExtensionSpring(1.25e-3, 12.5e-3, 40.0)
     assert wound.stress(2.0 + RATE * spring.offer.largest) == pytest.approx(500e6, rel=1e-12)
     with pytest.raises(ValidationError, match="give 'wire', 'coil' and 'turns'"):
         CatalogueSpring.model_validate({"name": "s", "stiffness": "1 N/mm", "max_stress": "500 MPa"})
@@ -145,7 +147,7 @@ def test_rates_at_joints_follow_from_the_wires_and_each_spring_bears_its_own_cou
     path = tmp_path / "crank.yaml"
     path.write_text(CRANK)
     found = cfmkit.analyze(cfmkit.load(path))
-    one, other = HelicalSpring("torsion", 0.8e-3, 4.8e-3, 5.0), HelicalSpring("torsion", 1e-3, 10e-3, 8.0)
+    one, other = HelicalTorsionSpring(0.8e-3, 4.8e-3, 5.0), HelicalTorsionSpring(1e-3, 10e-3, 8.0)
     springs = found.spec.get_value("mechanism.springs")
     assert springs.pivot == pytest.approx(2 * one.rate, rel=1e-12)
     turned = [found.values[f"{name}_rotation_max"].value for name in ("pivot", "slider_pin")]
@@ -189,7 +191,7 @@ def test_a_torsion_spring_that_is_turned_both_ways_is_stressed_both_ways(tmp_pat
     path = tmp_path / "crank.yaml"
     path.write_text(CRANK)
     given = cfmkit.load(path).replace(TURNED | {"analysis.angle": (f"{low} deg", f"{high} deg")})
-    wound = HelicalSpring("torsion", 0.8e-3, 4.8e-3, 5.0)
+    wound = HelicalTorsionSpring(0.8e-3, 4.8e-3, 5.0)
     most = wound.stress(wound.rate * math.radians(60.0))
     amplitude, mean = 0.5 * most * (1 - least), 0.5 * most * (1 + least)
     cycles = 0.5 * (amplitude / (1 - mean / 2000e6) / 2000e6) ** (1 / -0.1)
@@ -203,7 +205,7 @@ def test_a_wire_bears_its_share_of_the_rate_that_is_stated(tmp_path):
     path = tmp_path / "crank.yaml"
     path.write_text(CRANK)
     given = cfmkit.load(path).replace(TURNED | {"analysis.angle": ("0 deg", "60 deg")})
-    wound = HelicalSpring("torsion", 0.8e-3, 4.8e-3, 5.0)
+    wound = HelicalTorsionSpring(0.8e-3, 4.8e-3, 5.0)
     found = cfmkit.analyze(given.replace({"mechanism.springs.pivot": 1.09 * wound.rate})).values
     most = wound.stress(1.09 * wound.rate * math.radians(60.0))
     assert found["wire_stress_max"].value == pytest.approx(most, rel=1e-9)

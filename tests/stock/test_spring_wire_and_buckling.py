@@ -14,9 +14,12 @@ import cfmkit
 from cfmkit import Run
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
-from cfmkit.stock.springs.helical_spring_formulas import SEAT_FACTORS, HelicalSpring, buckling_deflection
-from cfmkit.stock.springs.offers import PIN_SHARE, SHEAR_SHARE, extension_spring, generic, stiffest, torsion_spring
+from cfmkit.stock.springs.compression_springs import CompressionSpring, buckling_deflection
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.helical_spring_formulas import SEAT_FACTORS
+from cfmkit.stock.springs.offers import PIN_SHARE, SERIES_SHARES, generic, slimmest_spring, stiffest
 from cfmkit.stock.springs.spec import CatalogueSpring, DataSource, offers
+from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireOutOfRange
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -94,11 +97,11 @@ def test_music_wire_that_is_too_thick_is_refused_and_other_wire_of_that_diameter
 
 
 def test_springs_wound_to_measure_keep_to_the_diameters_of_the_table():
-    assert extension_spring(1e5, 0.02, 5.0) is None  # 2000 N take 7.2 mm or more
-    assert 4e-3 < extension_spring(5e4, 0.02, 5.0).wire <= MUSIC_WIRE.thickest
-    (rate,) = stiffest("torsion", np.array([1.0]), 1.0, 1.0)
-    assert torsion_spring(0.98 * rate, 1.0, 1.0).wire <= MUSIC_WIRE.thickest
-    assert torsion_spring(1.02 * rate, 1.0, 1.0) is None
+    assert slimmest_spring(ExtensionSpring, 1e5, 0.02, 5.0) is None  # 2000 N take 7.2 mm or more
+    assert 4e-3 < slimmest_spring(ExtensionSpring, 5e4, 0.02, 5.0).wire <= MUSIC_WIRE.thickest
+    (rate,) = stiffest(HelicalTorsionSpring, np.array([1.0]), 1.0, 1.0)
+    assert slimmest_spring(HelicalTorsionSpring, 0.98 * rate, 1.0, 1.0).wire <= MUSIC_WIRE.thickest
+    assert slimmest_spring(HelicalTorsionSpring, 1.02 * rate, 1.0, 1.0) is None
 
 
 COIL = {"wire": "1 mm", "coil": "10 mm", "turns": 20}
@@ -150,12 +153,12 @@ def test_a_wrong_line_of_a_catalogue_is_refused(change, reported):
 def test_a_file_has_columns_for_material_and_guide(tmp_path):
     text = "name,kind,wire [mm],coil [mm],turns,free_length [mm],material,seats,guide_rod [mm]\n"
     (tmp_path / "a.csv").write_text(text + "C,compression,1,8,20,60,stainless-302,fixed-pivoted,6\n")
-    (one,) = offers(DataSource("a.csv", tmp_path), "compression")
+    (one,) = offers(DataSource("a.csv", tmp_path), CompressionSpring)
     assert (one.wound.material, one.seats, one.guide_rod) == ("stainless-302", "fixed-pivoted", 0.006)
     assert one.rate == pytest.approx(70e9 * 1e-3**4 / (8 * 8e-3**3 * 20))
     (tmp_path / "b.csv").write_text(text + "C,compression,7,50,20,600,,,\n")
     with pytest.raises(DataError, match=r"b\.csv:2: .*music-wire is listed from 0\.1 to 6\.5 mm"):
-        offers(DataSource("b.csv", tmp_path), "compression")
+        offers(DataSource("b.csv", tmp_path), CompressionSpring)
 
 
 @pytest.mark.parametrize("seats", SEAT_FACTORS)
@@ -172,8 +175,8 @@ def test_buckling_is_the_formula_of_en_13906_1():
     g = 81.5 / 206
     for length, nu, seats in ((20.1e-3, 0.5, "fixed-fixed"), (30e-3, 1.0, "pivoted-pivoted")):
         root = math.sqrt(1 - (1 - g) / (0.5 + g) * (math.pi * 3e-3 / (nu * length)) ** 2)
-        spring = HelicalSpring("compression", 0.5e-3, 3e-3, 16.0)
-        assert spring.buckling_deflection(length, seats) == pytest.approx(
+        spring = CompressionSpring(0.5e-3, 3e-3, 16.0)
+        assert spring.unguided_deflection(length, spring, None, seats) == pytest.approx(
             length * 0.5 / (1 - g) * (1 - root), rel=1e-12
         )
 
@@ -188,9 +191,9 @@ def test_a_spring_is_stable_up_to_the_slenderness_of_shigley():
 
 
 def test_of_the_generic_series_what_buckles_comes_with_a_rod_that_fits():
-    series = generic("compression")
+    series = generic(CompressionSpring)
     for one in series:
-        limit = one.wound.buckling_deflection(one.free_length)
+        limit = buckling_deflection(one.free_length, one.wound.coil)
         assert (one.guide_rod is not None) == (limit < one.largest)
         if one.guide_rod is not None:
             assert 0.85 * one.wound.inner_diameter < one.guide_rod < 0.951 * one.wound.inner_diameter
@@ -199,13 +202,13 @@ def test_of_the_generic_series_what_buckles_comes_with_a_rod_that_fits():
 
 def test_loops_of_the_generic_series_are_below_what_shigley_allows_in_bending():
     """[Shigley, eq. 10-34] with the mean radius of a full loop D/2: sigma_A = F (K_A 16 D/(pi d^3) + 4/(pi d^2))."""
-    for one in generic("extension"):
+    for one in generic(ExtensionSpring):
         d, c = one.wound.wire, one.wound.index
         curved = (4 * c * c - c - 1) / (4 * c * (c - 1))
         load = one.rate * one.largest
         stress = load * (curved * 16 * one.wound.coil / (math.pi * d**3) + 4 / (math.pi * d**2))
         assert stress < 0.75 * MUSIC_WIRE.tensile_strength(d)
-        assert one.stress(one.largest) == pytest.approx(SHEAR_SHARE * MUSIC_WIRE.tensile_strength(d))
+        assert one.stress(one.largest) == pytest.approx(SERIES_SHARES["shear"] * MUSIC_WIRE.tensile_strength(d))
 
 
 @pytest.fixture(scope="module")
@@ -295,12 +298,12 @@ def test_a_design_takes_springs_that_stand_alone_before_those_that_need_a_rod(vc
 
 
 def test_a_torsion_spring_becomes_narrower_and_longer_as_its_wire_is_conserved():
-    spring = HelicalSpring("torsion", 1e-3, 10e-3, 5.0)
+    spring = HelicalTorsionSpring(1e-3, 10e-3, 5.0)
     turned = math.radians(120)
     turns = 5.0 + 120 / 360
-    mean = spring.inner_diameter_wound_up(turned) + spring.wire
+    mean = spring.inner_diameter_at(turned) + spring.wire
     assert math.pi * mean * turns == pytest.approx(math.pi * spring.coil * spring.turns, rel=1e-12)
-    assert spring.body_length_wound_up(turned) == pytest.approx((turns + 1) * spring.wire, rel=1e-12)
+    assert spring.room_for(turned) == pytest.approx((turns + 1) * spring.wire, rel=1e-12)
 
 
 @pytest.mark.parametrize(("pin", "binds"), [("4.2 mm", False), ("4.3 mm", True)])
@@ -321,13 +324,16 @@ def test_a_design_takes_springs_that_fit_over_the_pins():
     assert "spring_binds_on_pin" not in {one.name for one in result.warnings}
     for one in found.spec.mechanism.springs.bought:
         turned = result.values[f"{one.at}_rotation_max"].value
-        assert PIN_SHARE * one.coil.inner_diameter_wound_up(turned) >= 5e-3
+        assert PIN_SHARE * one.coil.inner_diameter_at(turned) >= 5e-3
 
 
 def test_a_spring_wound_to_measure_fits_over_its_pin():
-    free, around = torsion_spring(0.05, 1.0, 0.05), torsion_spring(0.05, 1.0, 0.05, 6e-3)
-    assert PIN_SHARE * free.inner_diameter_wound_up(1.0) < 6e-3
-    assert PIN_SHARE * around.inner_diameter_wound_up(1.0) >= 6e-3
+    free, around = (
+        slimmest_spring(HelicalTorsionSpring, 0.05, 1.0, 0.05),
+        slimmest_spring(HelicalTorsionSpring, 0.05, 1.0, 0.05, pin=6e-3),
+    )
+    assert PIN_SHARE * free.inner_diameter_at(1.0) < 6e-3
+    assert PIN_SHARE * around.inner_diameter_at(1.0) >= 6e-3
     assert around.rate == pytest.approx(0.05, rel=0.005 / around.turns)
 
 

@@ -12,17 +12,20 @@ from pydantic import ValidationError
 
 import cfmkit
 from cfmkit.errors import DataError, SpecError
-from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
+from cfmkit.stock.springs.compression_springs import CompressionSpring
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.kinds import HELICAL_KINDS
 from cfmkit.stock.springs.offers import Miss, generic, nearest
 from cfmkit.stock.springs.spec import CatalogueSpring, DataSource, offers
+from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 WANTED = {"force": "50 N", "stroke": "200 mm", "choose": "catalogue"}
 
 
-@pytest.mark.parametrize("kind", ["extension", "compression", "torsion"])
-def test_the_generic_series_written_as_a_list_is_the_same_series(kind):
-    assert offers(tuple(map(CatalogueSpring.from_offer, generic(kind))), kind) == generic(kind)
+@pytest.mark.parametrize("spring_type", HELICAL_KINDS.values())
+def test_the_generic_series_written_as_a_list_is_the_same_series(spring_type):
+    assert offers(tuple(map(CatalogueSpring.from_offer, generic(spring_type))), spring_type) == generic(spring_type)
 
 
 def chosen(catalogue, **changes):
@@ -34,16 +37,16 @@ def test_the_rate_of_a_coil_is_the_twist_of_a_long_straight_wire():
     """Castigliano: the wire of length pi D n carries the torque F D/2, or the bending moment M."""
     d, mean, n, shear, young = 1e-3, 10e-3, 25.0, 72e9, 190e9
     length, polar, plane = math.pi * mean * n, math.pi * d**4 / 32, math.pi * d**4 / 64
-    pulled, wound = (HelicalSpring(kind, d, mean, n, shear, young) for kind in ("extension", "torsion"))
+    pulled, wound = (spring_type(d, mean, n, shear, young) for spring_type in (ExtensionSpring, HelicalTorsionSpring))
     assert pulled.rate == pytest.approx(shear * polar / (length * (mean / 2) ** 2), rel=1e-12)
     assert wound.rate == pytest.approx(young * plane / length, rel=1e-12)
 
 
 def test_far_from_its_axis_a_coil_is_stressed_as_a_straight_wire():
     wire = 1e-3
-    far = HelicalSpring("compression", wire, 1000 * wire, 5.0)
+    far = CompressionSpring(wire, 1000 * wire, 5.0)
     assert far.stress(1.0) == pytest.approx(16 * 0.5 * far.coil / (math.pi * wire**3), rel=2e-3)
-    bent = HelicalSpring("torsion", wire, 1000 * wire, 5.0)
+    bent = HelicalTorsionSpring(wire, 1000 * wire, 5.0)
     assert bent.stress(1.0) == pytest.approx(32 / (math.pi * wire**3), rel=2e-3)
     assert far.stress(far.rate * far.deflection_at(300e6)) == pytest.approx(300e6, rel=1e-12)
 
@@ -92,7 +95,7 @@ def test_springs_that_only_press_or_turn_are_no_springs_for_a_cam():
 def test_the_generic_series_serves_and_says_what_is_bought():
     found = chosen("generic")
     springs, result = found.spec.mechanism.springs, analyze(found.spec)
-    offer = {item.name: item for item in generic("extension")}[springs.name]
+    offer = {item.name: item for item in generic(ExtensionSpring)}[springs.name]
     assert springs.stiffness == offer.rate
     assert offer.stress(result.state.elongation.max()) <= offer.wound.stress(offer.rate * offer.largest) * (1 + 1e-9)
     table = result.tables["parts"]()
@@ -118,11 +121,11 @@ def test_a_list_may_be_a_file(tmp_path):
     text += "E-1,extension,0.55,130,1 2,,,\nT-1,torsion,,,,0.8,8,5\nE-2,,,120,2,1.25,12.5,40\n"
     (tmp_path / "springs.csv").write_text(text, encoding="utf-8")
     source = DataSource("springs.csv", tmp_path)
-    pulled = offers(source, "extension")
+    pulled = offers(source, ExtensionSpring)
     assert [(one.name, one.counts) for one in pulled] == [("E-1", (1, 2)), ("E-2", (2,))]
     assert pulled[0].rate == pytest.approx(550.0)
     assert pulled[1].rate == pytest.approx(81.5e9 * 1.25e-3**4 / (8 * 12.5e-3**3 * 40))
-    assert offers(source, "torsion")[0].rate == pytest.approx(206e9 * 0.8e-3**4 / (64 * 8e-3 * 5))
+    assert offers(source, HelicalTorsionSpring)[0].rate == pytest.approx(206e9 * 0.8e-3**4 / (64 * 8e-3 * 5))
 
 
 @pytest.mark.parametrize(
@@ -137,7 +140,7 @@ def test_a_list_may_be_a_file(tmp_path):
 def test_a_fault_of_a_file_is_told_with_its_line(tmp_path, line, reported):
     (tmp_path / "springs.csv").write_text(f"name,stiffness [N/mm]\nE-0,1\n{line}\n", encoding="utf-8")
     with pytest.raises(DataError, match=r"springs\.csv:3") as caught:
-        offers(DataSource("springs.csv", tmp_path), "extension")
+        offers(DataSource("springs.csv", tmp_path), ExtensionSpring)
     assert reported in str(caught.value)
 
 
@@ -159,7 +162,7 @@ def test_a_fault_of_a_file_is_told_with_its_line(tmp_path, line, reported):
 def test_a_file_that_is_no_list_of_springs_is_refused_in_one_line(tmp_path, data, reported):
     (tmp_path / "springs.csv").write_bytes(data)
     with pytest.raises(DataError) as caught:
-        offers(DataSource("springs.csv", tmp_path), "extension")
+        offers(DataSource("springs.csv", tmp_path), ExtensionSpring)
     assert reported in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -177,13 +180,13 @@ def test_a_file_that_is_no_list_of_springs_is_refused_in_one_line(tmp_path, data
 )
 def test_lists_of_springs_as_makers_and_spreadsheets_write_them(tmp_path, text, encoding):
     (tmp_path / "springs.csv").write_bytes(text.encode(encoding))
-    (one,) = offers(DataSource("springs.csv", tmp_path), "extension")
+    (one,) = offers(DataSource("springs.csv", tmp_path), ExtensionSpring)
     assert (one.name, one.rate, one.largest) == ("Feder-1", pytest.approx(550.0), pytest.approx(0.165))
 
 
 def test_cells_of_a_file_have_the_units_of_its_header(tmp_path):
     (tmp_path / "springs.csv").write_text("name,stiffness [lbf/in],max_elongation [in],life\nA,2,7,1e5\nA,2,7,1e5\n")
-    one, same = offers(DataSource("springs.csv", tmp_path), "extension")
+    one, same = offers(DataSource("springs.csv", tmp_path), ExtensionSpring)
     assert one == same
     assert (one.rate, one.largest, one.life) == pytest.approx((2 * 4.4482216152605 / 0.0254, 0.1778, 1e5))
 

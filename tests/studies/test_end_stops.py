@@ -12,7 +12,7 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.results import Status
 from cfmkit.studies.point_evaluation import Study, metrics_of
-from cfmkit.studies.variants_in_rows import are_solved_together
+from cfmkit.studies.variants_in_rows import points_at_once
 
 GAP = 4e-3
 RATE = 5e4
@@ -161,4 +161,4 @@ def test_a_sweep_of_every_column_without_stops_is_solved_in_rows(name):
     path = "mechanism.bistable.thickness"
     plan = GivenPoints({path: float(spec.get_value(path)) * np.array([0.99, 1.0, 1.01])})
     every = metrics_of(spec, (), cfmkit.analyze(spec).curves[0])
-    assert are_solved_together(Study(spec, plan.paths, tuple(every)), plan)
+    assert points_at_once(Study(spec, plan.paths, tuple(every)), plan) > 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from study_rows import assert_rows_equal_runs, study_of
+from study_rows import assert_rows_equal_runs, run_point, study_of
 
 import cfmkit
 from cfmkit.families import Variants, family
@@ -15,7 +15,7 @@ from cfmkit.studies.plan import Draw, sample_axes
 from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.row_blocks_for_journal import join_rows
 from cfmkit.studies.serial_and_cluster_executors import Lost
-from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
+from cfmkit.studies.variants_in_rows import evaluate_rows, points_at_once
 from cfmkit.studies.variations import axes, collect_variations
 
 solve_rows = family("cam").rows
@@ -183,7 +183,7 @@ def test_motions_measured_cams_and_curves_that_no_target_names_are_analysed_alon
 
 def test_designing_is_done_point_by_point():
     many = work(count=4, names=("force_mean",))
-    assert not are_solved_together(Study(SPEC, many.plan.paths, many.study.metrics, design=True), many.plan)
+    assert points_at_once(Study(SPEC, many.plan.paths, many.study.metrics, design=True), many.plan) == 1
 
 
 def test_rows_do_not_depend_on_how_a_study_is_cut_into_blocks():
@@ -204,7 +204,7 @@ def test_rows_are_the_same_whether_curves_are_wanted_or_not(tmp_path):
             (rows,) = [rows for _, rows in run(kept, journal=journal).batches()]
         assert np.array_equal(rows.values, without.values, equal_nan=True)
         assert rows.odd == without.odd
-        alone = {k: kept.study.evaluate(kept.plan.point(k)).curve for k in range(20)}
+        alone = {k: run_point(kept.study, kept.plan, k).curve for k in range(20)}
         assert rows.curves == {k: curve for k, curve in alone.items() if curve}
 
 
@@ -267,7 +267,7 @@ def test_a_window_that_some_travels_leave_no_width_is_refused_as_each_mechanism_
     plan = sample_axes(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 4))
     many = Work(Study(spec, plan.paths, metrics_of(spec, ("force_mean",))), plan)
     assert {run(many).row(k).status(0) for k in range(4)} == {
-        (alone.status, alone.message) for alone in (many.study.evaluate(many.plan.point(k)) for k in range(4))
+        (alone.status, alone.message) for alone in (run_point(many.study, many.plan, k) for k in range(4))
     }
 
 

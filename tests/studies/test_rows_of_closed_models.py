@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from given_points import GivenPoints
-from study_rows import assert_rows_equal_runs
+from study_rows import assert_rows_equal_runs, run_point
 
 import cfmkit
 from cfmkit.families import Variants, family
 from cfmkit.studies.point_evaluation import Study, metrics_of
-from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
+from cfmkit.studies.variants_in_rows import evaluate_rows, points_at_once
 from cfmkit.studies.variations import FIXED_BLOCKS, CannotVary, leaf
 
 CLOSED_FIDELITIES = ("quasi-static", "truss", "analytic", "prb")
@@ -83,8 +83,8 @@ def test_a_sweep_over_any_number_with_the_requirements_of_its_own_is_solved_in_r
     for path, value in numbers_that_vary(spec).items():
         plan = GivenPoints({path: value * np.array([1.0, 1.0 + 1e-4, 1.0 - 1e-4])})
         study = Study(spec, plan.paths, metrics)
-        usable = [study.evaluate(plan.point(k)).status.usable for k in range(3)]
-        if all(usable) and not are_solved_together(study, plan):
+        usable = [run_point(study, plan, k).status.usable for k in range(3)]
+        if all(usable) and points_at_once(study, plan) == 1:
             alone.append(path)
     assert alone == []
 
@@ -107,7 +107,7 @@ def test_mechanisms_with_bands_of_their_own_are_solved_together(stem):
     variants = Variants(study.plain, dict(zip(plan.paths, plan.columns, strict=True)), study_variant(study, plan), 3)
     assert [len(members) for members, _ in family(spec.family).rows(variants)] == [3]
     strokes = evaluate_rows(study, plan, 0, 3).values[:, 0]
-    assert strokes.tolist() == pytest.approx([study.evaluate((band,)).values[0] for band in bands], rel=1e-12)
+    assert strokes.tolist() == pytest.approx([run_point(study, plan, k).values[0] for k in range(3)], rel=1e-12)
     assert (np.diff(strokes) > 0).any()
 
 
@@ -118,7 +118,7 @@ def test_rows_know_the_usable_stroke_of_one_branch_alone():
     names = ("usable_stroke[load]", "usable_stroke[unload]", "usable_stroke")
     study = Study(spec, ("mechanism.springs.stiffness",), metrics_of(spec, names, cfmkit.analyze(spec).curve))
     plan = GivenPoints({"mechanism.springs.stiffness": 690.0 * np.linspace(0.95, 1.05, 9)})
-    together, alone = evaluate_rows(study, plan, 0, 9), [study.evaluate(plan.point(k)) for k in range(9)]
+    together, alone = evaluate_rows(study, plan, 0, 9), [run_point(study, plan, k) for k in range(9)]
     np.testing.assert_allclose(together.values, np.array([one.values for one in alone]), rtol=1e-12)
     assert together.met.tolist() == [list(one.met) for one in alone]
     assert set(together.met.ravel().tolist()) == {True, False}
@@ -142,7 +142,7 @@ def test_rows_follow_a_curve_as_runs_of_their_own_do(stem, window, last):
     assert {"deviation_from_curve", "rms_to_curve", "usable_stroke", "usable_start", "usable_end"} <= set(names)
     plan = GivenPoints({"analysis.window.1": np.array(last)})
     study = Study(spec, plan.paths, metrics)
-    assert are_solved_together(study, plan)
+    assert points_at_once(study, plan) > 1
     together = assert_rows_equal_runs(study, plan)
     known = np.isfinite(together.values[:, names.index("deviation_from_curve")])
     assert known.tolist() == [True, True, not np.isfinite(spec.target_curve.extent[1])]

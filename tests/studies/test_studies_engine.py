@@ -239,7 +239,7 @@ def test_the_warnings_of_rows_are_theirs_and_those_of_single_analyses(monkeypatc
 
     fake = dataclasses.replace(record, models={"quasi-static": single}, rows=rows)
     monkeypatch.setattr("cfmkit.studies.variants_in_rows.family", lambda _name: fake)
-    monkeypatch.setattr("cfmkit.studies.engine.are_solved_together", lambda *_: True)
+    monkeypatch.setattr("cfmkit.studies.engine.points_at_once", lambda *_: 64)
     monkeypatch.setattr("cfmkit.studies.point_evaluation.family", lambda _name: fake)
     some = work("mechanism.profile.friction=[0, 0.001, 0.002, 0.003]", names=("theoretical_force",))
     expected = [None, "undercut", "high_pressure_angle; undercut", "odd"]

@@ -17,7 +17,7 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family, function_named
 from cfmkit.metrics import values_of_family
 from cfmkit.results import Quantity
-from cfmkit.stock.springs import WIRES_BY_NAME
+from cfmkit.stock.springs import WIRES_BY_NAME, ExtensionSpring
 from cfmkit.studies.parts.near_parts import expected_shares
 from cfmkit.studies.parts.parts import Parts, assume_errors
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
@@ -144,7 +144,7 @@ def test_the_springs_of_a_proposed_cam_are_stated_and_bear_their_load():
     spec = function_named(candidate.finish)(plain, asked)
     wire = spec.mechanism.springs.wound
     springs = spec.mechanism.springs
-    assert wire.to_wound("extension").rate * springs.count == pytest.approx(springs.total, rel=1e-12)
+    assert wire.to_wound(ExtensionSpring).rate * springs.count == pytest.approx(springs.total, rel=1e-12)
     assert springs.total == pytest.approx(plain.mechanism.springs.total, rel=0.005 / wire.turns)
     assert spec.mechanism.springs.name.startswith("custom, wire")
     result = cfmkit.analyze(spec)

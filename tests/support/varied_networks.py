@@ -19,7 +19,11 @@ def lan(x: Any) -> el.Network:
     return half(el.Section(x[13] * 1e9, 10e-3, x[12] * 1e-3), nodes=nodes, coefficients=varied)
 
 
-def arms(x: Any) -> el.Network:
+def lan_pushed(x: Any) -> Any:
+    return lan(x), el.Displacement("n5", -np.pi / 2, np.array([2e-3, 6e-3]))
+
+
+def arms(x: Any) -> Any:
     """A tapered beam on a rigid arm, with its weight, and a linked node whose places vary."""
     section = el.Section(2e9, 8e-3, el.Taper(np.array([0, 0.5, 1]), np.array([1e-3, x[0], 1.2e-3])), shear=True)
     nodes = {
@@ -34,7 +38,41 @@ def arms(x: Any) -> el.Network:
         "bc": el.Beam("bb", "c", section, end_joint="pin"),
         "bd": el.Beam("b", "d", section),
     }
-    return el.Network(nodes, beams, links=(el.Link("b", "bb"),), loads=(el.LineLoad("ab", 20.0, -60.0),))
+    network = el.Network(nodes, beams, links=(el.Link("b", "bb"),), loads=(el.LineLoad("ab", 20.0, -60.0),))
+    return network, el.Displacement("d", -np.pi / 2, np.array([2e-3, 6e-3]))
+
+
+def pinned(x: Any) -> Any:
+    """Two beams that meet at a pin with a torsion spring."""
+    section = el.Section(2e9, 8e-3, 1e-3)
+    nodes = {
+        "a": el.Node(0.0, 0.0, el.CLAMPED_SUPPORT),
+        "b": el.Node(x[1], 0.03),
+        "p": el.Node(x[1], 0.03),
+        "c": el.Node(0.1, 0.05, el.slider_support(np.pi / 2)),
+    }
+    beams = {"ab": el.Beam("a", "b", section, el.Polynomial((0.0, 0.4))), "pc": el.Beam("p", "c", section)}
+    network = el.Network(nodes, beams, (el.Link("b", "p", turns=False),), (el.TorsionSpring("b", "p", x[0]),))
+    return network, el.Displacement("c", -np.pi / 2, np.array([2e-3, 6e-3]))
+
+
+def wide(x: Any, tapered: bool = False) -> Any:
+    """A wide strip of any modulus [GPa], width and thickness [mm], Poisson's ratio and turn, and a narrow beam."""
+    taper = el.Taper(np.array([0.0, 0.4, 1.0]), np.array([x[2], 0.7 * x[2], x[2]]) * 1e-3)
+    section = el.Section(x[0] * 1e9, x[1] * 1e-3, taper if tapered else x[2] * 1e-3, poisson_ratio=x[3], wide=True)
+    nodes = {
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "b": el.Node(x[4] * 1e-2, 0.02),
+        "c": el.Node(0.1, 0, el.CLAMPED_SUPPORT),
+    }
+    narrow = el.Beam("b", "c", el.Section(2e9, 4e-3, x[2] * 1e-3))
+    beams = {"ab": el.Beam("a", "b", section, el.arc(x[5])), "bc": narrow}
+    network = el.Network(nodes, beams, loads=(el.LineLoad("ab", 0.0, -20.0),))
+    return network, el.Displacement("b", -np.pi / 2, np.array([2e-3, 6e-3]))
+
+
+def wide_and_tapered(x: Any) -> Any:
+    return wide(x, tapered=True)
 
 
 VALUES = {
@@ -122,3 +160,15 @@ def loaded(x: Any) -> Any:
         el.LineLoad("bf", 1.0, x[15]),
     )
     return zoo(x), el.Loading(loads, np.array([0.5, 1.0]))
+
+
+ARMS, PIN, WIDE = (
+    np.array([1.3e-3, 4e-3, 2e-3, 3e-3]),
+    np.array([0.3, 0.05]),
+    np.array([2.0, 10.0, 1.0, 0.35, 5.0, 0.7]),
+)
+BUILDERS: Any = [
+    (pushed, X), (turned, X), (loaded, X), (lan_pushed, LAN), (arms, ARMS), (pinned, PIN), (wide, WIDE),
+    (wide_and_tapered, WIDE),
+]  # fmt: skip
+"""Functions from design variables to network and drive, and where to differentiate."""

@@ -15,7 +15,7 @@ from cfmkit.families import family
 from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.results import Status
-from cfmkit.stock.springs import generic
+from cfmkit.stock.springs import CompressionSpring, generic
 
 CONFIG = Path(__file__).parents[2] / "configs" / "vcfm_bought_springs.yaml"
 
@@ -63,7 +63,7 @@ def test_the_wire_bears_travel_and_preload_together(spec):
     found, springs = cfmkit.analyze(spec), spec.mechanism.springs
     most = 4.888e-3 + 2.0103e-3
     assert found.values["spring_deflection_max"].value == pytest.approx(most, rel=1e-12)
-    wound = springs.wound.to_wound("compression")
+    wound = springs.coil
     assert found.values["wire_stress_max"].value == pytest.approx(wound.stress(springs.rate * most), rel=1e-12)
     columns = {column.name: column.cells() for column in found.tables["parts"]().columns}
     assert list(zip(columns["source"], columns["count"], strict=True)) == [("make", 1), ("buy", 1)]
@@ -80,7 +80,7 @@ def test_slack_and_overstretched_springs_are_told(spec):
 
 def test_a_compression_spring_gets_no_shorter_than_its_turns_on_each_other(spec):
     springs = spec.mechanism.springs
-    room = springs.free_length - springs.wound.to_wound("compression").body_length
+    room = springs.free_length - springs.coil.body_length
     pressed = cfmkit.analyze(spec.replace({"analysis.preloads": (0.0, 12e-3)}))
     assert pressed.status is Status.PARTIAL
     assert "its turns touch" in pressed.message
@@ -110,7 +110,7 @@ def test_a_design_does_not_press_its_own_springs_until_their_turns_touch(spec):
 
 
 def test_the_initial_tension_of_extension_springs_carries_a_part_of_the_force(spec):
-    rate = generic("compression")[0].rate
+    rate = generic(CompressionSpring)[0].rate
     offer = {"name": "pull", "kind": "extension", "stiffness": f"{rate / 1000} N/mm", "initial_tension": "1 N"}
     hung = spec.replace({"mechanism.springs": {"kind": "extension", "stiffness": "1 N/mm"}})
     found = designed(hung, catalogue=(offer | {"counts": (1, 2)},), rise=None, preload=None, spring_room=None)
@@ -160,7 +160,7 @@ def test_of_generic_springs_the_one_nearest_to_the_largest_rise_is_taken(spec, r
     # springs with a rise between this one and the limit are too long, are deflected too far, or would need a guide
     nearer = [
         one
-        for one in generic("compression")
+        for one in generic(CompressionSpring)
         for count in one.counts
         if h * (1 + 1e-6) < 11.15 / (one.rate * count) <= rise
     ]
@@ -193,7 +193,7 @@ def test_where_none_fits_the_nearest_three_are_told(spec):
     ("changes", "reported"),
     [
         ({"mechanism.springs": None}, "needs 'positive', a spring of leaves, or 'springs' that are bought"),
-        ({"mechanism.springs.initial_tension": "1 N"}, "compression springs have none"),
+        ({"mechanism.springs.initial_tension": "1 N"}, "of extension springs; this is of kind 'compression'"),
         ({"analysis.fidelity": "truss"}, "truss laws are for 'diamond'"),
         (
             {"design.catalogue": (), "design.spring_life": 1e5},

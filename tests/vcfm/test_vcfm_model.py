@@ -15,6 +15,7 @@ from cfmkit import api
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.families import family
+from cfmkit.families.vcfm.curves_in_rows import Preloaded
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring, parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
@@ -23,13 +24,13 @@ from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond, Fold
 from cfmkit.families.vcfm.leaves.s_form import POLE_LOAD, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.v_beam import TrussLeaf, VBeam
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
-from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
+from cfmkit.families.vcfm.model import rests_by_laws, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
 from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES, spread
 from cfmkit.families.vcfm.range_and_flatness_findings import extreme_sums
-from cfmkit.metrics import evaluate
+from cfmkit.metrics import CycleRows, evaluate
 from cfmkit.results import Status
-from cfmkit.studies import are_solved_together
+from cfmkit.studies import points_at_once
 
 # --- preloads together, and lines together ---------------------------------------------------------------------
 
@@ -39,10 +40,9 @@ def test_what_all_preloads_share_is_what_each_has_alone(name):
     spec = cfmkit.load(CONFIGS / f"{name}.yaml").replace({"analysis.preloads": ["0 mm", "1 mm", "3 mm", "-0.5 mm"]})
     solution = cfmkit.analyze(spec).state
     grid = np.linspace(0.0, spec.travel, spec.analysis.points)
-    preloads = tuple(spec.analysis.preloads)
-    alone = [rest_of(solution.sampler, one, grid) for one in preloads]
-    for found, wanted in zip(rests_of(solution.sampler, preloads, grid), alone, strict=True):
-        assert found == pytest.approx(np.nan if wanted is None else wanted, rel=1e-13, nan_ok=True)
+    together = Preloaded(solution.sampler, np.array(spec.analysis.preloads)[:, None], solution.curves.stops)
+    alone = [rests_of(replace(together, preload=one[None]), grid)[0] for one in together.preload]
+    assert rests_of(together, grid) == pytest.approx(alone, rel=1e-13, nan_ok=True)
     windows = np.transpose(solution.curves.flat_parts(spec.analysis.flatness))
     for row, (push, window) in enumerate(zip(solution.pushes, windows, strict=True)):
         one = solution.curves.select_rows(np.array([row]))
@@ -218,7 +218,7 @@ def test_rows_have_the_numbers_and_warnings_of_their_points(model, window, prelo
         preloads=preloads,
     )  # fmt: skip
     study, plan = study_of(spec, draw_points(spec, ranges, 64), names)
-    assert are_solved_together(study, plan)
+    assert points_at_once(study, plan) > 1
     rows = assert_rows_equal_runs(study, plan, step=4)
     if ranges is WIDE:
         assert sum(mask.any() for mask in rows.warned.values()) > (2 if model == "truss" else 5)
@@ -575,7 +575,7 @@ def test_the_ends_of_a_window_have_the_force_of_the_model(points):
     spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"analysis.points": points})
     solution = cfmkit.analyze(spec).state
     low, high = 0.61e-3, 3.33e-3
-    inside = solution.branches["load"].restrict_to_window((np.array([low]), np.array([high]))).inside.values[0]
+    inside = CycleRows.from_curves(solution.branches, (np.array([low]), np.array([high]))).first.inside.values[0]
     wanted = solution.sampler.leaf_force(np.array([low, high])) + solution.sampler.spring(np.array([low, high]))[0]
     assert inside[[0, -1]] == pytest.approx(wanted, rel=1e-14)
     assert np.isnan(solution.nominal.evaluate_within_ends(np.array([[-1e-3, 1.0]]))).all()
@@ -606,14 +606,14 @@ def test_rows_take_windows_that_are_shares_of_the_travel():
         }
     )
     study, plan = study_of(spec, {"mechanism.bistable.width": (6e-3, 7e-3)}, ("force_mean",))
-    assert are_solved_together(study, plan)
+    assert points_at_once(study, plan) > 1
     assert_rows_equal_runs(study, plan)
 
 
 def test_the_room_of_a_mechanism_begins_where_a_preload_pushes_it_to_and_has_walls_as_thick_as_stated():
     room = family("vcfm").envelope
     plain, pushed = (room(analyzed("analysis.points=21", preloads=one)) for one in ("[0 mm]", "[0 mm, 7.5 mm]"))
-    (rest,) = rests_of(LawSampler(parts(table_i())), [7.5 * MM], np.array([0.0]))
+    (rest,) = rests_by_laws(parts(table_i()), [7.5 * MM], np.array([0.0]))
     assert rest == pytest.approx(-0.955 * MM, rel=1e-3)
     assert pushed.along - plain.along == pytest.approx(-rest, rel=1e-9)
     assert pushed.across == plain.across

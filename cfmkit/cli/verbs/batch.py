@@ -80,7 +80,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
 
     start = time.perf_counter()
     with watching(terminal, "specs") as progress:
-        found = batch(
+        result = batch(
             options.specs,
             "cfm-out/batch" if options.out is None else options.out,
             verb=options.verb,
@@ -103,25 +103,25 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
             monitor=progress,
             noting=open_journal,
         )
-    written = Written(found.folder, found.files, time.perf_counter() - start)
+    written = Written(result.folder, result.files, time.perf_counter() - start)
     named = tuple(Note("written", file, whole=True) for file in (options.junit, options.summary) if file)
-    if found.accepted:
-        named = (*named, Note("accepted", f"{found.accepted} has these results now", whole=True))
-    document = document_of(found.entries, found.exit_code, written, found.compared)
+    if result.accepted:
+        named = (*named, Note("accepted", f"{result.accepted} has these results now", whole=True))
+    document = document_of(result.entries, result.exit_code, written, result.compared)
     return replace(
         document,
-        data=dict(found.summary)
+        data=dict(result.summary)
         | written.data
-        | {"junit": options.junit, "reused": sum(one.reused for one in found.entries)}
-        | ({"accepted": found.accepted} if found.accepted else {}),
+        | {"junit": options.junit, "reused": sum(entry.reused for entry in result.entries)}
+        | ({"accepted": result.accepted} if result.accepted else {}),
         notes=(*document.notes, *named),
         complaints=(
-            *_complaints(found, options, terminal),
-            *list_unreached_options(found.entries, options.changes),
-            *(_annotations(found) if options.annotations else ()),
+            *_complaints(result, options, terminal),
+            *list_unreached_options(result.entries, options.changes),
+            *(_annotations(result) if options.annotations else ()),
         ),
-        quiet_complaints=() if found.exit_code is ExitCode.OK else (message(found.entries),),
-        errors=tuple({"message": line} for one in found.entries for line in one.errors),
+        quiet_complaints=() if result.exit_code is ExitCode.OK else (message(result.entries),),
+        errors=tuple({"message": line} for entry in result.entries for line in entry.errors),
     )
 
 
@@ -139,10 +139,10 @@ def _tolerance(options: BatchOptions) -> float | None:
         raise UsageError(f"--compare-tolerance: {error}") from None
 
 
-def _annotations(found: BatchResult) -> Iterator[str]:
+def _annotations(result: BatchResult) -> Iterator[str]:
     from cfmkit.documents.continuous_integration import workflow_commands
 
-    return workflow_commands(found.entries, _place_of, found.compared.changes if found.compared else ())
+    return workflow_commands(result.entries, _place_of, result.compared.changes if result.compared else ())
 
 
 def _place_of(name: str, number: int) -> tuple[int, int]:
@@ -157,11 +157,11 @@ def _place_of(name: str, number: int) -> tuple[int, int]:
     return line or 0, column or 0
 
 
-def _complaints(found: BatchResult, options: BatchOptions, terminal: Terminal) -> Iterator[str]:
+def _complaints(result: BatchResult, options: BatchOptions, terminal: Terminal) -> Iterator[str]:
     from cfmkit.cli.failures import go_on
     from cfmkit.runs.batch import complaints
 
-    yield from complaints(found.entries, terminal.tracebacks)
-    if found.exit_code is ExitCode.INTERRUPTED:
-        left = sum(one.skipped for one in found.entries)
-        yield f"interrupted  {left} of {len(found.entries)} specs were not run; {go_on(options.fresh)}"
+    yield from complaints(result.entries, terminal.tracebacks)
+    if result.exit_code is ExitCode.INTERRUPTED:
+        left = sum(entry.skipped for entry in result.entries)
+        yield f"interrupted  {left} of {len(result.entries)} specs were not run; {go_on(options.fresh)}"

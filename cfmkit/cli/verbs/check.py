@@ -42,16 +42,16 @@ class Checked:
 def run(options: CheckOptions, terminal: Terminal) -> Document:
     """Check specs without computing anything: every problem of every file, with its line and column."""
     files = _files(options.specs)
-    found = [_check_file(name, options.changes, len(files) > 1, terminal.excerpts) for name in files]
-    bad = sum(item.spec is None for item in found)
-    message = f"{bad} of {len(found)} files are not valid" if bad else ""
+    checked_files = [_check_file(name, options.changes, len(files) > 1, terminal.excerpts) for name in files]
+    bad = sum(item.spec is None for item in checked_files)
+    message = f"{bad} of {len(checked_files)} files are not valid" if bad else ""
 
     return Document(
-        {"files": [_record(item) for item in found], "message": message},
-        _lines(found, terminal.verbose > 0),
-        _code([item.failure.exit_code for item in found]),
-        complaints=tuple(line for item in found for line in item.failure.complaints),
-        errors=tuple(entry for item in found for entry in item.failure.errors),
+        {"files": [_record(item) for item in checked_files], "message": message},
+        _lines(checked_files, terminal.verbose > 0),
+        _code([item.failure.exit_code for item in checked_files]),
+        complaints=tuple(line for item in checked_files for line in item.failure.complaints),
+        errors=tuple(entry for item in checked_files for entry in item.failure.errors),
     )
 
 
@@ -59,10 +59,10 @@ def _files(named: list[str]) -> list[str]:
     """Return the files to check: a folder stands for all YAML files in it and below, as in a batch."""
     from cfmkit.studies.batch_sources_and_outcomes import files_below
 
-    found: list[str] = []
+    paths: list[str] = []
     for name in named:
-        found += files_below(name) if os.path.isdir(name) else [name]
-    return found
+        paths += files_below(name) if os.path.isdir(name) else [name]
+    return paths
 
 
 def _check_file(name: str, changes: tuple[str, ...], of_many: bool, excerpts: bool) -> Checked:
@@ -85,10 +85,10 @@ def _record(item: Checked) -> dict[str, Any]:
     return {"file": item.file, "ok": item.spec is not None, **about, "errors": list(item.failure.errors)}
 
 
-def _lines(found: list[Checked], everything: bool) -> Iterator[TextLine]:
+def _lines(checked_files: list[Checked], everything: bool) -> Iterator[TextLine]:
     """Yield one line per file, names whole whatever the width; and all of its requirements."""
-    wide = max(len(visible(item.file)) for item in found)
-    for item in found:
+    wide = max(len(visible(item.file)) for item in checked_files)
+    for item in checked_files:
         name = f"{visible(item.file).ljust(wide)}  "
         if item.spec is None:
             count = len(item.failure.errors)
@@ -96,5 +96,7 @@ def _lines(found: list[Checked], everything: bool) -> Iterator[TextLine]:
             continue
         about = f"       {item.spec.family}  {' '.join(item.spec.name.split())}"
         yield whole_line(name, Span("ok", Tone.GOOD), about)
-        for one in item.spec.requirements if everything else ():
-            yield whole_line(f"    {one.metric} {format_bounds({'min': one.min, 'max': one.max})}")
+        for requirement in item.spec.requirements if everything else ():
+            yield whole_line(
+                f"    {requirement.metric} {format_bounds({'min': requirement.min, 'max': requirement.max})}"
+            )

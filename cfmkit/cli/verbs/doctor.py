@@ -36,7 +36,7 @@ def run(options: DoctorOptions, terminal: Terminal) -> Document:
 
     Families of other packages are imported for this, which runs installed code.
     """
-    found = {
+    report = {
         "versions": {"cfmkit": __version__, "python": platform.python_version(), "system": platform.platform()},
         "packages": list(_packages()),
         "folders": [
@@ -48,11 +48,11 @@ def run(options: DoctorOptions, terminal: Terminal) -> Document:
         "caches": list(_caches()),
         "families": list(_families()),
     }
-    troubles = tuple(_troubles(found))
-    data = {"message": "; ".join(troubles) or "nothing is wrong", **found}
+    troubles = tuple(_troubles(report))
+    data = {"message": "; ".join(troubles) or "nothing is wrong", **report}
     warnings = [{"name": "doctor", "message": trouble} for trouble in troubles]
 
-    return Document({**data, "warnings": warnings}, _page(found, troubles))
+    return Document({**data, "warnings": warnings}, _page(report, troubles))
 
 
 def _packages() -> Iterator[Record]:
@@ -71,12 +71,12 @@ def _packages() -> Iterator[Record]:
             continue
         package = Requirement(text)
         try:
-            found: str | None = version(package.name)
+            installed: str | None = version(package.name)
         except PackageNotFoundError:
-            found = None
-        allowed = found is None or package.specifier.contains(found, prereleases=True)
+            installed = None
+        allowed = installed is None or package.specifier.contains(installed, prereleases=True)
         needs = {"needs": str(package.specifier), "allowed": allowed}
-        yield {"name": package.name, "version": found, "extra": extra[1] if extra else "", **needs}
+        yield {"name": package.name, "version": installed, "extra": extra[1] if extra else "", **needs}
 
 
 _USER_EXTRAS = ("cluster",)
@@ -98,11 +98,11 @@ def _locks() -> Record:
     """Return whether the current folder has file locks; None if it cannot be written to."""
     from cfmkit.store.lock import has_native_locks
 
-    here = Path.cwd()
+    folder = Path.cwd()
     try:
-        return {"folder": str(here), "native": has_native_locks(here)}
+        return {"folder": str(folder), "native": has_native_locks(folder)}
     except OSError:
-        return {"folder": str(here), "native": None}
+        return {"folder": str(folder), "native": None}
 
 
 def _solver() -> Record:
@@ -126,8 +126,8 @@ def _caches() -> Iterator[Record]:
     from cfmkit.plots.font_cache import kept_lists
 
     for what, path in {"list of fonts": kept_lists()}.items():
-        files = [one for one in Path(path).glob("*") if one.is_file()] if os.path.isdir(path) else []
-        size = sum(one.stat().st_size for one in files)
+        files = [file for file in Path(path).glob("*") if file.is_file()] if os.path.isdir(path) else []
+        size = sum(file.stat().st_size for file in files)
         yield {"name": what, "path": str(path), "files": len(files), "megabytes": round(size / 1e6, 2)}
 
 
@@ -135,55 +135,55 @@ def _families() -> Iterator[Record]:
     """Yield every family that is offered, with what is wrong with it."""
     from cfmkit import families
 
-    for offer, found in families.examine_families():
+    for offer, outcome in families.examine_families():
         package, version = ("cfmkit", __version__) if offer is None else (offer.package, offer.version)
         about = {"package": package, "version": version}
-        if isinstance(found, str):
-            yield {"name": offer.name if offer else "", **about, "state": "skipped", "reason": found}
+        if isinstance(outcome, str):
+            yield {"name": offer.name if offer else "", **about, "state": "skipped", "reason": outcome}
         else:
-            yield {"name": found.name, **about, "state": "ok", "reason": ""}
+            yield {"name": outcome.name, **about, "state": "ok", "reason": ""}
 
 
-def _troubles(found: Mapping[str, Any]) -> Iterator[str]:
-    for one in found["packages"]:
-        if one["version"] is None and not one["extra"]:
-            yield f"the package {one['name']} is missing: install cfmkit again"
-        if not one["allowed"]:
-            needed = f"{one['name']}{one['needs']}"
-            yield f"{one['name']} {one['version']} does not work with this cfmkit: pip install '{needed}'"
-    for one in found["folders"]:
-        if not one["writable"]:
-            yield f"{one['path']} cannot be written to: {one['name']}"
-    if found["locks"]["native"] is False:
-        yield f"no file locks in {found['locks']['folder']}: {SOFT_LOCK} marks a live run, and stays if one is killed"
-    if not found["fonts"]["path"]:
-        yield f"the font {found['fonts']['name']} is not installed: figures use another one and are not byte-identical"
-    for one in found["families"]:
-        if one["reason"]:
-            yield one["reason"]
+def _troubles(report: Mapping[str, Any]) -> Iterator[str]:
+    for record in report["packages"]:
+        if record["version"] is None and not record["extra"]:
+            yield f"the package {record['name']} is missing: install cfmkit again"
+        if not record["allowed"]:
+            needed = f"{record['name']}{record['needs']}"
+            yield f"{record['name']} {record['version']} does not work with this cfmkit: pip install '{needed}'"
+    for record in report["folders"]:
+        if not record["writable"]:
+            yield f"{record['path']} cannot be written to: {record['name']}"
+    if report["locks"]["native"] is False:
+        yield f"no file locks in {report['locks']['folder']}: {SOFT_LOCK} marks a live run, and stays if one is killed"
+    if not report["fonts"]["path"]:
+        yield f"the font {report['fonts']['name']} is not installed: figures use another one and are not byte-identical"
+    for record in report["families"]:
+        if record["reason"]:
+            yield record["reason"]
 
 
-def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
+def _page(report: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     yield TextLine((Span("cfmkit doctor", Tone.LABEL), Span("  what this installation has")))
-    versions = [{"name": name, "version": version} for name, version in found["versions"].items()]
+    versions = [{"name": name, "version": version} for name, version in report["versions"].items()]
     yield from record_table("versions", versions, (field("name"), field("version", wraps=True)))
-    yield from record_table("packages", found["packages"], (field("name"), Field("version", _version)))
-    access = Field("", lambda one: "writable" if one["writable"] else "cannot be written to")
-    yield from record_table("folders", found["folders"], (field("name"), access, field("path", wraps=True)))
+    yield from record_table("packages", report["packages"], (field("name"), Field("version", _version)))
+    access = Field("", lambda folder: "writable" if folder["writable"] else "cannot be written to")
+    yield from record_table("folders", report["folders"], (field("name"), access, field("path", wraps=True)))
     locks = {True: "by the operating system", False: f"none: the file {SOFT_LOCK} marks a live run", None: "not tried"}
     yield from record_table(
-        "file locks here", [{"locks": locks[found["locks"]["native"]]}], (field("locks", wraps=True),)
+        "file locks here", [{"locks": locks[report["locks"]["native"]]}], (field("locks", wraps=True),)
     )
-    yield from record_table("beam engine", [{"engine": _engine(found["solver"])}], (field("engine", wraps=True),))
-    fonts = {"name": found["fonts"]["name"], "path": found["fonts"]["path"] or "not found: matplotlib is incomplete"}
+    yield from record_table("beam engine", [{"engine": _engine(report["solver"])}], (field("engine", wraps=True),))
+    fonts = {"name": report["fonts"]["name"], "path": report["fonts"]["path"] or "not found: matplotlib is incomplete"}
     yield from record_table("font of the figures", [fonts], (field("name"), field("path", wraps=True)))
-    size = Field("size", lambda one: f"{one['files']} files, {one['megabytes']} MB")
+    size = Field("size", lambda folder: f"{folder['files']} files, {folder['megabytes']} MB")
     yield from record_table(
-        "caches (may be deleted)", found["caches"], (field("name"), size, field("path", wraps=True))
+        "caches (may be deleted)", report["caches"], (field("name"), size, field("path", wraps=True))
     )
-    state = Field("state", lambda one: one["reason"] or one["state"], wraps=True)
-    yield from record_table("families", found["families"], (field("name"), field("package"), field("version"), state))
-    reported = [f"warning  {one}" for one in troubles] or ["nothing is wrong"]
+    state = Field("state", lambda family: family["reason"] or family["state"], wraps=True)
+    yield from record_table("families", report["families"], (field("name"), field("package"), field("version"), state))
+    reported = [f"warning  {trouble}" for trouble in troubles] or ["nothing is wrong"]
     yield Verbatim("\n".join(["", *reported, ""]))
 
 

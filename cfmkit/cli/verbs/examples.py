@@ -58,7 +58,7 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Document:
         return Document({"files": written}, page)
     if options.out is not None or options.schema is not None:
         raise UsageError("--out and --schema are for a copy: name an example")
-    records = [{"name": one.name, "family": one.family, "about": one.about} for one in examples()]
+    records = [{"name": example.name, "family": example.family, "about": example.about} for example in examples()]
     fields = (field("name"), field("family"), field("about", wraps=True))
     return Document({"examples": records}, tuple(record_table("examples", records, fields)))
 
@@ -86,9 +86,9 @@ def _check_examples(name: str, options: ExamplesOptions, terminal: Terminal) -> 
     from cfmkit.runs.shipped_files import example, examples
 
     if name in (ALL_EXAMPLES, QUICK_EXAMPLES):
-        mechanisms = [one for one in examples() if "/" not in one.name]
-        chosen = sorted(mechanisms, key=lambda one: one.searches)
-        searches = sum(one.searches for one in chosen)
+        mechanisms = [example for example in examples() if "/" not in example.name]
+        chosen = sorted(mechanisms, key=lambda example: example.searches)
+        searches = sum(example.searches for example in chosen)
         if name == QUICK_EXAMPLES:
             chosen = chosen[: len(chosen) - searches]
         else:
@@ -98,16 +98,16 @@ def _check_examples(name: str, options: ExamplesOptions, terminal: Terminal) -> 
     else:
         chosen = [example(name)]
     with TemporaryDirectory(prefix="cfmkit-examples-") as place, watching(terminal, "examples") as progress:
-        files = [one.path for one in chosen]
-        found = batch(files, place, plots=False, jobs=options.jobs, arguments=terminal.arguments, monitor=progress)
+        files = [example.path for example in chosen]
+        result = batch(files, place, plots=False, jobs=options.jobs, arguments=terminal.arguments, monitor=progress)
     records = [
-        {"name": one.name, "status": entry.status, "exit_code": int(entry.code), "message": entry.message}
-        for one, entry in zip(chosen, found.entries, strict=True)
+        {"name": example.name, "status": entry.status, "exit_code": int(entry.code), "message": entry.message}
+        for example, entry in zip(chosen, result.entries, strict=True)
     ]
-    wrong = [one for one in records if one["exit_code"] != 0]
+    wrong = [record for record in records if record["exit_code"] != 0]
     reported = f"{len(records) - len(wrong)} of {len(records)} examples end as they should"
     page = (
         *record_table("examples", records, (field("name"), field("status"), field("message", wraps=True))),
         Paragraph("verdict", reported, Tone.BAD if wrong else Tone.GOOD),
     )
-    return Document({"message": reported, "examples": records}, page, found.exit_code)
+    return Document({"message": reported, "examples": records}, page, result.exit_code)

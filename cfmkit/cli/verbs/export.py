@@ -50,7 +50,7 @@ def run(options: ExportOptions, terminal: Terminal) -> Document:
         code = ExitCode.PARTIAL if failed else ExitCode.OK
         manifest = folder.commit(origin | {"status": "partial" if failed else "complete", "exit_code": int(code)})
     written = Written(out, (*manifest.files, "manifest.json"))
-    warnings = [{"name": one.name, "message": one.message} for one in drawing.warnings]
+    warnings = [{"name": finding.name, "message": finding.message} for finding in drawing.warnings]
     problems = [f"{name} is not written: {sentence_of(error)}" for name, error in failed.items()]
     return Document(
         written.data | {"notes": list(drawing.notes), "warnings": warnings},
@@ -60,6 +60,6 @@ def run(options: ExportOptions, terminal: Terminal) -> Document:
         title=" ".join(spec.name.split()),
         verdict="partial" if failed else "",
         notes=tuple(Note("note", note, whole=True) for note in drawing.notes),
-        warnings=tuple(warning_of(one) for one in drawing.warnings),
+        warnings=tuple(warning_of(finding) for finding in drawing.warnings),
         files=written,
     )

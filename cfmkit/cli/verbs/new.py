@@ -78,15 +78,15 @@ def template(name: str) -> str:
     written = record.read("template.yaml")
     if not written:
         raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
-    known = keys(record.spec_type)
-    kinds = {key.path: key.kind for key in known}
+    allowed_keys = keys(record.spec_type)
+    kinds = {key.path: key.kind for key in allowed_keys}
     text = re.sub(r"\{words of (\S+)\}", lambda word: kinds[word[1]].replace(" | ", ", "), written)
-    return complete_template(text, known)
+    return complete_template(text, allowed_keys)
 
 
-def complete_template(text: str, known: Iterable[Key]) -> str:
+def complete_template(text: str, allowed_keys: Iterable[Key]) -> str:
     """Return a template with every optional key of its blocks, those that it left out as comments at their ends."""
-    for key in known:
+    for key in allowed_keys:
         block, _, name = key.path.partition(".")
         is_missing = block.isidentifier() and name.isidentifier() and f"{name}:" not in text
         if not is_missing or key.required or (start := re.search(rf"(?m)^{block}:.*\n", text)) is None:

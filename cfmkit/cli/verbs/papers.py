@@ -58,20 +58,22 @@ def run(options: PapersOptions, terminal: Terminal) -> Document:
             records.append(asdict(done.row) | {"command": done.row.command} | outcome)
             progress.add_finished(1, 0, False)
     counts = {
-        verdict: sum(len(one["printed"]) for one in records if one["verdict"] == verdict)
+        verdict: sum(len(record["printed"]) for record in records if record["verdict"] == verdict)
         for verdict in VERDICT_MEANINGS
     }
-    wrong = [one for one in records if one["trouble"]]
+    wrong = [record for record in records if record["trouble"]]
     reported = f"{sum(counts.values())} printed numbers; " + (
         f"{len(wrong)} verdicts do not hold" if wrong else "every verdict that was computed holds"
     )
     data = {"message": reported, "papers": records, "counts": counts}
-    errors = tuple({"message": f"{one['paper']}, {one['place']}, {one['what']}: {one['trouble']}"} for one in wrong)
+    errors = tuple(
+        {"message": f"{record['paper']}, {record['place']}, {record['what']}: {record['trouble']}"} for record in wrong
+    )
     return Document(
         data,
         _page(records, counts, reported, bool(terminal.verbose)),
         ExitCode.REQUIREMENT_MISSED if wrong else ExitCode.OK,
-        complaints=tuple(f"error    {one['message']}" for one in errors),
+        complaints=tuple(f"error    {error['message']}" for error in errors),
         errors=errors,
     )
 
@@ -79,10 +81,10 @@ def run(options: PapersOptions, terminal: Terminal) -> Document:
 def _page(records: Sequence[Record], counts: Mapping[str, int], reported: str, verbose: bool) -> Iterator[Block]:
     from cfmkit.cli.show_topics import references
 
-    titles = {one["name"]: one["reference"] for one in references()}
+    titles = {reference["name"]: reference["reference"] for reference in references()}
     yield TextLine((Span("cfmkit papers", Tone.LABEL), Span("  numbers of the papers, and the results here")))
-    for paper in dict.fromkeys(one["paper"] for one in records):
-        mine = [one for one in records if one["paper"] == paper]
+    for paper in dict.fromkeys(record["paper"] for record in records):
+        mine = [record for record in records if record["paper"] == paper]
         yield from _list_paper_rows(f"{paper}: {titles.get(paper, '')}", mine, verbose)
     yield BLANK_LINE
     yield Paragraph("verdict", reported, Tone.BAD if "do not hold" in reported else Tone.GOOD)
@@ -94,24 +96,26 @@ def _page(records: Sequence[Record], counts: Mapping[str, int], reported: str, v
 
 def _list_paper_rows(title: str, records: Sequence[Record], verbose: bool) -> Iterator[Block]:
     """Yield the rows of one paper, with the reasons below them; inputs only where everything is wanted."""
-    shown = [one for one in records if verbose or one["trouble"] or one["verdict"] != "given"]
+    shown = [record for record in records if verbose or record["trouble"] or record["verdict"] != "given"]
     fields = (
         field("place", wraps=True),
         field("what", wraps=True),
-        Field("printed", lambda one: ", ".join(one["printed"]), wraps=True),
+        Field("printed", lambda record: ", ".join(record["printed"]), wraps=True),
         Field("here", _describe_computed, wraps=True),
-        Field("verdict", lambda one: "DOES NOT HOLD" if one["trouble"] else one["verdict"]),
+        Field("verdict", lambda record: "DOES NOT HOLD" if record["trouble"] else record["verdict"]),
     )
     yield from record_table(title, shown, fields)
-    silent = sum(len(one["printed"]) for one in records) - sum(len(one["printed"]) for one in shown)
+    silent = sum(len(record["printed"]) for record in records) - sum(len(record["printed"]) for record in shown)
     if silent:
         yield line(f"  and {silent} inputs, which are as printed (-v lists them)", Tone.FAINT)
-    reasons = [one for one in shown if one["why"] and (verbose or one["verdict"] in ("misprint", "disagrees"))]
+    reasons = [
+        record for record in shown if record["why"] and (verbose or record["verdict"] in ("misprint", "disagrees"))
+    ]
     yield from record_table(
         "reasons", reasons, (field("place", ""), field("what", "", wraps=True), field("why", "", wraps=True))
     )
     if verbose:
-        commands = [one for one in shown if one["command"]]
+        commands = [record for record in shown if record["command"]]
         yield from record_table(
             "commands", commands, (field("place", ""), field("what", "", wraps=True), field("command", "", wraps=True))
         )

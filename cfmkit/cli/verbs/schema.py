@@ -33,5 +33,5 @@ def run(options: SchemaOptions, terminal: Terminal) -> Document:
     return with_skipped_families(families.list_skipped(), _answer(schema(families.records())))
 
 
-def _answer(found: dict[str, Any]) -> Document:
-    return Document({"schema": found}, (JsonText(found),))
+def _answer(schema: dict[str, Any]) -> Document:
+    return Document({"schema": schema}, (JsonText(schema),))

@@ -63,20 +63,20 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
         setup = prepare(changed_by(options, spec), options.seed, options.max_points)
     with open_study("sensitivity", options, terminal, start) as study:
         study.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
-        found = replace(carry_out(setup, study.compute), fresh=options.fresh)
-        tables = study.write_tables(outputs(found))
-        page = sensitivity_document(found)
-        study.write_pages(page, setup.study, found.setup.paths, tables, partial(_pictures, found))
-        data, pieces = as_json(found), [piece.records for piece in found.evaluator.pieces]
+        findings = replace(carry_out(setup, study.compute), fresh=options.fresh)
+        tables = study.write_tables(outputs(findings))
+        page = sensitivity_document(findings)
+        study.write_pages(page, setup.study, findings.setup.paths, tables, partial(_pictures, findings))
+        data, pieces = as_json(findings), [piece.records for piece in findings.evaluator.pieces]
         finished = study.commit(page, setup.study, setup.seed, pieces, data)
-    return replace(finished, quiet_complaints=tuple(_quiet(found, data, page.exit_code)))
+    return replace(finished, quiet_complaints=tuple(_quiet(findings, data, page.exit_code)))
 
 
-def _pictures(found: Findings) -> Mapping[str, Callable[[], Figure]]:
+def _pictures(findings: Findings) -> Mapping[str, Callable[[], Figure]]:
     """Return what draws the pictures of a study; nothing of one that was not finished."""
     from cfmkit.plots.sensitivity import figures
 
-    return {} if found.interrupted else figures(found)
+    return {} if findings.interrupted else figures(findings)
 
 
 def changed_by(options: SensitivityOptions, spec: Spec) -> Spec:
@@ -128,12 +128,12 @@ def spread(option: str) -> tuple[str, Any]:
     return path, {first: second} if first in ("normal", "uniform") else (first, second)
 
 
-def _quiet(found: Findings, data: Mapping[str, Any], code: ExitCode) -> Iterator[str]:
+def _quiet(findings: Findings, data: Mapping[str, Any], code: ExitCode) -> Iterator[str]:
     """Yield what a user must hear who has asked to hear nothing else."""
     from cfmkit.studies.sensitivity.run_and_files import message
 
     if code not in (ExitCode.OK, ExitCode.REQUIREMENT_MISSED):
-        yield f"{data['status']:<9}{message(found)}"
-    for one in data["requirements"]:
-        if not one["ok"]:
-            yield f"missed   {one['sentence'].removesuffix(': missed')}"
+        yield f"{data['status']:<9}{message(findings)}"
+    for requirement in data["requirements"]:
+        if not requirement["ok"]:
+            yield f"missed   {requirement['sentence'].removesuffix(': missed')}"

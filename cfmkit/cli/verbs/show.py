@@ -57,7 +57,7 @@ def run(options: ShowOptions, terminal: Terminal) -> Document:
     )
 
 
-def _copy_drawing(name: str | None, given: str) -> Document:
+def _copy_drawing(name: str | None, destination: str) -> Document:
     """Copy the drawing of a family to a file that is not there yet."""
     from pathlib import Path
 
@@ -66,7 +66,7 @@ def _copy_drawing(name: str | None, given: str) -> Document:
 
     record = find_drawn_family(name)
     files = read_drawing(record)
-    path = Path(given or record.name + next(iter(files)))
+    path = Path(destination or record.name + next(iter(files)))
     if path.suffix.lower() not in files:
         raise UsageError(f"a figure ends with {', '.join(files)}, not {visible(path.suffix)!r}")
     rows = read_dimensions(record)

@@ -81,7 +81,7 @@ class SuggestOptions(RequestOptions):
     no_lock: bool = NO_LOCK_FLAG()
 
 
-REQUEST_KEYS = tuple(one.name for one in fields(RequestOptions) if one not in fields(Common))
+REQUEST_KEYS = tuple(option.name for option in fields(RequestOptions) if option not in fields(Common))
 """Options that are keys of a request."""
 LIST_KEYS = ("material", "adjustable", "prefer")
 BAND_KEYS = ("force", "torque")  # keys that are a list where two values are given
@@ -111,11 +111,11 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
 
     start, begun = time.perf_counter(), time.time()
     budget = seconds(options.time_budget)
-    given = keys(options)
-    if options.request is None and not given:
+    values_by_key = keys(options)
+    if options.request is None and not values_by_key:
         raise UsageError("requirements are missing: name a file, or give --force, --travel and --envelope")
     ends = begun + budget
-    block = read_request(options.request, given)
+    block = read_request(options.request, values_by_key)
     out = folder_of(options.out, options.request or "options", "suggest")
     with RunFolder(out) as folder, terminal.progress(budget) as progress:
         folder.check("metrics.json", "suggestions.csv")
@@ -125,28 +125,28 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
             if jobs == 1:  # a process of its own, which can be ended when the time is up
                 working = replace(working, executor=Pool(1))
             reserve = max(FIGURES_RESERVE, WRITING_SHARE * budget) if options.no_plots else FIGURE_SECONDS
-            found = suggest(block.request(), working, block.prefer, reserve)
+            suggestions = suggest(block.request(), working, block.prefer, reserve)
             deadlines = suggestion_files.Deadlines(Clock(ends - FIGURES_RESERVE), Clock(ends - WRITING_RESERVE))
             command = shlex.join(["cfmkit", *terminal.arguments]) if options.report else None
             for name, content in suggestion_files.files(
-                found, block, working, not options.no_plots, deadlines, command
+                suggestions, block, working, not options.no_plots, deadlines, command
             ):
                 folder.write(name, content)
-        code = found.exit_code
+        code = suggestions.exit_code
         manifest = folder.commit(
             {
                 "command": "suggest", "arguments": list(terminal.arguments), "seed": options.seed,
-                "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True), "reused": found.reused,
-                "status": code.name.lower(), "exit_code": int(code),
+                "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
+                "reused": suggestions.reused, "status": code.name.lower(), "exit_code": int(code),
             }
         )  # fmt: skip
     written = Written(out, (*manifest.files, "manifest.json"), time.perf_counter() - start)
-    data = suggestion_record.as_json(found, block) | written.data | {"reused": found.reused}
+    data = suggestion_record.as_json(suggestions, block) | written.data | {"reused": suggestions.reused}
     complaints = () if code is ExitCode.OK else (f"error    {data['message']}",)
     document = replace(
         suggestion_document.document_of(data, code, written),
         data=data,
-        complaints=tuple(_bugs(found.bugs, terminal.tracebacks)),
+        complaints=tuple(_bugs(suggestions.bugs, terminal.tracebacks)),
         quiet_complaints=complaints,
     )
     return with_skipped_families(families.list_skipped(), document)
@@ -162,21 +162,21 @@ def _bugs(bugs: Sequence[str], shown: bool) -> Iterator[str]:
 
 def keys(options: SuggestOptions) -> dict[str, str]:
     """Return the keys of a request that options say, each as a file would have it."""
-    found = {}
-    for one in fields(options):
-        value = getattr(options, one.name)
-        if one.name not in REQUEST_KEYS or value is None or value == []:
+    values_by_key = {}
+    for item in fields(options):
+        value = getattr(options, item.name)
+        if item.name not in REQUEST_KEYS or value is None or value == []:
             continue
         if isinstance(value, list):
             value = value[0] if len(value) == 1 else ",".join(part.strip().strip("[]") for part in value)
-        if one.name == "envelope":
+        if item.name == "envelope":
             value = parse_envelope(value)
-        elif (one.name in LIST_KEYS or (one.name in BAND_KEYS and _are_two(value))) and not value.strip().startswith(
+        elif (item.name in LIST_KEYS or (item.name in BAND_KEYS and _are_two(value))) and not value.strip().startswith(
             "["
         ):
             value = f"[{value}]"
-        found["yield" if one.name == "made_well" else one.name] = value
-    return found
+        values_by_key["yield" if item.name == "made_well" else item.name] = value
+    return values_by_key
 
 
 def _are_two(text: str) -> bool:
@@ -202,4 +202,4 @@ def parse_envelope(text: str) -> str:
     unit = sides[-1][2]
     if not unit:
         raise UsageError(f"--envelope: {text.strip()} has no unit; write {text.strip()}mm")
-    return "[" + ", ".join(f"{number} {own or unit}" for number, _, own in sides) + "]"
+    return "[" + ", ".join(f"{number} {unit_of_side or unit}" for number, _, unit_of_side in sides) + "]"

@@ -66,11 +66,11 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
         summary = summary_of(records)
         tables = study.write_tables(outputs(records, summary, writes_curves(spec, asked)))  # which fill the summary
         code, reported = exit_code(records, summary), summary.as_json(records)
-        dimensions = {one.name: one.dimension for one in work.study.metrics}
-        found = study_documents.sweep_document(spec, reported, dimensions, code, reused=records.reused)
+        dimensions = {metric.name: metric.dimension for metric in work.study.metrics}
+        page = study_documents.sweep_document(spec, reported, dimensions, code, reused=records.reused)
         varied = [item.path for item in work.plan.variables]
-        study.write_pages(found, work.study, varied, tables, partial(_pictures, records, summary))
-        finished = study.commit(found, work.study, options.seed, [records], reported)
+        study.write_pages(page, work.study, varied, tables, partial(_pictures, records, summary))
+        finished = study.commit(page, work.study, options.seed, [records], reported)
     return replace(finished, complaints=(*_complaints(records, code, options, document), *finished.complaints))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.side_gaps import find_line_tables, side_states
+from cfmkit.elastica.contact.side_gaps import ElementLines, find_line_tables, find_lines
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import cuts_at
@@ -91,19 +91,11 @@ def _sample(
     places[..., 0], places[..., 1] = numbers, fractions
     result = equations(mesh).locate(z, stages, places, find_line_tables(mesh.degree))
     if result is None:
-        result = np.array([_locate(mesh, z[k], stage.take([k]), numbers[k], fractions[k]) for k in range(count)])
+        whole = find_lines(mesh, z, stage, np.arange(len(mesh.elements.beam)))
+        seen = ElementLines(*(table[states, numbers] for table in whole)).evaluate(fractions[..., None])
+        result = np.concatenate([seen.place[:, :, 0], seen.turn, seen.ahead], axis=-1)
     result = result.reshape(*at.shape, 4)
     last = numbers.reshape(at.shape)[..., -1]
     load = energy.line_load(mesh, stages[:, 0], stages[:, 1, None, None])[states, last]
     force = z[states[..., None], mesh.elements.unknowns[last, -2:]] + load * result[..., -1, 3:]
     return result[..., -1, :2], result[..., 2], force
-
-
-def _locate(mesh: Discretisation, z: FloatArray, stage: LoadStage, numbers: Any, fractions: FloatArray) -> FloatArray:
-    """Return x, y, rotation, arc length to the end of the element, at places in one state, (k, 4)."""
-    result = np.empty((len(numbers), 4))
-    for number in np.unique(numbers).tolist():
-        rows = numbers == number
-        seen = side_states(mesh, z[None], stage, np.array([number]), fractions[rows])
-        result[rows, :2], result[rows, 2], result[rows, 3] = seen.place[0, 0], seen.turn[0, 0], seen.ahead[0, 0]
-    return result

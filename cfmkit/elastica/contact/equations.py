@@ -16,13 +16,14 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.terms import contact_contribution, gaps
-from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations, SolvedStates
-from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.contact.line_tangent import raise_pad
+from cfmkit.elastica.contact.terms import contact_contribution, measure
+from cfmkit.elastica.mechanics.contact_arrays import node_contacts
+from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
 from cfmkit.elastica.model.contact import FrictionState
 
 if TYPE_CHECKING:
@@ -69,65 +70,56 @@ def _first_contact(mesh: Discretisation) -> int:
     return min(contact.unknown for contact in mesh.contacts)
 
 
-class GapBounds:
-    """Lower bounds of the gaps of contacts: a gap changes by no more than its pad moves, or its node turns.
+class SymmetricRow(NamedTuple):
+    """A row of a condition in the symmetric matrix that stability is counted from."""
 
-    They are kept from state to state, so that the gap of a contact that is far is not measured in each.
-    """
-
-    def __init__(self, mesh: Discretisation) -> None:
-        self.mesh = mesh
-        places = [contact.place for contact in mesh.contacts]
-        self.places = np.array(places)
-        self.forces = np.array([contact.unknown for contact in mesh.contacts])
-        self.turning = np.array([contact.item.turns for contact in mesh.contacts])
-        self.turns = mesh.attachments.unknowns[places, 3]
-        self.judged = np.array([contact.closed is None for contact in mesh.contacts])
-        self.at = np.zeros((len(places), 2))  # where each gap was measured: place, or rotation
-        self.gap = np.full(len(places), -np.inf)
-
-    def are_open(self, z: FloatArray) -> Any:
-        """Return which contacts without a force are certainly open, (contacts,)."""
-        if not self.judged.any():
-            return self.judged
-        where = poses(self.mesh.attachments, z, self.places).place
-        if self.turning.any():
-            where = np.where(self.turning[:, None], np.stack([z[self.turns], 0 * z[self.turns]], axis=1), where)
-        idle = self.judged & (z[self.forces] <= 0)
-        far = idle & (np.hypot(*(where - self.at).T) < self.gap)
-        for number in np.flatnonzero(idle & ~far).tolist():
-            gap = float(gaps(self.mesh, self.mesh.contacts[number], z[None])[0])
-            self.at[number], self.gap[number], far[number] = where[number], gap, gap > 0
-        return far
-
-
-def number_free_unknowns(mesh: Discretisation) -> Any:
-    """Return the number of every unknown among the free ones, (size,); -1 where it is held."""
-    slots = np.full(mesh.size, -1)
-    slots[mesh.free] = np.arange(len(mesh.free))
-    return slots
+    unknowns: Any  # (k,) among the free ones
+    values: FloatArray  # (k,)
+    pivot: float
 
 
 @dataclass(frozen=True, eq=False)
-class ContactEquations(NumpyEquations):
-    """Equations of a network with contacts for its free unknowns."""
+class EquationsWithNodes(NumpyEquations):
+    """Equations of a network with contacts, as far as pads and stops of nodes go."""
 
     plain: NumpyEquations = field(kw_only=True)  # without contacts; its free unknowns are the first of these
-    watched: GapBounds = field(init=False)
     slots: Any = field(init=False)  # (size,) number of every unknown among the free ones, -1 where it is held
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "slots", number_free_unknowns(self.mesh))
-        object.__setattr__(self, "watched", GapBounds(self.mesh))
+        slots = np.full(self.mesh.size, -1)
+        slots[self.mesh.free] = np.arange(len(self.mesh.free))
+        object.__setattr__(self, "slots", slots)
 
-    def rebase(self, base: FloatArray) -> ContactEquations:
-        """Return the equations with other values of the unknowns that are held, (size,)."""
-        return ContactEquations(replace(self.mesh, base=base), self.ramp, plain=self.plain.rebase(base))
+    def place_among_all(self, at: LinearEquations) -> LinearEquations:
+        """Return the equations without contacts among those of all unknowns, the others zero."""
+        n, count = self.n, self.plain.n
+        tangent, residual, change = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+        tangent[:count, :count], residual[:count], change[:count] = at.tangent, at.residual, at.change
+        return LinearEquations(residual, tangent, change)
 
-    def stiffen(self, mesh: Discretisation) -> ContactEquations:
-        """Return the equations of the same network with another flexibility along its beams."""
-        return ContactEquations(mesh, self.ramp, plain=self.plain.stiffen(open_all_contacts(mesh)))
+    def add_nodes(self, z: FloatArray, at: LinearEquations) -> list[SymmetricRow]:
+        """Add the contacts of nodes to the equations at a state; return their rows of the symmetric matrix."""
+        moved, rows = self.mesh.base if self.ramp else self.mesh.rate, list[SymmetricRow]()
+        for contact in node_contacts(self.mesh):
+            if contact.closed is None and (lowered := raise_pad(self.mesh, contact, z[None])[0]):
+                contact = contact._replace(
+                    closed=bool(z[contact.unknown] > measure(self.mesh, contact, z).value + lowered)
+                )
+            term = contact_contribution(self.mesh, contact, z)
+            slots = self.slots[term.unknowns]
+            inside = slots >= 0
+            pushed, slot = slots[inside], self.slots[contact.unknown]
+            at.residual[pushed] += term.gradient[inside]
+            at.tangent[np.ix_(pushed, pushed)] += term.hessian[np.ix_(inside, inside)]
+            at.change[pushed] += term.hessian[inside] @ moved[term.unknowns]
+            values, pivot = term.hessian[-1, :-1][inside[:-1]], float(term.hessian[-1, -1])
+            rows.append(SymmetricRow(pushed[pushed != slot], values, pivot))
+        return rows
+
+
+class ContactEquations(EquationsWithNodes):
+    """Equations of a network with pads and stops of nodes for its free unknowns."""
 
     def gradient(self, free: Any, way: Any) -> Any:
         """Return the gradient by all unknowns, (size,)."""
@@ -144,62 +136,8 @@ class ContactEquations(NumpyEquations):
                 whole_gradients[number, term.unknowns] += term.gradient
         return whole_gradients
 
-    def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
-        """Return gradient (size,) and Hessian (size, size) by all unknowns."""
-        gradient, hessian = self.plain.evaluate(z, drive, share)
-        for contact in self.mesh.contacts:
-            term = contact_contribution(self.mesh, contact, z)
-            gradient[term.unknowns] += term.gradient
-            hessian[np.ix_(term.unknowns, term.unknowns)] += term.hessian
-        return gradient, hessian
-
-    def solve_each(
-        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
-    ) -> SolvedStates:
-        """Return the equilibria near k guesses (k, n) at places (k,) of the way.
-
-        Those without a force are found without contacts, together; it is seen then whether a gap closes.
-        """
-        count, mesh = self.plain.n, self.mesh
-        idle = ~np.asarray(free)[:, count:].any(axis=1)
-        if not idle.any() or any(contact.closed for contact in mesh.contacts):
-            return super().solve_each(free, way, tolerance, quick)
-        rows, pad = np.flatnonzero(idle), ((0, 0), (0, self.n - count))
-        easy = self.plain.solve_each(free[rows, :count], way[rows], tolerance, quick)
-        z = np.array([self.values(*pair) for pair in zip(np.pad(easy.free, pad), way[rows], strict=True)])
-        judged = [contact for contact in mesh.contacts if contact.closed is None]
-        good = easy.converged & np.all([gaps(mesh, contact, z) >= 0 for contact in judged], axis=0)
-        left = np.setdiff1d(np.arange(len(free)), rows[good])
-        others = super().solve_each(free[left], way[left], tolerance, quick)
-        whole = SolvedStates(
-            np.ones(len(free), bool), np.zeros((len(free), self.n)), np.zeros((len(free), self.n)),
-            np.zeros(len(free), np.int64), np.zeros(len(free)),
-        )  # fmt: skip
-        padded = easy._replace(free=np.pad(easy.free, pad), rate=np.pad(easy.rate, pad))
-        for total, some, other in zip(whole, padded, others, strict=True):
-            total[rows[good]], total[left] = some[good], other
-        return whole
-
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
-        mesh, count = self.mesh, self.plain.n
-        at = self.plain.linearise(free[:count], way)
-        residual, change, tangent = np.zeros(self.n), np.zeros(self.n), np.zeros((self.n, self.n))
-        residual[:count], change[:count], tangent[:count, :count] = at.residual, at.change, at.tangent
-        z, moved = np.asarray(self.values(free, way)), mesh.base if self.ramp else mesh.rate
-        far = self.watched.are_open(z)
-        for number, contact in enumerate(mesh.contacts):
-            if far[number] or contact.closed is False:
-                own = self.slots[list(contact.own_unknowns)]
-                held = own[own >= 0]
-                tangent[held, held] = -1.0
-                residual[held[:2]] = -free[held[:2]]  # flag and anchor of one with friction stay
-                continue
-            term = contact_contribution(mesh, contact, z)
-            slots = self.slots[term.unknowns]
-            inside = slots >= 0
-            rows = slots[inside]
-            residual[rows] += term.gradient[inside]
-            tangent[np.ix_(rows, rows)] += term.hessian[np.ix_(inside, inside)]
-            change[rows] += term.hessian[inside] @ moved[term.unknowns]
-        return LinearEquations(residual, tangent, change)
+        at = self.place_among_all(self.plain.linearise(free[: self.plain.n], way))
+        self.add_nodes(np.asarray(self.values(free, way)), at)
+        return at

@@ -16,10 +16,13 @@ from cfmkit.numerics.continuation.steps import correct
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.contact.changes import PieceOfPath
+    from cfmkit.elastica.contact.piece import PieceOfPath
     from cfmkit.elastica.model.contact import BeamSide
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
+CHANGE_OF_KIND: dict[str, Literal["begins", "ends", "slips", "sticks"]] = {
+    "gap": "begins", "force": "ends", "grip": "slips", "slip": "sticks",
+}  # fmt: skip
 NOT_LOCATED = "where {names} {what} was not found near {{place}}"
 
 
@@ -39,16 +42,12 @@ def find_change_before_end(
 def find_change(piece: PieceOfPath, first: PathEquilibrium, last: PathEquilibrium) -> ContactChange | PathStop | None:
     """Return the first change of a contact between two points of a piece; None if there is none."""
     step = StepBetween(piece, first, last)
-    if step.is_far:
-        return None
-    values = step.values
-    rounding = piece.roundings(values)
-    dips = (values < -rounding[:, None])[:, 1:]
+    dips = (step.values < -step.roundings[:, None])[:, 1:]
     if not dips.any():
         return None
     if not dips[:, -1].any():  # only the guess says so: see whether the equilibrium does
         at = step.solve(float(step.shares[1:][dips.any(axis=0).argmax()]))
-        return None if at is None else _find_change_at_end(piece, first, piece.grow(at), rounding)
+        return None if at is None else _find_change_at_end(piece, first, piece.grow(at), step.roundings)
     rows = np.flatnonzero(dips.any(axis=1)).tolist()
     beside = [row for row in rows if _is_beside_change(piece, row, rows)]
     located = {row: _locate(piece, step, row) for row in rows if row not in beside}
@@ -56,7 +55,7 @@ def find_change(piece: PieceOfPath, first: PathEquilibrium, last: PathEquilibriu
     # a contact that parts, or moves, brings the side beside it into the obstacle: nothing else touches by that
     for row in beside:
         values_there = [piece.row_value(change.at, row) for change in changes if change.piece is None]
-        if not changes or min(values_there, default=0.0) < -rounding[row]:
+        if not changes or min(values_there, default=0.0) < -step.roundings[row]:
             located[row] = _locate(piece, step, row)
     changes = [change for change in located.values() if isinstance(change, ContactChange)]
     if not changes:
@@ -64,19 +63,14 @@ def find_change(piece: PieceOfPath, first: PathEquilibrium, last: PathEquilibriu
         what, names = ("ends" if missing in piece.closed else "begins"), piece.say(missing)
         lost = PathStop(WhyStopped.LOST, first.drive, NOT_LOCATED.format(names=names, what=what))
         return next((stop for stop in located.values() if isinstance(stop, PathStop)), lost)
-
     return min(changes, key=lambda change: step.share_of(change.at, change.piece))
 
 
 def _is_beside_change(piece: PieceOfPath, row: int, rows: list[int]) -> bool:
     """Return True if a row is a side that touches where another of its contacts changes, too."""
-    count = len(piece.whole.mesh.contacts)
-    rubs = row - count >= len(piece.sides.all)
-    if row < count or rubs or piece.sides.all[row - count].kind != "touch":
-        return False
-    item = piece.sides.all[row - count].item
-    sides = [k for k in rows if count <= k < count + len(piece.sides.all)]
-    return any(k != row and _touch_alike(piece.sides.all[k - count].item, item) for k in sides)
+    conditions = piece.conditions.all
+    others = (conditions[k] for k in rows if k != row and conditions[k].kind not in ("gap", "force", "grip", "slip"))
+    return conditions[row].kind == "touch" and any(_touch_alike(each.item, conditions[row].item) for each in others)
 
 
 def _touch_alike(item: BeamSide, neighbour: BeamSide) -> bool:
@@ -88,41 +82,31 @@ def _find_change_at_end(
     piece: PieceOfPath, first: PathEquilibrium, last: PathEquilibrium, rounding: FloatArray
 ) -> ContactChange | PathStop | None:
     """Return the first change up to a point that may violate a condition; None if it does not."""
-    values = piece.values(last.x[None], np.array([last.drive]))[:, 0]
-    travel = StepBetween(piece, first, last).travel
-    values[list(piece.slipping_rows)] = [piece.row_value(last, row, travel) for row in piece.slipping_rows]
-    return find_change(piece, first, last) if (values < -rounding).any() else None
+    return find_change(piece, first, last) if piece.violates(last, rounding, last.drive - first.drive) else None
 
 
 def _locate(piece: PieceOfPath, step: StepBetween, row: int) -> ContactChange | PathStop | None:
     """Return where a contact changes within a step: where its gap and its force are both zero."""
-    first_rub = len(piece.whole.mesh.contacts) + len(piece.sides.all)
-    if row >= first_rub:
-        number, at = piece.rubbing[row - first_rub], step.bisect(row)
-        if at is None:
-            return None
-        what: Literal["slips", "sticks"] = "sticks" if row in piece.slipping_rows else "slips"
-        return ContactChange(
-            what, number, at, step.first.unstable, step.first.unstable, piece.whole.mesh.contacts[number].number
-        )
-    if row >= len(piece.whole.mesh.contacts):
+    kind, number, _, _, _ = piece.conditions.all[row]
+    if kind not in CHANGE_OF_KIND:
         return locate_side_change(piece, step, row)
-    contact, unstable = piece.whole.mesh.contacts[row].number, step.first.unstable
+    at = _solve_change(piece, step, row) if kind in ("gap", "force") else None
+    if at is None and (kind in ("grip", "slip") or step.crossing(row) is not None):
+        at = step.bisect(row)
+    unstable, contact = step.first.unstable, piece.whole.mesh.contacts[number].number
+    return None if at is None else ContactChange(CHANGE_OF_KIND[kind], number, at, unstable, unstable, contact)
+
+
+def _solve_change(piece: PieceOfPath, step: StepBetween, row: int) -> PathEquilibrium | None:
+    """Return where gap and force of a contact are both zero, by these two equations."""
     share = step.crossing(row)
     if share is None:
         return None
-    guess, drive = step.interpolate(share)
-    kind: Literal["begins", "ends"] = "ends" if row in piece.closed else "begins"
-    both = piece.with_closed(piece.closed | {row})
-    x = guess[both.own_mask]
-    border = np.zeros(len(x) + 1)
-    border[int(both.own_mask[: piece.slot(row)].sum())] = 1.0
-    state = both.own.equations.solve(x, drive, border, 0.0)
-    if state is not None and np.isfinite(state.rate).all():
-        free = both.expand_state(state.x)
-        free[piece.slot(row)] = 0.0
-        at = step.first._replace(x=free, drive=state.drive, effort=np.nan, stiffness=np.nan)
-        if step.contains(at, guess):
-            return ContactChange(kind, row, at, unstable, unstable, contact)
-    bracketed = step.bisect(row)
-    return None if bracketed is None else ContactChange(kind, row, bracketed, unstable, unstable, contact)
+    guess, both = step.guess(share), piece.with_closed(piece.closed | {row})
+    state = both.solve_at_level(guess, {both.slot_in_own(row): 1.0}, 0.0)
+    if state is None:
+        return None
+    free = both.expand_state(state.x)
+    free[piece.slot(row)] = 0.0
+    at = step.first._replace(x=free, drive=state.drive, effort=np.nan, stiffness=np.nan)
+    return at if step.contains(at, guess.x) else None

@@ -19,16 +19,16 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import FORCE_ROUNDING, PieceOfPath
+from cfmkit.elastica.contact.conditions import FORCE_ROUNDING
 from cfmkit.elastica.contact.equations import NO_FRICTION
 from cfmkit.elastica.contact.first_change import find_change, find_change_before_end
-from cfmkit.elastica.contact.path_items import ContactChange, PathItem, Remeshed
+from cfmkit.elastica.contact.path_items import BeyondChange, ContactChange, PathItem, Remeshed
+from cfmkit.elastica.contact.piece import PieceOfPath
 from cfmkit.elastica.contact.side_changes import enter_side_change
-from cfmkit.elastica.contact.terms import slip_way
 from cfmkit.elastica.model.contact import FrictionState
 from cfmkit.numerics.continuation.arc import follow_arc, unit_tangent
 from cfmkit.numerics.continuation.by_arc import pass_fold
-from cfmkit.numerics.continuation.follow import LOCKED_MESSAGE, each_point, follow, follow_on
+from cfmkit.numerics.continuation.follow import LOCKED_MESSAGE, each_point, follow, follow_on, limit_points
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 
 if TYPE_CHECKING:
@@ -49,15 +49,6 @@ RIGID_RATE = 1e9  # motion or force per drive beyond which the contacts leave no
 MAX_TOGETHER = 5  # contacts whose states are chosen together: three to this power are tried
 
 
-class ChosenState(NamedTuple):
-    """A piece whose friction can go on, its start, the sense of the drive, and how many choices can go on that way."""
-
-    piece: PieceOfPath
-    at: PathEquilibrium
-    sense: float
-    n_states: int
-
-
 def choose_friction(
     piece: PieceOfPath,  # with the contacts that are closed there, and what friction did before
     at: PathEquilibrium,  # in the unknowns of all contacts
@@ -65,9 +56,9 @@ def choose_friction(
     changed: int | None = None,  # contact that begins or ends there
     settled: int | None = None,  # contact that can only go on as the piece says
     turns: bool = False,  # whether the drive turns back: what slips is tried to stick first
-) -> ChosenState | None:
+) -> BeyondChange | None:
     """Return the first combination of states of friction that can go on from an equilibrium; None if none can."""
-    numbers = [k for k in sorted(piece.closed) if piece.whole.mesh.contacts[k].rub >= 0]
+    numbers = piece.rubbing
     choices = [[piece.friction[k]] if k == settled else list(_continuations(piece, at, k, turns)) for k in numbers]
     several = [k for k, states in enumerate(choices) if len(states) > 1]
     for k in several[MAX_TOGETHER:]:
@@ -75,47 +66,38 @@ def choose_friction(
     tried = []
     for states in itertools.product(*choices):
         beyond = replace(piece, friction=dict(zip(numbers, states, strict=True)))
-        near = beyond.shrink(at)
-        start = beyond.own.solve(near.x, near.drive)
-        if start is None or not np.abs(start.rate).max(initial=0.0) < RIGID_RATE:
-            continue
-        tried.append((beyond, beyond.grow(start)))
+        start = _start_loose(beyond, at)
+        if start is not None:
+            tried.append((beyond, start))
     for sense in senses:
         possible = [(beyond, start) for beyond, start in tried if _goes_on(beyond, start, sense, changed)]
         if possible:
-            return ChosenState(*possible[0], sense, len(possible))
+            return BeyondChange(*possible[0], sense, len(possible))
     return None
 
 
-def is_jammed(piece: PieceOfPath, at: PathEquilibrium) -> bool:
-    """Return True if nothing can move with the drive where all contacts with friction stick."""
-    mesh, z = piece.whole.mesh, piece.whole.values(at.x, at.drive)
-    rubbing = [number for number in piece.closed if mesh.contacts[number].rub >= 0]
-    stuck = {k: FrictionState(0.0, float(slip_way(mesh, mesh.contacts[k], z).value)) for k in rubbing}
-    beyond = replace(piece, friction=stuck)
-    near = beyond.shrink(at)
-    start = beyond.own.solve(near.x, near.drive)
-    return start is None or not np.abs(start.rate).max(initial=0.0) < RIGID_RATE
+def _start_loose(piece: PieceOfPath, at: PathEquilibrium) -> PathEquilibrium | None:
+    """Return the start of a piece; None if there is none, or its contacts leave no way to move with the drive."""
+    start = piece.solve_near(at)
+    return start if start is not None and np.abs(start.rate).max(initial=0.0) < RIGID_RATE else None
 
 
 def _continuations(piece: PieceOfPath, at: PathEquilibrium, number: int, turns: bool) -> Iterator[FrictionState]:
     """Yield the states in which the friction of a closed contact may go on, the likelier ones first."""
-    mesh, z = piece.whole.mesh, piece.whole.values(at.x, at.drive)
-    contact, before = mesh.contacts[number], piece.friction.get(number, NO_FRICTION)
+    contact, before = piece.whole.mesh.contacts[number], piece.friction.get(number, NO_FRICTION)
+    z = piece.whole.values(at.x, at.drive)
     limit, rub = contact.item.friction * float(z[contact.unknown]), float(z[contact.rub])
     if before.sense == 0:
         yield before
         if abs(abs(rub) - limit) <= AT_LIMIT * limit:
             yield FrictionState(-float(np.sign(rub)))
-        return
-    sticks = FrictionState(0.0, float(slip_way(mesh, contact, z).value))
-    if before.sense == NO_FRICTION.sense:
-        yield sticks
+    elif before.sense == NO_FRICTION.sense:
+        yield piece.stick_at(at, number)
         if limit <= piece.roundings_of_force(at):
-            yield FrictionState(1.0)
-            yield FrictionState(-1.0)
-        return
-    yield from (sticks, before) if turns else (before, sticks)
+            yield from (FrictionState(1.0), FrictionState(-1.0))
+    else:
+        sticks = piece.stick_at(at, number)
+        yield from (sticks, before) if turns else (before, sticks)
 
 
 def _goes_on(piece: PieceOfPath, at: PathEquilibrium, sense: float, changed: int | None) -> bool:
@@ -152,10 +134,8 @@ def _steps_on(piece: PieceOfPath, at: PathEquilibrium, sense: float) -> bool:
     if new is None:
         return False
     grown = piece.grow(new)
-    values = piece.values(grown.x[None], np.array([grown.drive]))
-    for row in piece.slipping_rows:
-        values[row] = piece.row_value(grown, row, sense)
-    return bool((values[:, 0] >= -piece.roundings(values)).all())
+    roundings = piece.conditions.roundings(piece.values(grown.x[None], np.array([grown.drive])))
+    return not piece.violates(grown, roundings, sense)
 
 
 SAME_PLACE = 1e-11  # share of the range within which a change is at a point
@@ -192,17 +172,9 @@ def follow_in_contact(
     )
     part = PieceOfPath(problem, closed, options)
     if any(contact.rub >= 0 for contact in problem.mesh.contacts) and not problem.ramp:
-        part, start = _begin_friction(part, start)
-    yield from _limit_points(_follow(part, start, targets, branch), options)
-
-
-def _begin_friction(part: PieceOfPath, start: PathEquilibrium) -> tuple[PieceOfPath, PathEquilibrium]:
-    """Return the piece and its start, at which what is closed sticks: constant loads have come on without friction."""
-    mesh, z = part.whole.mesh, part.whole.values(start.x, start.drive)
-    rubbing = [number for number in part.closed if mesh.contacts[number].rub >= 0]
-    friction = {k: FrictionState(0.0, float(slip_way(mesh, mesh.contacts[k], z).value)) for k in rubbing}
-    part = replace(part, friction=friction)
-    return part, part.grow(part.shrink(start))
+        part = part.stick_all(start)  # constant loads have come on without friction
+        start = part.grow(part.shrink(start))
+    yield from limit_points(_follow(part, start, targets, branch), options.most_points)
 
 
 def _find_turns(problem: NetworkProblem, start: float, targets: FloatArray) -> list[int]:
@@ -213,18 +185,6 @@ def _find_turns(problem: NetworkProblem, start: float, targets: FloatArray) -> l
     moving = np.flatnonzero(ways)
     turns = moving[1:][ways[moving[1:]] != ways[moving[:-1]]]
     return [*turns.tolist(), len(targets)]
-
-
-def _limit_points(items: Iterator[PathItem], options: Options) -> Iterator[PathItem]:
-    """Yield the items of a path, at most as many points as are allowed."""
-    between = 0
-    for item in items:
-        yield item
-        between += isinstance(item, Point) and item.target < 0
-        if between > options.most_points:
-            assert isinstance(item, Point)
-            yield PathStop(WhyStopped.FULL, item.at.drive, "more points than allowed at {place}")
-            return
 
 
 def _follow(
@@ -263,9 +223,9 @@ def _follow(
             yield after
             return
         changed, before = change.piece or part, part.friction
-        part, at, sense, turned, states = after
-        yield change._replace(after=at.unstable, states=states)
-        yield from _change_others(ChosenState(part, at, sense, 1), before, change.number)
+        turned, part, at, sense = after.sense != sense, after.piece, after.at, after.sense
+        yield change._replace(after=at.unstable, states=after.n_states)
+        yield from _change_others(after._replace(n_states=1), before, change.number)
         if part.whole.mesh is not mesh:
             yield Remeshed(part.whole)
         if turned and not options.through_folds:
@@ -297,7 +257,7 @@ def _stop_at_change(end: WhyStopped, message: str, changed: PieceOfPath, change:
 
 def _turn_back(
     part: PieceOfPath, at: PathEquilibrium, sense: float
-) -> Generator[ContactChange | PathStop, None, ChosenState | None]:
+) -> Generator[ContactChange | PathStop, None, BeyondChange | None]:
     """Yield what changes where the drive turns back, and return what goes on: what slips sticks from there on."""
     chosen = choose_friction(part, at, (sense,), turns=True)
     if chosen is None:
@@ -309,14 +269,14 @@ def _turn_back(
     return chosen
 
 
-def _change_others(chosen: ChosenState, before: Mapping[int, FrictionState], changed: int) -> Iterator[ContactChange]:
+def _change_others(chosen: BeyondChange, before: Mapping[int, FrictionState], changed: int) -> Iterator[ContactChange]:
     """Yield what friction of other contacts changes with that of one, by which their rates change."""
     for number, state in chosen.piece.friction.items():
         if number in before and number != changed and before[number].sense != state.sense:
             yield _change_friction(chosen, number, chosen.at)
 
 
-def _change_friction(chosen: ChosenState, number: int, at: PathEquilibrium) -> ContactChange:
+def _change_friction(chosen: BeyondChange, number: int, at: PathEquilibrium) -> ContactChange:
     """Return the change of a contact that begins to stick or to slip with another one, or where the drive turns."""
     kind: Literal["slips", "sticks"] = "slips" if chosen.piece.friction[number].sense else "sticks"
     contact = chosen.piece.whole.mesh.contacts[number].number
@@ -417,56 +377,41 @@ def _pass_point(walk: Walk, point: Point | None) -> Walk:
     return walk._replace(number=number, branch=point.branch)
 
 
-def _enter(
-    part: PieceOfPath, change: ContactChange, sense: float
-) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool, int]:
-    """Return the piece behind a change, its start, the sense of the drive there, and whether it has turned.
-
-    Behind them stands how many states of friction are possible.
-    """
-    if change.condition is not None or part.whole.mesh.contacts[change.number].slide >= 0:
-        side = enter_side_change(part, change, sense)
-        return side if isinstance(side, PathStop) else (*side, 1)
-    begins, number = change.kind == "begins", change.number
+def _enter(part: PieceOfPath, change: ContactChange, sense: float) -> PathStop | BeyondChange:
+    """Return the piece behind a change, its start, and the sense of the drive there."""
+    number, contacts = change.number, part.whole.mesh.contacts
+    if change.condition is not None or contacts[number].slide >= 0:
+        return enter_side_change(part, change, sense)
     if change.kind in ("slips", "sticks"):
-        return _enter_friction(_mark_limit(part, change), change, sense, None)
-    closed = part.closed | {number} if begins else part.closed - {number}
-    beyond = part.with_closed(closed)
-    if not part.whole.ramp and any(part.whole.mesh.contacts[k].rub >= 0 for k in closed):
-        return _enter_friction(beyond, change, sense, number)
-    near = beyond.shrink(change.at)
-    at = beyond.own.solve(near.x, near.drive)
-    if at is None or not np.abs(at.rate).max(initial=0.0) < RIGID_RATE:
-        if not begins:
-            return PathStop(
-                WhyStopped.JUMPS, near.drive, STABILITY_LOSS_MESSAGE.format(names=beyond.say(number), what="ends")
+        state = part.stick_at(change.at, number)
+        if change.kind == "slips":  # against the tangential force
+            state = FrictionState(
+                -float(np.sign(part.whole.values(change.at.x, change.at.drive)[contacts[number].rub]))
             )
-        return PathStop(WhyStopped.BLOCKED, near.drive, BLOCKED_MESSAGE.format(names=beyond.say_all(number)))
-    whole = beyond.grow(at)
-    turned = bool(beyond.grows_along(whole, number) * sense < 0)
-    return beyond, whole, (-sense if turned else sense), turned, 1
-
-
-def _mark_limit(part: PieceOfPath, change: ContactChange) -> PieceOfPath:
-    """Return the piece without the state that ends at a change of friction: it slips against its force, or sticks."""
-    mesh, number = part.whole.mesh, change.number
-    z = part.whole.values(change.at.x, change.at.drive)
-    contact = mesh.contacts[number]
-    sticks = FrictionState(0.0, float(slip_way(mesh, contact, z).value))
-    slips = FrictionState(-float(np.sign(z[contact.rub])))
-    return replace(part, friction={**part.friction, number: slips if change.kind == "slips" else sticks})
+        settled = replace(part, friction={**part.friction, number: state})
+        return _enter_friction(settled, change, sense, None)
+    begins = change.kind == "begins"
+    beyond = part.with_closed(part.closed | {number} if begins else part.closed - {number})
+    if not part.whole.ramp and beyond.rubbing:
+        return _enter_friction(beyond, change, sense, number)
+    at, place = _start_loose(beyond, change.at), change.at.drive
+    if at is None and begins:
+        return PathStop(WhyStopped.BLOCKED, place, BLOCKED_MESSAGE.format(names=beyond.say_all(number)))
+    if at is None:
+        message = STABILITY_LOSS_MESSAGE.format(names=beyond.say(number), what="ends")
+        return PathStop(WhyStopped.JUMPS, place, message)
+    return BeyondChange(beyond, at, -sense if beyond.grows_along(at, number) * sense < 0 else sense)
 
 
 def _enter_friction(
     beyond: PieceOfPath, change: ContactChange, sense: float, changed: int | None
-) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool, int]:
+) -> PathStop | BeyondChange:
     """Return the same where a closed contact has friction."""
     settled = change.number if changed is None else None
     chosen = choose_friction(beyond, change.at, (sense, -sense), changed, settled)
     if chosen is not None:
-        return chosen.piece, chosen.at, chosen.sense, chosen.sense != sense, chosen.n_states
-    if is_jammed(beyond, change.at):
-        return PathStop(
-            WhyStopped.BLOCKED, change.at.drive, BLOCKED_MESSAGE.format(names=beyond.say_all(change.number))
-        )
+        return chosen
+    if _start_loose(beyond.stick_all(change.at), change.at) is None:
+        message = BLOCKED_MESSAGE.format(names=beyond.say_all(change.number))
+        return PathStop(WhyStopped.BLOCKED, change.at.drive, message)
     return PathStop(WhyStopped.LOST, change.at.drive, NO_FRICTION_STATE.format(names=beyond.say_rubbing()))

@@ -9,15 +9,13 @@ import numpy as np
 
 from cfmkit.elastica.contact.edges import half_thickness_of
 from cfmkit.elastica.contact.line_tangent import measure_compliances
-from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps, interpolate_line, side_states
-from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.moving_elements import with_places
-from cfmkit.elastica.mechanics.polynomials import basis
-from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps, find_lines, interpolate_line
+from cfmkit.elastica.mechanics.moving_elements import cuts_at
 from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.contact.side_gaps import ElementLines
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.contact import BeamSide
 
@@ -67,33 +65,27 @@ class PairGaps(SideGaps):
 
         Of places that are farther than `NEAR_DISTANCE` it is the nearest of those at which the beam is sampled.
         """
-        mesh, elements = self.mesh, self.partner_elements
-        moved = with_places(mesh, z)
-        e, count = moved.elements, len(z)
-        sampled = side_states(mesh, z, stage, elements, self.fractions).place.reshape(count, -1, 2)
+        lines = find_lines(self.mesh, z, stage, self.partner_elements)
+        sampled = lines.evaluate(self.fractions).place.reshape(len(z), -1, 2)
         pairs = zip(places, sampled, strict=True)  # one state after the other: together they may be too many
         nearest = np.array([((at[:, None] - line) ** 2).sum(axis=-1).argmin(axis=-1) for at, line in pairs])
         row, fraction = nearest // len(self.fractions), self.fractions[nearest % len(self.fractions)]
         place = np.take_along_axis(sampled, nearest[..., None], axis=1)
         near = np.nonzero(np.hypot(*np.moveaxis(places - place, -1, 0)) < NEAR_DISTANCE)
-        fields = energy.fields(moved, z, *stage)
-        speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, elements] / basis(mesh.degree).weights
-        slopes = np.stack([fields.slope_x[:, elements] * speed, fields.slope_y[:, elements] * speed], axis=-1)
-        lines = poses(mesh.attachments, z, e.ends[elements, 0]).place, slopes
         row[near], fraction[near], place[near] = self._approach(places[near], near[0], row[near], fraction[near], lines)
-        last = len(elements) - 1
+        last = len(self.partner_elements) - 1
         is_end = ((row == 0) & (fraction == 0)) | ((row == last) & (fraction == 1))
-        cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
-        cuts = np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, elements][np.arange(count)[:, None], row]
+        cuts = lines.cuts[np.arange(len(z))[:, None], row]
         return Feet(place, cuts[..., 0] + (cuts[..., 1] - cuts[..., 0]) * fraction, ~is_end)
 
     def _approach(
-        self, places: FloatArray, states: Any, row: Any, fraction: FloatArray, lines: tuple[Any, Any]
+        self, places: FloatArray, states: Any, row: Any, fraction: FloatArray, lines: ElementLines
     ) -> tuple[Any, FloatArray, FloatArray]:
         """Return rows of elements, fractions and places of the feet of k places (k, 2), from nearby ones (k,)."""
         last = len(self.partner_elements) - 1
         for _ in range(N_FOOT_STEPS):
-            place, tangent = interpolate_line(self.mesh.degree, fraction, *(each[states, row] for each in lines))
+            here = lines.start[states, row], lines.slope[states, row]
+            place, tangent = interpolate_line(self.mesh.degree, fraction, *here)
             step = ((places - place) * tangent).sum(axis=-1) / (tangent * tangent).sum(axis=-1)
             before, behind = (fraction + step < 0) & (row > 0), (fraction + step > 1) & (row < last)
             row = row - before + behind
@@ -102,16 +94,16 @@ class PairGaps(SideGaps):
             fraction = advanced
             if stands:
                 break
-        place, _ = interpolate_line(self.mesh.degree, fraction, *(each[states, row] for each in lines))
+        here = lines.start[states, row], lines.slope[states, row]
+        place, _ = interpolate_line(self.mesh.degree, fraction, *here)
         return row, fraction, place
 
     def find_partner_place(self, z: FloatArray, stage: LoadStage, parameter: float) -> float | None:
         """Return the parameter of the place of the other beam that is nearest in a state; None if it is an end."""
-        e = with_places(self.mesh, z[None]).elements
-        cuts = np.reshape(e.cuts if e.moved_cuts is None else e.moved_cuts[0], (-1, 2))[self.elements]
+        cuts = cuts_at(self.mesh, z)[self.elements]
         row = int(np.clip(np.searchsorted(cuts[:, 1], parameter), 0, len(cuts) - 1))
         fraction = np.array([(parameter - cuts[row, 0]) / (cuts[row, 1] - cuts[row, 0])])
-        place = side_states(self.mesh, z[None], stage, self.elements[row : row + 1], fraction).place
+        place = find_lines(self.mesh, z[None], stage, self.elements[row : row + 1]).evaluate(fraction).place
         feet = self.find_feet(place.reshape(1, 1, 2), z[None], stage)
         return float(feet.parameter[0, 0]) if feet.is_inside[0, 0] else None
 

@@ -7,12 +7,14 @@ where it is next, so that states may be interpolated.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+import itertools
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.side_gaps import LoadStage
+from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace
 from cfmkit.elastica.mechanics.elements import smooth_marks
 from cfmkit.elastica.mechanics.march import equations
@@ -22,8 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.contact.changes import PieceOfPath
-    from cfmkit.elastica.contact.side_conditions import SideCondition
+    from cfmkit.elastica.contact.conditions import Condition
+    from cfmkit.elastica.contact.piece import PieceOfPath
     from cfmkit.elastica.mechanics.problem import NetworkProblem
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
@@ -37,9 +39,18 @@ class ContactChange(NamedTuple):
     before: int
     after: int
     contact: int = -1  # in `Network.contacts`
-    condition: SideCondition | None = None  # on the side of a beam, that is met
+    condition: Condition | None = None  # on the side of a beam, that is met
     piece: PieceOfPath | None = None  # whose unknowns `at` has; None: that of the piece before
     states: int = 1  # of friction that are possible behind it
+
+
+class BeyondChange(NamedTuple):
+    """A piece behind a change, where it begins, and the sense of the drive there."""
+
+    piece: PieceOfPath
+    at: PathEquilibrium
+    sense: float
+    n_states: int = 1  # of friction that can go on that way
 
 
 class Remeshed(NamedTuple):
@@ -66,42 +77,35 @@ SAME_POINT = 1e-3  # motion by which a joined state may be corrected
 class _Slot(NamedTuple):
     """A contact of the network, and the smooth part of its beam that it is on."""
 
-    number: int
+    beam: int
     part: int
+    number: int
 
 
 def join_pieces(
     pieces: Sequence[StatesOfPiece], remesh: Callable[[tuple[FlankPlace, ...]], Discretisation]
 ) -> tuple[Discretisation, FloatArray]:
     """Return one network of elements for all pieces, and the states on it, (n, size)."""
-    beams = list(pieces[0].mesh.fits.network.beams)
-    network = pieces[0].mesh.fits.network
-    sequences = [
-        [_slot(piece.mesh, contact) for contact in piece.mesh.contacts if contact.slide >= 0] for piece in pieces
-    ]
     slots: list[_Slot] = []
-    for beam in beams:
-        common: list[_Slot] = []
-        for sequence in sequences:
-            mine = [slot for slot in sequence if network.contacts[slot.number].beam == beam]  # type: ignore[union-attr]
-            common = _common(common, mine)
-        slots += common
-    places = _places(pieces, sequences, slots)
-    if not len(slots):
+    for piece in pieces:
+        slots = _common(slots, _slots_of(piece.mesh))
+    if not slots:
         return pieces[0].mesh, np.concatenate([piece.z for piece in pieces])
+    ends = np.cumsum([0, *(len(piece.drive) for piece in pieces)]).tolist()
+    rows = [slice(*pair) for pair in itertools.pairwise(ends)]
+    used = [_match_slots(_slots_of(piece.mesh), slots) for piece in pieces]
+    places = np.full((ends[-1], len(slots)), np.nan)
+    for piece, some, numbers in zip(pieces, rows, used, strict=True):
+        for contact, slot in zip(side_contacts(piece.mesh), numbers, strict=True):
+            places[some, slot] = piece.z[:, contact.slide]
+    places = _fill_places(pieces[0].mesh, places, slots)
     mesh = remesh(tuple(FlankPlace(slot.number, place) for slot, place in zip(slots, places[0].tolist(), strict=True)))
-    states, count = np.zeros((len(places), mesh.size)), 0
-    sides = [contact for contact in mesh.contacts if contact.slide >= 0]
-    for piece, sequence in zip(pieces, sequences, strict=True):
-        used = _match_slots(sequence, slots)
-        before = [contact for contact in piece.mesh.contacts if contact.slide >= 0]
-        rows = slice(count, count + len(piece.drive))
-        joined = carry(piece.mesh, piece.z, LoadStage(piece.drive), mesh, places[rows])
-        for contact, slot in zip(before, used, strict=True):
-            joined[:, sides[slot].unknown] = np.maximum(piece.z[:, contact.unknown], 0.0)
-            joined[:, sides[slot].flag] = contact.laid
-        states[rows] = joined
-        count += len(piece.drive)
+    states, sides = np.zeros((ends[-1], mesh.size)), side_contacts(mesh)
+    for piece, some, numbers in zip(pieces, rows, used, strict=True):
+        states[some] = carry(piece.mesh, piece.z, LoadStage(piece.drive), mesh, places[some])
+        for contact, slot in zip(side_contacts(piece.mesh), numbers, strict=True):
+            states[some, sides[slot].unknown] = np.maximum(piece.z[:, contact.unknown], 0.0)
+            states[some, sides[slot].flag] = contact.laid
     return mesh, _correct_states(mesh, states, np.concatenate([piece.drive for piece in pieces]))
 
 
@@ -116,10 +120,14 @@ def _correct_states(mesh: Discretisation, states: FloatArray, drives: FloatArray
     return joined
 
 
-def _slot(mesh: Discretisation, contact: Any) -> _Slot:
-    name = contact.item.beam
-    marks = smooth_marks(mesh.fits.network.beams[name], mesh.fits[name])
-    return _Slot(contact.number, int(np.searchsorted(marks, mesh.elements.cuts[contact.element, 1])))
+def _slots_of(mesh: Discretisation) -> list[_Slot]:
+    slots, names = list[_Slot](), list(mesh.fits.network.beams)
+    for contact in side_contacts(mesh):
+        beam: str = contact.item.beam  # type: ignore[union-attr]
+        marks = smooth_marks(mesh.fits.network.beams[beam], mesh.fits[beam])
+        part = int(np.searchsorted(marks, mesh.elements.cuts[contact.element, 1]))
+        slots.append(_Slot(names.index(beam), part, contact.number))
+    return slots
 
 
 def _common(first: list[_Slot], second: list[_Slot]) -> list[_Slot]:
@@ -133,9 +141,7 @@ def _common(first: list[_Slot], second: list[_Slot]) -> list[_Slot]:
                 best[i, j] = [first[i], *best[i + 1, j + 1]]
             else:
                 ways = [first[i], *best[i + 1, j]], [second[j], *best[i, j + 1]]
-                best[i, j] = min(
-                    ways, key=lambda sequence_tail: (len(sequence_tail), [slot.part for slot in sequence_tail])
-                )
+                best[i, j] = min(ways, key=lambda tail: (len(tail), [slot[:2] for slot in tail]))
     return best[0, 0]
 
 
@@ -149,33 +155,17 @@ def _match_slots(sequence: list[_Slot], slots: list[_Slot]) -> list[int]:
     return joined
 
 
-def _places(pieces: Sequence[StatesOfPiece], sequences: list[list[_Slot]], slots: list[_Slot]) -> FloatArray:
-    """Return the place of every slot in every state, (n, slots)."""
-    total = sum(len(piece.drive) for piece in pieces)
-    closed_places = np.full((total, len(slots)), np.nan)
-    count = 0
-    for piece, sequence in zip(pieces, sequences, strict=True):
-        rows = slice(count, count + len(piece.drive))
-        for contact, slot in zip(
-            (contact for contact in piece.mesh.contacts if contact.slide >= 0),
-            _match_slots(sequence, slots),
-            strict=True,
-        ):
-            closed_places[rows, slot] = piece.z[:, contact.slide]
-        count += len(piece.drive)
-    joined = closed_places.copy()
+def _fill_places(mesh: Discretisation, known: FloatArray, slots: list[_Slot]) -> FloatArray:
+    """Return the place of every slot in every state, from known ones (n, slots): nan where it is open."""
+    joined, total = known.copy(), len(known)
     for slot in range(len(slots)):
-        at = np.flatnonzero(np.isfinite(closed_places[:, slot]))
-        joined[:, slot] = np.interp(np.arange(total), at, closed_places[at, slot])
-    network, fits = pieces[0].mesh.fits.network, pieces[0].mesh.fits
-    for beam in network.beams:
-        mine = [k for k, slot in enumerate(slots) if network.contacts[slot.number].beam == beam]  # type: ignore[union-attr]
-        if mine:
-            marks = smooth_marks(network.beams[beam], fits[beam])
-            for row in range(total):
-                joined[row, mine] = _place_between(
-                    closed_places[row, mine], joined[row, mine], [slots[k].part for k in mine], marks
-                )
+        at = np.flatnonzero(np.isfinite(known[:, slot]))
+        joined[:, slot] = np.interp(np.arange(total), at, known[at, slot])
+    for number, (name, beam) in enumerate(mesh.fits.network.beams.items()):
+        mine = [k for k, slot in enumerate(slots) if slot.beam == number]
+        parts, marks = [slots[k].part for k in mine], smooth_marks(beam, mesh.fits[name]) if mine else []
+        for row in range(total if mine else 0):
+            joined[row, mine] = _place_between(known[row, mine], joined[row, mine], parts, marks)
     return joined
 
 

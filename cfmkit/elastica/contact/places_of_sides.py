@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.elastica.contact.conditions import NEW_PLACE, PAD_OF_SIDE, ROUNDING_OF_KIND
 from cfmkit.elastica.contact.edges import find_mate
 from cfmkit.elastica.contact.pair_gaps import PairGaps
-from cfmkit.elastica.contact.side_conditions import NEW_PLACE, PAD_OF_SIDE, ROUNDING_OF_KIND
 from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
@@ -21,8 +21,8 @@ from cfmkit.elastica.model.shapes import Polynomial
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.contact.changes import PieceOfPath
-    from cfmkit.elastica.contact.side_conditions import SideCondition
+    from cfmkit.elastica.contact.conditions import Condition
+    from cfmkit.elastica.contact.piece import PieceOfPath
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.contact import BeamSide
     from cfmkit.numerics.continuation.problem import PathEquilibrium
@@ -80,17 +80,16 @@ def guess_laid(mesh: Discretisation, z: FloatArray, element: int, tension: float
 
 def presses(piece: PieceOfPath, at: PathEquilibrium) -> bool:
     """Return True if everything that lies on an obstacle presses on it."""
-    whole, count = piece.grow(at), len(piece.whole.mesh.contacts)
-    rows = [count + k for k, contact in enumerate(piece.sides.all) if contact.kind == "pulls"]
+    whole, rows = piece.grow(at), piece.conditions.rows_of("pulls")
     return all(piece.row_value(whole, row) > -ROUNDING_OF_KIND["pulls"] for row in rows)
 
 
 def find_nearest_places(
-    piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium, parameter: float
+    piece: PieceOfPath, condition: Condition, at: PathEquilibrium, parameter: float
 ) -> list[FlankPlace]:
     """Return the place at which a side is nearest, of two beams that of each; none where one is an end."""
     places = [FlankPlace(condition.number, parameter)]
-    gaps = piece.sides.gaps_of(condition.item)
+    gaps = piece.conditions.gaps_of(condition.item)
     if isinstance(gaps, PairGaps):
         stage = LoadStage.from_problem(piece.whole, np.array([at.drive]))
         on_partner = gaps.find_partner_place(piece.whole.values(at.x, at.drive), stage, parameter)
@@ -107,7 +106,7 @@ def find_partner(piece: PieceOfPath, number: int) -> int:
     return items.index(partner)
 
 
-def find_pads_at(piece: PieceOfPath, condition: SideCondition, end: float) -> list[int]:
+def find_pads_at(piece: PieceOfPath, condition: Condition, end: float) -> list[int]:
     """Return the numbers of the pads of the node at the end of a beam that is near, on what the side may touch.
 
     They are numbers in the arrays; of pads on beams, which are there only while they touch, in `Network.contacts`.

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import PieceOfPath
+from cfmkit.elastica.contact.beam_lines import find_end
+from cfmkit.elastica.contact.conditions import NEW_PLACE, step_inwards
 from cfmkit.elastica.contact.edges import find_mate
 from cfmkit.elastica.contact.line_tangent import KINK_REACH
-from cfmkit.elastica.contact.path_items import ContactChange
+from cfmkit.elastica.contact.path_items import BeyondChange, ContactChange
 from cfmkit.elastica.contact.places_of_sides import (
     find_nearest_places,
     find_pads_at,
@@ -26,16 +27,16 @@ from cfmkit.elastica.contact.places_of_sides import (
     presses_where_it_spreads,
     why_not_laid,
 )
-from cfmkit.elastica.contact.side_conditions import NEW_PLACE, step_inwards
 from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.mechanics.discretise import FlankPlace
-from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, NodeOnBeam, describe
 from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.contact.side_conditions import SideCondition
+    from cfmkit.elastica.contact.conditions import Condition
+    from cfmkit.elastica.contact.piece import PieceOfPath
     from cfmkit.elastica.contact.step_between import StepBetween
+    from cfmkit.elastica.model.contact import Contact
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 BESIDE_SHARE = 0.05  # of a step, by which a located change may lie beside it
@@ -54,50 +55,62 @@ NO_WAY = "no equilibrium was found behind the change of the contact of {names} a
 
 def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> ContactChange | PathStop | None:
     """Return where a condition on a side is first violated within a step; None if that is not found."""
-    condition = piece.sides.all[row - len(piece.whole.mesh.contacts)]
-    unstable = step.first.unstable
+    condition, unstable = piece.conditions.all[row], step.first.unstable
     if condition.kind == "touch":
         return _locate_touch(piece, step, row, condition)
     at = _locate_zero(piece, step, row)
     if at is None:
         return None
     if condition.kind == "tangent" and _is_parallel(piece, condition, at):
-        return PathStop(WhyStopped.LOST, at.drive, MEETS_WHOLE.format(names=describe(condition.item)))
+        return _stop_lost(at, MEETS_WHOLE, condition.item)
     if condition.kind == "pinch":
-        return PathStop(WhyStopped.LOST, at.drive, CONTACTS_MEET.format(beam=condition.item.beam))
-    number = _side_number(piece, condition)
-    if condition.kind in ("wraps", "pulls"):
-        number = condition.number if condition.kind == "wraps" else number
-        kind_of_lie: Literal["spreads", "closes"] = "spreads" if condition.kind == "wraps" else "closes"
-        return ContactChange(kind_of_lie, condition.number, at, unstable, unstable, number, condition)
-    if condition.kind in ("tangent", "spreads"):
-        kind: Literal["moves", "spreads"] = "moves" if condition.kind == "tangent" else "spreads"
+        return _stop_lost(at, CONTACTS_MEET, condition.item, beam=condition.item.beam)
+    items = piece.whole.mesh.fits.network.contacts
+    number = next(k for k, item in enumerate(items) if item is condition.item)
+    if condition.kind in ("wraps", "pulls", "tangent", "spreads"):
+        kinds: dict[str, Literal["spreads", "closes", "moves"]] = {"pulls": "closes", "tangent": "moves"}
+        kind = kinds.get(condition.kind, "spreads")
         return ContactChange(kind, condition.number, at, unstable, unstable, number, condition)
-    if condition.kind == "end" and condition.mark in (0.0, 1.0) and condition.last in piece.sides.roots(condition.item):
-        beyond = piece.with_flanks(list_remaining_places(piece, condition.number), piece.closed - {condition.number})
-        begin, wanted = piece.carry(at, beyond), ("wraps", condition.last)
-    elif condition.kind == "end":
-        onto = _move_onto_node(piece, condition, at)
-        if onto is None:
-            return PathStop(WhyStopped.LOST, at.drive, REACHES_MARK.format(
-                names=piece.say(condition.number), mark=_mark(piece, condition)))  # fmt: skip
-        beyond = onto
-        begin, wanted = _pass_force_on(piece, at, beyond, condition.number), ("tangent", condition.last)
+    beyond = _enter_neighbour(piece, condition, at)
+    if beyond is None:
+        item = piece.whole.mesh.contacts[condition.number].item
+        return _stop_lost(at, REACHES_MARK, item, mark=_mark(piece, condition))
+    wanted = _opposite(beyond, condition)
+    if wanted[0] == "wraps":
+        begin = piece.carry(at, beyond)
     else:
-        beyond = _join_contacts(piece, condition, at)
-        begin, wanted = _pass_force_on(piece, at, beyond, condition.number, condition.number + 1), ("spreads", False)
-    exact = _zero_of(beyond, begin, _find(beyond, condition, wanted))
+        left = (condition.number, condition.number + 1) if condition.kind == "closes" else (condition.number,)
+        begin = _pass_force_on(piece, at, beyond, *left)
+    exact = _zero_of(beyond, begin, beyond.conditions.find_row(wanted[0], condition.item, wanted[1]))
     if exact is None:
         return None
-    kind_of: Literal["moves", "closes"] = "moves" if wanted[0] == "tangent" else "closes"
-    return ContactChange(kind_of, condition.number, exact, unstable, unstable, number, condition, beyond)
+    change: Literal["moves", "closes"] = "moves" if wanted[0] == "tangent" else "closes"
+    return ContactChange(change, condition.number, exact, unstable, unstable, number, condition, beyond)
 
 
-def _side_number(piece: PieceOfPath, condition: SideCondition) -> int:
-    return next(k for k, item in enumerate(piece.whole.mesh.fits.network.contacts) if item is condition.item)
+def _enter_neighbour(piece: PieceOfPath, condition: Condition, at: PathEquilibrium) -> PieceOfPath | None:
+    """Return the piece behind a contact that reaches an end of its beam, or another one; None if there is none."""
+    if condition.kind == "closes":
+        return _join_contacts(piece, condition, at)
+    if condition.mark in (0.0, 1.0) and condition.last in piece.conditions.roots(condition.item):
+        return piece.with_flanks(list_remaining_places(piece, condition.number), piece.closed - {condition.number})
+    return _move_onto_node(piece, condition, at)
 
 
-def _mark(piece: PieceOfPath, condition: SideCondition) -> str:
+def _opposite(beyond: PieceOfPath, condition: Condition) -> tuple[str, bool | None]:
+    """Return kind and end of the condition that is met from the other side of a change."""
+    if condition.kind == "closes":
+        return "spreads", None
+    rooted = condition.last in beyond.conditions.roots(condition.item)
+    return ("wraps" if rooted and condition.mark in (0.0, 1.0) else "tangent"), condition.last
+
+
+def _stop_lost(at: PathEquilibrium, message: str, item: Contact, **words: str) -> PathStop:
+    """Return the end of a path at an equilibrium that contact does not let it pass."""
+    return PathStop(WhyStopped.LOST, at.drive, message.format(names=describe(item), **words))
+
+
+def _mark(piece: PieceOfPath, condition: Condition) -> str:
     """Return what a contact has come to."""
     beam = piece.whole.mesh.fits.network.beams[condition.item.beam]
     if condition.mark in (0.0, 1.0):
@@ -106,47 +119,42 @@ def _mark(piece: PieceOfPath, condition: SideCondition) -> str:
 
 
 def _locate_touch(
-    piece: PieceOfPath, step: StepBetween, row: int, condition: SideCondition
+    piece: PieceOfPath, step: StepBetween, row: int, condition: Condition
 ) -> ContactChange | PathStop | None:
     """Return where a side begins to touch."""
-    share = step.crossing(row)
+    share, unstable = step.crossing(row), step.first.unstable
     if share is None:
         return None
-    x, drive = step.interpolate(share)
-    guess = step.first._replace(x=x, drive=float(drive))
+    guess = step.guess(share)
     if _is_parallel(piece, condition, guess):
-        return PathStop(WhyStopped.LOST, guess.drive, MEETS_WHOLE.format(names=describe(condition.item)))
+        return _stop_lost(guess, MEETS_WHOLE, condition.item)
     for _ in range(2):
         stage = LoadStage.from_problem(piece.whole, np.array([guess.drive]))
-        least = piece.sides.gaps_of(condition.item).find_least(piece.whole.values(guess.x, guess.drive), stage)
+        least = piece.conditions.gaps_of(condition.item).find_least(piece.whole.values(guess.x, guess.drive), stage)
         if _is_beside_kink(piece, condition, guess, least.parameter):
-            why = why_not_laid(piece, condition.item)
-            return PathStop(
-                WhyStopped.LOST, guess.drive, SPREADS_MESSAGE.format(names=describe(condition.item), why=why)
-            )
+            return _stop_lost(guess, SPREADS_MESSAGE, condition.item, why=why_not_laid(piece, condition.item))
         between = _contact_around(piece, condition, least.parameter)
         if between is not None:
-            at = step.bisect(row)
-            return None if at is None else ContactChange(
-                "spreads", between, at, step.first.unstable, step.first.unstable, condition.number,
-                condition._replace(kind="lies", number=between))  # fmt: skip
-        if isinstance(condition.item, BeamOnBeam) and any(
-            contact.number == condition.number for contact in piece.whole.mesh.contacts
-        ):
-            return PathStop(WhyStopped.LOST, guess.drive, TOUCHES_TWICE.format(names=describe(condition.item)))
+            at, lies = step.bisect(row), condition._replace(kind="lies", number=between)
+            number = condition.number
+            return None if at is None else ContactChange("spreads", between, at, unstable, unstable, number, lies)
+        if isinstance(condition.item, BeamOnBeam) and condition.number in {
+            contact.number for contact in piece.whole.mesh.contacts
+        }:
+            return _stop_lost(guess, TOUCHES_TWICE, condition.item)
         places = find_nearest_places(piece, condition, guess, least.parameter)
         if places:
             beyond = piece.with_flanks([*piece.flanks, *places], piece.closed)
-            begin_guess = beyond.shrink(piece.carry(guess, beyond))
-            number = _new_side(piece, beyond, condition.number, least.parameter)
-            border = np.zeros(len(begin_guess.x) + 1)
-            border[beyond.slot_in_own(number)] = 1.0
-            state = beyond.own.equations.solve(begin_guess.x, begin_guess.drive, border, 0.0)
-            if state is not None and np.isfinite(state.rate).all():
-                at = beyond.grow(begin_guess._replace(x=state.x, drive=state.drive, rate=state.rate))
+            begin = piece.carry(guess, beyond)
+            number = _new_side(beyond, condition.number, least.parameter)
+            slot = beyond.slot_in_own(number)
+            state = beyond.solve_at_level(begin, {slot: 1.0}, 0.0)
+            if state is not None:
+                x = np.array(state.x)
+                x[slot] = 0.0  # but for rounding
+                at = beyond.grow(beyond.shrink(begin)._replace(x=x, drive=state.drive, rate=state.rate))
                 if -BESIDE_SHARE <= step.share_of(at, beyond) <= 1 + BESIDE_SHARE:
-                    return ContactChange("begins", number, at, step.first.unstable, step.first.unstable,
-                                         condition.number, condition, beyond)  # fmt: skip
+                    return ContactChange("begins", number, at, unstable, unstable, condition.number, condition, beyond)
         elif isinstance(condition.item, BeamOnBeam) or find_pads_at(piece, condition, least.parameter):
             return None  # it is the node that begins to touch
         closer = step.bisect(row)
@@ -154,11 +162,11 @@ def _locate_touch(
             return None
         guess = closer
     if isinstance(condition.item, NodeOnBeam) and not 0.5 * NEW_PLACE < least.parameter < 1 - 0.5 * NEW_PLACE:
-        return PathStop(WhyStopped.LOST, guess.drive, MEETS_END.format(names=describe(condition.item)))
+        return _stop_lost(guess, MEETS_END, condition.item)
     return None
 
 
-def _is_beside_kink(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium, parameter: float) -> bool:
+def _is_beside_kink(piece: PieceOfPath, condition: Condition, at: PathEquilibrium, parameter: float) -> bool:
     """Return True if a place is near where the same touches, in a beam that shears: it lies there."""
     mesh, z, beam = piece.whole.mesh, piece.whole.values(at.x, at.drive), condition.item.beam
     section = mesh.fits.network.beams[beam].section
@@ -167,19 +175,19 @@ def _is_beside_kink(piece: PieceOfPath, condition: SideCondition, at: PathEquili
     return section.shear and any(abs(place - parameter) < near for place in places)
 
 
-def _is_parallel(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> bool:
+def _is_parallel(piece: PieceOfPath, condition: Condition, at: PathEquilibrium) -> bool:
     stage = LoadStage.from_problem(piece.whole, np.array([at.drive]))
-    return piece.sides.gaps_of(condition.item).is_parallel(piece.whole.values(at.x, at.drive), stage)
+    return piece.conditions.gaps_of(condition.item).is_parallel(piece.whole.values(at.x, at.drive), stage)
 
 
-def _new_side(piece: PieceOfPath, beyond: PieceOfPath, number: int, parameter: float) -> int:
+def _new_side(beyond: PieceOfPath, number: int, parameter: float) -> int:
     """Return the number in the arrays of a contact at a place."""
     mesh = beyond.whole.mesh
     sides = [k for k, contact in enumerate(mesh.contacts) if contact.slide >= 0 and contact.number == number]
     return min(sides, key=lambda k: abs(mesh.elements.cuts[mesh.contacts[k].element, 1] - parameter))
 
 
-def _move_onto_node(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> PieceOfPath | None:
+def _move_onto_node(piece: PieceOfPath, condition: Condition, at: PathEquilibrium) -> PieceOfPath | None:
     """Return the piece in which the node at the end of a beam touches instead of its side; None if none may."""
     pads = find_pads_at(piece, condition, 1.0 if condition.last else 0.0)
     if not pads or condition.mark not in (0.0, 1.0):
@@ -192,7 +200,7 @@ def _move_onto_node(piece: PieceOfPath, condition: SideCondition, at: PathEquili
     return piece.with_flanks(left, (piece.closed - {condition.number}) | {pads[0]})
 
 
-def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: float) -> int | None:
+def _contact_around(piece: PieceOfPath, condition: Condition, parameter: float) -> int | None:
     """Return the contact at an end of a free part of a side between two contacts.
 
     One of these may be a clamped end on the obstacle. None if the part may touch at a point: a straight beam at a
@@ -203,7 +211,7 @@ def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: flo
     sides = [(k, mesh.contacts[k]) for k in of_beam]
     before = [k for k, contact in sides if mesh.elements.cuts[contact.element, 1] < parameter]
     after = [k for k, contact in sides if mesh.elements.cuts[contact.element, 1] > parameter]
-    roots = piece.sides.roots(item)
+    roots = piece.conditions.roots(item)
     if not may_lie(piece, item, parameter):
         return None
     if before and after:
@@ -216,7 +224,7 @@ def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: flo
     return None
 
 
-def _join_contacts(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> PieceOfPath:
+def _join_contacts(piece: PieceOfPath, condition: Condition, at: PathEquilibrium) -> PieceOfPath:
     """Return the piece in which two contacts are one."""
     z, mesh = piece.whole.values(at.x, at.drive), piece.whole.mesh
     pair = mesh.contacts[condition.number], mesh.contacts[condition.number + 1]
@@ -235,18 +243,6 @@ def _pass_force_on(piece: PieceOfPath, at: PathEquilibrium, beyond: PieceOfPath,
     n_forces = sum(not isinstance(contact.item, BeamOnBeam) or contact.item.leads for contact in idle)
     full[[contact.unknown for contact in idle]] = force / max(n_forces, 1)
     return begin_guess._replace(x=full[mesh.free])
-
-
-def _find(beyond: PieceOfPath, condition: SideCondition, wanted: tuple[str, bool]) -> int:
-    """Return the row of a condition on the same side."""
-    kind, last = wanted
-    sided = kind in ("tangent", "wraps")
-    rows = (
-        k
-        for k, row in enumerate(beyond.sides.all)
-        if row.kind == kind and row.item is condition.item and not (sided and row.last != last)
-    )
-    return len(beyond.whole.mesh.contacts) + next(rows)
 
 
 def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquilibrium | None:
@@ -281,9 +277,9 @@ def _locate_zero(piece: PieceOfPath, step: StepBetween, row: int) -> PathEquilib
     """Return the equilibrium of a step at which a condition is just met: by secants, else by bisection."""
     share = step.crossing(row)
     if share is not None:
-        guess, drive = step.interpolate(share)
-        at = _zero_of(piece, step.first._replace(x=guess, drive=float(drive)), row)
-        if at is not None and step.contains(at, guess):
+        guess = step.guess(share)
+        at = _zero_of(piece, guess, row)
+        if at is not None and step.contains(at, guess.x):
             return at
     return step.bisect(row)
 
@@ -296,65 +292,52 @@ def row_rate(piece: PieceOfPath, at: PathEquilibrium, row: int) -> float:
     return (ahead - behind) / (2 * step)
 
 
-def enter_side_change(
-    piece: PieceOfPath, change: ContactChange, sense: float
-) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool]:
-    """Return the piece behind a change of a side, its start, the sense of the drive, and whether it has turned."""
+def enter_side_change(piece: PieceOfPath, change: ContactChange, sense: float) -> PathStop | BeyondChange:
+    """Return the piece behind a change of a side, its start, and the sense of the drive there."""
     condition = change.condition
     if condition is not None and condition.kind in ("wraps", "spreads", "lies"):
         why = why_not_laid(piece, condition.item)
-        curved = condition.kind == "wraps" or may_lie(piece, condition.item, 0.5)
-        if why and curved:
-            text = BEGINS_TO_LIE if isinstance(condition.item, BeamOnObstacle) else SPREADS_MESSAGE
-            text = text.format(names=describe(condition.item), why=why)
-            return PathStop(WhyStopped.LOST, change.at.drive, text)
-    if condition is None:  # a contact of a side ends
-        item = piece.whole.mesh.contacts[change.number]
-        beyond = piece.with_flanks(list_remaining_places(piece, change.number), piece.closed - {change.number})
-        begin_guess = beyond.shrink(piece.carry(change.at, beyond))
-        at = beyond.own.solve(begin_guess.x, begin_guess.drive)
-        if at is None:
-            return _stop_lost(piece, change)
-        number = item.number
-        if isinstance(item.item, BeamOnBeam) and not item.item.leads:
-            number = find_partner(piece, number)
-        row = len(beyond.whole.mesh.contacts) + next(
-            k for k, contact in enumerate(beyond.sides.all) if contact.kind == "touch" and contact.number == number
-        )
-        whole = beyond.grow(at)
-        grows = row_rate(beyond, whole, row)
-    elif change.piece is not None:  # begins, moves onto a node, joins another
-        beyond = change.piece
-        begin_guess = beyond.shrink(change.at)
-        at = beyond.own.solve(begin_guess.x, begin_guess.drive)
-        if at is None:
-            return _stop_lost(piece, change)
-        whole = beyond.grow(at)
-        if condition.kind == "touch":
-            grows = beyond.grows_along(whole, change.number)
-        else:
-            wanted = ("spreads", False)
-            if condition.kind == "end":
-                rooted = condition.last in beyond.sides.roots(condition.item)
-                wanted = ("wraps" if rooted else "tangent", condition.last)
-            grows = row_rate(beyond, whole, _find(beyond, condition, wanted))
+        if why and (condition.kind == "wraps" or may_lie(piece, condition.item, 0.5)):
+            message = BEGINS_TO_LIE if isinstance(condition.item, BeamOnObstacle) else SPREADS_MESSAGE
+            return _stop_lost(change.at, message, condition.item, why=why)
+    if condition is None:
+        entered = _end_contact(piece, change)
+    elif change.piece is not None:
+        entered = _enter_located(change, condition, change.piece)
     else:
         ways = {"tangent": _move_into_beam, "spreads": _part_contact, "wraps": _lie_from_root}
-        part = ways[condition.kind](piece, change) if condition.kind in ways else _lay(piece, change, sense)
-        if part is None:
-            return _stop_lost(piece, change)
-        beyond, whole, grows = part
-    turned = bool(grows * sense < 0)
-    return beyond, whole, (-sense if turned else sense), turned
+        entered = ways[condition.kind](piece, change) if condition.kind in ways else _lay(piece, change, sense)
+    if entered is None:
+        return _stop_lost(change.at, NO_WAY, piece.whole.mesh.fits.network.contacts[change.contact])
+    beyond, at, grows = entered
+    return BeyondChange(beyond, at, -sense if grows * sense < 0 else sense)
 
 
-def _stop_lost(piece: PieceOfPath, change: ContactChange) -> PathStop:
-    """Return the end of a path behind whose change nothing was found."""
-    names = piece.say(change.number) if change.piece is None else change.piece.say(min(change.number, 0))
-    return PathStop(WhyStopped.LOST, change.at.drive, NO_WAY.format(names=names))
+def _end_contact(piece: PieceOfPath, change: ContactChange) -> Entered | None:
+    """Return the piece in which a contact of a side has ended, and how its gap grows."""
+    contact = piece.whole.mesh.contacts[change.number]
+    beyond = piece.with_flanks(list_remaining_places(piece, change.number), piece.closed - {change.number})
+    at = beyond.solve_near(piece.carry(change.at, beyond))
+    if at is None:
+        return None
+    item = contact.item
+    if isinstance(item, BeamOnBeam) and not item.leads:
+        item = piece.whole.mesh.fits.network.contacts[find_partner(piece, contact.number)]
+    return beyond, at, row_rate(beyond, at, beyond.conditions.find_row("touch", item))
 
 
-Entered = tuple[PieceOfPath, "PathEquilibrium", float]
+def _enter_located(change: ContactChange, condition: Condition, beyond: PieceOfPath) -> Entered | None:
+    """Return the piece in which a side begins to touch, moves onto a node or joins another one, and how that grows."""
+    at = beyond.solve_near(change.at)
+    if at is None:
+        return None
+    if condition.kind == "touch":
+        return beyond, at, beyond.grows_along(at, change.number)
+    kind, last = _opposite(beyond, condition)
+    return beyond, at, row_rate(beyond, at, beyond.conditions.find_row(kind, condition.item, last))
+
+
+Entered = tuple["PieceOfPath", "PathEquilibrium", float]
 
 
 def _move_into_beam(piece: PieceOfPath, change: ContactChange) -> Entered | None:
@@ -367,10 +350,10 @@ def _move_into_beam(piece: PieceOfPath, change: ContactChange) -> Entered | None
         left = tuple(list_remaining_places(piece, change.number))
         new.append(FlankPlace(find_partner(piece, change.contact), float(z[pad.slide])))
     beyond = piece.with_flanks([*left, *new], piece.closed - {change.number})
-    number = _new_side(piece, beyond, change.contact, place)
+    number = _new_side(beyond, change.contact, place)
     begin = _pass_force_on(piece, change.at, beyond, change.number)
     slide = beyond.slot_in_own(number, slide=True)
-    at = _solve_at_level(beyond, begin, {slide: 1.0}, place)
+    at = beyond.solve_at_level(begin, {slide: 1.0}, place)
     if at is None:
         return None
     return beyond, beyond.grow(at), float(at.rate[slide]) * (-1.0 if condition.last else 1.0)
@@ -390,7 +373,7 @@ def _part_contact(piece: PieceOfPath, change: ContactChange, free: bool = False)
     lies = lies and not free
     both = [FlankPlace(change.contact, middle + side * NEW_PLACE, int(lies and side < 0)) for side in (-1.0, 1.0)]
     beyond = piece.with_flanks([*list_remaining_places(piece, change.number), *both], piece.closed)
-    first, last = (_new_side(piece, beyond, change.contact, contact.parameter) for contact in both)
+    first, last = (_new_side(beyond, change.contact, contact.parameter) for contact in both)
     begin = _pass_force_on(piece, change.at, beyond, change.number)
     new = beyond.whole.mesh
     full = beyond.whole.values(begin.x, begin.drive)
@@ -401,7 +384,7 @@ def _part_contact(piece: PieceOfPath, change: ContactChange, free: bool = False)
         guess_laid(new, full, new.contacts[last].element, float(force @ [np.cos(angle), np.sin(angle)]))
     begin = begin._replace(x=full[new.free])
     low, high = (beyond.slot_in_own(number, slide=True) for number in (first, last))
-    at = _solve_at_level(beyond, begin, {high: 1.0, low: -1.0}, 2 * NEW_PLACE)
+    at = beyond.solve_at_level(begin, {high: 1.0, low: -1.0}, 2 * NEW_PLACE)
     if lies and (at is None or not presses(beyond, at)):
         return _part_contact(piece, change, free=True)
     return None if at is None else (beyond, beyond.grow(at), float(at.rate[high] - at.rate[low]))
@@ -411,28 +394,22 @@ def _lie_from_root(piece: PieceOfPath, change: ContactChange, free: bool = False
     """Return the piece in which a side lies from a clamped end on, or touches beside it, and how that grows."""
     condition: Any = change.condition
     mesh, z, item = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive), condition.item
-    side_contact = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
-    element, end = (side_contact[-1], 1) if condition.last else (side_contact[0], 0)
-    angle = float(np.real(mesh.fits[item.beam].angle(float(end), 0.5))) + float(
-        z[mesh.elements.unknowns[element, 3 + 4 * end]]
-    )
-    force = z[mesh.elements.unknowns[element, -2:]]
-    place = poses(mesh.attachments, z, [int(mesh.elements.ends[element, end])]).place[0]
-    place = step_inwards(item, place, angle, condition.last)
+    element, angle, place = find_end(mesh, item.beam, condition.last, z)
+    force, place = z[mesh.elements.unknowns[element, -2:]], step_inwards(item, place, angle, condition.last)
     lies = presses_where_it_spreads(piece, item, place, force, angle) and not free
     first = FROM_ROOT if lies else BESIDE_ROOT
     parameter, laid = (1 - first, 1) if condition.last else (first, -1)
     beyond = piece.with_flanks(
         [*piece.flanks, FlankPlace(change.contact, parameter, laid if lies else 0)], piece.closed
     )
-    number = _new_side(piece, beyond, change.contact, parameter)
+    number = _new_side(beyond, change.contact, parameter)
     begin, new = piece.carry(change.at, beyond), beyond.whole.mesh
     full = beyond.whole.values(begin.x, begin.drive)
     if lies:
         at = new.contacts[number].element + (laid > 0)
         guess_laid(new, full, at, float(force @ [np.cos(angle), np.sin(angle)]))
     slide = beyond.slot_in_own(number, slide=True)
-    solved = _solve_at_level(beyond, begin._replace(x=full[new.free]), {slide: 1.0}, parameter)
+    solved = beyond.solve_at_level(begin._replace(x=full[new.free]), {slide: 1.0}, parameter)
     if lies and (solved is None or not presses(beyond, solved)):
         return _lie_from_root(piece, change, free=True)
     if solved is None:
@@ -446,9 +423,9 @@ def _lay(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | N
     mesh, z = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive)
     contact = mesh.contacts[change.number]
     item: Any = contact.item
-    sides = [k for k, contact in enumerate(mesh.contacts) if contact.slide >= 0 and contact.item.beam == item.beam]  # type: ignore[union-attr]
+    sides = piece.sides_of(item.beam)
     if condition.kind == "lies":
-        laid = -1 if change.number == sides[0] and False in piece.sides.roots(item) else 1
+        laid = -1 if change.number == sides[0] and False in piece.conditions.roots(item) else 1
         laid = laid if laid < 0 or change.number == sides[-1] or change.number + 1 in sides else -1
     else:
         laid = contact.laid
@@ -468,16 +445,3 @@ def _lay(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | N
         full[new.elements.unknowns[element, -2:]] = z[side_contact[-2]] * along
     at = beyond.own.solve(full[new.free][beyond.own_mask], change.at.drive)
     return None if at is None else (beyond, beyond.grow(at), sense)
-
-
-def _solve_at_level(piece: PieceOfPath, begin: PathEquilibrium, row: dict[int, float], level: float) -> Any:
-    """Return the equilibrium of a piece at which a combination of its unknowns has a value."""
-    begin_guess = piece.shrink(begin)
-    border = np.zeros(len(begin_guess.x) + 1)
-    for slot, factor in row.items():
-        border[slot] = factor
-    state = piece.own.equations.solve(begin_guess.x, begin_guess.drive, border, level)
-    if state is None or not np.isfinite(state.rate).all():
-        return None
-    return begin_guess._replace(x=state.x, drive=state.drive, rate=state.rate, unstable=state.unstable,
-                         effort=state.effort)  # fmt: skip

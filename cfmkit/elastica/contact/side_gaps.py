@@ -45,7 +45,8 @@ class SideStates(NamedTuple):
     place: Any  # (n, m, k, 2)
     turn: Any  # rotation from rest
     angle: Any  # of the tangent
-    ahead: Any  # arc length to the end of the element
+    behind: Any  # arc length from the start of the element
+    ahead: Any  # to its end
     parameter: Any
     slope: Any  # (n, m, k, 2) of the middle line, by the unloaded arc length
 
@@ -75,30 +76,51 @@ class LoadStage(NamedTuple):
         return LoadStage(self.drive[some], self.share if np.isscalar(self.share) else self.share[some])
 
 
-def side_states(
-    mesh: Discretisation, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray
-) -> SideStates:
-    """Return the states at fractions (k,) of elements (m,) in n states (n, size); contacts stand at their places."""
+class ElementLines(NamedTuple):
+    """Lines of m elements in n states, from which states at any of their places are evaluated; q Gauss points."""
+
+    start: FloatArray  # (n, m, 2)
+    slope: FloatArray  # (n, m, q, 2) of the middle line, by the place along the element
+    speed: FloatArray  # (n, m, q) unloaded arc length by the place along the element
+    angle: FloatArray  # (n, m, q) unloaded
+    rotation: FloatArray  # (n, m, degree + 1)
+    cuts: FloatArray  # (n, m, 2)
+
+    def evaluate(self, fractions: FloatArray) -> SideStates:
+        """Return the states at fractions of the elements, (k,) of all or (n, m, k)."""
+        at = _rows_at(self.rotation.shape[-1] - 1, fractions)
+        behind, turn = _apply(at.integrals, self.speed), _apply(at.values, self.rotation)
+        low, high = self.cuts[..., :1], self.cuts[..., 1:]
+        return SideStates(
+            self.start[:, :, None] + at.integrals @ self.slope,
+            turn,
+            _apply(at.interpolation, self.angle) + turn,
+            behind,
+            self.speed @ basis(self.rotation.shape[-1] - 1).weights[:, None] - behind,
+            low + (high - low) * fractions,
+            at.interpolation @ (self.slope / self.speed[..., None]),
+        )
+
+
+def _apply(rows: FloatArray, values: FloatArray) -> Any:
+    """Return rows (..., k, q) times values (..., q), (..., k)."""
+    return (rows @ values[..., None])[..., 0]
+
+
+def find_lines(mesh: Discretisation, z: FloatArray, stage: LoadStage, elements: Any) -> ElementLines:
+    """Return the lines of elements (m,) in n states (n, size); contacts stand at their places."""
     moved = with_places(mesh, z)
-    whole, rule, at = moved.elements, basis(mesh.degree), _rows_at(mesh.degree, fractions)
-    fields = energy.fields(moved, z, *stage)
-    rotation = z[:, whole.unknowns[elements]][..., energy.rotation_columns(mesh.degree)]
-    speed = np.broadcast_to(whole.weight, (len(z), *whole.weight.shape[-2:]))[:, elements] / rule.weights
-    angle = np.broadcast_to(whole.angle, (len(z), *whole.angle.shape[-2:]))[:, elements]
-    start = poses(mesh.attachments, z, whole.ends[elements, 0]).place[:, :, None]
+    whole, fields = moved.elements, energy.fields(moved, z, *stage)
+
+    def pick(table: Any, rank: int = 2) -> Any:
+        return np.broadcast_to(table, (len(z), *table.shape[-rank:]))[:, elements]
+
+    speed = pick(whole.weight) / basis(mesh.degree).weights
     slope = np.stack([fields.slope_x[:, elements], fields.slope_y[:, elements]], axis=-1) * speed[..., None]
-    turn = rotation @ at.values.T
+    rotation = z[:, whole.unknowns[elements]][..., energy.rotation_columns(mesh.degree)]
+    start = poses(mesh.attachments, z, whole.ends[elements, 0]).place
     cuts = whole.cuts if whole.moved_cuts is None else whole.moved_cuts
-    cuts = np.broadcast_to(cuts, (len(z), *cuts.shape[-2:]))[:, elements]
-    length = np.broadcast_to(whole.length, (len(z), whole.length.shape[-1]))[:, elements]
-    return SideStates(
-        start + np.einsum("kq,nmqd->nmkd", at.integrals, slope),
-        turn,
-        angle @ at.interpolation.T + turn,
-        length[..., None] - speed @ at.integrals.T,
-        cuts[..., :1] + (cuts[..., 1:] - cuts[..., :1]) * fractions,
-        np.einsum("kq,nmqd->nmkd", at.interpolation, slope / speed[..., None]),
-    )
+    return ElementLines(start, slope, speed, pick(whole.angle), rotation, pick(cuts))
 
 
 class _RowsAtPlaces(NamedTuple):
@@ -117,17 +139,19 @@ def _series_matrix(degree: int) -> FloatArray:
 
 
 def _rows_at(degree: int, places: FloatArray) -> _RowsAtPlaces:
-    """Return the matrices at any places, (n, ...): shapes, integrals from values at Gauss points, interpolation."""
+    """Return the matrices at any places, (..., n): shapes, integrals from values at Gauss points, interpolation."""
     series = _series_matrix(degree)
     x, count = 2 * places - 1, len(series)
     polynomials = legendre.legvander(x, count)
     order = np.arange(1, count)
-    primitives = np.concatenate([x[:, None] + 1, (polynomials[:, 2:] - polynomials[:, :-2]) / (2 * order + 1)], axis=1)
-    shapes = np.empty((len(x), degree + 1))
-    shapes[:, 0], shapes[:, 1] = (1 - x) / 2, (1 + x) / 2
+    primitives = np.empty((*x.shape, count))
+    primitives[..., 0] = x + 1
+    primitives[..., 1:] = (polynomials[..., 2:] - polynomials[..., :-2]) / (2 * order + 1)
+    values = np.empty((*x.shape, degree + 1))
+    values[..., 0], values[..., 1] = (1 - x) / 2, (1 + x) / 2
     order = np.arange(2, degree + 1)
-    shapes[:, 2:] = (polynomials[:, 2 : degree + 1] - polynomials[:, : degree - 1]) / np.sqrt(4 * order - 2)
-    return _RowsAtPlaces(shapes, primitives @ series / 2, polynomials[:, :count] @ series)
+    values[..., 2:] = (polynomials[..., 2 : degree + 1] - polynomials[..., : degree - 1]) / np.sqrt(4 * order - 2)
+    return _RowsAtPlaces(values, primitives @ series / 2, polynomials[..., :count] @ series)
 
 
 @lru_cache(maxsize=64)
@@ -145,11 +169,9 @@ def _even_angles() -> FloatArray:
 
 
 def interpolate_line(degree: int, fractions: FloatArray, start: Any, slopes: Any) -> tuple[Any, Any]:
-    """Return places of elements and their slopes at fractions (...), from starts (..., 2), slopes (..., q, 2)."""
-    rows = _rows_at(degree, fractions.ravel())
-    shape = (*fractions.shape, rows.integrals.shape[-1])
-    place = start + np.einsum("...q,...qd->...d", rows.integrals.reshape(shape), slopes)
-    return place, np.einsum("...q,...qd->...d", rows.interpolation.reshape(shape), slopes)
+    """Return places of elements and their slopes at fractions (p,), from starts (p, 2), slopes (p, q, 2)."""
+    rows = _rows_at(degree, fractions[:, None])
+    return start + (rows.integrals @ slopes)[:, 0], (rows.interpolation @ slopes)[:, 0]
 
 
 def join_sides(sides: Sequence[SideData]) -> SideData:
@@ -225,15 +247,23 @@ class SideGaps:
 
     def measure(self, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray) -> MeasuredGaps:
         """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
-        gap, slope, seen = self._measure_line(z, stage, elements, fractions)
+        return self._measure(find_lines(self.mesh, z, stage, elements), z, stage, elements, fractions)
+
+    def _measure(
+        self, lines: ElementLines, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray
+    ) -> MeasuredGaps:
+        gap, slope, seen = self._measure_line(lines, z, stage, elements, fractions)
         if self.section.shear:
-            kinks, ways = self.find_kinks(z, stage, elements), (seen.ahead[..., :1] - seen.ahead, seen.ahead)
-            gap, slope = round_off(gap, slope, *ways, kinks, find_reach(self.mesh, self.item, elements))
+            kinks = self.find_kinks(z, stage, elements)
+            reach = find_reach(self.mesh, self.item, elements)
+            gap, slope = round_off(gap, slope, seen.behind, seen.ahead, kinks, reach)
         return gap, slope, seen
 
-    def _measure_line(self, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray) -> MeasuredGaps:
+    def _measure_line(
+        self, lines: ElementLines, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray
+    ) -> MeasuredGaps:
         """Return the same with the kinks of beams that shear."""
-        seen = side_states(self.mesh, z, stage, elements, fractions)
+        seen = lines.evaluate(fractions)
         value, normal = self.distance(seen.place, z, stage)
         half = [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)]
         if line_leaves_normal(self.section):
@@ -250,7 +280,8 @@ class SideGaps:
             contact for contact in self.mesh.contacts if contact.slide >= 0 and contact.item.name == self.item.name
         ]
         pressed = [contact.element for contact in sides if contact.item.beam == self.item.beam]  # type: ignore[union-attr]
-        gap, slope, _ = self._measure_line(z, stage, numbers, np.array([0.0, 1.0]))
+        lines = find_lines(self.mesh, z, stage, numbers)
+        gap, slope, _ = self._measure_line(lines, z, stage, numbers, np.array([0.0, 1.0]))
         at_pad = np.isin(numbers, self.touched)[:, None] & (np.abs(gap) < BESIDE_CONTACT)
         ends = np.stack([np.isin(numbers - 1, pressed), np.isin(numbers, pressed)], axis=1) | at_pad
         return np.where(ends, np.maximum(slope * (-1.0, 1.0), 0.0), 0.0)
@@ -261,48 +292,40 @@ class SideGaps:
 
     def is_parallel(self, z: FloatArray, stage: LoadStage) -> bool:
         """Return True if the whole side is parallel to the obstacle in one state (size,): no place touches first."""
-        result = self._search(z[None], stage)
-        spread = (
-            np.ptp(self.measure(z[None], stage, self.elements, self.fractions)[0]) if result is None else result[0, 4]
-        )
-        return bool(spread < PARALLEL_GAP)
+        return bool(self._search(z[None], stage)[0, 4] < PARALLEL_GAP)
 
     def least(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray:
         """Return the least gap in each of n states, plus what it may be negative by rounding beside contacts, (n,).
 
         It is exact where it is below `NEAR_GAP`, and above it otherwise: to `watch` for contact a lower bound.
         """
-        result = self._search(z, stage, watch)
-        if result is not None:
-            return result[:, 0]
-        gap, rows, _ = self._dips(z, stage)
-        values = (gap + self.slack[:, None]).min(axis=(1, 2))
-        for state, row, value in zip(rows.state, rows.row, self._refine(z, stage, rows)[0], strict=True):
-            values[state] = min(values[state], value + self.slack[row])
-        return np.asarray(values)
+        return self._search(z, stage, watch)[:, 0]
 
     def find_least(self, z: FloatArray, stage: LoadStage) -> LeastGap:
         """Return the least gap of one state (size,) exactly: where the side is parallel to the obstacle."""
-        result = self._search(z[None], stage)
-        if result is not None:
-            low, high = cuts_at(self.mesh, z)[self.elements[int(result[0, 2])]]
-            return LeastGap(float(result[0, 1]), float(low + (high - low) * result[0, 3]))
-        gap, rows, seen = self._dips(z[None], stage)
-        slack = self.slack[:, None]
-        row, place = np.unravel_index(int((gap[0] + slack).argmin()), gap[0].shape)
-        best = float((gap[0] + slack).min())
-        least = LeastGap(float(gap[0, row, place]), float(seen.parameter[0, row, place]))
-        for number, value, fraction in zip(rows.row, *self._refine(z[None], stage, rows), strict=True):
-            if value + self.slack[number] <= best:
-                states = self._take_element(z[None], stage, int(self.elements[number]))
-                parameter = float(self._measure_at(states, np.array([fraction])).parameter[0])
-                best, least = value + float(self.slack[number]), LeastGap(value, parameter)
-        return least
+        _, gap, row, fraction, _ = self._search(z[None], stage)[0].tolist()
+        low, high = cuts_at(self.mesh, z)[self.elements[int(row)]]
+        return LeastGap(gap, float(low + (high - low) * fraction))
 
-    def _search(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray | None:
-        """Return what compiled code finds in n states, (n, 5); None without it, or if the thickness varies."""
+    def _search(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray:
+        """Return of n states the least gap with its slack, without, where it is, and how gaps spread, (n, 5).
+
+        Its place is a number in `elements` and a fraction. In numpy if the thickness varies, or nothing is compiled.
+        """
         result = None if self.packed is None else search_sides(self.mesh, self.packed, z, stage, watch)
-        return None if result is None else result[:, 0]
+        if result is not None:
+            return result[:, 0]
+        gap, dips = self._find_dips(z, stage)
+        raised = (gap + self.slack[:, None]).reshape(len(z), -1)
+        least = raised.argmin(axis=1)
+        row, place = np.divmod(least, len(self.fractions))
+        at_places = gap.reshape(raised.shape)
+        columns = raised.min(axis=1), at_places[np.arange(len(z)), least], row, self.fractions[place]
+        result = np.column_stack([*columns, np.ptp(at_places, axis=1)])
+        for number, dip, value, fraction in zip(dips.state, dips.row, *self._refine(z, stage, dips), strict=True):
+            if value + self.slack[dip] <= result[number, 0]:
+                result[number, :4] = value + self.slack[dip], value, dip, fraction
+        return result
 
     @cached_property
     def packed(self) -> SideData | None:
@@ -332,7 +355,7 @@ class SideGaps:
         partner = self.item.partner if isinstance(self.item, BeamOnBeam) else None
         return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == partner], np.int64)
 
-    def _dips(self, z: FloatArray, stage: LoadStage) -> tuple[Any, _Dips, SideStates]:
+    def _find_dips(self, z: FloatArray, stage: LoadStage) -> tuple[Any, _Dips]:
         """Return gaps at places of elements in n states, and between which of them lies a least one that is near."""
         gap, slope, seen = self.measure(z, stage, self.elements, self.fractions)
         step = -np.diff(seen.ahead, axis=-1)
@@ -344,7 +367,7 @@ class SideGaps:
         least = np.minimum((gap + slack).min(axis=(1, 2)), NEAR_GAP)[:, None, None]
         lower = bound + slack < least - GAP_RESOLUTION
         state, row, place = np.nonzero(dips & lower)  # else the least of the gaps that are known is the least
-        return gap, _Dips(state, row, place, slope[state, row, place], slope[state, row, place + 1]), seen
+        return gap, _Dips(state, row, place, slope[state, row, place], slope[state, row, place + 1])
 
     def _refine(self, z: FloatArray, stage: LoadStage, dips: _Dips) -> tuple[FloatArray, FloatArray]:
         """Return the least gaps of dips and their places on their elements, where the slope is zero (Illinois)."""
@@ -354,71 +377,19 @@ class SideGaps:
         for row in np.unique(dips.row).tolist():
             indices = np.flatnonzero(dips.row == row)
             chosen = dips.state[indices]
-            states = self._take_element(z[chosen], stage.take(chosen), int(self.elements[row]))
+            states, of_states, element = z[chosen], stage.take(chosen), self.elements[[row]]
+            lines = find_lines(self.mesh, states, of_states, element)
             for _ in range(N_ROUNDS):
                 middle = b[indices] - high[indices] * (b[indices] - a[indices]) / (high[indices] - low[indices])
-                seen = self._measure_at(states, middle)
-                value[indices], best[indices] = seen.gap, middle
-                if np.abs(seen.slope).max() < SLOPE_LEVEL:
+                gap, slope, _ = self._measure(lines, states, of_states, element, middle[:, None, None])
+                value[indices], best[indices], slope = gap[:, 0, 0], middle, slope[:, 0, 0]
+                if np.abs(slope).max() < SLOPE_LEVEL:
                     break
-                below = seen.slope < 0
-                high[indices] = np.where(below, 0.5 * high[indices], seen.slope)
-                low[indices] = np.where(below, seen.slope, 0.5 * low[indices])
+                below = slope < 0
+                high[indices] = np.where(below, 0.5 * high[indices], slope)
+                low[indices] = np.where(below, slope, 0.5 * low[indices])
                 a[indices], b[indices] = np.where(below, middle, a[indices]), np.where(below, b[indices], middle)
         return value, best
-
-    def _take_element(self, z: FloatArray, stage: LoadStage, element: int) -> _ElementStates:
-        """Return what gaps at places of an element are made of, in n states."""
-        moved = with_places(self.mesh, z)
-        e, count = moved.elements, len(z)
-        fields = energy.fields(moved, z, *stage)
-        speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, element] / basis(self.mesh.degree).weights
-        cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
-        kinks = self.find_kinks(z, stage, np.array([element]))[:, 0] if self.section.shear else None
-        return _ElementStates(
-            element, z, stage, poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0],
-            fields.slope_x[:, element] * speed, fields.slope_y[:, element] * speed,
-            z[:, e.unknowns[element]][:, energy.rotation_columns(self.mesh.degree)],
-            np.broadcast_to(e.angle, (count, *e.angle.shape[-2:]))[:, element],
-            np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, element], speed, kinks,
-        )  # fmt: skip
-
-    def _measure_at(self, states: _ElementStates, fraction: FloatArray) -> _Beside:
-        """Return gap, slope and parameter at one place of an element in each of n states."""
-        values, upto, through = _rows_at(self.mesh.degree, fraction)
-        x = states.start[:, 0] + (states.x * upto).sum(axis=1)
-        y = states.start[:, 1] + (states.y * upto).sum(axis=1)
-        angle = (states.angle * through).sum(axis=1) + (states.rotation * values).sum(axis=1)
-        parameter = states.cuts[:, 0] + (states.cuts[:, 1] - states.cuts[:, 0]) * fraction
-        value, normal = self.distance(np.stack([x, y], axis=-1), states.z, states.stage)
-        gap = value - self.half_thickness(parameter, states.element)
-        if line_leaves_normal(self.section):
-            along = ((states.x * normal[:, :1] + states.y * normal[:, 1:]) * through).sum(axis=1)
-            slope = along / (states.speed * through).sum(axis=1)
-        else:
-            slope = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
-        slope = slope - self._taper(parameter, states.element)
-        if states.kinks is not None:
-            behind, length = (states.speed * upto).sum(axis=1), states.speed @ basis(self.mesh.degree).weights
-            reach = find_reach(self.mesh, self.item, [states.element])[0, 0]
-            gap, slope = round_off(gap, slope, behind, length - behind, states.kinks, reach)
-        return _Beside(gap, slope, parameter)
-
-
-class _ElementStates(NamedTuple):
-    """One element in n states: its start, slopes of its line and angle at Gauss points, rotation, cuts."""
-
-    element: int
-    z: FloatArray  # (n, size)
-    stage: LoadStage
-    start: FloatArray  # (n, 2)
-    x: FloatArray  # (n, q)
-    y: FloatArray
-    rotation: FloatArray  # (n, degree + 1)
-    angle: FloatArray  # (n, q) unloaded
-    cuts: FloatArray  # (n, 2)
-    speed: FloatArray  # (n, q) arc length by the place along the element
-    kinks: FloatArray | None  # (n, 2) of beams that shear
 
 
 class _Dips(NamedTuple):
@@ -429,11 +400,3 @@ class _Dips(NamedTuple):
     place: Any
     low: FloatArray  # slopes of the gap at both
     high: FloatArray
-
-
-class _Beside(NamedTuple):
-    """Gap of a side in n states."""
-
-    gap: FloatArray
-    slope: FloatArray
-    parameter: FloatArray

@@ -13,24 +13,19 @@ taken at the least gap along the beam, not at a gap that follows a material poin
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cfmkit.elastica.contact.edges import find_leading, find_motion, measure_distance
-from cfmkit.elastica.contact.equations import GapBounds, number_free_unknowns, open_all_contacts
+from cfmkit.elastica.contact.equations import EquationsWithNodes, SymmetricRow, open_all_contacts
 from cfmkit.elastica.contact.laid_elements import LaidPart, compute_laid_rows
-from cfmkit.elastica.contact.line_tangent import (
-    line_leaves_normal,
-    measure_compliances,
-    measure_line_tangent,
-    raise_pad,
-)
-from cfmkit.elastica.contact.terms import contact_contribution, measure
+from cfmkit.elastica.contact.line_tangent import line_leaves_normal, measure_compliances, measure_line_tangent
+from cfmkit.elastica.contact.terms import contact_contribution
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
+from cfmkit.elastica.mechanics.equations import LinearEquations
 from cfmkit.elastica.mechanics.moving_elements import (
     MOVED_TABLES,
     PLACE_STEP,
@@ -48,6 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.equations import NumpyEquations
 
 SMALLEST_ELEMENT = 1e-9  # of a beam: shorter ones have no equations
 NEUTRAL_STIFFNESS = 1e-6  # of the motions [EI/L^3] below which a direction counts as stable: exactly critical ones
@@ -78,30 +74,17 @@ class SideAt(NamedTuple):
     frozen_row: FloatArray  # (m,) `tangency_row` by what is unknown while all places and forces of contacts are held
 
 
-@dataclass(frozen=True, eq=False)
-class SlidingEquations(NumpyEquations):
-    """Equations of a network with contacts of the sides of beams, and of nodes."""
+class SlidingEquations(EquationsWithNodes):
+    """Equations of a network with contacts of the sides of beams, and of nodes.
 
-    plain: NumpyEquations = field(kw_only=True)  # without contacts; its elements are moved to where contacts are
-    watched: GapBounds | None = field(init=False)
-    slots: Any = field(init=False)  # (size,) number of every unknown among the free ones, -1 where it is held
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "slots", number_free_unknowns(self.mesh))
-        nodes = tuple(contact for contact in self.mesh.contacts if contact.slide < 0)
-        watched = GapBounds(replace(self.mesh, contacts=nodes)) if nodes else None
-        object.__setattr__(self, "watched", watched)
+    The elements of the equations without contacts are moved to where contacts are.
+    """
 
     @classmethod
     def from_mesh(cls, mesh: Discretisation, ramp: bool, make: Callable[..., NumpyEquations]) -> SlidingEquations:
         """Return the equations of a network; `make` returns those of one whose elements stand still."""
         mesh = copy_moved_tables(mesh)
         return cls(mesh, ramp, plain=make(replace(open_all_contacts(mesh), moving=None), ramp))
-
-    def rebase(self, base: FloatArray) -> SlidingEquations:
-        """Return the equations with other values of the unknowns that are held, (size,)."""
-        return SlidingEquations(replace(self.mesh, base=base), self.ramp, plain=self.plain.rebase(base))
 
     # -- places --------------------------------------------------------------------------------------------------------
     @property
@@ -207,7 +190,7 @@ class SlidingEquations(NumpyEquations):
     # -- equations -----------------------------------------------------------------------------------------------------
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns; not a number where elements vanish."""
-        mesh, plain, count, slots = self.mesh, self.plain, self.plain.n, self.slots
+        mesh, count, slots = self.mesh, self.plain.n, self.slots
         n, z = self.n, np.asarray(self.values(free, way))
         moved = mesh.base if self.ramp else mesh.rate
         sides = self._sides
@@ -219,13 +202,11 @@ class SlidingEquations(NumpyEquations):
         laid = self.find_laid_parts(z)
         self._lay(laid)
         bare = self._drop_tension(z, laid)[mesh.free][:count]
-        at = plain.linearise(bare, way)
-        residual, change, tangent = np.zeros(n), np.zeros(n), np.zeros((n, n))
-        residual[:count], change[:count], tangent[:count, :count] = at.residual, at.change, at.tangent
+        placed = self.place_among_all(self.plain.linearise(bare, way))
+        residual, tangent, change = placed
         for part in laid:
             self._lay_rows(part, z, residual, tangent)
-        rows: list[tuple[Any, FloatArray, float]] = []  # of the symmetric matrix: unknowns, row, pivot
-        self._add_nodes(z, moved, residual, change, tangent, rows)
+        rows = self.add_nodes(z, placed)
         pressing: dict[int, tuple[SideAt, int]] = {}  # sides that touch by their forces, with their last rows
         for number, contact in enumerate(sides):
             force, place, flag = slots[contact.unknown], slots[contact.slide], slots[contact.flag]
@@ -247,7 +228,7 @@ class SlidingEquations(NumpyEquations):
                 residual[force], change[force] = -side.gap, -side.gap_row @ rate
                 tangent[force, indices] -= press_row
                 tangent[force, place] = -side.by_place[0]
-                rows.append((indices[indices < count], -press_row[indices < count], 0.0))
+                rows.append(SymmetricRow(indices[indices < count], -press_row[indices < count], 0.0))
             else:
                 residual[force] = z[leading.unknown] - value
                 tangent[force, force], tangent[force, slots[leading.unknown]] = -1.0, 1.0
@@ -258,7 +239,7 @@ class SlidingEquations(NumpyEquations):
             pressing[contact.unknown] = side, len(rows)
             bound = any(part.element in (contact.element, contact.element + 1) for part in laid)
             stiffness = 0.0 if bound else -max(side.curvature, 0.0) / max(value, SMALLEST_FORCE)
-            rows.append((indices[indices < count], side.frozen_row[inside][indices < count], stiffness))
+            rows.append(SymmetricRow(indices[indices < count], side.frozen_row[inside][indices < count], stiffness))
         self.move_to(places)
         at = LinearisedSides(residual, tangent, change)
         at.frozen, at.n_laid = self._frozen(tangent, rows, laid, z), len(laid)
@@ -292,34 +273,6 @@ class SlidingEquations(NumpyEquations):
     def is_pressing(self, contact: ContactAt, z: FloatArray) -> bool:
         """Return True if the side of a beam counts as touching: as it was set, or where it has a force."""
         return contact.closed if contact.closed is not None else bool(z[find_leading(self.mesh, contact).unknown] > 0)
-
-    def _add_nodes(
-        self, z: FloatArray, moved: FloatArray, residual: FloatArray, change: FloatArray, tangent: FloatArray,
-        rows: list[tuple[Any, FloatArray, float]],
-    ) -> None:  # fmt: skip
-        """Add the contacts of nodes."""
-        if self.watched is None:
-            return
-        far = self.watched.are_open(z)
-        for number, contact in enumerate(self.watched.mesh.contacts):
-            slot = self.slots[contact.unknown]
-            if far[number] or contact.closed is False:
-                if slot >= 0:
-                    residual[slot], tangent[slot, slot] = -z[contact.unknown], -1.0
-                continue
-            lowered = raise_pad(self.mesh, contact, z[None])[0]
-            if lowered and contact.closed is None:
-                contact = contact._replace(
-                    closed=bool(z[contact.unknown] > measure(self.mesh, contact, z).value + lowered)
-                )
-            term = contact_contribution(self.mesh, contact, z)
-            slots = self.slots[term.unknowns]
-            indices = slots >= 0
-            pushed = slots[indices]
-            residual[pushed] += term.gradient[indices]
-            tangent[np.ix_(pushed, pushed)] += term.hessian[np.ix_(indices, indices)]
-            change[pushed] += term.hessian[indices] @ moved[term.unknowns]
-            rows.append((pushed[pushed != slot], term.hessian[-1, :-1][indices[:-1]], float(term.hessian[-1, -1])))
 
     def _differentiate_by_place(
         self, free: FloatArray, way: float, z: FloatArray, number: int, laid: list[LaidPart]
@@ -364,9 +317,7 @@ class SlidingEquations(NumpyEquations):
         gradient = energy.gradient(moved, z[: mesh.size], *self.factors(place))
         return np.asarray(gradient[mesh.free].imag / COMPLEX_STEP)
 
-    def _frozen(
-        self, tangent: FloatArray, rows: list[tuple[Any, FloatArray, float]], laid: list[LaidPart], z: FloatArray
-    ) -> FloatArray:
+    def _frozen(self, tangent: FloatArray, rows: list[SymmetricRow], laid: list[LaidPart], z: FloatArray) -> FloatArray:
         """Return the symmetric matrix of motions, section forces and conditions with all places held.
 
         Of an element that lies on an obstacle there is its length, a constraint.

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import FEWEST_SAMPLES, MAX_SLOPE_STEPS, SAMPLES_PER_RADIUS
+from cfmkit.elastica.contact.piece import FEWEST_SAMPLES, StepsOfPiece
 from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import correct, hermite
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.contact.changes import PieceOfPath
+    from cfmkit.elastica.contact.piece import PieceOfPath
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
-MOST_SAMPLES = 400  # of a step
-OPEN_GAP_STEPS = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
+MAX_SAMPLES = 400  # of a step
 MAX_HALVINGS = 30  # halvings of a step, in which it is looked for where a contact still sticks
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
@@ -33,85 +32,83 @@ class StepBetween:
     last: PathEquilibrium
 
     @cached_property
+    def _steps(self) -> StepsOfPiece:
+        x, rate = (np.array([getattr(at, name) for at in (self.first, self.last)]) for name in ("x", "rate"))
+        return StepsOfPiece(self.part, x, np.array([self.first.drive, self.last.drive]), rate)
+
+    @property
     def moved(self) -> float:
         """Largest motion of the step."""
-        return largest_motion(self.part.whole, self.last.x - self.first.x)
-
-    @cached_property
-    def _is_smooth(self) -> bool:
-        width = abs(self.last.drive - self.first.drive)
-        rates = (largest_motion(self.part.whole, at.rate) for at in (self.first, self.last))
-        return width > 0 and max(rates) * width <= MAX_SLOPE_STEPS * self.moved
+        return float(self._steps.moved[0])
 
     @cached_property
     def shares(self) -> FloatArray:
         """Places at which gaps and forces are looked at, from 0 to 1: so dense that no obstacle is passed."""
-        wanted = SAMPLES_PER_RADIUS * self.moved * self.part.whole.mesh.scales.length / self.part.smallest_radius
-        return np.linspace(0.0, 1.0, int(np.clip(np.ceil(wanted), FEWEST_SAMPLES, MOST_SAMPLES)) + 1)
-
-    @property
-    def is_far(self) -> bool:
-        """True if every contact is open and its gap is more than the step can close."""
-        if self.part.closed:
-            return False
-        mesh, ends = self.part.whole.mesh, self.part.values(*self.interpolate(np.array([[0.0], [1.0]])))
-        arms = np.hypot(*mesh.attachments.arm[[contact.place for contact in mesh.contacts]].T)
-        reach = np.append(1.0 + arms, np.full(len(ends) - len(arms), 2.0))
-        return bool((ends > OPEN_GAP_STEPS * self.moved * reach[:, None]).all())
+        wanted = np.ceil(self._steps.wanted_samples[0])
+        return np.linspace(0.0, 1.0, int(np.clip(wanted, FEWEST_SAMPLES, MAX_SAMPLES)) + 1)
 
     @cached_property
     def values(self) -> FloatArray:
-        """Forces of closed and gaps of open contacts there, (contacts, shares)."""
+        """Values of all conditions there, (rows, shares)."""
         seen = self.part.seen_between.pop((self.first.drive, self.last.drive), None)
         if seen is not None and seen.shape[-1] == len(self.shares):
             return seen
-        part, values = self.part, self.part.values(*self.interpolate(self.shares[:, None]))
-        for row in part.slipping_rows:
-            values[row] = np.diff(values[row], prepend=values[row, :1])
-            grown = abs(self.last.drive - self.first.drive) * part.row_value(self.last, row, self.travel)
-            values[row, -1] = min(values[row, -1], grown)
-        return values
+        return self._steps.values(self.shares)[:, 0]
+
+    @cached_property
+    def roundings(self) -> FloatArray:
+        """By how much each condition may be negative, (rows,)."""
+        return self.part.conditions.roundings(self.values)
+
+    def find_negative(self, row: int) -> list[int]:
+        """Return at which shares behind the first one a condition is violated."""
+        return (np.flatnonzero(self.values[row, 1:] < -self.roundings[row]) + 1).tolist()
 
     @property
     def travel(self) -> float:
         """Sense in which the drive goes."""
         return 1.0 if self.last.drive >= self.first.drive else -1.0
 
-    def interpolate(self, share: Any) -> tuple[FloatArray, Any]:
-        """Return the unknowns (n,) and the drive at a share of the step, or (m, n) and (m,) at m of them, (m, 1)."""
+    def interpolate(self, share: float) -> tuple[FloatArray, float]:
+        """Return the unknowns (n,) and the drive at a share of the step."""
+        if share == 1.0:
+            return self.last.x, self.last.drive
         drive = self.first.drive + share * (self.last.drive - self.first.drive)
-        if self._is_smooth:
-            x = hermite(self.first, self.last, drive)
-        else:
-            x = self.first.x + share * (self.last.x - self.first.x)
-        x = np.where(share == 1.0, self.last.x, x)
-        return x, np.where(share == 1.0, self.last.drive, drive)[..., 0] if np.ndim(share) else drive
+        if self._steps.are_smooth[0]:
+            return hermite(self.first, self.last, drive), drive
+        return self.first.x + share * (self.last.x - self.first.x), drive
+
+    def guess(self, share: float) -> PathEquilibrium:
+        """Return the interpolated place at a share of the step."""
+        x, drive = self.interpolate(share)
+        return self.first._replace(x=x, drive=drive)
 
     def solve(self, share: float) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at a share of the step."""
         x, drive = self.interpolate(share)
-        at = correct(self.part.own, x[self.part.own_mask], float(drive))
+        at = correct(self.part.own, x[self.part.own_mask], drive)
         if at is None or largest_motion(self.part.own, at.x - x[self.part.own_mask]) > MAX_MISS * self.moved + 1e-9:
             return None
         return at
 
-    def crossing(self, number: int) -> float | None:
-        """Return the first share at which force or gap of a contact vanishes, by straight lines; None if nowhere."""
-        values = self.values[number]
-        below = np.flatnonzero(values[1:] < -self.part.roundings(self.values)[number])
-        if not len(below):
+    def crossing(self, row: int) -> float | None:
+        """Return the first share at which a condition is just met, by straight lines; None if it is not violated."""
+        values, below = self.values[row], self.find_negative(row)
+        if not below:
             return None
-        behind = int(below[0]) + 1
-        before, after = float(values[behind - 1]), float(values[behind])
+        before, after = values[below[0] - 1 : below[0] + 1].tolist()
         part = 0.0 if before <= 0 else before / (before - after)
-        return float(self.shares[behind - 1] + part * (self.shares[behind] - self.shares[behind - 1]))
+        low, high = self.shares[below[0] - 1 : below[0] + 1].tolist()
+        return low + part * (high - low)  # type: ignore[no-any-return]
 
     @cached_property
     def _follows_drive(self) -> bool:
         """True if motions go on with the drive at both ends: no limit point lies between them."""
         moves = self.part.whole.motions
         chord, way = (self.last.x - self.first.x)[moves], self.last.drive - self.first.drive
-        return self._is_smooth and all(float(at.rate[moves] @ chord) * way > 0 for at in (self.first, self.last))
+        return bool(self._steps.are_smooth[0]) and all(
+            float(at.rate[moves] @ chord) * way > 0 for at in (self.first, self.last)
+        )
 
     def share_of(self, at: PathEquilibrium, piece: PieceOfPath | None = None) -> float:
         """Return at which share of the step an equilibrium lies: by its drive, or by motions that do not follow it.
@@ -122,8 +119,7 @@ class StepBetween:
             return float((at.drive - self.first.drive) / (self.last.drive - self.first.drive))
         at = at if piece is None else piece.carry(at, self.part)
         weights = arc_weights(self.part.whole, self.part.options.span)
-        start = np.append(self.first.x, self.first.drive)
-        chord, way = np.append(self.last.x, self.last.drive) - start, np.append(at.x, at.drive) - start
+        chord, way = self.last.place - self.first.place, at.place - self.first.place
         finite = np.isfinite(weights)
         return float((weights * chord)[finite] @ way[finite] / ((weights * chord)[finite] @ chord[finite]))
 
@@ -132,8 +128,8 @@ class StepBetween:
         start = largest_motion(self.part.whole, at.x - guess) <= MAX_MISS * self.moved + 1e-9
         return start and -BESIDE_STEP <= self.share_of(at) <= 1 + BESIDE_STEP
 
-    def bisect(self, number: int) -> PathEquilibrium | None:
-        """Return the equilibrium of the piece at which force or gap vanishes, by its drive alone; None if lost."""
+    def bisect(self, row: int) -> PathEquilibrium | None:
+        """Return the equilibrium of the piece at which a condition is just met, by its drive alone; None if lost."""
         from scipy.optimize import brentq
 
         part = self.part
@@ -142,20 +138,18 @@ class StepBetween:
             at = self.solve(share)
             if at is None:
                 raise ArithmeticError
-            return part.row_value(part.grow(at), number, self.travel)
+            return part.row_value(part.grow(at), row, self.travel)
 
         try:
-            row_values = self.values[number]
-            behind = np.flatnonzero(row_values[1:] < -part.roundings(self.values)[number])
-            end = int(behind[0]) + 1 if len(behind) else len(row_values) - 1
+            end = next(iter(self.find_negative(row)), len(self.shares) - 1)
             begins = self.shares[end - 1 :: -1].tolist()
-            if number >= len(part.whole.mesh.contacts) + len(part.sides.all):
+            if part.conditions.all[row].kind in ("grip", "slip"):
                 # what sticks begins at its limit, where the drive turns, and may soon reach the other one
                 begins += [float(self.shares[end]) * 0.5**k for k in range(1, MAX_HALVINGS)]
             begin = next((share for share in begins if value(share) > 0), None)
             if begin is None:
                 return self.first
-            last = next((k for k in range(end, len(row_values)) if value(float(self.shares[k])) <= 0), None)
+            last = next((k for k in range(end, len(self.shares)) if value(float(self.shares[k])) <= 0), None)
             if last is None:
                 return None
             share = float(brentq(value, begin, self.shares[last], xtol=1e-15, rtol=1e-14))

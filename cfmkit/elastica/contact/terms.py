@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
 
-class ContactGap(NamedTuple):
-    """Gap of a contact with its derivatives by the n unknowns that change it."""
+class MeasuredGap(NamedTuple):
+    """Gap of a contact, or the way that it has slipped, with its derivatives by the n unknowns that change it."""
 
     value: Any
     unknowns: Any  # (n,)
@@ -25,13 +25,13 @@ class ContactGap(NamedTuple):
     hessian: Any  # (n, n)
 
 
-def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> ContactGap:
+def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> MeasuredGap:
     """Return the gap of a contact at the values of all unknowns (size,)."""
     item, length = contact.item, mesh.scales.length
     at = poses(mesh.attachments, z, [contact.place])
     if isinstance(item, Stop) and item.turns:
         turn = at.unknowns[0, 3]
-        return ContactGap(item.gap - item.sense * z[turn], np.array([turn]), np.array([-item.sense]), np.zeros((1, 1)))
+        return MeasuredGap(item.gap - item.sense * z[turn], np.array([turn]), np.array([-item.sense]), np.zeros((1, 1)))
     arm, jacobian = at.arm[0], at.jacobian[0]
     if isinstance(item, Stop):
         normal = -_direction(item)
@@ -44,7 +44,7 @@ def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> ContactGap:
         across = np.array([normal[1], -normal[0]]) @ jacobian
         hessian = found.curvature * length * np.outer(across, across)
     hessian[2, 2] -= normal @ arm
-    return ContactGap(value, at.unknowns[0, :3], normal @ jacobian, hessian)
+    return MeasuredGap(value, at.unknowns[0, :3], normal @ jacobian, hessian)
 
 
 def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
@@ -59,16 +59,7 @@ def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
     return (item.outline.distance(place * length).value - item.radius) / length
 
 
-class SlipWay(NamedTuple):
-    """The way that a contact has slipped, with its derivatives by the n unknowns that change it."""
-
-    value: Any
-    unknowns: Any  # (n,)
-    gradient: Any  # (n,)
-    hessian: Any  # (n, n)
-
-
-def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | None = None) -> SlipWay:
+def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | None = None) -> MeasuredGap:
     """Return how far the point of a pad that touches has come along an obstacle or a stop, rolling counted.
 
     The sense is that of the normal turned by -90 deg. Around a closed obstacle it is what is nearest to `near`.
@@ -95,7 +86,7 @@ def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | Non
     if unknowns[2] == unknowns[3]:  # the node turns with its body
         gradient, hessian, unknowns = gradient[:3], hessian[:3, :3], unknowns[:3]
         gradient[2] += radius
-    return SlipWay(value + radius * z[at.unknowns[0, 3]], unknowns, gradient, hessian)
+    return MeasuredGap(value + radius * z[at.unknowns[0, 3]], unknowns, gradient, hessian)
 
 
 def rub_values(mesh: Discretisation, contact: ContactAt, state: FrictionState, z: FloatArray) -> FloatArray:
@@ -134,57 +125,41 @@ def is_closed(contact: ContactAt, z: Any, gap: Any) -> bool:
 
 
 def contact_contribution(mesh: Discretisation, contact: ContactAt, z: Any) -> Contribution:
-    """Return the term of a contact: that of its force where it is closed, else of the condition that it has none."""
-    gap, force = measure(mesh, contact, z), z[contact.unknown]
-    if contact.rub >= 0:
-        return _press_and_rub(mesh, contact, z, gap)
-    unknowns = np.append(gap.unknowns, contact.unknown)
-    count = len(gap.unknowns)
-    hessian = np.zeros((count + 1, count + 1), np.result_type(gap.hessian, z.dtype))
-    if not is_closed(contact, z, gap.value):
-        hessian[-1, -1] = -1.0
-        return Contribution(0.0 * force, unknowns, np.append(np.zeros(count), -force), hessian)
-    soft = compliance(mesh, contact)
-    hessian[:count, :count] = -force * gap.hessian
-    hessian[:count, -1] = hessian[-1, :count] = -gap.gradient
-    hessian[-1, -1] = -soft
-    gradient = np.append(-force * gap.gradient, -gap.value - soft * force)
-    return Contribution(0.5 * soft * force**2, unknowns, gradient, hessian)
+    """Return the term of a contact: that of its forces where it is closed, else of the condition that it has none.
 
-
-def _press_and_rub(mesh: Discretisation, contact: ContactAt, z: Any, gap: ContactGap) -> Contribution:
-    """Return the term of a contact with friction. It has no functional where it slips: its matrix is not symmetric.
-
-    Flag and anchor of a state keep the values that they have.
+    With friction it has no functional where it slips: its matrix is not symmetric. Flag and anchor of a state keep the
+    values that they have.
     """
-    force, rub = z[contact.unknown], z[contact.rub]
-    state = friction_of(contact, z)
-    slip = slip_way(mesh, contact, z, state.anchor)
-    motions = np.union1d(gap.unknowns, slip.unknowns)
-    pressing, rubbing = np.searchsorted(motions, gap.unknowns), np.searchsorted(motions, slip.unknowns)
-    unknowns, count = np.append(motions, contact.own_unknowns), len(motions)
-    gradient = np.zeros(count + 4, z.dtype)
-    hessian = np.zeros((count + 4, count + 4), np.result_type(gap.hessian, slip.hessian, z.dtype))
-    hessian[[count + 2, count + 3], [count + 2, count + 3]] = -1.0
-    soft = compliance(mesh, contact)
+    gap, force, own = measure(mesh, contact, z), z[contact.unknown], contact.own_unknowns
+    motions, slip = gap.unknowns, None
+    if contact.rub >= 0:
+        state = friction_of(contact, z)
+        slip = slip_way(mesh, contact, z, state.anchor)
+        motions = np.union1d(gap.unknowns, slip.unknowns)
+    unknowns, count, size = np.append(motions, own), len(motions), len(motions) + len(own)
+    kind = np.result_type(gap.value, gap.gradient, gap.hessian, z.dtype)
+    gradient, hessian = np.zeros(size, kind), np.zeros((size, size), kind)
+    hessian[range(count, size), range(count, size)] = -1.0
     if not is_closed(contact, z, gap.value):
-        gradient[count : count + 2] = -force, -rub
-        hessian[[count, count + 1], [count, count + 1]] = -1.0
+        forces = list(own[:2])
+        gradient[count : count + len(forces)] = -z[forces]
         return Contribution(0.0 * force, unknowns, gradient, hessian)
+    soft, pressing = compliance(mesh, contact), np.searchsorted(motions, gap.unknowns)
     gradient[pressing] -= force * gap.gradient
-    gradient[rubbing] -= rub * slip.gradient
     hessian[np.ix_(pressing, pressing)] -= force * gap.hessian
-    hessian[np.ix_(rubbing, rubbing)] -= rub * slip.hessian
     hessian[pressing, count] = hessian[count, pressing] = -gap.gradient
-    hessian[rubbing, count + 1] = -slip.gradient
     gradient[count], hessian[count, count] = -gap.value - soft * force, -soft
-    if state.sense == 0:
-        hessian[count + 1, rubbing], hessian[count + 1, count + 3] = -slip.gradient, 1.0
-        gradient[count + 1] = state.anchor - slip.value
-    else:
-        share = contact.item.friction * state.sense if abs(state.sense) == 1 else 0.0
-        gradient[count + 1] = -rub - share * force
-        hessian[count + 1, count + 1], hessian[count + 1, count] = -1.0, -share
+    if slip is not None:
+        rub, rubbing = z[contact.rub], np.searchsorted(motions, slip.unknowns)
+        gradient[rubbing] -= rub * slip.gradient
+        hessian[np.ix_(rubbing, rubbing)] -= rub * slip.hessian
+        hessian[rubbing, count + 1] = -slip.gradient
+        if state.sense == 0:
+            hessian[count + 1, rubbing], hessian[count + 1, count + 3] = -slip.gradient, 1.0
+            gradient[count + 1], hessian[count + 1, count + 1] = state.anchor - slip.value, 0.0
+        else:
+            share = contact.item.friction * state.sense if abs(state.sense) == 1 else 0.0
+            gradient[count + 1], hessian[count + 1, count] = -rub - share * force, -share
     return Contribution(0.5 * soft * force**2, unknowns, gradient, hessian)
 
 

@@ -128,12 +128,12 @@ static double largest_force(const Model *m, const double *z) {
  * of those unknowns. */
 int compare(const Model *models, Int designs, const Model *shapes, const double *laws, Int powers, const double *z,
             const double *drive, Int count, double tolerance, double *ends, double *found) {
-    const Goal goal = {NULL, 0.0, NULL, tolerance, 1};
+    const Goal goal = {NULL, 0.0, tolerance, 1};
     for (const Model *m = models; m < models + designs; laws += m->elements * (powers + 2), m++) {
         Model fine;
         const Int same = n_ends(m);
         void *room = raise_model(m, shapes, laws, powers, &fine);
-        Work *w = room ? work_open(&fine) : NULL;
+        Work *w = room ? work_open(&fine, 0) : NULL;
         double *state = w ? malloc((size_t)(3 * fine.size + fine.free) * sizeof(double)) : NULL;
         int good = state != NULL;
         for (Int k = 0; good && k < count; k++, z += m->size, ends += same, found += N_COMPARED) {

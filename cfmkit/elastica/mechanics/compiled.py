@@ -16,7 +16,6 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.edges import find_circle, find_leading, half_thickness_of
 from cfmkit.elastica.mechanics.compiled_module import (
     ADDRESS_FIELDS,
-    COUNT_FIELDS,
     MAX_DEGREE,
     N_LAW,
     find_module,
@@ -47,8 +46,9 @@ from cfmkit.elastica.mechanics.equations import (
     SideData,
     SolvedStates,
 )
-from cfmkit.elastica.model.beam_fits import coefficients_of, has_polynomial_angle
-from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, NodeOnBeam, NodeOnObstacle, Stop
+from cfmkit.elastica.mechanics.numbering import number_free
+from cfmkit.elastica.model.beam_fits import coefficients_of
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.elastica.model.network import LineSpring, SlideSpring
 from cfmkit.numerics.continuation.problem import PathEquilibrium
 
@@ -62,20 +62,6 @@ if TYPE_CHECKING:
 CLOSED_SIDE = 5  # column of `side_at`
 IN_PLACE = ("angle", "weight", "rigidity", "ahead", "length", "bend", "rest", "curl")
 """Arrays of a `Model` that `sides.c` changes where elements move."""
-
-
-def are_sides_compiled(mesh: Discretisation) -> bool:
-    """Return True if `sides.c` has all contacts: those of uniform beams at points, and of nodes without friction."""
-    follows = any(load.item.follows for load in mesh.loads)
-    kinds = {type(contact.item) for contact in mesh.contacts}
-    beams = {mesh.elements.beam[number] for number in mesh.moving.elements} if mesh.moving is not None else set()
-    return (
-        not follows
-        and kinds <= {Stop, NodeOnObstacle, BeamOnObstacle, NodeOnBeam, BeamOnBeam}
-        and all(contact.rub < 0 and not contact.laid for contact in mesh.contacts)
-        and all(has_polynomial_angle(mesh.fits.network.beams[beam]) for beam in beams)
-        and not any(mesh.fits.network.beams[beam].section.shear for beam in beams)
-    )
 
 
 def side_arrays(mesh: Discretisation, first_part: int) -> tuple[dict[str, Any], Any]:
@@ -160,10 +146,6 @@ class CompiledEquations(NumpyEquations):
             counts |= {"moved": moved, "coefficients": wide - N_LAW}
         return counts
 
-    def stiffen(self, mesh: Discretisation) -> CompiledEquations:
-        """Return the equations of the same network with another flexibility along its beams."""
-        return self._exchange(mesh, {"axial": np.ascontiguousarray(mesh.elements.axial, float)})
-
     def refill(self, elements: Any, tables: Mapping[str, Any]) -> None:
         """Replace the tables of some elements, in place: only of equations whose arrays are their own."""
         super().refill(elements, tables)
@@ -171,14 +153,9 @@ class CompiledEquations(NumpyEquations):
             self.arrays[name][elements] = values
         self.arrays["bend"][elements] = (tables["weight"] * tables["rigidity"]) @ slope_products(self.mesh.degree)
 
-    def rebase(self, base: FloatArray) -> CompiledEquations:
-        """Return the equations with other values of the unknowns that are held, (size,)."""
-        return self._exchange(replace(self.mesh, base=base), {"base": np.ascontiguousarray(base, float)})
-
     def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
         """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
-        slot, kept = np.full(mesh.size, -1, np.int64), np.searchsorted(self.mesh.free, mesh.free)
-        slot[mesh.free] = np.arange(len(mesh.free))
+        slot, kept = number_free(mesh.free, mesh.size), np.searchsorted(self.mesh.free, mesh.free)
         unit, nodes = self.unit[kept], node_contacts(mesh)
         arrays = {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
         for name, column, contacts in (
@@ -188,20 +165,10 @@ class CompiledEquations(NumpyEquations):
             if contacts:
                 arrays[name] = self.arrays[name].copy()
                 arrays[name][:, column] = [-1 if contact.closed is None else contact.closed for contact in contacts]
-        exchanged = self._exchange(mesh, arrays)
-        object.__setattr__(exchanged, "unit", unit)
-        exchanged.row[COUNT_FIELDS.index("free")] = len(mesh.free)
-        exchanged.row[COUNT_FIELDS.index("presses")] = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
-        return exchanged
-
-    def _exchange(self, mesh: Discretisation, arrays: Mapping[str, Any]) -> CompiledEquations:
-        """Return the equations of a mesh that differs in some arrays."""
+        presses = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
+        row = make_row(arrays, {"free": len(mesh.free), "presses": presses}, self.row)
         exchanged = copy(self)
-        object.__setattr__(exchanged, "mesh", mesh)
-        object.__setattr__(exchanged, "arrays", {**self.arrays, **arrays})
-        object.__setattr__(exchanged, "row", self.row.copy())
-        for name, array in arrays.items():
-            self.code.place(exchanged.row, len(COUNT_FIELDS) + ADDRESS_FIELDS.index(name), (array,))
+        vars(exchanged).update(mesh=mesh, unit=unit, arrays={**self.arrays, **arrays}, row=row)
         return exchanged
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
@@ -272,40 +239,44 @@ class CompiledEquations(NumpyEquations):
         way: float,
         border: FloatArray | None = None,
         level: float = 0.0,
-        push: FloatArray | None = None,
         tolerance: float = 1e-10,
         quick: bool = False,
     ) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
-        x, at, rate, outcome = np.array(free, float), np.array([way], float), np.empty(len(free)), np.empty(2)
-        row = NO_NUMBERS if border is None else np.ascontiguousarray(border, float)
-        force = NO_NUMBERS if push is None else np.ascontiguousarray(push, float)
-        if self.code.solve(self.row, x, at, row, force, rate, outcome, level, tolerance, quick):
+        solved = self._newton(free[None], [way], border, level, tolerance, quick)
+        x, at, rate, (code, told, effort) = (values[0] for values in solved)
+        if code:
             return None
-        (way,), (unstable, effort) = at.tolist(), outcome.tolist()
-        return PathEquilibrium(x, way, rate, self._unstable(x, way, int(unstable)), effort)
+        return PathEquilibrium(x, float(at), rate, self._unstable(x, float(at), int(told)), float(effort))
 
     def solve_each(
         self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses."""
-        x, ways = np.array(free, float, order="C"), np.array(way, float)
-        rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
-        if self.code.solve_each(self.row, x, ways, rate, outcomes, tolerance, quick):
-            raise MemoryError
+        x, ways, rate, outcomes = self._newton(free, way, None, 0.0, tolerance, quick)
         converged, unstable = outcomes[:, 0] == 0, outcomes[:, 1].astype(np.int64)
         for k in np.flatnonzero(converged & (unstable < 0)):
             unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
         return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
 
+    def _newton(self, free: Any, way: Any, border: FloatArray | None, *numbers: float) -> tuple[FloatArray, ...]:
+        """Return unknowns, places of the way, slopes, and codes, counts and efforts (k, 3), from k guesses."""
+        x, ways = np.array(free, float, order="C"), np.array(way, float)
+        rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
+        row = NO_NUMBERS if border is None else np.ascontiguousarray(border, float)
+        if self.code.solve(self.row, x, ways, row, rate, outcomes, *numbers):
+            raise MemoryError
+        return x, ways, rate, outcomes
+
     def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
         """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""
         mesh, bundle = self.mesh, self.mesh.fits.bundle
-        special = _has_more_unknowns(mesh) or bundle.others or self.follows or degree > MAX_DEGREE
+        special = _has_more_unknowns(mesh) or bundle.others or degree > MAX_DEGREE
         if special or np.count_nonzero(mesh.elements.line):
             return None
         laws = angle_laws(bundle.coefficients[mesh.fits.number], mesh)
-        return compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+        compared = compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+        return None if (compared.unstable < 0).any() else compared  # under loads that follow C may know a parity only
 
     def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode."""
@@ -388,7 +359,7 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
         if rows:
             arrays |= {f"{name}_at": [at for at, _ in rows], name: [values for _, values in rows]}
     if _has_more_unknowns(mesh):
-        arrays |= free_arrays(mesh)
+        arrays |= {"slot": number_free(mesh.free, mesh.size), "leaves": last_elements(mesh)[mesh.free]}
     if mesh.contacts:
         arrays |= contact_arrays(mesh)
     if mesh.moving is not None:
@@ -405,13 +376,6 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
 def _has_more_unknowns(mesh: Discretisation) -> bool:
     """Return True if there are unknowns of contacts, which may all be open."""
     return mesh.size != mesh.numbering.size
-
-
-def free_arrays(mesh: Discretisation) -> dict[str, Any]:
-    """Return the number of each unknown among the free ones, (size,), and the last element that holds it, (n,)."""
-    slot = np.full(mesh.size, -1, np.int64)
-    slot[mesh.free] = np.arange(len(mesh.free))
-    return {"slot": slot, "leaves": last_elements(mesh)[mesh.free]}
 
 
 def spring_row(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics.numbering import number_free
 from cfmkit.elastica.mechanics.polynomials import basis
 
 if TYPE_CHECKING:
@@ -84,9 +85,8 @@ def shape_row(degree: int) -> tuple[Any, dict[str, Any]]:
 def numbered_row(numbering: Numbering, free: bytes) -> tuple[Any, dict[str, Any]]:
     """Return a `Model` with what networks of one topology and the same free unknowns share, and its arrays."""
     row, tables = shape_row(numbering.topology.degree)
-    chosen, slot = np.frombuffer(free, np.int64), np.full(numbering.size, -1, np.int64)
-    slot[chosen] = np.arange(len(chosen))
-    arrays = {"unknowns": numbering.unknowns, "ends": numbering.ends, "places": numbering.places, "slot": slot}
-    arrays |= {"leaves": numbering.last_element[chosen]}
+    chosen = np.frombuffer(free, np.int64)
+    arrays = {"unknowns": numbering.unknowns, "ends": numbering.ends, "places": numbering.places}
+    arrays |= {"slot": number_free(chosen, numbering.size), "leaves": numbering.last_element[chosen]}
     counts = {"elements": len(numbering.ends), "size": numbering.size, "free": len(chosen)}
     return make_row(arrays, counts, row), tables | arrays

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.terms import compliance
-from cfmkit.elastica.model.contact import NodeOnObstacle, ObstacleEdge, Stop
+from cfmkit.elastica.model.contact import NodeOnObstacle, ObstacleEdge
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -18,15 +18,6 @@ if TYPE_CHECKING:
 
 CLOSED_NODE = 3  # column of `contact_at`
 ROTATION_STOP, MOTION_STOP, NODE_PAD = range(3)
-
-
-def are_compiled(mesh: Discretisation) -> bool:
-    """Return True if `contact.c` has all contacts of a network: those of nodes, without friction."""
-    if not mesh.contacts:
-        return True
-    kinds = {type(contact.item) for contact in mesh.contacts}
-    follows = any(load.item.follows for load in mesh.loads)
-    return kinds <= {Stop, NodeOnObstacle} and all(contact.rub < 0 for contact in mesh.contacts) and not follows
 
 
 def node_contacts(mesh: Discretisation) -> list[ContactAt]:

@@ -67,6 +67,4 @@ def make_inextensible(mesh: Discretisation, elements: Any) -> Discretisation:
     """Return the same arrays with elements that do not stretch at all."""
     axial, floored = mesh.elements.axial.copy(), mesh.floored.copy()
     axial[elements], floored[elements] = 0.0, False
-    stiff = replace(mesh, elements=mesh.elements._replace(axial=axial), floored=floored)
-    stiff.known.update((key, made.stiffen(stiff)) for key, made in mesh.known.items())
-    return stiff
+    return replace(mesh, elements=mesh.elements._replace(axial=axial), floored=floored)

@@ -17,33 +17,28 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.terms import contact_contribution
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
 from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, cos_sin, slopes_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
-    from cfmkit.elastica.mechanics.terms import Contribution
-
-    Acting = tuple[Discretisation, Attached | ContactAt]
 
 MAX_TOGETHER = 300_000  # numbers of a table of all designs at some points: 5 MB
 
@@ -122,30 +117,26 @@ def _differentiate_attachments(mesh: Discretisation, z: Any, load: Any) -> dict[
     }
 
 
-def effort_motions(
-    at: Equilibria,  # under a drive by a motion
-    # (p, n): slopes of the free unknowns along the path: they are w unless loads grow with the drive, or follow
-    rates: FloatArray | None = None,
-) -> FloatArray:
-    """Return w, the motion of all unknowns that the effort is the work of, (p, size)."""
-    mesh = at.mesh
-    loads = [load for load in mesh.loads if load.grows or load.item.follows]
-    found = np.tile(mesh.rate, (len(at.z), 1))
-    if rates is not None and not loads and not mesh.elements.line[:, 1].any():
-        found[:, mesh.free] = rates
-        return found
-    chosen = mesh.free
-    for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
-        tangent = energy.hessian(mesh, z, drive)
-        right = mesh.rate @ tangent[:, chosen]
-        found[k, chosen] = -np.linalg.solve(tangent[np.ix_(chosen, chosen)].T, right)
-    return found
+def effort_motions(at: Equilibria, rates: FloatArray) -> FloatArray:
+    """Return w, the motion of all unknowns that the effort of a drive by a motion is the work of, (p, size).
+
+    The slopes of the free unknowns along the path, `rates` (p, n), are w unless loads grow with the drive, or follow.
+    """
+    mesh, chosen = at.mesh, at.mesh.free
+    motions = np.tile(mesh.rate, (len(at.z), 1))
+    motions[:, chosen] = rates
+    if any(load.grows or load.item.follows for load in mesh.loads) or mesh.elements.line[:, 1].any():
+        for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
+            tangent = energy.hessian(mesh, z, drive)
+            right = mesh.rate @ tangent[:, chosen]
+            motions[k, chosen] = -np.linalg.solve(tangent[np.ix_(chosen, chosen)].T, right)
+    return motions
 
 
 def effort_slopes(
     at: Equilibria,  # under a drive by a motion, of the designs' template
     designs: NetworkDesigns,  # a complex step of `COMPLEX_STEP` in each variable
-    rates: FloatArray | None = None,  # (p, n): slopes of the free unknowns along the path, if they are known
+    rates: FloatArray,  # (p, n): slopes of the free unknowns along the path
 ) -> FloatArray:
     """Return the derivatives of the effort by variables at points of a path, (p, k) [N or N m]."""
     mesh, motions = at.mesh, effort_motions(at, rates)
@@ -161,61 +152,38 @@ def effort_slopes(
     for name, table in changes.items():
         slopes = np.imag(by_table[name]).reshape(len(at.z), -1) / COMPLEX_STEP
         total += slopes @ (table.imag.reshape(designs.count, -1) / COMPLEX_STEP).T
-    for k, pair in enumerate(_changed_terms(designs)):
-        for own in pair:
-            total[:, k] += _term_slopes(own, at, motions)
+    for k, d, unknowns, slopes in _term_slopes(at, designs, None):
+        total[k, d] += slopes @ motions[k, unknowns]
     if designs.held_slopes is not None:
         total += _held_forces(at, motions) @ designs.held_slopes.T
     return np.asarray(total * mesh.scales.moment / mesh.scales.drive)
 
 
-def _changed_terms(designs: NetworkDesigns) -> list[list[Acting]]:
-    """Return the springs, loads and contacts of each design with a complex step, with the arrays of that design."""
-    found: list[list[Acting]] = []
-    if not _acting(designs.template):
-        return found
-    for d in range(designs.count):
+def _term_slopes(
+    at: Equilibria, designs: NetworkDesigns, held: FloatArray | None
+) -> Iterator[tuple[int, int, Any, FloatArray]]:
+    """Yield point, design, unknowns and derivatives of the gradient by them: of springs, loads, contacts that change.
+
+    Where `held` unknowns move with the variables, (k, size), all of them answer.
+    """
+    for d in range(designs.count if at.mesh.acting else 0):
         network = design_of(designs, d)
-        own = []
-        for attached in _acting(network):
-            places = [attached.place] if isinstance(attached, ContactAt) else list(attached.places)
-            arrays = [getattr(network.attachments, name)[places] for name in ("origin", "arm", "frame")]
-            if _is_stepped(attached.item) or any(np.imag(array).any() for array in arrays):
-                own.append((network, attached))
-        found.append(own)
-    return found
+        moved = at.z if held is None else at.z + 1j * COMPLEX_STEP * held[d]
+        for acting in network.acting:
+            if held is None and not _is_stepped(network, acting):
+                continue
+            for k, drive in enumerate(at.drive.tolist()):
+                part = energy.term(network, acting, moved[k], drive)
+                yield k, d, part.unknowns, np.imag(part.gradient) / COMPLEX_STEP
 
 
-def _is_stepped(item: Any) -> bool:
-    """Return True if a number of a record has a complex step."""
-    values = (getattr(item, each.name) for each in fields(item)) if is_dataclass(item) else (item,)
-    return any(
-        bool(np.imag(np.asarray(value)).any())
-        for value in values
-        if isinstance(value, complex | tuple | np.ndarray | np.number)
-    )
-
-
-def _acting(network: Discretisation) -> tuple[Attached | ContactAt, ...]:
-    """Return what acts on attachments."""
-    return (*network.springs, *network.loads, *network.contacts)
-
-
-def _term(acting: Acting, z: Any, drive: float) -> Contribution:
-    """Return the term of a spring, a load or a contact in one state."""
-    network, attached = acting
-    if isinstance(attached, ContactAt):
-        return contact_contribution(network, attached, z)
-    return ENERGY_TERMS[type(attached.item)](network, attached, z, 1.0, drive)
-
-
-def _term_slopes(own: Acting, at: Equilibria, motions: FloatArray) -> FloatArray:
-    """Return what a spring, a load or a contact adds to the derivatives, (p,)."""
-    found = np.empty(len(at.z))
-    for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
-        part = _term(own, z, drive)
-        found[k] = (np.imag(part.gradient) * motions[k][part.unknowns]).sum() / COMPLEX_STEP
-    return found
+def _is_stepped(network: Discretisation, acting: Attached | ContactAt) -> bool:
+    """Return True if a number of what acts on attachments, or of these, has a complex step."""
+    places = [acting.place] if isinstance(acting, ContactAt) else list(acting.places)
+    own = vars(acting.item).values()
+    numbers = [value for value in own if isinstance(value, complex | tuple | np.ndarray | np.number)]
+    arrays = [getattr(network.attachments, name)[places] for name in ("origin", "arm", "frame")]
+    return any(bool(np.imag(np.asarray(value)).any()) for value in (*numbers, *arrays))
 
 
 def _held_forces(at: Equilibria, motions: FloatArray) -> FloatArray:
@@ -263,11 +231,8 @@ def force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
             change = np.moveaxis(slopes_of(force, designs.count, force.shape), 0, 1)
             for element, own in enumerate(unknowns[:, list(columns)]):  # all different, unlike those of all elements
                 found[some, :, own] += change[:, :, element]
-    for d, terms in enumerate(_moved_terms(at, designs)):
-        for acting in terms:
-            for k, drive in enumerate(at.drive.tolist()):
-                part = _term(acting, at.z[k] if held is None else at.z[k] + 1j * COMPLEX_STEP * held[d], drive)
-                np.add.at(found[k, d], part.unknowns, np.imag(part.gradient) / COMPLEX_STEP)
+    for k, d, own, slopes in _term_slopes(at, designs, held):
+        np.add.at(found[k, d], own, slopes)
     return found
 
 
@@ -286,11 +251,3 @@ def _dual(owner: Any, stepped: dict[str, Any]) -> dict[str, Any]:
     """Return the arrays of an owner that have a complex step."""
     changed = {name: array.imag for name, array in stepped.items() if np.iscomplexobj(array) and array.imag.any()}
     return {name: DualArray(getattr(owner, name), steps / COMPLEX_STEP) for name, steps in changed.items()}
-
-
-def _moved_terms(at: Equilibria, designs: NetworkDesigns) -> list[list[Acting]]:
-    """Return the springs, loads and contacts of each design with a complex step; all where held unknowns have one."""
-    if designs.held_slopes is None or not _acting(at.mesh):
-        return _changed_terms(designs)
-    each = (design_of(designs, d) for d in range(designs.count))
-    return [[(network, attached) for attached in _acting(network)] for network in each]

@@ -18,18 +18,17 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.elements import (
-    TAUT_RATIO,
+    CutLaw,
     MechanicsUnits,
     MovingCuts,
     find_cuts,
     find_moving_cuts,
     is_straight,
     join_cut_laws,
-    turns_little,
 )
 from cfmkit.elastica.mechanics.network_arrays import fill_arrays, join_held
 from cfmkit.elastica.mechanics.numbering import Numbering, Topology, find_free, number
-from cfmkit.elastica.model.beam_fits import BeamFits, is_plain
+from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.contact import BeamSide, Stop
 from cfmkit.elastica.model.drive import FRAME_OF_DRIVE, Displacement, Loading, find_driven_node
 from cfmkit.elastica.model.network import PointLoad, TorsionSpring, apart, spring_ends
@@ -139,6 +138,11 @@ class Discretisation:
         return self.numbering.nodes
 
     @property
+    def acting(self) -> tuple[Attached | ContactAt, ...]:
+        """Springs, loads and contacts: all that acts on attachments."""
+        return (*self.springs, *self.loads, *self.contacts)
+
+    @property
     def axial(self) -> FloatArray:
         """1/EA of the elements, (e, q); with contacts at places of several states those of the first."""
         return np.asarray(self.elements.axial.reshape(-1, *self.elements.axial.shape[-2:])[0])
@@ -171,188 +175,141 @@ def discretise(
     Raises InputError if the driven node cannot move along the drive, or beams with offsets hang at a node that is
     pinned to an arm.
     """
-    fits = fits or BeamFits(network)
-    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build(tuple(flanks))
+    fits, tension = fits or BeamFits(network), tension or {}
+    scales, driven = scales or _find_units(network, drive, fits), find_driven_node(network, drive)
+    _check_arms(network)
+    cuts, laws = _cut_beams(network, fits, pieces, tension, flanks)
+    point_loads = [
+        (load, grows)
+        for grows, given in enumerate((network.loads, drive.loads))
+        for load in given
+        if isinstance(load, PointLoad)
+    ]
+    numbering = number(_find_topology(network, degree, cuts, [load for load, _ in point_loads]))
+    acting = iter(numbering.acting)
+    springs = tuple(Attached(spring, next(acting)) for spring in network.springs)
+    loads = tuple(Attached(load, next(acting), bool(grows)) for load, grows in point_loads)
+    places = np.array([pair for own in cuts.values() for pair in itertools.pairwise(own)])
+    arrays = fill_arrays(numbering, scales, places, [(network, drive)], [fits], driven)
+    attachments = Attachments(numbering.places, **{name: at[0] for name, at in arrays.places.items()})
+    floors = np.array([_find_floor(beam, drive, scales, fits, name) for name, beam in network.beams.items()])
+    floors = floors[numbering.row]
+    tables = {name: table[0] for name, table in arrays.tables.items()}
+    if np.count_nonzero(floors):
+        tables["axial"] = tables["axial"] + floors[:, None]
+    names = tuple(map(list(network.beams).__getitem__, numbering.row.tolist()))
+    elements = BeamElements(**tables, ends=numbering.ends, unknowns=numbering.unknowns, beam=names, cuts=places)
+    contacts, size = _number_contacts(network, numbering, flanks, elements)
+    rate, held = np.zeros(size), arrays.held[0]
+    if driven is not None:
+        rate[numbering.bodies[driven.node][driven.motion % FRAME_OF_DRIVE]] = driven.sense
+    arms = ((attachments.arm[:, 0] != 0) | (attachments.arm[:, 1] != 0)).tobytes()
+    acts = [(attached.places, *_acts_on(attached.item)) for attached in (*springs, *loads)]
+    acts += [((contact.place,), *_acts_on(contact.item)) for contact in contacts]
+    free = find_free(numbering, tuple(held), arms, tuple(acts))
+    if contacts:
+        free = np.append(free, np.arange(numbering.size, size))
+    sides = [(contact.item.beam, contact.slide) for contact in contacts if contact.slide >= 0]  # type: ignore[union-attr]
+    return Discretisation(
+        degree, elements, attachments, springs, loads, size, free, join_held([held], size)[0], rate, scales,
+        numbering, fits, floors > 0, pieces, tension, contacts, join_cut_laws(laws, names, sides) if flanks else None,
+    )  # fmt: skip
 
 
-class _ArrayBuilder:
-    """Collects attachments, elements and what is held."""
+def _cut_beams(
+    network: Network, fits: BeamFits, pieces: int, tension: Mapping[str, float], flanks: Sequence[FlankPlace]
+) -> tuple[dict[str, list[float]], dict[str, CutLaw]]:
+    """Return where the elements of each beam begin and end, and how these places move with contacts on their sides."""
+    touched: dict[str, list[float]] = {}
+    for flank in flanks:
+        touched.setdefault(network.contacts[flank.number].beam, []).append(flank.parameter)  # type: ignore[union-attr]
+    laws = {name: find_moving_cuts(network.beams[name], fits[name], places) for name, places in touched.items()}
+    cuts = {
+        name: laws[name].evaluate(touched[name]) if name in laws else find_cuts(beam, fits, name, pieces, tension)
+        for name, beam in network.beams.items()
+    }
+    return cuts, laws
 
-    def __init__(
-        self, network: Network, drive: Drive, degree: int, pieces: int, tension: Mapping[str, float], scales: Any,
-        fits: BeamFits,
-    ) -> None:  # fmt: skip
-        self.network, self.drive, self.degree, self.pieces, self.tension = network, drive, degree, pieces, tension
-        self.fits, self.bundle = fits, fits.bundle
-        self.scales = scales or self._scales()
-        self.driven = find_driven_node(network, drive)
 
-    def build(self, flanks: tuple[FlankPlace, ...]) -> Discretisation:
-        """Return the arrays."""
-        beams = self.network.beams
-        touched: dict[str, list[float]] = {}
-        for flank in flanks:
-            touched.setdefault(self.network.contacts[flank.number].beam, []).append(flank.parameter)  # type: ignore[union-attr]
-        laws = {name: find_moving_cuts(beams[name], self.fits[name], places) for name, places in touched.items()}
-        cuts = {
-            name: laws[name].evaluate(touched[name]) if name in laws else self._cuts(name, beam)
-            for name, beam in beams.items()
-        }
-        given = [(load, False) for load in self.network.loads] + [(load, True) for load in self.drive.loads]
-        point_loads = [(load, grows) for load, grows in given if isinstance(load, PointLoad)]
-        touching = [
-            (contact_number, contact)
-            for contact_number, contact in enumerate(self.network.contacts)
-            if not isinstance(contact, BeamSide)
-        ]
-        numbering = number(self._topology(cuts, [load for load, _ in point_loads], [item.node for _, item in touching]))
-        springs = tuple(map(Attached, self.network.springs, numbering.acting))
-        at_loads = numbering.acting[len(springs) :]
-        loads = tuple(
-            Attached(load, places, grows) for (load, grows), places in zip(point_loads, at_loads, strict=True)
-        )
-        places = np.array([pair for own in cuts.values() for pair in itertools.pairwise(own)])
-        arrays = fill_arrays(numbering, self.scales, places, [(self.network, self.drive)], [self.fits], self.driven)
-        attachments = Attachments(numbering.places, **{name: at[0] for name, at in arrays.places.items()})
-        floors = np.array([self._floor(name, beam) for name, beam in beams.items()])[numbering.row]
-        tables = {name: table[0] for name, table in arrays.tables.items()}
-        if np.count_nonzero(floors):
-            tables["axial"] = tables["axial"] + floors[:, None]
-        names = tuple(map(list(beams).__getitem__, numbering.row.tolist()))
-        elements = BeamElements(**tables, ends=numbering.ends, unknowns=numbering.unknowns, beam=names, cuts=places)
-        size = numbering.size
-        contacts = tuple(
-            ContactAt(item, place, size + k, contact_number)
-            for k, ((contact_number, item), place) in enumerate(zip(touching, numbering.touching, strict=True))
-        )
-        behind = size + len(contacts) + 3 * len(flanks)
-        contacts, n_friction = _number_friction(contacts, behind)
-        contacts += self._flank_contacts(flanks, elements, size + len(contacts))
-        acting = [*springs, *loads, *(Attached(contact.item, (contact.place,)) for contact in contacts)]
-        free, base, rate = self._constraints(numbering, attachments, acting, arrays.held[0])
-        if contacts:
-            sides = [contact for contact in contacts if contact.slide >= 0]
-            more = (
-                [contact.unknown for contact in contacts]
-                + [contact.slide for contact in sides]
-                + [contact.flag for contact in sides]
-                + list(range(behind, behind + n_friction))
+def _find_units(network: Network, drive: Drive, fits: BeamFits) -> MechanicsUnits:
+    bundle = fits.bundle
+    lengths = [np.real(fits[bundle.names[k]].length) for k in bundle.others]
+    lengths += bundle.length[fits.number].real.tolist() if bundle.plain else []
+    length = float(sum(lengths) / len(lengths))
+    if bundle.plain[:1] == [0]:
+        rigidity = float(bundle.rigidities[0, fits.number, 0].real)
+    else:
+        rigidity = _find_rigidity(next(iter(network.beams.values())))
+    return MechanicsUnits(length, rigidity / length**2, length if isinstance(drive, Displacement) else 1.0)
+
+
+def _find_rigidity(beam: Beam) -> float:
+    """Return the bending rigidity of a beam in its middle [N m2]."""
+    return float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0]))
+
+
+def _find_floor(beam: Beam, drive: Drive, scales: MechanicsUnits, fits: BeamFits, name: str) -> float:
+    """Return 1/EA that a straight beam gets which does not stretch."""
+    if beam.section.axial or not is_straight(beam, fits, name):
+        return 0.0
+    floor = FLOOR_UNDER_LOADS if isinstance(drive, Loading) else FLOOR_UNDER_MOTION
+    return floor * scales.force * scales.length**2 / _find_rigidity(beam)
+
+
+def _find_topology(network: Network, degree: int, cuts: Mapping[str, list[float]], loads: list[PointLoad]) -> Topology:
+    """Return what the numbers of unknowns and attachments depend on."""
+    beams = zip(network.beams.values(), cuts.values(), strict=True)
+    return Topology(
+        degree,
+        tuple(network.nodes),
+        network.links,
+        tuple(link.node for link in network.links if apart(network, link.node)),
+        tuple((b.start, b.end, b.start_joint == "pin", b.end_joint == "pin", len(own) - 1) for b, own in beams),
+        tuple(tuple(spring_ends(spring)) for spring in network.springs) + tuple((load.node,) for load in loads),
+        tuple(contact.node for contact in network.contacts if not isinstance(contact, BeamSide)),
+    )
+
+
+def _check_arms(network: Network) -> None:
+    """Refuse what hangs at a distance from a node that is pinned to a rigid arm."""
+    for link in network.links:
+        carrier, node = network.body_of(link.node), network.nodes[link.node]
+        if not network.is_moved_by_link(carrier) or not apart(network, carrier):
+            continue
+        ends = [((b.start, b.start_offset), (b.end, b.end_offset)) for b in network.beams.values()]
+        offsets = [offset for pair in ends for name, offset in pair if name == link.node]
+        if np.any(offsets) or node.x != network.nodes[carrier].x or node.y != network.nodes[carrier].y:
+            raise InputError(f"{carrier!r} is pinned to a rigid arm: it cannot carry offsets or rigid links of its own")
+
+
+def _number_contacts(
+    network: Network, numbering: Numbering, flanks: Sequence[FlankPlace], elements: BeamElements
+) -> tuple[tuple[ContactAt, ...], int]:
+    """Return the contacts, those of nodes first, and the number of all unknowns: those of contacts are the last.
+
+    They are all forces, then places and flags of sides of beams, then three of every node with friction.
+    """
+    contacts, count = list[ContactAt](), len(flanks)
+    touching = [(k, contact) for k, contact in enumerate(network.contacts) if not isinstance(contact, BeamSide)]
+    first = numbering.size + len(touching)
+    size = first + 3 * count
+    for unknown, (k, contact), place in zip(itertools.count(numbering.size), touching, numbering.touching):
+        own = ContactAt(contact, place, unknown, k)
+        if contact.friction:
+            own, size = own._replace(rub=size, flag=size + 1, anchor=size + 2), size + 3
+        contacts.append(own)
+    for unknown, flank in enumerate(flanks, start=first):
+        item: Any = network.contacts[flank.number]
+        on_beam = [element for element, name in enumerate(elements.beam) if name == item.beam]
+        ending = elements.cuts[on_beam, 1] - flank.parameter
+        element = on_beam[int(np.abs(ending).argmin())]
+        place = int(elements.ends[element, 1])
+        contacts.append(
+            ContactAt(
+                item, place, unknown, flank.number, None, unknown + count, element, flank.laid, unknown + 2 * count
             )
-            size += len(more)
-            free = np.append(free, more)
-            base, rate = (np.append(values, np.zeros(len(more))) for values in (base, rate))
-        return Discretisation(
-            self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
-            numbering, self.fits, floors > 0, self.pieces, self.tension, contacts,
-            join_cut_laws(laws, elements.beam, _sides(contacts))
-            if flanks
-            else None,
-        )  # fmt: skip
-
-    def _flank_contacts(
-        self, flanks: tuple[FlankPlace, ...], elements: BeamElements, first: int
-    ) -> tuple[ContactAt, ...]:
-        """Return the contacts of the sides of beams: their forces are numbered from `first` on, then their places."""
-        found = []
-        for k, flank in enumerate(flanks):
-            item: Any = self.network.contacts[flank.number]
-            own = [number for number, name in enumerate(elements.beam) if name == item.beam]
-            element = min(own, key=lambda number: abs(elements.cuts[number, 1] - flank.parameter))
-            place = int(elements.ends[element, 1])
-            count = len(flanks)
-            found.append(
-                ContactAt(
-                    item, place, first + k, flank.number, None, first + count + k, element, flank.laid,
-                    first + 2 * count + k,
-                )
-            )  # fmt: skip
-        return tuple(found)
-
-    # -- bodies and attachments ------------------------------------------------------------------------------------
-    def _scales(self) -> MechanicsUnits:
-        lengths = [np.real(self.fits[name].length) for name in (self.bundle.names[k] for k in self.bundle.others)]
-        lengths += self.bundle.length[self.fits.number].real.tolist() if self.bundle.plain else []
-        length = float(sum(lengths) / len(lengths))
-        if self.bundle.plain[:1] == [0]:
-            rigidity = float(self.bundle.rigidities[0, self.fits.number, 0].real)
-        else:
-            section = next(iter(self.network.beams.values())).section
-            rigidity = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
-        return MechanicsUnits(length, rigidity / length**2, length if isinstance(self.drive, Displacement) else 1.0)
-
-    def _topology(self, cuts: Mapping[str, list[float]], loads: list[PointLoad], touching: list[str]) -> Topology:
-        """Return what the numbers of unknowns and attachments depend on."""
-        network = self.network
-        self._check_arms()
-        beams = zip(network.beams.values(), cuts.values(), strict=True)
-        return Topology(
-            self.degree,
-            tuple(network.nodes),
-            network.links,
-            tuple(link.node for link in network.links if apart(network, link.node)),
-            tuple((b.start, b.end, b.start_joint == "pin", b.end_joint == "pin", len(own) - 1) for b, own in beams),
-            tuple(tuple(spring_ends(spring)) for spring in network.springs) + tuple((load.node,) for load in loads),
-            tuple(touching),
         )
-
-    def _check_arms(self) -> None:
-        """Refuse what hangs at a distance from a node that is pinned to a rigid arm."""
-        network = self.network
-        for link in network.links:
-            carrier, node = network.body_of(link.node), network.nodes[link.node]
-            if not network.is_moved_by_link(carrier) or not apart(network, carrier):
-                continue
-            ends = [((b.start, b.start_offset), (b.end, b.end_offset)) for b in network.beams.values()]
-            offsets = [offset for pair in ends for name, offset in pair if name == link.node]
-            if np.any(offsets) or node.x != network.nodes[carrier].x or node.y != network.nodes[carrier].y:
-                raise InputError(
-                    f"{carrier!r} is pinned to a rigid arm: it cannot carry offsets or rigid links of its own"
-                )
-
-    # -- elements --------------------------------------------------------------------------------------------------
-    def _cuts(self, name: str, beam: Beam) -> list[float]:
-        """Return the parameters between which the elements of a beam lie."""
-        tautness = self.tension.get(name, 0.0)
-        whole = self.pieces == 1 and tautness <= TAUT_RATIO and turns_little(beam)
-        return [0.0, 1.0] if whole and is_plain(beam) else find_cuts(beam, self.fits[name], self.pieces, tautness)
-
-    def _floor(self, name: str, beam: Beam) -> float:
-        """Return 1/EA that a straight beam gets which does not stretch."""
-        if beam.section.axial or not is_straight(beam, self.fits, name):
-            return 0.0
-        rigidity = np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])
-        floor = FLOOR_UNDER_LOADS if isinstance(self.drive, Loading) else FLOOR_UNDER_MOTION
-        return float(floor * self.scales.force * self.scales.length**2 / rigidity)
-
-    # -- what is held ----------------------------------------------------------------------------------------------
-    def _constraints(
-        self, numbering: Numbering, attachments: Attachments, acting: list[Attached], held: dict[int, Any]
-    ) -> tuple[Any, Any, Any]:
-        """Return the free unknowns, the values of held ones and their change with the drive."""
-        base, rate = join_held([held], numbering.size)[0], np.zeros(numbering.size)
-        if self.driven is not None:
-            rate[numbering.bodies[self.driven.node][self.driven.motion % FRAME_OF_DRIVE]] = self.driven.sense
-        arms = ((attachments.arm[:, 0] != 0) | (attachments.arm[:, 1] != 0)).tobytes()
-        acts = tuple((attached.places, *_acts_on(attached.item)) for attached in acting)
-        return find_free(numbering, tuple(held), arms, acts), base, rate
-
-
-def _number_friction(contacts: tuple[ContactAt, ...], first: int) -> tuple[tuple[ContactAt, ...], int]:
-    """Return contacts with the unknowns of their friction, numbered from `first` on, and how many these are."""
-    numbered, count = list[ContactAt](), 0
-    for contact in contacts:
-        if contact.item.friction:
-            own = first + count
-            contact = contact._replace(rub=own, flag=own + 1, anchor=own + 2)
-            count += 3
-        numbered.append(contact)
-    return tuple(numbered), count
-
-
-def _sides(contacts: tuple[ContactAt, ...]) -> list[tuple[str, int]]:
-    """Return beam and unknown place of each contact of a side."""
-    sides: Any = [contact for contact in contacts if contact.slide >= 0]
-    return [(contact.item.beam, contact.slide) for contact in sides]
+    return tuple(contacts), size
 
 
 def _acts_on(item: Any) -> tuple[bool, bool]:

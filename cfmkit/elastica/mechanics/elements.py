@@ -14,6 +14,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.compiled_module import load_compiled, shape_row
 from cfmkit.elastica.mechanics.polynomials import N_EXTRA_POINTS, basis, integrals_to_points, slopes_at_points
+from cfmkit.elastica.model.beam_fits import is_plain
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.model.shapes import Polynomial
 
@@ -172,10 +173,18 @@ class MovingCuts(NamedTuple):
     shares: FloatArray  # (r, 2, k)
     places: Any  # (k,) unknowns
 
+    def evaluate(self, places: Any) -> Any:
+        """Return where these elements begin and end with contacts at some places (..., k), (..., r, 2)."""
+        return self.fixed + np.einsum("rck,...k->...rc", self.shares, places)
 
-def find_cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float) -> list[float]:
+
+def find_cuts(beam: Beam, fits: BeamFits, name: str, pieces: int, tension: Mapping[str, float]) -> list[float]:
     """Return the parameters between which the elements of a beam lie."""
-    count = pieces if turns_little(beam) else max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
+    tautness, little = tension.get(name, 0.0), turns_little(beam)
+    if pieces == 1 and tautness <= TAUT_RATIO and little and is_plain(beam):
+        return [0.0, 1.0]
+    fitted = fits[name]
+    count = pieces if little else max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
     smooth = itertools.pairwise(smooth_marks(beam, fitted))
     cuts = [left + (right - left) * k / count for left, right in smooth for k in range(count)]
     cuts.append(1.0)

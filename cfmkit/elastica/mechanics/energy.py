@@ -14,6 +14,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.terms import contact_contribution
+from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
@@ -23,8 +24,7 @@ from cfmkit.numerics.dual_array import DualArray, chain, cos_sin, plain, stack
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
-    from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
+    from cfmkit.elastica.mechanics.discretise import Attached, BeamElements, Discretisation
     from cfmkit.elastica.mechanics.terms import Contribution
 
 SINGULAR_SHIFT = 1e-13  # added to the stiffness of the motions where it is singular to rounding
@@ -61,6 +61,8 @@ class SectionFields(SectionForces):
     Tables of elements may be dual, too. `slope_x`, `slope_y` and `turning` have derivatives then.
     """
 
+    curvature: Any  # phi' by the element's parameter, of `fields`
+
     def __init__(self, elements: BeamElements, angle: Any, h: Any, v: Any) -> None:
         """Compute the forces; the rest when it is needed."""
         super().__init__(angle, h, v)
@@ -69,57 +71,52 @@ class SectionFields(SectionForces):
         self.axial, self.slip = plain(elements.axial), plain(elements.shear)
 
     @property
+    def factors(self) -> tuple[Any, Any]:
+        """1 + (a - b) N and (a - b) Q."""
+        softer = self.axial - self.slip
+        return 1 + softer * self.normal, softer * self.shear
+
+    @property
     def slope_x(self) -> Any:
         """dX/ds."""
-        cos, sin, normal, shear, axial, slip = self._parts
-        value = (1 + axial * normal) * cos - slip * shear * sin
-        if not self.is_dual:
-            return value
-        f, g = 1 + (axial - slip) * normal, (axial - slip) * shear
-        by_h, by_v = axial * cos**2 + slip * sin**2, (axial - slip) * cos * sin
-        return chain(value, (g * cos - f * sin, by_h, by_v, normal * cos, -shear * sin), self.all_arguments)
+        return self._slope(self.cos, self.sin)
 
     @property
     def slope_y(self) -> Any:
         """dY/ds."""
-        cos, sin, normal, shear, axial, slip = self._parts
-        value = (1 + axial * normal) * sin + slip * shear * cos
+        return self._slope(self.sin, -self.cos)
+
+    def _slope(self, along: Any, across: Any) -> Any:
+        """Return the share of dX/ds in a direction that has these shares along the section's tangent and normal."""
+        axial, slip = self.axial, self.slip
+        value = (1 + axial * self.normal) * along - slip * self.shear * across
         if not self.is_dual:
             return value
-        f, g = 1 + (axial - slip) * normal, (axial - slip) * shear
-        by_h, by_v = (axial - slip) * cos * sin, axial * sin**2 + slip * cos**2
-        return chain(value, (g * sin + f * cos, by_h, by_v, normal * sin, shear * cos), self.all_arguments)
+        f, g = self.factors
+        by_h, by_v = (axial * along * h + slip * across * v for h, v in ((self.cos, self.sin), (self.sin, -self.cos)))
+        partials = g * along - f * across, by_h, by_v, self.normal * along, -self.shear * across
+        return chain(value, partials, self.all_arguments)
 
     @property
     def turning(self) -> Any:
         """-dM/ds."""
-        cos, sin, normal, shear, axial, slip = self._parts
-        f, g = 1 + (axial - slip) * normal, (axial - slip) * shear
-        value = shear * f
+        f, g = self.factors
         if not self.is_dual:
-            return value
-        by_force = g * cos - f * sin, g * sin + f * cos
-        return chain(value, (g * shear - f * normal, *by_force, shear * normal, -shear * normal), self.all_arguments)
-
-    @property
-    def _parts(self) -> tuple[Any, ...]:
-        return self.cos, self.sin, self.normal, self.shear, self.axial, self.slip
+            return self.shear * f
+        by_force = g * self.cos - f * self.sin, g * self.sin + f * self.cos
+        by_tables = self.shear * self.normal, -self.shear * self.normal
+        partials = g * self.shear - f * self.normal, *by_force, *by_tables
+        return chain(self.shear * f, partials, self.all_arguments)
 
 
-class Fields(SectionFields):
-    """The same at the Gauss points of all elements, with the change of curvature."""
-
-    curvature: Any  # phi' by the element's parameter
-
-
-def fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fields:
+def fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> SectionFields:
     """Return rotations and section forces at the Gauss points, of one state (size,) or of several (n, size)."""
     e, rule = mesh.elements, basis(mesh.degree)
     own = z[..., e.unknowns]
     rotation = own[..., rotation_columns(mesh.degree)]
     load = line_load(mesh, drive, share)
     h, v = (own[..., axis - 2, None] + load[..., axis, None] * e.ahead for axis in (0, 1))
-    at = Fields(e, e.angle + rotation @ rule.values.T, h, v)
+    at = SectionFields(e, e.angle + rotation @ rule.values.T, h, v)
     at.curvature = rotation @ rule.slopes.T
     if e.laid is not None:
         at.normal = np.where(e.laid[..., None], own[..., None, -2], at.normal)
@@ -142,7 +139,7 @@ def line_load(mesh: Discretisation, drive: Any, share: Any = 1.0) -> Any:
 def gradient(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the gradient of the functional by all unknowns, (size,); complex where z or the arrays are."""
     own, kind = element_gradients(mesh, z, drive, share)
-    parts = list(_contributions(mesh, z, drive, share))
+    parts = [term(mesh, acting, z, drive, share) for acting in mesh.acting]
     total = np.zeros(mesh.size, np.result_type(kind, *(part.gradient for part in parts)))
     np.add.at(total, mesh.elements.unknowns, own)
     for part in parts:
@@ -150,11 +147,11 @@ def gradient(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     return total
 
 
-def _contributions(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[Contribution]:
-    for attached in (*mesh.springs, *mesh.loads):
-        yield ENERGY_TERMS[type(attached.item)](mesh, attached, z, share, drive)
-    for contact in mesh.contacts:
-        yield contact_contribution(mesh, contact, z)
+def term(mesh: Discretisation, acting: Attached | ContactAt, z: Any, drive: Any, share: Any = 1.0) -> Contribution:
+    """Return the term of a spring, a load or a contact in one state."""
+    if isinstance(acting, ContactAt):
+        return contact_contribution(mesh, acting, z)
+    return ENERGY_TERMS[type(acting.item)](mesh, acting, z, share, drive)
 
 
 def _end_poses(mesh: Discretisation, z: Any) -> tuple[AttachmentPoses, AttachmentPoses]:
@@ -197,8 +194,7 @@ def hessian(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the Hessian by all unknowns, (size, size): symmetric unless loads follow."""
     e, rule, at = mesh.elements, basis(mesh.degree), fields(mesh, z, drive, share)
     start, end = _end_poses(mesh, z)
-    columns, softer = rotation_columns(mesh.degree), e.axial - e.shear
-    f, g = 1 + softer * at.normal, softer * at.shear
+    columns, (f, g) = rotation_columns(mesh.degree), at.factors
     own = np.zeros((*e.unknowns.shape, e.unknowns.shape[1]))
     bend, turn = e.weight * bending(e, at.curvature).stiffness, e.weight * (at.normal * f - g * at.shear)
     slopes, values = rule.slopes, rule.values
@@ -211,14 +207,15 @@ def hessian(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     own[:, 0:3, -2:], own[:, 4:7, -2:] = -start.jacobian.transpose(0, 2, 1), end.jacobian.transpose(0, 2, 1)
     own[:, -2, -2] = -(e.weight * (e.axial * at.cos**2 + e.shear * at.sin**2)).sum(axis=1)
     own[:, -1, -1] = -(e.weight * (e.axial * at.sin**2 + e.shear * at.cos**2)).sum(axis=1)
-    own[:, -2, -1] = own[:, -1, -2] = -(e.weight * softer * at.cos * at.sin).sum(axis=1)
+    own[:, -2, -1] = own[:, -1, -2] = -(e.weight * (e.axial - e.shear) * at.cos * at.sin).sum(axis=1)
     last = z[e.unknowns[:, -2:]]
     first = last + line_load(mesh, drive, share) * e.length[:, None]
     own[:, 2, 2] += (first * start.arm).sum(axis=1)
     own[:, 6, 6] -= (last * end.arm).sum(axis=1)
     total = np.zeros((mesh.size, mesh.size))
     np.add.at(total, (e.unknowns[:, :, None], e.unknowns[:, None, :]), own)
-    for part in _contributions(mesh, z, drive, share):
+    for acting in mesh.acting:
+        part = term(mesh, acting, z, drive, share)
         np.add.at(total, (part.unknowns[:, None], part.unknowns), part.hessian)
     return total
 
@@ -229,17 +226,6 @@ def values(mesh: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> Any
     z = z.astype(np.result_type(z, free))
     z[mesh.free] = free
     return z
-
-
-def strain_energy(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
-    """Return the energy of beams and springs."""
-    e, at = mesh.elements, fields(mesh, z, drive, share)
-    strain = e.axial * at.normal**2 + e.shear * at.shear**2
-    beams = e.weight * (2 * bending(e, at.curvature).energy + strain)
-    springs = (ENERGY_TERMS[type(spring.item)](mesh, spring, z, share, drive).energy for spring in mesh.springs)
-    return (
-        beams.sum() / 2 + sum(springs) + sum(contact_contribution(mesh, contact, z).energy for contact in mesh.contacts)
-    )
 
 
 def count_unstable(mesh: Discretisation, tangent: Any) -> int:

@@ -11,7 +11,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,7 +19,8 @@ import numpy as np
 
 from cfmkit.elastica.mechanics import energy
 from cfmkit.numerics.continuation.path import MarchedSteps
-from cfmkit.numerics.continuation.problem import PathEquilibrium
+from cfmkit.numerics.continuation.problem import PathEquilibrium, largest_motion
+from cfmkit.numerics.continuation.steps import judge
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
@@ -137,14 +138,6 @@ class NumpyEquations:
         """Set the units."""
         object.__setattr__(self, "unit", force_units(self.mesh))
 
-    def rebase(self, base: FloatArray) -> NumpyEquations:
-        """Return the equations with other values of the unknowns that are held, (size,)."""
-        return replace(self, mesh=replace(self.mesh, base=base))
-
-    def stiffen(self, mesh: Discretisation) -> NumpyEquations:
-        """Return the equations of the same network with another flexibility along its beams."""
-        return replace(self, mesh=mesh)
-
     def exchange_contacts(self, mesh: Discretisation) -> NumpyEquations | None:
         """Return the equations of the same network with other contacts closed; None if they must be made anew."""
         return None
@@ -153,6 +146,11 @@ class NumpyEquations:
         """Replace the tables of some elements, in place: only of equations whose arrays are their own."""
         for name, values in tables.items():
             getattr(self.mesh.elements, name)[elements] = values
+
+    @property
+    def motions(self) -> Any:
+        """Which free unknowns are motions, or say where and how contacts touch."""
+        return np.isinf(self.unit)
 
     @property
     def n(self) -> int:
@@ -222,7 +220,6 @@ class NumpyEquations:
         place: float,
         border: FloatArray | None = None,
         level: float = 0.0,
-        push: FloatArray | None = None,
         tolerance: float = 1e-10,
         quick: bool = False,
     ) -> PathEquilibrium | None:
@@ -234,20 +231,17 @@ class NumpyEquations:
             First guess.
         border, level : (n + 1,) array, float, optional
             What is held instead of the way, and where.
-        push : (n,) array, optional
-            Added force.
         tolerance : float
             Of corrections, relative to the largest motion and force.
         quick : bool
             Accept when the next correction would be below the tolerance.
         """
         free, last = np.array(free, float), np.inf
-        moves, size = np.isinf(self.unit), np.zeros(len(free))
+        moves, size = self.motions, np.zeros(len(free))
         for _ in range(MAX_ROUNDS):
             at = self.linearise(free, place)
-            residual = at.residual if push is None else at.residual - push
             try:
-                step, rate = np.linalg.solve(at.tangent, -np.stack([residual, at.change], axis=1)).T
+                step, rate = np.linalg.solve(at.tangent, -np.stack([at.residual, at.change], axis=1)).T
             except np.linalg.LinAlgError:
                 return None
             along = 0.0
@@ -338,13 +332,6 @@ def force_units(mesh: Discretisation) -> FloatArray:
 
 
 # -- natural march -----------------------------------------------------------------------------------------------------
-class _Judgement(NamedTuple):
-    moved: float  # largest change of a motion
-    missed: float  # what the prediction missed of it
-    force: float  # change of section forces over the allowed one
-    agrees: bool  # the chord with the slopes at its ends: else it is another path
-
-
 def predict(states: Sequence[PathEquilibrium], goal: float) -> FloatArray:
     """Return Hermite's polynomial through up to three states and their slopes at a place of the way.
 
@@ -360,21 +347,6 @@ def predict(states: Sequence[PathEquilibrium], goal: float) -> FloatArray:
     return np.asarray(total)
 
 
-def _judge(equations: NumpyEquations, current: PathEquilibrium, new: PathEquilibrium, guess: FloatArray) -> _Judgement:
-    moves = np.isinf(equations.unit)
-    chord = new.x - current.x
-    forces, ahead = ~moves, new.drive - current.drive
-    allowed = FORCE_CHANGE * equations.unit[forces] + 0.5 * np.abs(current.x[forces])
-    force = float((np.abs(chord[forces]) / allowed).max(initial=0.0))
-    chord, old, rate = chord[moves], current.rate[moves], new.rate[moves]
-    moved = float(np.abs(chord).max(initial=0.0))
-    missed = float(np.abs(new.x - guess)[moves].max(initial=0.0))
-    bend = float(np.abs(chord - 0.5 * ahead * (old + rate)).max(initial=0.0))
-    sense, size = np.sign(ahead), np.linalg.norm(chord)
-    along = all(sense * (chord @ t) >= 0.5 * size * np.linalg.norm(t) for t in (old, rate))
-    return _Judgement(moved, missed, force, bool(along and bend <= 0.25 * moved + SAME_EQUILIBRIUM))
-
-
 def _leads_back(
     equations: NumpyEquations, current: PathEquilibrium, new: PathEquilibrium, moved: float, tolerance: float
 ) -> bool:
@@ -383,8 +355,7 @@ def _leads_back(
     back = equations.solve(guess, current.drive, tolerance=tolerance, quick=True)
     if back is None:
         return False
-    apart = np.abs(back.x - current.x)[np.isinf(equations.unit)].max(initial=0.0)
-    return bool(apart < SAME_EQUILIBRIUM + 1e-3 * moved)
+    return largest_motion(equations, back.x - current.x) < SAME_EQUILIBRIUM + 1e-3 * moved
 
 
 def _march(equations: NumpyEquations, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
@@ -411,28 +382,25 @@ def _march(equations: NumpyEquations, start: PathEquilibrium, targets: FloatArra
             earlier = []
         guess = predict((current, *earlier), goal)
         new = equations.solve(guess, goal, tolerance=plan.tolerance, quick=True)
-        seen = _Judgement(0.0, 0.0, 0.0, True) if new is None else _judge(equations, current, new, guess)
-        same = new is not None and new.unstable == start.unstable
-        wide = seen.moved > plan.largest_turn or seen.missed > 0.4 * seen.moved + SAME_EQUILIBRIUM
-        if new is not None and seen.force > 1 and seen.moved <= plan.largest_turn:
-            step = abs(ahead) * max(0.7 / seen.force, 1e-4)  # too long for the forces: no sign of trouble
-        elif new is None or wide or (same and seen.moved > SAME_EQUILIBRIUM and not seen.agrees):
+        trial = judge(equations, current, new, guess, (plan.largest_turn, FORCE_CHANGE))
+        if trial.excess > 1:
+            step = abs(ahead) * max(0.7 / trial.excess, 1e-4)  # too long for the forces: no sign of trouble
+        elif trial.new is None:
             step, rejected = 0.5 * abs(ahead), rejected + 2
         else:
-            rejected = max(0, rejected - 1)
-            if not same:
+            new, rejected = trial.new, max(0, rejected - 1)
+            if new.unstable != start.unstable:
                 return end(MarchCode.STABILITY_CHANGES)
-            if plan.branch and not _leads_back(equations, current, new, seen.moved, plan.tolerance):
+            if plan.branch and not _leads_back(equations, current, new, trial.motion, plan.tolerance):
                 return end(MarchCode.BRANCH_ENDS)
             earlier = [current, *earlier[: N_PREDICTING - 2]]
             current = new
             states.append(new)
             at_targets.append(passed if lands else -1)
             passed += lands
-            quality = seen.missed / (seen.moved + 1e-8)
-            if quality < 0.1:
+            if trial.misfit < 0.1:
                 step = min(plan.span, 1.6 * (step if lands else max(step, abs(ahead))))
-            elif quality > 0.25:
+            elif trial.misfit > 0.25:
                 step = 0.8 * abs(ahead)
             continue
         if earlier and step < 0.25 * abs(current.drive - earlier[0].drive):
@@ -440,8 +408,3 @@ def _march(equations: NumpyEquations, start: PathEquilibrium, targets: FloatArra
         if rejected > MAX_REJECTED or step < SHORTEST_STEP * plan.span:
             return end(MarchCode.STEPS_FAIL)
     return end(MarchCode.DONE if passed == len(targets) else MarchCode.FULL)
-
-
-def begin(equations: NumpyEquations, free: FloatArray | None = None, place: float = 0.0) -> PathEquilibrium | None:
-    """Return the equilibrium at the start of a way: at rest, unless near some free unknowns."""
-    return equations.solve(np.zeros(equations.n) if free is None else free, place)

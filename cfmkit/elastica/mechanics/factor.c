@@ -271,7 +271,7 @@ static int dense_factors(Factors *f) {
     return 1;
 }
 
-int factors_finish(Factors *f, int unsymmetric) { return unsymmetric ? dense_factors(f) : f->fronts == 0; }
+int factors_finish(Factors *f) { return f->dense ? dense_factors(f) : f->fronts == 0; }
 
 static void dense_solve(const Factors *f, double *x) {
     const Int n = f->n;
@@ -287,53 +287,21 @@ static void dense_solve(const Factors *f, double *x) {
     }
 }
 
-/* Put the solutions in the place of two right sides, (n) each. */
-void factors_solve_two(const Factors *f, int unsymmetric, double *restrict x, double *restrict y) {
-    if (unsymmetric) { dense_solve(f, x); dense_solve(f, y); return; }
+/* Put the solution in the place of the right side, (n). */
+void factors_solve(const Factors *f, double *restrict x) {
+    if (f->dense) { dense_solve(f, x); return; }
     for (Int p = 0; p < f->pivots; p++) {
-        const double a = x[f->unknown[p]], b = y[f->unknown[p]];
-        for (Int k = f->first[p]; k < f->first[p + 1]; k++) {
-            x[f->row[k]] -= f->factor[k] * a;
-            y[f->row[k]] -= f->factor[k] * b;
-        }
+        const double own = x[f->unknown[p]];
+        for (Int k = f->first[p]; k < f->first[p + 1]; k++) x[f->row[k]] -= f->factor[k] * own;
     }
     for (Int p = 0; p < f->pivots; p++) {
         const Int own = f->unknown[p];
         const double *by = f->inverse + 2 * p;
-        if (!f->pair[p]) { x[own] *= by[0]; y[own] *= by[0]; continue; }
-        const Int other = f->unknown[p + 1];
-        const double a = x[own], b = x[other], c = y[own], d = y[other];
-        x[own] = by[0] * a + by[1] * b; x[other] = by[3] * a + by[2] * b;
-        y[own] = by[0] * c + by[1] * d; y[other] = by[3] * c + by[2] * d;
-        p++;
-    }
-    for (Int p = f->pivots - 1; p >= 0; p--) {
-        double a = x[f->unknown[p]], b = y[f->unknown[p]];
-        for (Int k = f->first[p]; k < f->first[p + 1]; k++) {
-            a -= f->factor[k] * x[f->row[k]];
-            b -= f->factor[k] * y[f->row[k]];
-        }
-        x[f->unknown[p]] = a;
-        y[f->unknown[p]] = b;
-    }
-}
-
-/* Put the solution in the place of the right side, (n). */
-void factors_solve(const Factors *f, int unsymmetric, double *x) {
-    if (unsymmetric) { dense_solve(f, x); return; }
-    for (Int p = 0; p < f->pivots; p++) {
-        const double own = x[f->unknown[p]];
-        if (own != 0.0)
-            for (Int k = f->first[p]; k < f->first[p + 1]; k++) x[f->row[k]] -= f->factor[k] * own;
-    }
-    for (Int p = 0; p < f->pivots; p++) {
-        const Int own = f->unknown[p];
-        if (!f->pair[p]) { x[own] *= f->inverse[2 * p]; continue; }
-        const Int other = f->unknown[p + 1];
+        if (!f->pair[p]) { x[own] *= by[0]; continue; }
+        const Int other = f->unknown[++p];
         const double a = x[own], b = x[other];
-        x[own] = f->inverse[2 * p] * a + f->inverse[2 * p + 1] * b;
-        x[other] = f->inverse[2 * p + 3] * a + f->inverse[2 * p + 2] * b;
-        p++;
+        x[own] = by[0] * a + by[1] * b;
+        x[other] = by[3] * a + by[2] * b;
     }
     for (Int p = f->pivots - 1; p >= 0; p--) {
         double own = x[f->unknown[p]];

@@ -62,7 +62,7 @@ static Judgement judge(const Model *m, const Known *here, const double *x, const
 /* On a branch: go back from the new point along its own slope; unless the branch has ended that leads to `here`. */
 static int leads_back(const Model *m, Work *w, const Known *here, const double *x, double ahead, double moved, double tolerance,
                       double *scratch) {
-    const Goal goal = {NULL, 0.0, NULL, tolerance, 1};
+    const Goal goal = {NULL, 0.0, tolerance, 1};
     double *back = scratch, *slope = scratch + m->free, way = here->way, apart = 0.0;
     Found found;
     memcpy(slope, w->slope, (size_t)m->free * sizeof(double));
@@ -93,14 +93,14 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
           Int count, double *rows, Int room, Int *stored, const double *any) {
     const Int n = m->free, wide = 2 * n + 4;
     const size_t bytes = (size_t)n * sizeof(double);
-    const Goal goal = {NULL, 0.0, NULL, plan->tolerance, 1};
+    const Goal goal = {NULL, 0.0, plan->tolerance, 1};
     int code = DONE, known = 1, rejected = 0; /* equilibria that predict */
     Int kept = 0, passed = 0;
     Found found = {(Int)plan->unstable, (Int)plan->unstable, 0.0};
     double *memory = calloc((size_t)(8 * n + 1), sizeof(double));
     double *guess = memory, *next = memory + n, *scratch = memory + 2 * n;
     Known at[N_PREDICTING] = {{x, rate, *way}, {memory + 4 * n, memory + 5 * n, 0.0}, {memory + 6 * n, memory + 7 * n, 0.0}};
-    Work *w = work_open(m);
+    Work *w = work_open(m, 0);
     if (!w || !memory) { code = NO_START; goto end; }
     if (before && before[2 * n] != *way) {
         memcpy(at[1].x, before, bytes); memcpy(at[1].rate, before + n, bytes);
@@ -108,7 +108,7 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
         known = 2;
     }
     if (plan->start != 0.0) {
-        const Goal first = {NULL, 0.0, NULL, plan->tolerance, 0};
+        const Goal first = {NULL, 0.0, plan->tolerance, 0};
         if (newton(m, w, x, way, &first, &found)) { code = NO_START; goto end; }
         memcpy(rate, w->slope, bytes);
         plan->unstable = (double)found.unstable;

@@ -121,9 +121,8 @@ void factors_close(Factors *f);
 void factors_begin(Factors *f);
 int factors_add(Factors *f, const Int *at, Int count, const double *matrix);
 int factors_eliminate(Factors *f, const Int *leaves, Int element);
-int factors_finish(Factors *f, int unsymmetric);
-void factors_solve_two(const Factors *f, int unsymmetric, double *x, double *y);
-void factors_solve(const Factors *f, int unsymmetric, double *x);
+int factors_finish(Factors *f);
+void factors_solve(const Factors *f, double *x);
 
 #define SAME_EQUILIBRIUM 1e-7 /* motions that differ by less are one */
 
@@ -143,7 +142,6 @@ typedef struct {
 typedef struct {
     const double *border; /* (n + 1): border . (x, way) = level instead of a given way; NULL if none */
     double level;
-    const double *push;   /* (n): added force; NULL if none */
     double tolerance;
     int quick; /* accept when the next correction would be below the tolerance */
 } Goal;
@@ -151,14 +149,12 @@ typedef struct {
 typedef struct { Int unstable, told; double effort; } Found; /* effort: gradient of what the drive moves */
 
 int newton(const Model *m, Work *w, double *x, double *way, const Goal *goal, Found *found);
-Work *work_open(const Model *m);
+Work *work_open(const Model *m, int dense);
 void work_close(Work *w);
 int evaluate(const Model *m, const double *z, const double *drive, double share, Int count, double *gradient, double *hessian);
 int linearise(const Model *m, const double *x, double way, double *residual, double *tangent, double *change);
 int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable);
-int solve(const Model *m, double *x, double *way, const double *border, double level, const double *push, double tolerance,
-          int quick, double *rate, double *found);
-int solve_each(const Model *m, double *x, double *way, Int count, double tolerance, int quick, double *rate, double *found);
+int solve_each(const Model *m, double *x, double *way, Int count, const Goal *goal, double *rate, double *found);
 double soften(const Model *m, const double *x, double way, Int rounds, double *vector);
 int beam_tables(const Model *shapes, Int elements, const Int *row, const double *cuts, const double *coefficients, Int powers,
                 const double *length, const double *rigidities, Int beams, double unit_length, double unit_force,

@@ -6,34 +6,32 @@ Both give the same to rounding (tests/elastica/test_elastica_march.py).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
 from cfmkit.elastica.contact.sliding import SlidingEquations
-from cfmkit.elastica.mechanics.compiled import CompiledEquations, are_sides_compiled
+from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.compiled_module import MAX_DEGREE, load_compiled
-from cfmkit.elastica.mechanics.contact_arrays import are_compiled, side_contacts
+from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.equations import (
-    LinearEquations,
     MarchPlan,
     NaturalMarch,
     NumpyEquations,
     SolvedStates,
 )
 from cfmkit.elastica.mechanics.moving_elements import copy_moved_tables
+from cfmkit.elastica.model.beam_fits import has_polynomial_angle
 from cfmkit.elastica.model.network import LineSpring, PointLoad, SlideSpring, TorsionSpring
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
-COMPILED_TERMS = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
+COMPILED_TERMS = {LineSpring, SlideSpring, TorsionSpring, PointLoad}
 """Springs and loads that march.c has; networks with others run on numpy."""
 
 
@@ -49,19 +47,44 @@ def equations(
     """Return the equations of a network, compiled if they can be."""
     key = equations, ramp, load_compiled() is not None
     if key not in mesh.known:
-        kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
-        plain = kinds <= set(COMPILED_TERMS) and mesh.degree <= MAX_DEGREE
-        if mesh.moving is not None and plain and key[2] and are_sides_compiled(mesh):
+        compiled = key[2] and _is_compiled(mesh)
+        if mesh.moving is not None and compiled:
             mesh.known[key] = CompiledSides(copy_moved_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
         elif mesh.moving is not None:
             mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
-        elif plain and key[2] and are_compiled(mesh):
+        elif compiled:
             mesh.known[key] = CompiledEquations(mesh, ramp)
         elif mesh.contacts:
             mesh.known[key] = ContactEquations(mesh, ramp, plain=equations(open_all_contacts(mesh), ramp))
         else:
             mesh.known[key] = NumpyEquations(mesh, ramp)
     return mesh.known[key]  # type: ignore[no-any-return]
+
+
+def _is_compiled(mesh: Discretisation) -> bool:
+    """Return True if C has everything of a network.
+
+    With contacts: they do not rub, no load follows, and sides of beams, which are uniform, touch at points.
+    """
+    acting, contacts = (*mesh.springs, *mesh.loads), mesh.contacts
+    if not {type(attached.item) for attached in acting} <= COMPILED_TERMS or mesh.degree > MAX_DEGREE:
+        return False
+    follows = any(load.item.follows for load in mesh.loads)
+    if contacts and (follows or any(contact.rub >= 0 or contact.laid for contact in contacts)):
+        return False
+    moving = () if mesh.moving is None else mesh.moving.elements
+    beams = [mesh.fits.network.beams[mesh.elements.beam[number]] for number in moving]
+    return all(has_polynomial_angle(beam) and not beam.section.shear for beam in beams)
+
+
+def _delegate(name: str) -> Any:
+    """Return a method of `CompiledSides` that is that of the same equations in numpy."""
+
+    @wraps(getattr(NumpyEquations, name))
+    def method(equations: CompiledSides, *arguments: Any, **options: Any) -> Any:
+        return getattr(equations.reference, name)(*arguments, **options)
+
+    return method
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,60 +106,43 @@ class CompiledSides(CompiledEquations):
         """Return whether some side lies on its obstacle in states (..., n)."""
         return np.rint(free[..., self._flags]).any(axis=-1)
 
-    def _exchange(self, mesh: Discretisation, arrays: Mapping[str, Any]) -> CompiledEquations:
-        exchanged = super()._exchange(mesh, arrays)
+    def _any_lies(self, z: FloatArray) -> bool:
+        return bool(self._lies(z[:, self.mesh.free]).any())
+
+    def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
+        """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
+        exchanged = super().exchange_contacts(mesh)
         for name in ("reference", "_flags"):
             vars(exchanged).pop(name, None)
         return exchanged
 
-    def gradient(self, free: Any, place: Any) -> Any:
-        """Return the gradient by all unknowns, (size,)."""
-        return self.reference.gradient(free, place)
+    gradient = _delegate("gradient")
+    evaluate = _delegate("evaluate")
+    linearise = _delegate("linearise")
+    count_unstable = _delegate("count_unstable")
+    resolve = _delegate("resolve")
+    soften = _delegate("soften")
 
     def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
         """Return the curvatures of gaps at contacts of sides in n states, (sides, n); None where something lies."""
         curvatures, states = np.empty((len(side_contacts(self.mesh)), len(z))), np.ascontiguousarray(z, float)
-        lies = self._lies(z[:, self.mesh.free]).any()
-        return None if lies or not self.code.side_curvatures(self.row, states, curvatures) else curvatures
+        return None if self._any_lies(z) or not self.code.side_curvatures(self.row, states, curvatures) else curvatures
 
     def search_sides(self, z: FloatArray, *rest: Any, **named: Any) -> FloatArray | None:
         """Return the least gaps of sides in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().search_sides(z, *rest, **named)
+        return None if self._any_lies(z) else super().search_sides(z, *rest, **named)
 
     def locate(self, z: FloatArray, *rest: Any) -> FloatArray | None:
         """Return places and rotations in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().locate(z, *rest)
+        return None if self._any_lies(z) else super().locate(z, *rest)
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""
-        lies = self._lies(z[:, self.mesh.free])
-        return self.reference.gradients(z, drive) if lies.any() else super().gradients(z, drive)
-
-    def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
-        """Return gradient (size,) and Hessian (size, size) by all unknowns."""
-        return self.reference.evaluate(z, drive, share)
-
-    def linearise(self, free: FloatArray, place: float) -> LinearEquations:
-        """Return the equations linearised at some unknowns."""
-        return self.reference.linearise(free, place)
-
-    def count_unstable(self, at: LinearEquations) -> int:
-        """Return the number of unstable directions at a held drive."""
-        return self.reference.count_unstable(at)
-
-    def resolve(self, free: FloatArray, place: float, right: FloatArray) -> tuple[FloatArray, int]:
-        """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable ones."""
-        return self.reference.resolve(free, place, right)
-
-    def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
-        """Return flexibility and shape of the softest mode."""
-        return self.reference.soften(free, place, vector, rounds)
+        return self.reference.gradients(z, drive) if self._any_lies(z) else super().gradients(z, drive)
 
     def solve(self, free: FloatArray, *rest: Any, **named: Any) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does."""
-        if self._lies(free):
-            return self.reference.solve(free, *rest, **named)
-        return super().solve(free, *rest, **named)
+        return self.reference.solve(free, *rest, **named) if self._lies(free) else super().solve(free, *rest, **named)
 
     def solve_each(
         self, free: FloatArray, places: FloatArray, tolerance: float = 1e-10, quick: bool = False
@@ -152,6 +158,5 @@ class CompiledSides(CompiledEquations):
 
     def march(self, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
-        if self._lies(start.x):
-            return self.reference.march(start, targets, plan)
-        return super().march(start, targets, plan)
+        lies = self._lies(start.x)
+        return self.reference.march(start, targets, plan) if lies else super().march(start, targets, plan)

@@ -48,11 +48,9 @@ FUNCTION(evaluate, 5, 1, evaluate(m, a->at[1], a->at[2], a->number[0], a->count[
 FUNCTION(linearise, 5, 1, linearise(m, a->at[1], a->number[0], a->at[2], a->at[3], a->at[4]))
 /* model, x, right, unstable; way -> code */
 FUNCTION(resolve, 4, 1, resolve(m, a->at[1], a->number[0], a->at[2], a->count[2] / m->free, a->at[3]))
-/* model, x, way, border, push, rate, found; level, tolerance, quick -> code */
-FUNCTION(solve, 7, 3, solve(m, a->at[1], a->at[2], a->at[3], a->number[0], a->at[4], a->number[1], a->number[2] != 0.0, a->at[5],
-                            a->at[6]))
-/* model, x, ways, rates, found; tolerance, quick -> code */
-FUNCTION(solve_each, 5, 2, solve_each(m, a->at[1], a->at[2], a->count[2], a->number[0], a->number[1] != 0.0, a->at[3], a->at[4]))
+/* model, x, ways, border, rate, found; level, tolerance, quick -> code */
+FUNCTION(solve, 6, 3, solve_each(m, a->at[1], a->at[2], a->count[2],
+                                 &(Goal){a->at[3], a->number[0], a->number[1], a->number[2] != 0.0}, a->at[4], a->at[5]))
 /* model, x, vector; way, rounds -> flexibility */
 FUNCTION(soften, 3, 2, soften(m, a->at[1], a->number[0], (Int)a->number[1], a->at[2]))
 /* models, shapes, laws, z, drives, ends, found; tolerance -> whether there was memory */
@@ -98,7 +96,7 @@ static PyObject *py_place(PyObject *self, PyObject *given) {
 
 #define ENTRY(name) {#name, py_##name, METH_VARARGS, NULL}
 static PyMethodDef methods[] = {
-    ENTRY(evaluate), ENTRY(linearise), ENTRY(resolve), ENTRY(solve), ENTRY(solve_each), ENTRY(soften), ENTRY(compare), ENTRY(tables),
+    ENTRY(evaluate), ENTRY(linearise), ENTRY(resolve), ENTRY(solve), ENTRY(soften), ENTRY(compare), ENTRY(tables),
     ENTRY(march), ENTRY(march_many), ENTRY(side_gaps), ENTRY(contact_gaps), ENTRY(side_curvatures), ENTRY(side_places), ENTRY(place),
     {NULL, NULL, 0, NULL},
 };

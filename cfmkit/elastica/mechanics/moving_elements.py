@@ -30,7 +30,7 @@ def compute_moved_tables(mesh: Discretisation, places: Any) -> dict[str, Any]:
     """Return the tables of the elements in `mesh.moving`, (..., r, q), with contacts at some places (..., k)."""
     moving = mesh.moving
     assert moving is not None
-    cuts = moving.fixed + np.einsum("rck,...k->...rc", moving.shares, places)
+    cuts = moving.evaluate(places)
     wide = mesh.elements.curl is not None
     tables_by_name: dict[str, Any] = {}
     for rows, beam, inside in _parts(mesh):
@@ -59,10 +59,7 @@ def cuts_at(mesh: Discretisation, z: Any) -> Any:
     cuts = np.empty((*z.shape[:-1], *mesh.elements.cuts.shape))
     cuts[...] = mesh.elements.cuts
     if mesh.moving is not None:
-        moving = mesh.moving
-        cuts[..., moving.elements, :] = moving.fixed + np.einsum(
-            "rck,...k->...rc", moving.shares, z[..., moving.places]
-        )
+        cuts[..., mesh.moving.elements, :] = mesh.moving.evaluate(z[..., mesh.moving.places])
     return cuts
 
 

@@ -11,12 +11,13 @@
 #define STANDING 1e-10          /* motions that change by less stand: then forces may still change by 1e-3 */
 #define MAX_ROUNDS 14
 
-Work *work_open(const Model *m) {
+/* Memory; with a dense matrix to hold the tangent as it is, whether it is symmetric or not. */
+Work *work_open(const Model *m, int dense) {
     Work *w = calloc(1, sizeof(Work));
     const size_t size = (size_t)m->size, n = (size_t)m->free;
     if (!w) return NULL;
     w->z = calloc(2 * size + 3 * n + 1, sizeof(double));
-    int opened = w->z && factors_open(&w->factors, m->free, is_dense(m));
+    int opened = w->z && factors_open(&w->factors, m->free, dense || is_dense(m));
     if (opened && is_dense(m)) opened = factors_open(&w->symmetric, m->free, 0);
     if (!opened) { work_close(w); return NULL; }
     w->gradient = w->z + size;
@@ -39,7 +40,7 @@ static void place(const Model *m, Work *w, const double *x, Stage at) {
         w->z[i] = m->slot[i] >= 0 ? x[m->slot[i]] : at.share * m->base[i] + at.drive * m->rate[i];
 }
 
-enum { GRADIENT, FACTORS, MATRIX };
+enum { GRADIENT, FACTORS, MATRIX }; /* what is assembled: MATRIX leaves a dense tangent as it is */
 
 static void add_to_gradient(Work *w, const Term *t) {
     for (Int i = 0; i < t->count; i++) w->gradient[t->at[i]] += t->gradient[i];
@@ -86,8 +87,7 @@ static int assemble_sides(const Model *m, Work *w, Stage at, int with_factors) {
     return 1;
 }
 
-/* Gradient of all unknowns at w->z; with factors also those of the tangent and the change of the residual on the way.
- * MATRIX leaves a dense tangent as it is. */
+/* Gradient of all unknowns at w->z; with factors also those of the tangent and the change of the residual on the way. */
 static int assemble(const Model *m, Work *w, Stage at, int with_factors) {
     Term *t = &w->term;
     Int slots[MAX_LOCAL];
@@ -111,18 +111,16 @@ static int assemble(const Model *m, Work *w, Stage at, int with_factors) {
         add_to_change(m, w, at, t, slots);
         if (!factors_add(&w->factors, slots, t->count, t->hessian)) return 0;
         const Int element = k + m->elements - terms(m);
-        if (!is_dense(m)) {
-            if (element >= 0 && !factors_eliminate(&w->factors, m->leaves, element)) return 0;
-            continue;
-        }
+        if (!w->factors.dense && element >= 0 && !factors_eliminate(&w->factors, m->leaves, element)) return 0;
+        if (!is_dense(m)) continue;
         if (m->follows) symmetrise(t);
         if (!factors_add(&w->symmetric, slots, t->count, t->hessian)) return 0;
         if (m->sides && element >= 0 && !sides_stiffen(m, &w->symmetric, t, element)) return 0;
         if (element >= 0 && !factors_eliminate(&w->symmetric, m->leaves, element)) w->definite = 0;
     }
     if (with_factors && m->follows)
-        w->definite = w->definite && factors_finish(&w->symmetric, 0) && w->symmetric.negative == 2 * m->elements;
-    return with_factors != FACTORS || factors_finish(&w->factors, is_dense(m));
+        w->definite = w->definite && factors_finish(&w->symmetric) && w->symmetric.negative == 2 * m->elements;
+    return with_factors != FACTORS || factors_finish(&w->factors);
 }
 
 /* Unstable directions. Under loads that follow: their parity, all that a march compares. */
@@ -166,37 +164,27 @@ int evaluate(const Model *m, const double *z, const double *drive, double share,
 
 /* Residual, tangent (n, n) and change of the residual on the way, of the free unknowns. */
 int linearise(const Model *m, const double *x, double way, double *residual, double *tangent, double *change) {
-    Work *w = work_open(m);
+    Work *w = work_open(m, 1);
     const Stage at = stage(m, way);
     if (!w) return DIVERGED;
     place(m, w, x, at);
     assemble(m, w, at, MATRIX);
     memcpy(change, w->change, (size_t)m->free * sizeof(double));
-    memset(tangent, 0, (size_t)(m->free * m->free) * sizeof(double));
+    memcpy(tangent, w->factors.dense, (size_t)(m->free * m->free) * sizeof(double));
     for (Int i = 0; i < m->size; i++) if (m->slot[i] >= 0) residual[m->slot[i]] = w->gradient[i];
-    if (is_dense(m)) memcpy(tangent, w->factors.dense, (size_t)(m->free * m->free) * sizeof(double));
-    else for (Int k = 0; k < terms(m); k++) {
-        Term *t = &w->term;
-        term(m, k, w->z, at, 1, t);
-        for (Int i = 0; i < t->count; i++)
-            for (Int j = 0; j < t->count; j++) {
-                const Int a = m->slot[t->at[i]], b = m->slot[t->at[j]];
-                if (a >= 0 && b >= 0) tangent[a * m->free + b] += t->hessian[i * t->count + j];
-            }
-    }
     work_close(w);
     return CONVERGED;
 }
 
 /* Solve with the tangent at x for right sides (count, n), in their place. */
 int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable) {
-    Work *w = work_open(m);
+    Work *w = work_open(m, 0);
     const Stage at = stage(m, way);
     int code = DIVERGED;
     if (w) {
         place(m, w, x, at);
         if (assemble(m, w, at, FACTORS)) {
-            for (Int k = 0; k < count; k++) factors_solve(&w->factors, is_dense(m), right + k * m->free);
+            for (Int k = 0; k < count; k++) factors_solve(&w->factors, right + k * m->free);
             *unstable = told_unstable(m, w);
             code = CONVERGED;
         }
@@ -240,12 +228,13 @@ int newton(const Model *m, Work *w, double *x, double *way, const Goal *goal, Fo
         for (Int i = 0; i < m->size; i++)
             if (m->slot[i] >= 0) {
                 const Int a = m->slot[i];
-                w->step[a] = (goal->push ? goal->push[a] : 0.0) - w->gradient[i];
+                w->step[a] = -w->gradient[i];
                 w->slope[a] = -w->change[a];
             }
         found->unstable = unstable_of(m, w);
         found->told = told_unstable(m, w);
-        factors_solve_two(&w->factors, is_dense(m), w->step, w->slope);
+        factors_solve(&w->factors, w->step);
+        factors_solve(&w->factors, w->slope);
         double along = 0.0;
         if (border) {
             double left = goal->level - border[n] * *way, below = border[n];
@@ -279,29 +268,14 @@ int newton(const Model *m, Work *w, double *x, double *way, const Goal *goal, Fo
     return DIVERGED;
 }
 
-int solve(const Model *m, double *x, double *way, const double *border, double level, const double *push, double tolerance,
-          int quick, double *rate, double *found) {
-    const Goal goal = {border, level, push, tolerance, quick};
-    Found end = {0, 0, 0.0};
-    Work *w = work_open(m);
-    if (!w) return DIVERGED;
-    const int code = newton(m, w, x, way, &goal, &end);
-    memcpy(rate, w->slope, (size_t)m->free * sizeof(double));
-    found[0] = (double)end.told;
-    found[1] = end.effort;
-    work_close(w);
-    return code;
-}
-
 /* Newton's method for each of several guesses (count, n) at places (count) of the way: codes, unstable directions and efforts
  * to found (count, 3), slopes to rate. */
-int solve_each(const Model *m, double *x, double *way, Int count, double tolerance, int quick, double *rate, double *found) {
-    const Goal goal = {NULL, 0.0, NULL, tolerance, quick};
-    Work *w = work_open(m);
+int solve_each(const Model *m, double *x, double *way, Int count, const Goal *goal, double *rate, double *found) {
+    Work *w = work_open(m, 0);
     if (!w) return DIVERGED;
     for (Int k = 0; k < count; k++, x += m->free, rate += m->free, found += 3) {
         Found end = {0, 0, 0.0};
-        found[0] = newton(m, w, x, way + k, &goal, &end);
+        found[0] = newton(m, w, x, way + k, goal, &end);
         memcpy(rate, w->slope, (size_t)m->free * sizeof(double));
         found[1] = (double)end.told;
         found[2] = end.effort;
@@ -313,7 +287,7 @@ int solve_each(const Model *m, double *x, double *way, Int count, double toleran
 /* Make a vector (n) the softest mode of the motions by powers of their flexibility; return the mode's flexibility, 0 if
  * the tangent is singular. */
 double soften(const Model *m, const double *x, double way, Int rounds, double *vector) {
-    Work *w = work_open(m);
+    Work *w = work_open(m, 0);
     const Stage at = stage(m, way);
     double flexibility = 0.0;
     if (w) {
@@ -321,7 +295,7 @@ double soften(const Model *m, const double *x, double way, Int rounds, double *v
         for (Int round = assemble(m, w, at, FACTORS) ? 0 : rounds; round < rounds; round++) {
             double before = 0.0, along = 0.0, after = 0.0;
             for (Int i = 0; i < m->free; i++) w->step[i] = m->unit[i] == HUGE_VAL ? vector[i] : 0.0;
-            factors_solve(&w->factors, is_dense(m), w->step);
+            factors_solve(&w->factors, w->step);
             for (Int i = 0; i < m->free; i++)
                 if (m->unit[i] == HUGE_VAL) {
                     before += vector[i] * vector[i];

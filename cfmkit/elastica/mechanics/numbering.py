@@ -133,3 +133,10 @@ def find_free(
             used[places[k, 3]] |= on_rotation
     used[list(held)] = False
     return read_only(np.flatnonzero(used), np.int64)
+
+
+def number_free(free: Any, size: int) -> Any:
+    """Return the number of every unknown among the free ones, (size,); -1 where it is held."""
+    slots = np.full(size, -1, np.int64)
+    slots[free] = np.arange(len(free))
+    return slots

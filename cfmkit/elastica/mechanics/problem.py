@@ -14,7 +14,6 @@ from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.equations import N_POWERS, MarchCode, MarchPlan, NaturalMarch
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import slopes_at_end
-from cfmkit.elastica.model.network import PointLoad
 from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
@@ -72,15 +71,12 @@ class NetworkProblem:
 
     def linearise(self, x: FloatArray, drive: float) -> Tangent:
         """Return residual, tangent and the residual's change with the drive."""
-        at = self.equations.linearise(x, drive)
-        return Tangent(self.equations, at)
+        return Tangent(self.equations, self.equations.linearise(x, drive))
 
-    def solve(
-        self, x: FloatArray, drive: float, border: Border | None = None, push: FloatArray | None = None
-    ) -> PathEquilibrium | None:
+    def solve(self, x: FloatArray, drive: float, border: Border | None = None) -> PathEquilibrium | None:
         """Return the equilibrium near a guess: Newton's method of the protocol, in compiled code."""
         row, level = (None, 0.0) if border is None else border
-        return self.equations.solve(x, drive, row, level, push)
+        return self.equations.solve(x, drive, row, level)
 
     def solve_each(self, guesses: Sequence[FloatArray], drives: Sequence[float]) -> list[PathEquilibrium | None]:
         """Return the equilibria near guesses at their drives, in compiled code."""
@@ -93,7 +89,8 @@ class NetworkProblem:
 
         Nothing does if all is stable, and no eigenvalue at either end as small as a stiffness by far.
         """
-        if not isinstance(self.equations, CompiledEquations) or self.follows or self.mesh.fits.network.contacts:
+        own = self.equations
+        if not isinstance(own, CompiledEquations) or own.follows or self.mesh.fits.network.contacts:
             return None
         march = self._march(walk, self._any_vector)
         ends = zip(march.flexibilities, stiffnesses, strict=True)
@@ -138,7 +135,7 @@ class NetworkProblem:
             shift = energy.SINGULAR_SHIFT * np.diag(self.motions.astype(float))
             flexibility = np.linalg.solve(tangent + shift, unit)
         inner = flexibility[moves]
-        if self.follows:
+        if self.equations.follows:
             inverse, vectors = np.linalg.eig(inner)
             real = np.abs(inverse.imag) <= energy.REAL_SHARE * np.abs(inverse)
             inverse, vectors = inverse[real].real, vectors[:, real].real
@@ -156,7 +153,7 @@ class NetworkProblem:
 
     def softest(self, at: PathEquilibrium, near: FloatArray | None = None) -> tuple[float, FloatArray | None]:
         """Return the size of the smallest eigenvalue and its mode, better where another is known that is near."""
-        if self.follows:
+        if self.equations.follows:
             return abs(float(self.modes(at, 1)[0][0])), None
         vector = self._any_vector if near is None else near + MODE_MIX_SHARE * self._any_vector
         rounds = FIRST_POWERS if near is None else N_POWERS
@@ -167,11 +164,6 @@ class NetworkProblem:
     def _any_vector(self) -> FloatArray:
         """Unit vector that has a share of every mode."""
         return _any_vector(len(self.mesh.free))
-
-    @cached_property
-    def follows(self) -> bool:
-        """True if a load turns with its node: the tangent is unsymmetric."""
-        return any(load.item.follows for load in self.mesh.loads if isinstance(load.item, PointLoad))
 
     def orient(self, modes: FloatArray) -> FloatArray:
         """Return one combination of modes, its largest motion one, on the side that `Control.sign` 1 names.
@@ -217,29 +209,15 @@ def _any_vector(count: int) -> FloatArray:
     return read_only(vector / np.linalg.norm(vector))
 
 
-@dataclass(frozen=True, eq=False)
 class Tangent:
     """Residual and tangent of a network at one place."""
 
-    equations: NumpyEquations
-    at: LinearEquations
+    def __init__(self, equations: NumpyEquations, at: LinearEquations) -> None:
+        self.equations, self.at = equations, at
+        # forces out of balance, their change with the drive (n,), their derivatives (n, n)
+        self.residual, self.rate, self.tangent = at.residual, at.change, at.tangent
 
     @property
-    def residual(self) -> FloatArray:
-        """Forces out of balance, (n,)."""
-        return self.at.residual
-
-    @property
-    def rate(self) -> FloatArray:
-        """Change of the residual with the drive, (n,)."""
-        return self.at.change
-
-    @property
-    def tangent(self) -> FloatArray:
-        """Derivatives of the residual, (n, n)."""
-        return self.at.tangent
-
-    @cached_property
     def unstable(self) -> int:
         """Number of unstable directions at a held drive."""
         return self.equations.count_unstable(self.at)

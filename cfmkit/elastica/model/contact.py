@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
 
@@ -102,7 +102,7 @@ class ObstacleEdge(ShortRepr):
             low = -reach if number == 0 and not self.closed else 0.0
             high = length + reach if number == last and not self.closed else length
             found.append(np.array([start + low * along, start + high * along]))
-        for centre, radius, first, sweep in zip(self.centre, self.radius, self.first, self.sweep, strict=True):
+        for centre, radius, first, sweep, _ in self._arcs:
             angle = first + sweep * np.linspace(0.0, 1.0, 2 + math.ceil(POINTS_PER_TURN * abs(sweep) / math.tau))
             found.append(centre + radius * np.column_stack([np.cos(angle), np.sin(angle)]))
         return found
@@ -113,40 +113,23 @@ class ObstacleEdge(ShortRepr):
         Places may be complex: what is nearest is decided by their real parts.
         """
         places = np.asarray(places)
-        candidates = [*self._from_segments(places), *self._from_arcs(places)]
-        if len(candidates) == 1:
-            return candidates[0][0]
-        far = np.array([np.where(near, np.abs(np.real(found.value)), np.inf) for found, near in candidates])
-        pick = far.argmin(axis=0)
-
-        def choose(values: list[Any]) -> Any:
-            stacked = np.array(values)
-            index = pick.reshape(1, *pick.shape, *(1,) * (stacked.ndim - 1 - pick.ndim))
-            return np.take_along_axis(stacked, index, axis=0)[0]
-
-        rows: list[list[Any]] = [list(row) for row in zip(*(found for found, _ in candidates), strict=True)]
-        return Distance(*map(choose, rows))
+        parts = [*self._from_segments(places), *self._from_arcs(places)]
+        return parts[0][0] if len(parts) == 1 else Distance(*_choose_nearest(parts, [found for found, _ in parts]))
 
     def way_along(self, places: Any, offset: float) -> WayAlong:
         """Return how far places (..., 2) [m] are along the line at a distance from it: the obstacle to the right.
 
         Of a closed one it is known but for whole rounds; see `round_length`.
         """
-        places = np.asarray(places)
-        ways = list[WayAlong]()
-        begins = self._part_begins(offset)
-        found = [*self._from_segments(places), *self._from_arcs(places)]
-        near = np.array([np.where(inside, np.abs(np.real(gap.value)), np.inf) for gap, inside in found])
+        places, ways, begins = np.asarray(places), list[WayAlong](), self._part_begins(offset)
         for start, along, begin in zip(self.start, self.along, begins, strict=False):
             ways.append(WayAlong(begin + (places - start) @ along, along + 0.0 * places, np.zeros((*places.shape, 2))))
-        arcs = zip(self.centre, self.radius, self.first, self.sweep, self.bulge, strict=True)
-        for (centre, radius, first, sweep, bulge), begin in zip(arcs, begins[len(self.start) :], strict=True):
+        for (centre, radius, first, sweep, bulge), begin in zip(self._arcs, begins[len(self.start) :], strict=True):
             away = places - centre
             reach = np.sqrt((away * away).sum(axis=-1))[..., None]
             outwards = away / reach
             across = np.stack([-outwards[..., 1], outwards[..., 0]], axis=-1)
-            angle = np.arctan2(np.real(away[..., 1]), np.real(away[..., 0]))
-            turned = (np.sign(sweep) * (angle - first) + BESIDE_END) % math.tau - BESIDE_END
+            turned = (_turn_along(away, first, sweep) + BESIDE_END) % math.tau - BESIDE_END
             size = -bulge * (radius + bulge * offset)
             value = np.sign(sweep) * turned + 0j if np.iscomplexobj(places) else np.sign(sweep) * turned
             if np.iscomplexobj(places):  # by a complex step
@@ -154,14 +137,11 @@ class ObstacleEdge(ShortRepr):
             both = outwards[..., :, None] * across[..., None, :]
             bend = -size * (both + np.swapaxes(both, -1, -2)) / (reach * reach)[..., None]
             ways.append(WayAlong(begin + size * value, size * across / reach, bend))
-        pick = near.argmin(axis=0)
+        return WayAlong(*_choose_nearest([*self._from_segments(places), *self._from_arcs(places)], ways))
 
-        def choose(values: list[Any]) -> Any:
-            stacked = np.array(values)
-            index = pick.reshape(1, *pick.shape, *(1,) * (stacked.ndim - 1 - pick.ndim))
-            return np.take_along_axis(stacked, index, axis=0)[0]
-
-        return WayAlong(*(choose([way[k] for way in ways]) for k in range(3)))
+    @property
+    def _arcs(self) -> Iterator[tuple[Any, ...]]:
+        return zip(self.centre, self.radius, self.first, self.sweep, self.bulge, strict=True)
 
     def round_length(self, offset: float) -> float:
         """Return the length of the line at a distance from a closed outline [m]; infinite of an endless one."""
@@ -196,17 +176,30 @@ class ObstacleEdge(ShortRepr):
 
     def _from_arcs(self, places: Any) -> list[tuple[Distance, Any]]:
         found = []
-        for centre, radius, first, sweep, bulge in zip(
-            self.centre, self.radius, self.first, self.sweep, self.bulge, strict=True
-        ):
+        for centre, radius, first, sweep, bulge in self._arcs:
             away = places - centre
             reach = np.sqrt((away * away).sum(axis=-1))
             safe = np.where(reach == 0, 1.0, reach)
-            angle = np.arctan2(np.real(away[..., 1]), np.real(away[..., 0]))
-            turned = (np.sign(sweep) * (angle - first)) % math.tau
+            turned = _turn_along(away, first, sweep) % math.tau
             near = (turned <= abs(sweep) + BESIDE_END) | (turned >= math.tau - BESIDE_END)
             found.append((Distance(bulge * (reach - radius), bulge * away / safe[..., None], bulge / safe), near))
         return found
+
+
+def _turn_along(away: Any, first: float, sweep: float) -> Any:
+    """Return by how much vectors (..., 2) from the centre of an arc are turned from its begin, along it [rad]."""
+    return np.sign(sweep) * (np.arctan2(np.real(away[..., 1]), np.real(away[..., 0])) - first)
+
+
+def _choose_nearest(parts: list[tuple[Distance, Any]], values: Sequence[tuple[Any, ...]]) -> list[Any]:
+    """Return the values of the part that is nearest to each place, of those beside which it lies."""
+    pick = np.array([np.where(near, np.abs(np.real(found.value)), np.inf) for found, near in parts]).argmin(axis=0)
+    chosen = []
+    for rows in zip(*values, strict=True):
+        stacked = np.array(rows)
+        index = pick.reshape(1, *pick.shape, *(1,) * (stacked.ndim - 1 - pick.ndim))
+        chosen.append(np.take_along_axis(stacked, index, axis=0)[0])
+    return chosen
 
 
 def line_edge(through: Sequence[float], direction: float) -> ObstacleEdge:
@@ -281,8 +274,20 @@ def _turn(one: FloatArray, other: FloatArray) -> float:
     return math.atan2(float(one[0] * other[1] - one[1] * other[0]), float(one @ other))
 
 
+class _Force:
+    """A contact whose force is no moment."""
+
+    turns = False
+
+
+class _RigidForce(_Force):
+    """The side of a beam: a bed of springs would be another model, and friction with rolling depends on the way."""
+
+    stiffness, friction = math.inf, 0.0
+
+
 @dataclass(frozen=True)
-class NodeOnObstacle:
+class NodeOnObstacle(_Force):
     """The round pad of a node and a rigid obstacle that is fixed to the ground."""
 
     name: str
@@ -292,47 +297,28 @@ class NodeOnObstacle:
     stiffness: float = math.inf  # [N/m]
     friction: float = 0.0  # coefficient
 
-    @property
-    def turns(self) -> bool:
-        """False: the force is no moment."""
-        return False
-
 
 @dataclass(frozen=True)
-class BeamOnObstacle:
+class BeamOnObstacle(_RigidForce):
     """The side of a beam and a rigid obstacle that is fixed to the ground; it touches at places that are unknowns."""
 
     name: str
     beam: str
     outline: ObstacleEdge = field(compare=False)
-    stiffness: float = field(default=math.inf, init=False)  # a bed of springs would be another model
-    friction: float = field(default=0.0, init=False)  # with rolling it would depend on the way
-
-    @property
-    def turns(self) -> bool:
-        """False: the force is no moment."""
-        return False
 
 
 @dataclass(frozen=True)
-class NodeOnBeam:
+class NodeOnBeam(_RigidForce):
     """The round pad of a node and the side of a beam, which touch at a place along the beam that is an unknown."""
 
     name: str
     node: str
     beam: str
     radius: float = 0.0  # of the pad [m]
-    stiffness: float = field(default=math.inf, init=False)
-    friction: float = field(default=0.0, init=False)
-
-    @property
-    def turns(self) -> bool:
-        """False: the force is no moment."""
-        return False
 
 
 @dataclass(frozen=True)
-class BeamOnBeam:
+class BeamOnBeam(_RigidForce):
     """One of two beams whose sides touch at a place of each that is an unknown.
 
     A pair has one for each of its beams: of one name, one after the other; the first `leads` and has gap and force.
@@ -342,13 +328,6 @@ class BeamOnBeam:
     beam: str
     partner: str
     leads: bool = True
-    stiffness: float = field(default=math.inf, init=False)
-    friction: float = field(default=0.0, init=False)
-
-    @property
-    def turns(self) -> bool:
-        """False: the force is no moment."""
-        return False
 
 
 BeamSide = BeamOnObstacle | NodeOnBeam | BeamOnBeam

@@ -323,15 +323,16 @@ def unloaded_places(net: Network, at: Equilibria, beam: str, fractions: Any) -> 
     """Return the places before any load, (k, 2) [m], at the fractions of `states`."""
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 
-    rest = Equilibria(at.mesh, np.zeros((1, at.mesh.size)), np.zeros(1))
-    line = at.mesh.elements.line[:, 0]
-    if line.any():  # without its loads
-        from dataclasses import replace
-
-        bare = at.mesh.elements._replace(line=0.0 * at.mesh.elements.line)
-        rest = Equilibria(replace(at.mesh, elements=bare), rest.z, rest.drive)
+    rest = Equilibria(drop_line_loads(at.mesh), np.zeros((1, at.mesh.size)), np.zeros(1))
     unloaded = states(net, rest, beam, fractions)
     return np.stack([unloaded.x[0], unloaded.y[0]], axis=-1)
+
+
+def drop_line_loads(mesh: Discretisation) -> Discretisation:
+    """Return the arrays without line loads, under which beams stretch also where all unknowns are zero."""
+    if not mesh.elements.line.any():
+        return mesh
+    return replace(mesh, elements=mesh.elements._replace(line=0.0 * mesh.elements.line))
 
 
 class BeamSections(NamedTuple):

@@ -106,6 +106,9 @@ CORNER_OFFSET = 1e-6
 CORNER_SHARES = (0.1, 0.01, 0.001)
 """Shares of the way from a corner to the next point: equilibria are solved for there, to extrapolate to the corner."""
 AT_POINT = 1e-10  # share of the drive's range within which a bifurcation is at a point: it is not located better
+NEXT_TO_POINT = 1e-7
+"""The same for a point of the path that goes through. So near, Newton's method leaves more of the critical mode than
+the path moves: no polynomial may run through both. On the branch that parts it moves with the root of the distance."""
 PLACE_RTOL = 1e-12  # share of the drive's range within which a place is that of a point
 
 
@@ -422,7 +425,8 @@ class BetweenPoints(ShortRepr):
         """The corners of the path by the number of the stretch behind each, increasing."""
         branch, stretches, drive = self.path.branch[self._order], self._stretch, self.own_drive
         names, corners = list(dict.fromkeys(self.path.branch.tolist())), {}
-        rounding = AT_POINT * (drive[-1] - drive[0])
+        width = float(drive[-1] - drive[0])
+        near = NEXT_TO_POINT * width
         for right in (np.flatnonzero(np.diff(stretches)) + 1).tolist():
             if right in self._contacts:
                 corners[int(stretches[right])] = Corner(
@@ -430,12 +434,15 @@ class BetweenPoints(ShortRepr):
                 )
                 continue
             before, behind = drive[right - 1], drive[right]
-            inner_events = self._events[(self._events >= before - rounding) & (self._events <= behind + rounding)]
+            inner_events = self._events[(self._events >= before - near) & (self._events <= behind + near)]
             if len(inner_events) != 1:
                 continue
             ranks = [names.index(branch[right - 1]), names.index(branch[right])]
             below, above = ranks[0] > ranks[1], ranks[1] > ranks[0]  # a branch that parts is named after the other
-            at = next((k for k in (right - 1, right) if abs(drive[k] - inner_events[0]) <= rounding), None)
+            # a point beyond the bifurcation is still on its branch where the mode is less than rounding
+            sides = (right - 1, inner_events[0] - before, below), (right, behind - inner_events[0], above)
+            limits = {True: AT_POINT * width, False: near}
+            at = next((point for point, distance, parts in sides if distance <= limits[parts]), None)
             place = float(inner_events[0] if at is None else drive[at])
             y = self._corner(place, right if below else right - 1) if at is None else np.asarray(self.own_unknowns[at])
             if y is not None:

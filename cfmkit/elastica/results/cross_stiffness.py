@@ -81,12 +81,12 @@ def _compute_along_path(path: EquilibriumPath, node: str, direction: float) -> t
     kept = mesh.free[(mesh.free != x) & (mesh.free != y)]
     loose = replace(mesh, attachments=mesh.attachments._replace(frame=frame), free=np.sort(np.append(kept, y)))
     loose = make_inextensible(loose, np.flatnonzero(mesh.floored))
-    own, cos, sin = equations(loose), new @ old, old[0] * new[1] - old[1] * new[0]
+    cos, sin = new @ old, old[0] * new[1] - old[1] * new[0]
     found = np.empty((len(path), 2))
     for k, (state, drive) in enumerate(zip(path.at.z, path.at.drive.tolist(), strict=True)):
         z = state.copy()
         z[x], z[y] = cos * z[x] + sin * z[y], cos * z[y] - sin * z[x]
-        found[k] = _condense(own.rebase(z - drive * mesh.rate), z, drive, y)
+        found[k] = _condense(equations(replace(loose, base=z - drive * mesh.rate)), z, drive, y)
     path.cross_stiffnesses[node, direction] = read_only(found[:, 0]), read_only(found[:, 1])
     return path.cross_stiffnesses[node, direction]
 

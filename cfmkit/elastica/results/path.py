@@ -428,7 +428,8 @@ def load_displacement(at: Equilibria, drive: Loading) -> Any:
         total = total + fx * moved[:, 0] + fy * moved[:, 1] + load.moment * moved[:, 2]
     line = mesh.elements.line[:, 1]
     if line.any():
-        rest = partials(mesh, np.zeros_like(at.z), np.zeros(len(at.z)), ("line",))["line"]
+        unloaded = beam_states.drop_line_loads(mesh)
+        rest = partials(unloaded, np.zeros_like(at.z), np.zeros(len(at.z)), ("line",))["line"]
         moved = rest[:, :, 0] - partials(mesh, at.z, at.drive, ("line",))["line"][:, :, 0]
         total = total + (moved * line).sum(axis=(1, 2)) * scales.moment / scales.drive
     return total + np.zeros(len(at.z))

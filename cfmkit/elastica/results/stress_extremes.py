@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.network import Network
-    from cfmkit.elastica.results.beam_states import BeamSections
+    from cfmkit.elastica.results.beam_states import BeamSections, BeamStates
 
     Knots = tuple[FloatArray, FloatArray]  # places, increasing, and stresses of one beam
     Solve = Callable[[FloatArray], tuple[FloatArray, Any]]
@@ -91,28 +91,43 @@ def extremes(net: Network, at: Equilibria, beams: Sequence[str], signs: FloatArr
     """
     own = [elements_of(at.mesh, beam) for beam in beams]
     elements = [number for numbers in own for number in numbers]
-    together = max(1, MAX_TOGETHER // max(1, len(elements) * len(signs) * N_GRID))
-    parts = [
-        _element_extremes(net, replace(at, z=at.z[k : k + together], drive=at.drive[k : k + together]), elements, signs)
-        for k in range(0, max(1, len(at.z)), together)
-    ]
-    return _highest(own, parts)
+    widths = np.array([net.beams[at.mesh.elements.beam[number]].section.width for number in elements])
+
+    def find_forces(some: slice, fractions: Any) -> tuple[BeamStates, Any]:
+        part = replace(at, z=at.z[some], drive=at.drive[some])
+        return forces_of_elements(net, part, elements, fractions), np.repeat(widths, len(fractions))
+
+    return _highest(own, _find_tops(at, len(elements), signs, find_forces))
 
 
 def extremes_of_designs(
     networks: Sequence[Network], meshes: Sequence[Discretisation], at: Equilibria, row: Any, signs: FloatArray
 ) -> FloatArray:
     """Return the highest combinations along all beams of some designs, (b, p, c); see `forces_of_designs`."""
+
+    def find_forces(some: slice, fractions: Any) -> tuple[BeamStates, Any]:
+        part = replace(at, z=at.z[some], drive=at.drive[some])
+        return forces_of_designs(networks, meshes, part, row[some], fractions)
+
+    own = [elements_of(at.mesh, beam) for beam in networks[0].beams]
+    return np.asarray(_highest(own, _find_tops(at, len(at.mesh.elements.beam), signs, find_forces))[0])
+
+
+def _find_tops(
+    at: Equilibria, count: int, signs: FloatArray, find_forces: Callable[[slice, Any], tuple[BeamStates, Any]]
+) -> list[tuple[Any, Any, Any]]:
+    """Return the highest stresses on each of m elements, places on their beams and on them, in pieces of the points.
+
+    `find_forces` returns forces at some points and fractions of the elements, and widths there.
+    """
     fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
-    elements = len(at.mesh.elements.beam)
-    together, parts = max(1, MAX_TOGETHER // (elements * len(signs) * N_GRID)), []
-    for k in range(0, len(at.z), together):
-        some = slice(k, k + together)
-        own = replace(at, z=at.z[some], drive=at.drive[some])
-        found, widths = forces_of_designs(networks, meshes, own, row[some], fractions)
-        arcs = found.place.reshape(len(own.z), elements, len(fractions))
-        parts.append(_tops(sections_of_width(widths, found), arcs, signs, to_series))
-    return np.asarray(_highest([elements_of(at.mesh, beam) for beam in networks[0].beams], parts)[0])
+    together, tops = max(1, MAX_TOGETHER // max(1, count * len(signs) * N_GRID)), []
+    for k in range(0, max(1, len(at.z)), together):
+        found, widths = find_forces(slice(k, k + together), fractions)
+        arcs = found.place.reshape(*found.place.shape[:-1], count, len(fractions))
+        arcs = arcs if arcs.ndim == 3 else arcs[None]
+        tops.append(_tops(sections_of_width(widths, found), arcs, signs, to_series))
+    return tops
 
 
 def _highest(own: Sequence[Sequence[int]], parts: Sequence[tuple[Any, Any, Any]]) -> tuple[Any, Any, Any, Any]:
@@ -131,15 +146,6 @@ def _highest(own: Sequence[Sequence[int]], parts: Sequence[tuple[Any, Any, Any]]
             arc[k], where[k] = np.where(better, place[end], arc[k]), np.where(better, fraction[end], where[k])
             end += 1
     return best, np.clip(arc, 0.0, 1.0), chosen, where
-
-
-def _element_extremes(net: Network, at: Equilibria, elements: list[int], signs: FloatArray) -> tuple[Any, Any, Any]:
-    """Return the highest stresses on each of m elements, places on their beams and on them, (m, p, c) each."""
-    fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
-    widths = np.array([net.beams[at.mesh.elements.beam[number]].section.width for number in elements])
-    found = forces_of_elements(net, at, elements, fractions)
-    arcs = found.place.reshape(-1, len(elements), len(fractions))
-    return _tops(sections_of_width(np.repeat(widths, len(fractions)), found), arcs, signs, to_series)
 
 
 def _tops(seen: BeamSections, arcs: Any, signs: FloatArray, to_series: FloatArray) -> tuple[Any, Any, Any]:
@@ -311,7 +317,8 @@ def largest_inside(
         known_stresses = np.concatenate([known_stresses, stresses(more)], axis=1)
         order = np.argsort(few, kind="stable")
         few, known_stresses = few[order], known_stresses[:, order]
-    return largest_between(x, few, known_stresses, solve, window)
+    runs = runs_of_points(x, few, known_stresses, window)
+    return largest_of_runs(x, few, known_stresses, window, [solve_extremes(*run[:2], solve, run[2]) for run in runs])
 
 
 def choose_few_points(x: FloatArray, low: float, high: float) -> NDArray[np.intp]:
@@ -335,16 +342,6 @@ def find_near_largest(
         wanted[np.clip(nearby + step, first, last)] = True
     wanted[few] = False
     return np.flatnonzero(wanted)
-
-
-def largest_between(
-    x: FloatArray, points: NDArray[np.intp], stresses: FloatArray, solve: Solve, window: FloatArray
-) -> float:
-    """Return the largest stress at points in a window, and between neighbours among them, which is solved for [Pa]."""
-    runs = runs_of_points(x, points, stresses, window)
-    return largest_of_runs(
-        x, points, stresses, window, [solve_extremes(t, rows, solve, bound) for t, rows, bound in runs]
-    )
 
 
 def runs_of_points(

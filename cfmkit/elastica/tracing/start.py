@@ -10,6 +10,7 @@ import numpy as np
 from cfmkit.elastica.contact.path_items import ContactChange, Remeshed
 from cfmkit.elastica.mechanics.derived_arrays import make_inextensible
 from cfmkit.elastica.mechanics.discretise import FlankPlace
+from cfmkit.elastica.mechanics.numbering import number_free
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.results.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
@@ -161,9 +162,7 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
     if not np.count_nonzero(mesh.floored):
         return problem, at
     elements = np.flatnonzero(mesh.floored)
-    slot = np.full(mesh.size, -1)
-    slot[mesh.free] = np.arange(len(mesh.free))
-    rows = slot[mesh.elements.unknowns[elements, -2:]]
+    rows = number_free(mesh.free, mesh.size)[mesh.elements.unknowns[elements, -2:]]
     unit = np.zeros((rows.size, len(mesh.free)))
     unit[np.arange(rows.size), rows.ravel()] = 1.0
     try:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,7 +34,7 @@ from cfmkit.elastica.tracing.accuracy import (
     pick_points,
 )
 from cfmkit.elastica.tracing.start import FREE_LENGTH_KEYS, next_correction
-from cfmkit.elastica.tracing.trace import trace
+from cfmkit.elastica.tracing.trace import FIRST_STEP, trace
 from cfmkit.errors import CfmError, InputError
 
 if TYPE_CHECKING:
@@ -43,17 +43,10 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.designs import NetworkDesigns
-    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.results.path import Path
-
-
-def is_compiled(mesh: Discretisation) -> bool:
-    """Return True if compiled code has networks like one as rows: without contacts, which have arrays of their own."""
-    own = equations(mesh)
-    return isinstance(own, CompiledEquations) and not mesh.contacts and not own.follows
 
 
 class CompiledBatch:
@@ -76,39 +69,18 @@ class CompiledBatch:
 
     def march(
         self,
-        targets: FloatArray,
-        first_step: float = 0.05,
-        tolerance: float = 1e-9,
-        largest_turn: float = MarchPlan.largest_turn,
-        chosen: Sequence[int] = (),
+        targets: FloatArray,  # (k,) values of the drive [m or rad]
+        tolerance: float = 1e-9,  # of corrections, relative to the largest motion and force
+        largest_turn: float = MarchPlan.largest_turn,  # change of a motion in one step [rad, or lengths of a beam]
+        chosen: Sequence[int] = (),  # targets at which the states are wanted, too
     ) -> tuple[FloatArray, Any, FloatArray]:
-        """Return the efforts under a drive by a motion, each design followed from rest.
+        """Return efforts (d, k) [N or N m], `MarchCode` (d,) and states (d, chosen, size) of designs from rest on.
 
-        Parameters
-        ----------
-        targets : (k,) array
-            Values of the drive [m or rad].
-        first_step : float
-            Share of the range of the drive.
-        tolerance : float
-            Of corrections, relative to the largest motion and force.
-        largest_turn : float
-            Change of a motion in one step [rad, or lengths of a beam].
-        chosen : sequence of int
-            Targets at which the states are wanted, too.
-
-        Returns
-        -------
-        efforts : (d, k) array
-            [N or N m]; not a number from where a path does not simply go on.
-        codes : (d,) int array
-            `MarchCode` of each.
-        states : (d, chosen, size) array
-            All unknowns.
+        Efforts are not a number from where a path under a drive by a motion does not simply go on.
         """
         mesh, goals = self.mesh, np.ascontiguousarray(targets, float) / self.mesh.scales.drive
         span = max(float(goals.max()), 0.0) - min(float(goals.min()), 0.0)
-        plan = MarchPlan(first_step * span, span, largest_turn=largest_turn, tolerance=tolerance)
+        plan = MarchPlan(FIRST_STEP * span, span, largest_turn=largest_turn, tolerance=tolerance)
         efforts, codes = np.full((self.count, len(goals)), np.nan), np.zeros(self.count, np.int64)
         free, some = np.full((self.count, len(chosen), len(mesh.free)), np.nan), np.array(chosen, np.int64)
         plan_row = plan_row_of(plan, 0, True)
@@ -129,22 +101,10 @@ ERROR_MARGIN = 4.0  # tolerances over the error of the network that was traced, 
 
 
 def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> FloatArray | None:
-    """Return the efforts of networks that are like one that was traced, at all requested values of the drive.
+    """Return the efforts of networks that are like one that was traced, at all requested values of the drive, (d, k).
 
-    Parameters
-    ----------
-    path : Path
-        Of the one.
-    networks : sequence of Network
-        The others.
-    control : Control
-        As the one was traced.
-
-    Returns
-    -------
-    (d, k) array or None
-        [N or N m]; not a number in rows of networks that must be traced by themselves: those of another topology, those
-        that lose their stability, or miss the tolerance. None if the one has events, or bears anything at rest.
+    [N or N m]; not a number in rows of networks that must be traced by themselves: those of another topology, those
+    that lose their stability, or miss the tolerance. None if the one has events, or bears anything at rest.
     """
     if not _goes_straight_on(path, control):
         return None
@@ -188,7 +148,9 @@ def _goes_straight_on(path: Path, control: Control) -> bool:
     quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
     simple = _get_common_values(path.network) is not None and arrays.pieces == 1 and not arrays.tension
     alone = control.imperfection or isinstance(path.load_case, Loading) or np.any(arrays.floored)
-    return bool(rests and quiet and simple and not alone and is_compiled(arrays))
+    own = equations(arrays)
+    compiled = isinstance(own, CompiledEquations) and not own.follows  # those with contacts have arrays of their own
+    return bool(rests and quiet and simple and not alone and compiled and not arrays.contacts)
 
 
 def _follow(path: Path, networks: list[Network], control: Control) -> Any:
@@ -282,59 +244,27 @@ def trace_many(
     workers : int
         Processes to use.
     """
-    one = partial(_outcomes, drive=drive, control=control or Control(), collect=collect)
+    trace_chunk = partial(_outcomes, drive=drive, control=control or Control(), collect=collect)
+    source = iter(networks)
+    chunks = iter(lambda: list(islice(source, _CHUNK_SIZE)), [])
     if workers <= 1:
-        for chunk in _chunks(networks):
-            yield from one(chunk)
+        yield from chain.from_iterable(map(trace_chunk, chunks))
         return
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        waiting: deque[Future[_Packed]] = deque()
-        for chunk in _chunks(networks):
-            waiting.append(pool.submit(_pack, chunk, one))
+        waiting: deque[Future[list[NetworkOutcome]]] = deque()
+        for chunk in chunks:
+            waiting.append(pool.submit(_list_outcomes, trace_chunk, chunk))
             if len(waiting) > _CHUNKS_PER_PROCESS * workers:
-                yield from waiting.popleft().result().outcomes()
+                yield from waiting.popleft().result()
         while waiting:
-            yield from waiting.popleft().result().outcomes()
+            yield from waiting.popleft().result()
 
 
-def _chunks(networks: Iterable[Network | Callable[[], Network]]) -> Iterator[list[Network | Callable[[], Network]]]:
-    """Yield the networks in lists of at most `_CHUNK_SIZE`."""
-    source = iter(networks)
-    while chunk := list(islice(source, _CHUNK_SIZE)):
-        yield chunk
-
-
-@dataclass(frozen=True)
-class _Packed:
-    """Outcomes on their way from a process: `Requested` as rows of three arrays for all, which are quicker to send."""
-
-    said: list[tuple[str, str]]
-    values: list[Any]
-    arrays: tuple[FloatArray, FloatArray, Any] | None
-
-    def outcomes(self) -> Iterator[NetworkOutcome]:
-        """Yield the outcomes."""
-        end = 0
-        for (status, message), value in zip(self.said, self.values, strict=True):
-            if self.arrays is not None and value is not None:
-                begin, end = end, end + value
-                value = Requested(*(array[begin:end] for array in self.arrays))
-            yield NetworkOutcome(status, message, value)
-
-
-def _pack(networks: list[Any], outcomes: Callable[[list[Any]], Iterator[NetworkOutcome]]) -> _Packed:
-    found = list(outcomes(networks))
-    said, values = [(each.status, each.message) for each in found], [each.value for each in found]
-    rows = [value for value in values if value is not None]
-    if not rows or not all(type(row) is Requested for row in rows):
-        return _Packed(said, values, None)
-    all_rows = zip(*((row.drive, row.effort, row.stable) for row in rows), strict=True)
-    drive, effort, stable = (np.concatenate(same) for same in all_rows)
-    lengths = [None if value is None else len(value.drive) for value in values]
-    return _Packed(said, lengths, (drive, effort, stable))
+def _list_outcomes(trace_chunk: Callable[[list[Any]], Iterator[NetworkOutcome]], chunk: list[Any]) -> Any:
+    return list(trace_chunk(chunk))
 
 
 def _outcomes(

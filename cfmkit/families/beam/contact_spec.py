@@ -22,12 +22,12 @@ from cfmkit.elastica.model.contact import (
     line_edge,
     polyline_edge,
 )
+from cfmkit.families.beam.shapes_spec import Point
+from cfmkit.families.end_stops_spec import FreeWay
 from cfmkit.specs.spec import Model, PositiveLength
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, format_short
 
-Point = tuple[Length, Length]
 FreeAngle = Annotated[Angle, Field(ge=0)]
-FreeWay = Annotated[Length, Field(ge=0)]
 FrictionCoefficient = Annotated[Ratio, Field(ge=0, lt=2)]
 Fault = tuple[tuple[str | int, ...], str]
 Mechanism = Any  # the block `mechanism`, which imports this file
@@ -258,7 +258,7 @@ class PartContact(Model):
         common = set(end_nodes(mechanism, first)) & set(end_nodes(mechanism, second))
         if common:
             return "between", f"both beams are at node {common.pop()!r}: give a node that touches, and the other beam"
-        tapered = [name for name in self.between if isinstance(mechanism.collect_beam_values("thickness")[name], tuple)]
+        tapered = [name for name in self.between if len(mechanism.list_thicknesses(name)) > 1]
         if tapered:
             return "between", f"the thickness of beam {tapered[0]!r} varies: give a node that touches, and a beam"
         for name in self.between:
@@ -276,11 +276,11 @@ class PartContact(Model):
             radius = free_ends(mechanism)[node] if self.radius is None else self.radius
             return (NodeOnBeam(f"{node}_{beam}", node, beam, radius),)
         first, second = self.between
-        name, thickness = f"{first}_{second}", mechanism.collect_beam_values("thickness")
+        name = f"{first}_{second}"
         ends = [
-            NodeOnBeam(name, node, partner, 0.5 * thickness[beam])
+            NodeOnBeam(name, node, partner, radius)
             for beam, partner in ((first, second), (second, first))
-            for node in end_nodes(mechanism, beam)
+            for node, radius in end_radii(mechanism, beam).items()
         ]
         return (BeamOnBeam(name, first, second), BeamOnBeam(name, second, first, leads=False), *ends)
 
@@ -288,6 +288,12 @@ class PartContact(Model):
 def end_nodes(mechanism: Mechanism, beam: str) -> tuple[str, str]:
     """Return the nodes at both ends of a beam."""
     return mechanism.beams[beam].start, mechanism.beams[beam].end
+
+
+def end_radii(mechanism: Mechanism, beam: str) -> dict[str, float]:
+    """Return the nodes at both ends of a beam, with half its thickness there [m]."""
+    thicknesses = mechanism.list_thicknesses(beam)
+    return dict(zip(end_nodes(mechanism, beam), (0.5 * thicknesses[0], 0.5 * thicknesses[-1]), strict=True))
 
 
 def list_names(names: Iterable[str]) -> str:
@@ -328,38 +334,24 @@ def pads_of(mechanism: Mechanism, obstacle: ObstacleBase) -> Mapping[str, float]
 
     Where the sides of beams may touch it, so may their ends, but for those that are held in place.
     """
-    if obstacle.nodes is None and obstacle.beams is None and (obstacle.stiffness is not None or obstacle.friction):
-        return free_ends(mechanism)
-    pads = dict(obstacle.nodes) if obstacle.nodes is not None else free_ends(mechanism)
-    for name in sides_of(mechanism, obstacle):
-        if name not in mechanism.beams:
-            continue
-        beam, thickness = mechanism.beams[name], mechanism.collect_beam_values("thickness")[name]
-        for node, last in ((beam.start, False), (beam.end, True)):
-            if mechanism.nodes[node].support not in HELD_SUPPORTS:
-                half = 0.5 * (thickness[-1 if last else 0][1] if isinstance(thickness, tuple) else thickness)
-                stated = pads.get(node, 0.0) if obstacle.nodes is None or node not in obstacle.nodes else math.inf
-                pads[node] = max(stated, half) if math.isfinite(stated) else pads[node]
+    stated = obstacle.nodes or {}
+    pads = dict(stated) if obstacle.nodes is not None else free_ends(mechanism)
+    for beam in sides_of(mechanism, obstacle):
+        for node, radius in end_radii(mechanism, beam).items():
+            if node not in stated and mechanism.nodes[node].support not in HELD_SUPPORTS:
+                pads[node] = max(pads.get(node, 0.0), radius)
     return pads
 
 
 def free_ends(mechanism: Mechanism) -> dict[str, float]:
     """Return the nodes at which one beam ends freely, with half its thickness there [m]."""
     linked = {name for link in mechanism.links for name in (link.master, link.node)}
-    thickness, radii = mechanism.collect_beam_values("thickness"), dict[str, float]()
-    for node, spec in mechanism.nodes.items():
-        ends = [(name, end) for name, beam in mechanism.beams.items() for end in ("start", "end")
-                if getattr(beam, end) == node]  # fmt: skip
-        if spec.support == "free" and node not in linked and len(ends) == 1:
-            ((name, end),) = ends
-            thickness_given = thickness[name]
-            tip_thickness = (
-                thickness_given[0 if end == "start" else -1][1]
-                if isinstance(thickness_given, tuple)
-                else thickness_given
-            )
-            radii[node] = 0.5 * tip_thickness
-    return radii
+    radii: dict[str, list[float]] = {name: [] for name in mechanism.nodes}
+    for beam in mechanism.beams:
+        for node, radius in end_radii(mechanism, beam).items():
+            radii[node].append(radius)
+    is_free = {name: node.support == "free" and name not in linked for name, node in mechanism.nodes.items()}
+    return {node: ends[0] for node, ends in radii.items() if is_free[node] and len(ends) == 1}
 
 
 def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
@@ -369,21 +361,16 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
         place = ("obstacles", name, obstacle.kind)
         yield from _side_faults(mechanism, obstacle, place)
         if obstacle.friction and obstacle.beams:
-            yield (
-                (*place, "friction"),
-                "friction along a beam's flank is not modelled: state 'nodes', or leave out 'friction'",
-            )
+            text = "friction along a beam's flank is not modelled: state 'nodes', or leave out 'friction'"
+            yield (*place, "friction"), text
         pads = pads_of(mechanism, obstacle)
         if not pads and not sides_of(mechanism, obstacle):
             yield (*place, "nodes"), "no beam ends freely: state the nodes that may touch it, such as {tip: 2 mm}"
         outline = obstacle.outline()
         for node, radius in pads.items():
             if outline.smallest_hollow <= radius:
-                yield (
-                    place,
-                    f"its hollow of {format_short(outline.smallest_hollow, 'length')} is too tight for the pad of "
-                    f"{node!r}, radius {format_short(radius, 'length')}",
-                )
+                hollow, size_of_pad = (format_short(size, "length") for size in (outline.smallest_hollow, radius))
+                yield place, f"its hollow of {hollow} is too tight for the pad of {node!r}, radius {size_of_pad}"
                 continue
             if radius == 0 and outline.smallest_bulge == 0:
                 yield place, f"a sharp corner needs a pad of {node!r} with a radius"
@@ -397,13 +384,10 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
         ("obstacles", name) for name, obstacle in mechanism.obstacles.items() if sides_of(mechanism, obstacle)
     ]
     smooth += [("contacts", number) for number in range(len(mechanism.contacts))]
-    said = any(obstacle.friction and obstacle.beams for obstacle in mechanism.obstacles.values())
-    if smooth and rubs(mechanism) and not said:
-        yield (
-            smooth[0],
-            "flanks of beams beside contacts with friction are not modelled: state the 'nodes' that may touch it, "
-            "or leave out 'friction'",
-        )
+    reported = any(obstacle.friction and obstacle.beams for obstacle in mechanism.obstacles.values())
+    if smooth and rubs(mechanism) and not reported:
+        text = "flanks of beams beside contacts with friction are not modelled: state the 'nodes' that may touch it"
+        yield smooth[0], f"{text}, or leave out 'friction'"
     yield from _stop_faults(mechanism)
     for name in mechanism.obstacles:
         if name in mechanism.stops:
@@ -413,13 +397,10 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
         if name in mechanism.stops or name in mechanism.obstacles:
             yield ("contacts", number), f"a stop or an obstacle has its name, {name!r}: rename that"
     key = next(key for key in ("stops", "obstacles", "contacts") if getattr(mechanism, key))
-    copies = mechanism.copies
-    if copies is not None and copies.layers > 1:
+    if mechanism.layers > 1:
         yield (key,), "contact is not supported with stages in series: leave out 'copies.layers'"
-    follows = getattr(mechanism.drive, "follows", False) or any(
-        getattr(load, "follows", False) for load in (*mechanism.loads, *getattr(mechanism.drive, "loads", ()))
-    )
-    if follows:
+    acting = (mechanism.drive, *mechanism.loads, *getattr(mechanism.drive, "loads", ()))
+    if any(getattr(load, "follows", False) for load in acting):
         yield (key,), "contact is not supported under loads that turn with their node: leave out 'follows'"
 
 
@@ -436,18 +417,12 @@ def _side_faults(mechanism: Mechanism, obstacle: ObstacleBase, place: tuple[str 
     """Yield what is wrong with the sides of beams on an obstacle."""
     if obstacle.beams and obstacle.stiffness is not None:
         yield (*place, "stiffness"), "an obstacle that sides of beams touch is rigid: leave it out, or state 'nodes'"
-    outline, thickness = obstacle.outline(), mechanism.collect_beam_values("thickness")
+    hollow = obstacle.outline().smallest_hollow
     for name in sides_of(mechanism, obstacle):
-        if name not in mechanism.beams:
-            continue
-        profile = thickness[name]
-        most = max(value for _, value in profile) if isinstance(profile, tuple) else profile
-        if outline.smallest_hollow <= 0.5 * most:
-            yield (
-                place,
-                f"its hollow of {format_short(outline.smallest_hollow, 'length')} is too tight for beam {name!r}, half "
-                f"as thick as {format_short(most, 'length')}",
-            )
+        most = max(mechanism.list_thicknesses(name))
+        if hollow <= 0.5 * most:
+            tight, thick = (format_short(size, "length") for size in (hollow, most))
+            yield place, f"its hollow of {tight} is too tight for beam {name!r}, half as thick as {thick}"
 
 
 def _column_faults(mechanism: Mechanism) -> Iterator[Fault]:

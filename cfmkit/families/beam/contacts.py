@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -119,31 +118,45 @@ def numbers_of(contacts: tuple[Contact, ...], name: str) -> list[int]:
 
 def named_force(path: Path, name: str) -> FloatArray:
     """Return the force of a stop, or of all pads on an obstacle, at every point of a path, (n,)."""
-    groups_of_contact = [
-        numbers for (contact_name, _), numbers in groups(path.network.contacts).items() if contact_name == name
-    ]
-    return np.asarray(sum(signed_force(path, numbers) for numbers in groups_of_contact))
+    pads = groups(path.network.contacts).items()
+    return np.asarray(sum(signed_force(path, numbers) for (owner, _), numbers in pads if owner == name))
 
 
 def contact_columns(solution: Solution) -> LazyColumns:
     """Return the force of each stop and each pad at every point of the curve, and what happens there; when read."""
-    columns = LazyMapping(("all",), lambda _: _columns(solution))
-    names = _column_names(solution) if solution.path.network.contacts else []
-    return {
-        name: partial(lambda column: columns["all"][column], name) for name in [*names, *(["event"] if names else [])]
-    }
-
-
-def _column_names(solution: Solution) -> list[str]:
-    """Return the names of all columns: of the side of a beam also those of where it touches."""
+    path = solution.path
+    columns: LazyColumns = {}
     forces = [column for _, column in column_names(solution.spec.mechanism)]
-    contacts, names = solution.path.network.contacts, list[str]()
-    for column, numbers in zip(forces, groups(contacts).values(), strict=True):
-        names.append(column)
-        names += _place_columns(contacts[numbers[0]], column)
-        if any(contacts[number].friction for number in numbers):
-            names += friction_columns(column)
-    return names
+    for column, numbers in zip(forces, groups(path.network.contacts).values(), strict=True):
+        columns |= _force_columns(solution, column, numbers)
+    return columns | ({"event": partial(_event_column, solution)} if columns else {})
+
+
+def _force_columns(solution: Solution, column: str, numbers: list[int]) -> LazyColumns:
+    """Return the force of a contact, where on the side of a beam it is, and its friction."""
+    path, keep = solution.path, solution.keep
+    contacts = [path.network.contacts[number] for number in numbers]
+
+    def force() -> Column:
+        return Column(signed_force(path, numbers)[keep], "torque" if contacts[0].turns else "force")
+
+    def place(k: int) -> Column:
+        return Column(_place_values(path, numbers)[keep][:, k], "ratio")
+
+    def tangential() -> Column:
+        signs = [getattr(contact, "sense", 1.0) for contact in contacts]
+        forces = [path.contact_friction(number)[0] for number in numbers]
+        return Column(np.sum([sign * force for sign, force in zip(signs, forces, strict=True)], axis=0)[keep], "force")
+
+    def state() -> Column:
+        marks = [np.asarray(path.contact_friction(number)[1])[keep] for number in numbers]
+        return Column(np.array(["".join(pose) for pose in zip(*marks, strict=True)], np.str_), "text")
+
+    columns: LazyColumns = {column: force}
+    columns |= {name: partial(place, k) for k, name in enumerate(_place_columns(contacts[0], column))}
+    if any(contact.friction for contact in contacts):
+        columns |= dict(zip(friction_columns(column), (tangential, state), strict=True))
+    return columns
 
 
 def _place_columns(contact: Contact, column: str) -> list[str]:
@@ -170,32 +183,16 @@ def _place_values(path: Path, numbers: list[int]) -> FloatArray:
     return places
 
 
-def _columns(solution: Solution) -> dict[str, Column]:
-    path, keep = solution.path, solution.keep
-    names = [column for _, column in column_names(solution.spec.mechanism)]
-    columns = {}
-    for column, numbers in zip(names, groups(path.network.contacts).values(), strict=True):
-        contact = path.network.contacts[numbers[0]]
-        columns[column] = Column(signed_force(path, numbers)[keep], "torque" if contact.turns else "force")
-        if any(path.network.contacts[number].friction for number in numbers):
-            tangential, state = friction_columns(column)
-            rubbing = [path.contact_friction(number) for number in numbers]
-            signs = [getattr(path.network.contacts[number], "sense", 1.0) for number in numbers]
-            total = np.sum([sign * force for sign, (force, _) in zip(signs, rubbing, strict=True)], axis=0)
-            columns[tangential] = Column(total[keep], "force")
-            said = [np.asarray(states)[keep] for _, states in rubbing]
-            columns[state] = Column(
-                np.array(["".join(marks_of_pose) for marks_of_pose in zip(*said, strict=True)], np.str_), "text"
-            )
-        place_columns = _place_columns(contact, column)
-        if place_columns:
-            places = _place_values(path, numbers)[keep]
-            columns |= {name: Column(places[:, k], "ratio") for k, name in enumerate(place_columns)}
-    marks = np.full(len(path), "", dtype=object)
+def _event_column(solution: Solution) -> Column:
+    path, marks = solution.path, [""] * len(solution.path)
     for event in path.contact_events:
-        point = int(np.abs(np.where(path.changes_contact, path.drive, np.inf) - event.drive).argmin())
+        point = _point_of_event(path, event)
         marks[point] = f"{marks[point]}; {_mark(path, event)}".removeprefix("; ")
-    return columns | {"event": Column(np.array([str(mark) for mark in marks[keep]], np.str_), "text")}
+    return Column(np.array([marks[point] for point in solution.keep], np.str_), "text")
+
+
+def _point_of_event(path: Path, event: ContactEvent) -> int:
+    return int(np.abs(np.where(path.changes_contact, path.drive, np.inf) - event.drive).argmin())
 
 
 def _mark(path: Path, event: ContactEvent) -> str:
@@ -240,7 +237,7 @@ def _first_contact(solution: Solution) -> float | None:
         return None
     if first is not None:
         path_at_changes = path.take(path.changes_contact)
-        motion = replace(solution, path=path_at_changes, keep=np.arange(len(path_at_changes)), ends=()).motion
+        motion = solution.replace_path(path_at_changes).motion
         return float(motion[int(np.abs(path_at_changes.drive - first.drive).argmin())])
     closed = any(path.contact_force(number)[0] > 0 for number in range(len(contacts)))
     return float(solution.motion[0]) if closed else None
@@ -251,10 +248,8 @@ def force_extremes(
 ) -> tuple[float, float] | tuple[None, None]:
     """Return the largest and the smallest force of a contact in a window [N]; None of a window that is not reached."""
 
-    def signed_force(path: Path, sign: float) -> FloatArray:
-        return sign * named_force(path, name)[None]
-
-    top, bottom = (largest(solution, partial(signed_force, sign=sign), window) for sign in (1.0, -1.0))
+    top = largest(solution, lambda path: named_force(path, name)[None], window)
+    bottom = largest(solution, lambda path: -named_force(path, name)[None], window)
     return (None, None) if top is None or bottom is None else (top, -bottom)
 
 
@@ -284,17 +279,18 @@ def contact_sentences(solution: Solution, say: Callable[[float], str]) -> Iterat
     path = solution.path
     if not path.network.contacts or not len(solution.keep):
         return
-    resting = [
-        describe(contact) for number, contact in enumerate(path.network.contacts) if path.contact_force(number)[0] > 0
-    ]
+    contacts = list(enumerate(path.network.contacts))
+    resting = [describe(contact) for number, contact in contacts if path.contact_force(number)[0] > 0]
     before = [f"closed before the drive moves: {', '.join(resting)}"] if resting else []
     yield from change_sentences(solution, say, before)
-    rubbing = [number for number, contact in enumerate(path.network.contacts) if contact.friction]
-    sliding = [number for number in rubbing if "slip" in path.contact_friction(number)[1][solution.keep]]
+    sliding = [
+        describe(contact)
+        for number, contact in contacts
+        if contact.friction and "slip" in path.contact_friction(number)[1][solution.keep]
+    ]
     if sliding:
-        names = ", ".join(describe(path.network.contacts[number]) for number in sliding[:MOST_NAMED])
-        message = f"{names} slides: 'stable' says there only that the drive passes no limit point"
-        yield "stability_of_sliding", message
+        message = f"{', '.join(sliding[:MOST_NAMED])} slides: 'stable' says there only that the drive passes no limit"
+        yield "stability_of_sliding", f"{message} point"
     yield from _gap_sentences(solution)
     yield from _side_sentences(solution, say)
 
@@ -310,64 +306,56 @@ def change_sentences(
         more = f"; and {len(told) - MOST_NAMED} more changes" if len(told) > MOST_NAMED else ""
         yield "contact_begins", "; ".join(told[:MOST_NAMED]) + more
     for event in path.contact_events:
+        contact, place = path.network.contacts[event.number], say(event.drive)
+        who = describe(contact)
         if event.states > 1:
-            who = describe(path.network.contacts[event.number])
-            yield (
-                "friction_not_unique",
-                f"where {who} changes at {say(event.drive)}, friction leaves {event.states} states that can go on: "
-                f"{_state_taken(path, event)}",
-            )
-        if event.kind == "spreads" and isinstance(path.network.contacts[event.number], NodeOnBeam | BeamOnBeam):
-            who = describe(path.network.contacts[event.number])
-            yield (
-                "contact_spreads_between_beams",
-                f"contact of {who} spreads along a length at {say(event.drive)}: that is not modelled between parts, "
-                "and the curve ends there",
-            )
+            states_left = f"friction leaves {event.states} states that can go on"
+            text = f"where {who} changes at {place}, {states_left}: {_state_taken(path, event)}"
+            yield "friction_not_unique", text
+        if event.kind == "spreads" and isinstance(contact, NodeOnBeam | BeamOnBeam):
+            text = f"contact of {who} spreads along a length at {place}: that is not modelled between parts"
+            yield "contact_spreads_between_beams", f"{text}, and the curve ends there"
         if event.kind == "blocks":
-            who = describe(path.network.contacts[event.number])
-            yield "blocked", f"the drive is blocked by {who} at {say(event.drive)}"
+            yield "blocked", f"the drive is blocked by {who} at {place}"
 
 
 def _state_taken(path: Path, event: ContactEvent) -> str:
     """Return which of several states of friction the curve goes on with: that of the next point."""
-    at = int(np.abs(np.where(path.changes_contact, path.drive, np.inf) - event.drive).argmin())
-    state = str(path.contact_friction(event.number)[1][min(at + 1, len(path) - 1)])
+    point = min(_point_of_event(path, event) + 1, len(path) - 1)
+    state = str(path.contact_friction(event.number)[1][point])
     return {"stick": "it sticks here", "slip": "it slides here"}.get(state, "it leaves here")
 
 
 def describe(contact: Contact) -> str:
     """Return what a contact is called."""
-    return (
-        f"stop {contact.name!r}" if isinstance(contact, Stop) else f"{toucher(contact)!r} on {counterpart(contact)!r}"
-    )
+    touches = f"{toucher(contact)!r} on {counterpart(contact)!r}"
+    return f"stop {contact.name!r}" if isinstance(contact, Stop) else touches
 
 
 def _sentence(solution: Solution, event: ContactEvent, place: str) -> str:
     contact, path = solution.path.network.contacts[event.number], solution.path
     if event.kind == "blocks" or (event.kind == "spreads" and isinstance(contact, NodeOnBeam | BeamOnBeam)):
         return ""
-    if not isinstance(contact, Stop):
-        what, partner = toucher(contact), counterpart(contact)
-        sentences = {
-            "begins": f"contact begins at {place} between {what!r} and {partner!r}",
-            "ends": f"{what!r} leaves {partner!r} at {place}",
-            "moves": f"the contact on {partner!r} moves between an end and the side of {what!r} at {place}",
-            "spreads": f"contact spreads at {place}: {what!r} lies along {partner!r} from there on",
-            "closes": f"{what!r} no longer lies along {partner!r} at {place}",
-            "slips": f"{what!r} slides on {partner!r} from {place} on",
-            "sticks": f"{what!r} sticks to {partner!r} from {place} on",
-        }
-        return sentences[event.kind]
-    if event.kind in ("slips", "sticks"):
-        does = "slides on" if event.kind == "slips" else "sticks to"
-        return f"{contact.node!r} {does} stop {contact.name!r} from {place} on"
-    if event.kind == "ends":
-        return f"stop {contact.name!r} is left at {place}"
-    last = float(path.contact_force(event.number)[solution.keep[-1]])
-    force = format_short(last, "torque" if contact.turns else "force")
-    return f"stop {contact.name!r} is reached at {place}; its {'moment' if contact.turns else 'force'} at the end is " \
-        f"{force}"  # fmt: skip
+    what, partner = f"{toucher(contact)!r}", f"{counterpart(contact)!r}"
+    if isinstance(contact, Stop):
+        partner = f"stop {partner}"
+    if isinstance(contact, Stop) and event.kind == "begins":
+        force = format_short(
+            float(path.contact_force(event.number)[solution.keep[-1]]), "torque" if contact.turns else "force"
+        )
+        return f"{partner} is reached at {place}; its {'moment' if contact.turns else 'force'} at the end is {force}"
+    if isinstance(contact, Stop) and event.kind == "ends":
+        return f"{partner} is left at {place}"
+    sentences = {
+        "begins": f"contact begins at {place} between {what} and {partner}",
+        "ends": f"{what} leaves {partner} at {place}",
+        "moves": f"the contact on {partner} moves between an end and the side of {what} at {place}",
+        "spreads": f"contact spreads at {place}: {what} lies along {partner} from there on",
+        "closes": f"{what} no longer lies along {partner} at {place}",
+        "slips": f"{what} slides on {partner} from {place} on",
+        "sticks": f"{what} sticks to {partner} from {place} on",
+    }
+    return sentences[event.kind]
 
 
 def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
@@ -381,26 +369,20 @@ def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
             continue
         if any(k in changed or path.contact_force(k).any() for k in numbers):
             continue
-        gap = path.contact_gap(number)
-        moved = 0.0
-        if isinstance(contact, BeamSide):
-            moved = float(np.hypot(*np.moveaxis(path.line_motion(contact.beam), -1, 0)).max())
-        if isinstance(contact, BeamOnBeam):
-            moved += float(np.hypot(*np.moveaxis(path.line_motion(contact.partner), -1, 0)).max())
-        elif not isinstance(contact, BeamOnObstacle):
+        beams = [name for name in (getattr(contact, "beam", ""), getattr(contact, "partner", "")) if name]
+        moved = sum((float(np.hypot(*np.moveaxis(path.line_motion(beam), -1, 0)).max()) for beam in beams), 0.0)
+        if not isinstance(contact, BeamOnObstacle | BeamOnBeam):
             moved += float(np.hypot(*path.motion(contact.node)[:, :2].T).max())
-        least = float(gap.min())
+        least = float(path.contact_gap(number).min())
         # a travel up to a rigid stop ends so near to it
         closed = 1.001 * BEFORE_STOP if isinstance(contact, Stop) else 0.0
         if max(ROUNDING_OF_GAP * path.mesh.scales.length, closed) < least < NEAR_GAP * thin:
             where = f"the gap of {describe(contact)} closes to {format_short(least, 'length')} and stays open"
             yield "near_contact", f"{where}: tolerances of that size decide whether they touch"
         elif not isinstance(contact, Stop) and least > OUT_OF_REACH * moved:
-            yield (
-                "obstacle_out_of_reach",
-                f"{toucher(contact)!r} comes no nearer to {counterpart(contact)!r} than "
-                f"{format_short(least, 'length')}, and moves by {format_short(moved, 'length')} only",
-            )
+            who, nearest, way = toucher(contact), format_short(least, "length"), format_short(moved, "length")
+            text = f"{who!r} comes no nearer to {counterpart(contact)!r} than {nearest}, and moves by {way} only"
+            yield "obstacle_out_of_reach", text
 
 
 def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator[tuple[str, str]]:
@@ -409,24 +391,25 @@ def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator
     for name, obstacle in mechanism.obstacles.items():
         outline = obstacle.outline()
         pads, sides = pads_of(mechanism, obstacle), sides_of(mechanism, obstacle)
+        # an elastic obstacle yields at its pads, and the beam with them
+        pressed = [number for number in numbers_of(path.network.contacts, name)
+                   if isinstance(path.network.contacts[number], NodeOnObstacle)]  # fmt: skip
+        yields = max((float(-path.contact_gap(number).min()) for number in pressed), default=0.0)
         for beam, network_beam in path.network.beams.items():
             if beam in sides:
                 continue
             side = states(path.network, path.take(keep).at, beam, np.linspace(0.0, 1.0, N_SIDE))
             places = np.stack([side.x, side.y], axis=-1)
-            depth = 0.5 * thickest_of(network_beam.section) - outline.distance(places).value
-            slack = MAX_PENETRATION_SHARE * thickest_of(network_beam.section)
-            # an elastic obstacle yields at its pads, and the beam with them
-            yields = max((float(-path.contact_gap(k).min()) for k, contact in enumerate(path.network.contacts)
-                          if isinstance(contact, NodeOnObstacle) and contact.name == name and contact.node in pads),
-                         default=0.0)  # fmt: skip
-            deep = depth > slack + max(yields, 0.0)
+            thick = thickest_of(network_beam.section)
+            depth = 0.5 * thick - outline.distance(places).value
+            deep = depth > MAX_PENETRATION_SHARE * thick + max(yields, 0.0)
             if deep.any():
                 first = int(deep.any(axis=1).argmax())
                 place = float(np.broadcast_to(side.place, depth.shape)[first, depth[first].argmax()])
+                passes = f"passes through {name!r} from {say(float(path.drive[keep[first]]))} on"
+                touching = ", ".join(map(repr, pads))
                 yield (
                     "side_in_obstacle",
-                    f"the side of beam {beam!r} passes through {name!r} from {say(float(path.drive[keep[first]]))} on, "
-                    f"at {place:.0%} of its length, where it does not touch: only with {', '.join(map(repr, pads))}; "
-                    "list it in 'beams'",
+                    f"the side of beam {beam!r} {passes}, at {place:.0%} of its length, where it does not touch: only "
+                    f"with {touching}; list it in 'beams'",
                 )

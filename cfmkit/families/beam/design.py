@@ -19,16 +19,19 @@ import numpy as np
 from cfmkit.errors import InputError
 from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.model import solve
-from cfmkit.families.beam.network_from_spec import thickest
+from cfmkit.families.beam.network_from_spec import change_at
 from cfmkit.families.beam.path_ending import ending_of
 from cfmkit.families.beam.scalar_results import force_at_end, number_of
+from cfmkit.families.rows import with_values
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, TravelShare, format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.families.beam.mechanism_spec import Mechanism
-    from cfmkit.families.beam.network_elements_spec import BeamMaterial, PartSpec, Thickness
+    from cfmkit.families.beam.network_elements_spec import BeamMaterial, Thickness
     from cfmkit.families.beam.spec import BeamSpec, Rescale
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
@@ -53,10 +56,7 @@ times the first."""
 TRAVEL_STEP = 1e-5  # travel that follows from the stress is rounded down to whole hundredths of a millimetre [m]
 
 
-def rescale(
-    spec: BeamSpec,  # driven by a displacement, without springs and loads
-    wanted: Rescale,  # what is to change
-) -> Design:
+def rescale(spec: BeamSpec, wanted: Rescale) -> Design:
     """Return the specification with the changes made and the force wanted reached, or why it cannot be."""
     wanted = wanted.model_copy(update={"free": wanted.choose_dimension(sheet_of(spec.mechanism.part))})
     changed = changed_spec(spec, wanted)
@@ -70,20 +70,14 @@ def rescale(
             changed = ended
         force = _force(changed)
         if force is None:
-            return Design(
-                None,
-                Status.NO_EQUILIBRIUM,
-                "the mechanism has no force at the end of its window (analysis.window) to scale",
-            )
+            why = "the mechanism has no force at the end of its window (analysis.window) to scale"
+            return Design(None, Status.NO_EQUILIBRIUM, why)
         if wanted.force is None:
             break
         again, reached = _correct_value(changed, wanted, force)
         if reached is None:
-            return Design(
-                None,
-                Status.INFEASIBLE,
-                f"no mechanism.{wanted.free} gives design.rescale.force = {format_short(wanted.force, 'force')}",
-            )
+            why = f"no mechanism.{wanted.free} gives design.rescale.force = {format_short(wanted.force, 'force')}"
+            return Design(None, Status.INFEASIBLE, why)
         changed = again
         if changed == before or not wanted.to_allowable_stress:
             break
@@ -126,12 +120,10 @@ def _exponent(before: float, after: float, factor: float, expected: float) -> fl
 
 def changed_spec(spec: BeamSpec, wanted: Rescale) -> BeamSpec:
     """Return the specification with size, material, thickness and width as wanted."""
-    mechanism = spec.mechanism
     if wanted.material is not None:
-        beams = {name: beam.model_copy(update={"material": None}) for name, beam in mechanism.beams.items()}
-        mechanism = mechanism.model_copy(update={"material": wanted.material, "beams": beams})
-    spec = spec.model_copy(update={"mechanism": mechanism})
-    for name, value in _sizes(mechanism).items():
+        spec = change_at(spec, "mechanism.material", lambda _: wanted.material)
+        spec = change_at(spec, "mechanism.beams.*.material", lambda _: None)
+    for name, value in _sizes(spec.mechanism).items():
         asked = getattr(wanted, name)
         if asked is not None and abs(asked / value - 1) > FORCE_RTOL:
             spec = _scale(spec, name, asked / value)
@@ -142,7 +134,7 @@ def _sizes(mechanism: Mechanism) -> dict[str, float]:
     """Return what a rescaling may change, by its key: size, largest thickness and largest width of the beams [m]."""
     return {
         "size": size_of(mechanism),
-        "thickness": max(map(thickest, mechanism.collect_beam_values("thickness").values())),
+        "thickness": max(max(mechanism.list_thicknesses(name)) for name in mechanism.beams),
         "width": max(mechanism.collect_beam_values("width").values()),
     }
 
@@ -155,75 +147,42 @@ def _modulus(mechanism: Mechanism) -> float:
 
 def size_of(mechanism: Mechanism) -> float:
     """Return L_x, the distance of the outermost nodes along x; along y where they have one x [m]."""
-    for axis in (0, 1):
-        places = [node.at[axis] for node in mechanism.nodes.values()]
-        if (size := max(places) - min(places)) > 0:
-            return size
-    raise ValueError("all nodes are at one place")
+    spans: list[float] = np.ptp([node.at for node in mechanism.nodes.values()], axis=0).tolist()
+    return next(span for span in spans if span > 0)
+
+
+LENGTHS_IN_PLANE = (
+    "mechanism.nodes.*.at",
+    *(f"mechanism.beams.*.{key}" for key in ("start_offset", "end_offset", "shape.length", "shape.rise")),
+    *(f"mechanism.copies.{key}" for key in ("mirror", "layer_pitch")),
+    *(f"mechanism.part.{key}" for key in ("pad", "holes.*.at")),
+    *(f"mechanism.part.frame.{key}" for key in ("wall", "shuttle", "ground", "clearance", "inside")),
+    *(f"analysis.{key}" for key in ("travel", "window", "reference", "surface.preload")),
+    "requirements.*.over",
+)
+"""Lengths of a mechanism that go with its size; screws, tools and a surface that is followed stay as they are."""
 
 
 def _scale(spec: BeamSpec, name: str, factor: float) -> BeamSpec:
     """Return the specification with its width, thickness or size times a factor."""
-    if name == "size":
-        return _resize(spec, factor)
-    mechanism = spec.mechanism
-    beams = {
-        key: beam.model_copy(update={name: _times(getattr(beam, name), factor)}) if getattr(beam, name) else beam
-        for key, beam in mechanism.beams.items()
-    }
-    update = {name: _times(getattr(mechanism, name), factor), "beams": beams}
-    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=update)})
+    scale: Callable[[Any, float], Any] = _scale_lengths if name == "size" else _scale_thickness
+    paths = LENGTHS_IN_PLANE if name == "size" else (f"mechanism.{name}", f"mechanism.beams.*.{name}")
+    for path in paths:
+        spec = change_at(spec, path, lambda value: scale(value, factor))
+    return spec
 
 
-def _times(thickness: Thickness, factor: float) -> Thickness:
+def _scale_thickness(thickness: Thickness, factor: float) -> Thickness:
     if isinstance(thickness, tuple):
         return tuple((place, value * factor) for place, value in thickness)
     return thickness * factor
 
 
-def _resize(spec: BeamSpec, factor: float) -> BeamSpec:
-    """Return the specification with all lengths in the plane times a factor, those of part and analysis included."""
-    mechanism, analysis = spec.mechanism, spec.analysis
-    nodes = {name: node.model_copy(update={"at": _point(node.at, factor)}) for name, node in mechanism.nodes.items()}
-    beams = {name: _lengths(beam, ("start_offset", "end_offset"), factor) for name, beam in mechanism.beams.items()}
-    beams = {
-        name: beam.model_copy(update={"shape": _lengths(beam.shape, ("length", "rise"), factor)})
-        for name, beam in beams.items()
-    }
-    copies = mechanism.copies and _lengths(mechanism.copies, ("mirror", "layer_pitch"), factor)
-    part = mechanism.part and _resized_part(mechanism.part, factor)
-    update = {"nodes": nodes, "beams": beams, "copies": copies, "part": part}
-    analysis = _lengths(analysis, ("travel", "window", "reference"), factor)
-    if analysis.surface is not None:  # what is followed stays as it is
-        analysis = analysis.model_copy(update={"surface": _lengths(analysis.surface, ("preload",), factor)})
-    return spec.model_copy(
-        update={
-            "mechanism": mechanism.model_copy(update=update),
-            "analysis": analysis,
-            "requirements": tuple(_lengths(requirement, ("over",), factor) for requirement in spec.requirements),
-        }
-    )
-
-
-def _resized_part(part: PartSpec, factor: float) -> PartSpec:
-    """Return a part whose pads, frame and places of holes are larger by a factor; screws and tools stay as they are."""
-    holes = tuple(_lengths(hole, ("at",), factor) for hole in part.holes)
-    frame = part.frame and _lengths(part.frame, ("wall", "shuttle", "ground", "clearance", "inside"), factor)
-    resized: PartSpec = _lengths(part, ("pad",), factor).model_copy(update={"holes": holes, "frame": frame})
-    return resized
-
-
-def _lengths(block: Any, names: tuple[str, ...], factor: float) -> Any:
-    """Return a block with the lengths and points of some names times a factor, where it has them."""
-    present = {name: getattr(block, name, None) for name in names}
-    update = {name: _point(value, factor) for name, value in present.items() if value is not None}
-    return block.model_copy(update=update) if update else block
-
-
-def _point(value: Any, factor: float) -> Any:
+def _scale_lengths(value: Any, factor: float) -> Any:
+    """Return a length, or lengths, times a factor; a share of the travel, which is scaled itself, stays."""
     if isinstance(value, tuple):
-        return tuple(_point(item, factor) for item in value)
-    if isinstance(value, TravelShare):  # of the travel, which is scaled itself
+        return tuple(_scale_lengths(item, factor) for item in value)
+    if isinstance(value, TravelShare):
         return value
     return Place(value * factor, value.dimension) if isinstance(value, Place) else value * factor
 
@@ -236,9 +195,9 @@ def _to_allowable_stress(spec: BeamSpec) -> tuple[BeamSpec | None, str]:
     end = _round_down(place)
     ended = _set_window(spec, 0.0, end)
     start = number_of("range_start", solve(ended))
-    return (
-        ended if start is None or abs(_round_up(start)) >= abs(end) else _set_window(ended, _round_up(start), end)
-    ), ""
+    if start is not None and abs(_round_up(start)) < abs(end):
+        ended = _set_window(ended, _round_up(start), end)
+    return ended, ""
 
 
 def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
@@ -250,7 +209,7 @@ def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
     travel, more = spec.extent, ": state a longer 'analysis.travel'"
     for number in range(MAX_ROUNDS + 1):
         try:
-            solution = solve(_with_analysis(spec, travel=Place(travel), window=None))
+            solution = solve(with_values(spec, {"analysis.travel": Place(travel), "analysis.window": None}))
         except InputError:
             if number == 0:
                 raise
@@ -280,12 +239,8 @@ def _round_up(value: float) -> float:
 
 
 def _set_window(spec: BeamSpec, start: float, end: float) -> BeamSpec:
-    low, high = sorted((start, end))
-    return _with_analysis(spec, travel=Place(end), window=(Place(low), Place(high)))
-
-
-def _with_analysis(spec: BeamSpec, **update: Any) -> BeamSpec:
-    return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=update)})
+    window = tuple(Place(place) for place in sorted((start, end)))
+    return with_values(spec, {"analysis.travel": Place(end), "analysis.window": window})
 
 
 def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
@@ -301,11 +256,10 @@ def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
     reached = _force(changed)
     if reached is not None and abs(reached / predicted - 1) <= FORCE_RTOL:
         return []
-    reported = (
-        "" if reached is None else f": by it alone the force would be off by {100 * (reached / predicted - 1):+.2g} %"
-    )
-    corrected = "; corrected" if wanted.force is not None else ""
-    return [finding("rescale_approximate", f"Eq. 6 is exact only for beams that do not stretch{reported}{corrected}")]
+    message = "Eq. 6 is exact only for beams that do not stretch"
+    if reached is not None:
+        message += f": by it alone the force would be off by {100 * (reached / predicted - 1):+.2g} %"
+    return [finding("rescale_approximate", message + ("; corrected" if wanted.force is not None else ""))]
 
 
 def _force_ratio(old: Mechanism, new: Mechanism) -> float:
@@ -324,14 +278,9 @@ def _stress(spec: BeamSpec) -> list[Finding]:
         return []
     if stress <= allowable and along.sense * place >= along.end:
         return []
-    return [
-        finding(
-            "rescale_stress",
-            f"the stress at the end of the window is {format_short(stress, 'stress')}; the allowable stress, "
-            f"{format_short(allowable, 'stress')}, is reached at {format_short(place, 'length')}",
-            "design.rescale.to_allowable_stress=true",
-        )
-    ]
+    limit = f"the allowable stress, {format_short(allowable, 'stress')}, is reached at {format_short(place, 'length')}"
+    message = f"the stress at the end of the window is {format_short(stress, 'stress')}; {limit}"
+    return [finding("rescale_stress", message, "design.rescale.to_allowable_stress=true")]
 
 
 def _report_changes(old: BeamSpec, new: BeamSpec) -> str:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, BeamSide, NodeOnBeam, Stop
-from cfmkit.families.beam.network_from_spec import mirror_axis
-from cfmkit.families.beam.strips_and_gaps import mirror_points
+from cfmkit.families.beam.solution import node_at
 from cfmkit.plots import parts
 from cfmkit.plots.style import TEXT_INK, TROUBLE_RED
 
@@ -24,12 +23,6 @@ if TYPE_CHECKING:
 LONGEST_ARROW = 0.12  # length of the arrow of the largest force, as a share of the figure's size
 
 
-def both_halves(solution: Solution, lines: list[FloatArray]) -> list[FloatArray]:
-    """Return lines of what is described, and those of its mirrored half."""
-    axis = mirror_axis(solution.assembly)
-    return lines if axis is None else [*lines, *(mirror_points(line, *axis) for line in lines)]
-
-
 def draw_contacts(
     solution: Solution,
     ax: Axes,
@@ -41,10 +34,10 @@ def draw_contacts(
     outlines = {contact.name: contact.outline for contact in contacts
                 if not isinstance(contact, Stop | NodeOnBeam | BeamOnBeam)}  # fmt: skip
     for name, outline in outlines.items():
-        for number, line in enumerate(both_halves(solution, outline.lines(2 * size))):
+        for number, line in enumerate(solution.assembly.add_images(outline.lines(2 * size))):
             parts.edge(ax, line, f"obstacle-{name}-{number}", color=TEXT_INK, linewidth=1.8, zorder=1.6)
         strokes = [_hatch(outline, line, 0.02 * size) for line in outline.lines(2 * size)]
-        for number, line in enumerate(both_halves(solution, strokes)):
+        for number, line in enumerate(solution.assembly.add_images(strokes)):
             parts.edge(ax, line, f"hatch-{name}-{number}", color=TEXT_INK, linewidth=0.5, zorder=1.5)
     for number, contact in enumerate(contacts):
         if isinstance(contact, BeamSide):
@@ -69,31 +62,24 @@ def _stop_or_pad(solution: Solution, ax: Axes, number: int, size: float, poses: 
     contact: Any = solution.path.network.contacts[number]
     if isinstance(contact, Stop) and contact.direction is not None:
         along = np.array([np.cos(contact.direction), np.sin(contact.direction)])
-        at = _node_at(solution, contact.node, None) + contact.gap * along
+        at = node_at(solution.path, contact.node) + contact.gap * along
         bar = 0.03 * size * np.array([[-along[1], along[0]], [along[1], -along[0]]])
-        for image, line in enumerate(both_halves(solution, [at + bar])):
+        for image, line in enumerate(solution.assembly.add_images([at + bar])):
             parts.edge(ax, line, f"stop-{contact.name}-{number}-{image}", color=TEXT_INK, linewidth=2.6, zorder=1.6)
     for pose, color in poses.items():
         point = int(solution.keep[pose])
         if contact.turns or not solution.path.contact_force(number)[point] > 0:
             continue
-        node = _node_at(solution, contact.node, point)[None]
-        for at_pad in () if isinstance(contact, NodeOnBeam) else both_halves(solution, [node]):
+        node = node_at(solution.path, contact.node, point)[None]
+        for at_pad in () if isinstance(contact, NodeOnBeam) else solution.assembly.add_images([node]):
             ax.plot(*parts.mm(at_pad[0]), marker="o", markersize=4.0, color=color, zorder=4.5, linestyle="",
                     gid=f"touch-{number}-{pose}")  # fmt: skip
         if isinstance(contact, Stop):
             continue
         turn = np.linspace(0.0, 2.0 * np.pi, 61)
         rim = contact.radius * np.column_stack([np.cos(turn), np.sin(turn)])
-        for image, line in enumerate(both_halves(solution, [node + rim])):
+        for image, line in enumerate(solution.assembly.add_images([node + rim])):
             parts.edge(ax, line, f"pad-{number}-{pose}-{image}", color=color, linewidth=0.8, zorder=4.4)
-
-
-def _node_at(solution: Solution, name: str, point: int | None) -> FloatArray:
-    """Return where a node is at a point of the path, or as cut, (2,) [m]."""
-    node = solution.path.network.nodes[name]
-    at = np.real([node.x, node.y]).astype(float)
-    return at if point is None else at + solution.path.motion(name)[point][:2]
 
 
 def _side_between(solution: Solution, number: int, point: int) -> FloatArray | None:
@@ -113,7 +99,7 @@ def _touching_side(solution: Solution, ax: Axes, number: int, poses: Mapping[int
     """Mark where the side of a beam touches: a dot, or a thick line along what lies on an obstacle."""
     for pose, color in poses.items():
         places = _side_between(solution, number, int(solution.keep[pose]))
-        for image, copy in enumerate([] if places is None else both_halves(solution, [places])):
+        for image, copy in enumerate([] if places is None else solution.assembly.add_images([places])):
             gid = f"side-{number}-{pose}-{image}"
             if len(copy) > 1:
                 parts.edge(ax, copy, gid, color=color, linewidth=3.0, zorder=4.4)
@@ -129,7 +115,7 @@ def _forces(solution: Solution, ax: Axes, size: float, poses: Mapping[int, str])
     look = {"arrowstyle": "->", "color": TROUBLE_RED, "linewidth": 0.9, "shrinkA": 0.0, "shrinkB": 0.0}
     for (pose, number), (at, force) in forces.items():
         arrow = np.array([at, at + LONGEST_ARROW * size * force / largest])
-        for image, line in enumerate(both_halves(solution, [arrow])):
+        for image, line in enumerate(solution.assembly.add_images([arrow])):
             begin, end = parts.mm(line).tolist()
             gid = f"force-{number}-{pose}-{image}"
             ax.annotate("", end, begin, zorder=4.6, gid=gid, arrowprops=look)
@@ -144,12 +130,12 @@ def _forces_at(solution: Solution, point: int) -> Iterator[tuple[int, FloatArray
         if isinstance(contact, Stop):
             assert contact.direction is not None
             normal = -np.array([np.cos(contact.direction), np.sin(contact.direction)])
-            yield number, _node_at(solution, contact.node, point), force * normal
+            yield number, node_at(solution.path, contact.node, point), force * normal
             continue
         if isinstance(contact, BeamSide):
             places = _side_between(solution, number, point)
         else:
-            places = _node_at(solution, contact.node, point)[None]
+            places = node_at(solution.path, contact.node, point)[None]
         if places is None or len(places) > 1:
             continue
         if isinstance(contact, NodeOnBeam | BeamOnBeam):
@@ -165,7 +151,7 @@ def _counterpart_at(solution: Solution, number: int, point: int) -> FloatArray:
     contacts = solution.path.network.contacts
     contact = contacts[number]
     if isinstance(contact, NodeOnBeam):
-        return _node_at(solution, contact.node, point)
+        return node_at(solution.path, contact.node, point)
     mates = (k for k, mate in enumerate(contacts) if mate.name == contact.name and k != number)
     places = (_side_between(solution, k, point) for k in mates if isinstance(contacts[k], BeamOnBeam))
     return next(place[0] for place in places if place is not None)

@@ -18,14 +18,14 @@ import numpy as np
 from cfmkit.export.contours import signed_area
 from cfmkit.export.drawn_as_specified import DrawnBlock
 from cfmkit.export.union import OutlinePiece
-from cfmkit.families.beam.network_from_spec import is_on_axis, mirror_axis, moving_nodes
-from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points
+from cfmkit.families.beam.network_from_spec import is_on_axis, node_place
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.network_from_spec import Assembly
+    from cfmkit.families.beam.strips_and_gaps import BeamStrip
 
 PAD_DEPTH = 4.0  # depth of a pad behind the end of a beam, in thicknesses
 EYE_RADIUS, HOLE_RADIUS = 2.5, 1.2  # radii of the eye and of the hole at a pinned support, in thicknesses
@@ -88,9 +88,9 @@ class DrawnParts:
 
 def both_halves(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> dict[str, list[BeamStrip]]:
     """Return beams by name, those of a mirrored half with a prime."""
-    if (axis := mirror_axis(assembly)) is None:
+    if (mirror := assembly.mirror) is None:
         return beams
-    return {**beams, **{f"{name}'": [strip.mirror(*axis) for strip in strips] for name, strips in beams.items()}}
+    return {**beams, **{f"{name}'": [strip.reflect(mirror) for strip in strips] for name, strips in beams.items()}}
 
 
 def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], max_deviation: float) -> DrawnParts:
@@ -98,26 +98,25 @@ def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], max_devia
 
     Nothing else is added: pieces that continue each other share their end, however thick each is there.
     """
-    halves, axis = both_halves(assembly, beams), mirror_axis(assembly)
+    halves = both_halves(assembly, beams)
     pieces = [strip.piece for strips in halves.values() for strip in strips]
     for name, strips in halves.items():
         for first, second in itertools.pairwise(strips):
             pieces += _close_ends([BeamEnd(name, first, True), BeamEnd(name, second, False)])
-    for ends in meeting_ends(assembly, halves).values():
+    meeting = meeting_ends(assembly, halves)
+    for ends in meeting.values():
         pieces += _close_ends(ends)
     blocks = list(_blocks(assembly, beams))
-    solid = [block.shape for block in blocks]
-    eyes = [end for node, ends in meeting_ends(assembly, halves).items() if _is_pinned(assembly, node) for end in ends]
+    bars = bars_between_halves(assembly, beams)
+    solid = [*assembly.add_images([block.shape for block in blocks]), *bars.values()]
+    eyes = [end for node, ends in meeting.items() if _is_pinned(assembly, node) for end in ends]
     blocks += [
         DrawnBlock(f"the eye of {end.beam} at {node}", (node,), disc(end.at, EYE_RADIUS * end.thickness, max_deviation))
         for node, ends in meeting_ends(assembly, beams).items()
         if _is_pinned(assembly, node)
         for end in ends
     ]
-    if axis is not None:
-        bars = bars_between_halves(assembly, beams, *axis)
-        solid += [mirror_points(shape, *axis) for shape in solid] + list(bars.values())
-        blocks += [DrawnBlock(f"the bar of {node}", (node, f"{node}'"), bar) for node, bar in bars.items()]
+    blocks += [DrawnBlock(f"the bar of {node}", (node, f"{node}'"), bar) for node, bar in bars.items()]
     pieces += [OutlinePiece.polygon(shape) for shape in solid] + [_round(end, EYE_RADIUS) for end in eyes]
     return DrawnParts(pieces, [_round(end, HOLE_RADIUS) for end in eyes], blocks)
 
@@ -168,17 +167,16 @@ def _blocks(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Iterator[D
     for node, beam_ends in ends.items():
         for pad, end in pads_behind(assembly, node, beam_ends) if is_padded(assembly, node) else ():
             yield DrawnBlock(f"the pad of {end.beam} at {node}", (node,), pad)
-        place = np.array([network.nodes[node].x, network.nodes[node].y])
+        place = node_place(network, node)
         for end in beam_ends:
             breadth = PAD_DEPTH * end.thickness
             if np.hypot(*(end.at - place)) > STANDING_DISTANCE * breadth:
                 arm = _bar(place, end.at, breadth, beam_ends)
                 yield DrawnBlock(f"the arm of {end.beam} at {node}", (node,), arm)
-    thick = max(float(strip.thickness.max()) for strips in beams.values() for strip in strips)
     for link in network.links:
         a, b = (_anchor(assembly, beams, end_node) for end_node in (link.master, link.node))
         if np.hypot(*(b - a)) > 0:
-            bar = _bar(a, b, PAD_DEPTH * thick, [*ends.get(link.master, []), *ends.get(link.node, [])])
+            bar = _bar(a, b, _bar_width(beams), [*ends.get(link.master, []), *ends.get(link.node, [])])
             yield DrawnBlock(f"the bar from {link.master} to {link.node}", (link.master, link.node), bar)
 
 
@@ -194,10 +192,8 @@ def is_padded(assembly: Assembly, node: str) -> bool:
     return (place.support.rotation and place.support.across) or node in linked
 
 
-def moves(assembly: Assembly, node: str) -> bool:
-    """Return True if a pad at a node moves: it is driven, guided or linked."""
-    support = assembly.network.nodes[node].support
-    return node in moving_nodes(assembly) or not (support.along and support.across and support.rotation)
+def _bar_width(beams: dict[str, list[BeamStrip]]) -> float:
+    return PAD_DEPTH * max(float(strip.thickness.max()) for strips in beams.values() for strip in strips)
 
 
 def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> FloatArray:
@@ -207,8 +203,7 @@ def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) ->
         for pad, _ in pads_behind(assembly, node, ends):
             middle: FloatArray = pad.mean(axis=0)
             return middle
-    place = assembly.network.nodes[node]
-    return np.array([place.x, place.y])
+    return node_place(assembly.network, node)
 
 
 def ends_at(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> list[BeamEnd]:
@@ -256,13 +251,12 @@ def pads_behind(assembly: Assembly, node: str, ends: list[BeamEnd]) -> Iterator[
 
     Of beams that leave to opposite sides nothing is behind both: they have no pad.
     """
-    part, moving = assembly.spec.mechanism.part, moves(assembly, node)
+    part = assembly.spec.mechanism.cut_part
     for end in ends:
-        depth, half = PAD_DEPTH * end.thickness, 0.5 * PAD_DEPTH * end.thickness
-        if part is not None and part.pad is not None:
-            depth, half = part.pad[0], 0.5 * part.pad[1]
-        if part is not None and part.frame is not None:
-            depth = (part.frame.shuttle if moving else part.frame.wall) or depth
+        depth, breadth = part.pad or (PAD_DEPTH * end.thickness, PAD_DEPTH * end.thickness)
+        half = 0.5 * breadth
+        if part.frame is not None:
+            depth = (part.frame.wall if assembly.stands(node) else part.frame.shuttle) or depth
         side, out = half * np.array([end.along[1], -end.along[0]]), -depth * end.along
         pad = np.array([end.at + side, end.at - side, end.at - side + out, end.at + side + out])
         for neighbour in ends:
@@ -298,23 +292,20 @@ def _bar(a: FloatArray, b: FloatArray, width: float, ends: Sequence[BeamEnd] = (
     return bar
 
 
-def bars_between_halves(
-    assembly: Assembly, beams: dict[str, list[BeamStrip]], at: complex, direction: float
-) -> dict[str, FloatArray]:
+def bars_between_halves(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> dict[str, FloatArray]:
     """Return the bars that join the moving parts of two halves, behind the pads, by their nodes."""
-    halves = both_halves(assembly, beams)
-    thick = max(float(strip.thickness.max()) for strips in beams.values() for strip in strips)
+    halves, frame = both_halves(assembly, beams), assembly.spec.mechanism.cut_part.frame
     bars: dict[str, FloatArray] = {}
-    for node in sorted(moving_nodes(assembly)):
+    for node in sorted(assembly.moving_nodes) if assembly.mirror is not None else ():
         ends = ends_at(assembly, halves, node)
         if not ends or is_on_axis(assembly, node):
             continue
         pads = list(pads_behind(assembly, node, ends)) if is_padded(assembly, node) else []
         middle = _far_side(pads[0][0], pads[0][1]) if pads else _anchor(assembly, beams, node)
-        mirrored = mirror_points(middle[None], at, direction)[0]
-        if np.hypot(*(mirrored - middle)) > 0:
-            images = ends_at(assembly, halves, f"{node}'")
-            bars[node] = _bar(middle, mirrored, _shuttle_depth(assembly) or PAD_DEPTH * thick, [*ends, *images])
+        middle, image = assembly.add_images([middle])
+        if np.hypot(*(image - middle)) > 0:
+            width = (frame and frame.shuttle) or _bar_width(beams)
+            bars[node] = _bar(middle, image, width, [*ends, *ends_at(assembly, halves, f"{node}'")])
     return bars
 
 
@@ -323,8 +314,3 @@ def _far_side(pad: FloatArray, end: BeamEnd) -> FloatArray:
     ahead = (pad - end.at) @ end.along
     middle: FloatArray = pad[ahead <= ahead.min() + STANDING_DISTANCE * end.thickness].mean(axis=0)
     return middle
-
-
-def _shuttle_depth(assembly: Assembly) -> float | None:
-    part = assembly.spec.mechanism.part
-    return part.frame.shuttle if part is not None and part.frame is not None else None

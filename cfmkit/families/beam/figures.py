@@ -11,11 +11,12 @@ import numpy as np
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.export.posed_part import PosedBody
-from cfmkit.families.beam.drawn_contacts import both_halves, draw_contacts
-from cfmkit.families.beam.network_from_spec import mirror_axis
+from cfmkit.families.beam.drawn_contacts import draw_contacts
+from cfmkit.families.beam.network_from_spec import node_place
 from cfmkit.families.beam.part import BOX_TOLERANCE, bodies, made_strips, regions
 from cfmkit.families.beam.scalar_results import natural
-from cfmkit.families.beam.strips_and_gaps import mirror_points, strips
+from cfmkit.families.beam.solution import node_at
+from cfmkit.families.beam.strips_and_gaps import strips
 from cfmkit.families.beam.tip_on_uneven_surface import follow_surface
 from cfmkit.families.fem_results import number_fillets
 from cfmkit.plots import parts
@@ -113,7 +114,7 @@ def shapes(result: Result) -> Figure:
     poses = np.unique(np.linspace(0, len(solution.keep) - 1, N_DRAWN_POSES).astype(int))[1:]
     shown, made = bodies(solution, poses, centre_line=centre_line), made_strips(solution.assembly)
     drawn = {int(pose): [body.core_at(k) for body in shown] for k, pose in enumerate(poses)}
-    springs = both_halves(solution, spring_lines(solution.path))
+    springs = solution.assembly.add_images(spring_lines(solution.path))
     box = _box([*made, *shown, *(PosedBody.line("spring", "free", line, 0.0) for line in springs)])
     width, height = box[2] - box[0], box[3] - box[1]
     scale = min(138.0 / width, 110.0 / height)
@@ -123,7 +124,7 @@ def shapes(result: Result) -> Figure:
     room = (17.0 + 0.5 * (138.0 - width * scale), 12.0, width * scale, height * scale)
     ax = axes_mm(figure, room)
     parts.bodies(ax, made, 0, {})
-    for number, line in enumerate(both_halves(solution, rigid_parts(solution.path, None))):
+    for number, line in enumerate(solution.assembly.add_images(rigid_parts(solution.path, None))):
         parts.edge(ax, line, f"rigid-{number}", color=TEXT_GREY, linewidth=2.4, zorder=1.3, solid_capstyle="round")
     for number, line in enumerate(springs):
         ends = [(float(x), float(y)) for x, y in line]
@@ -149,8 +150,7 @@ def _colors(count: int) -> list[str]:
 
 def _key(solution: Solution, poses: list[int]) -> list[tuple[str, str]]:
     """Return what the motion is in each pose, and its colour."""
-    kind = "angle" if solution.spec.mechanism.drive.turns else "length"
-    reported = (value_text(float(solution.motion[pose]), kind) for pose in poses)
+    reported = (value_text(float(solution.motion[pose]), solution.spec.motion) for pose in poses)
     return list(zip(reported, _colors(len(poses)), strict=True))
 
 
@@ -160,7 +160,7 @@ def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> 
         for number, line in enumerate(lines):
             parts.edge(ax, line, f"pose-{pose}-{number}", color=color, linewidth=1.2, zorder=2.5)
         point = int(solution.keep[pose])
-        for number, line in enumerate(both_halves(solution, rigid_parts(solution.path, point))):
+        for number, line in enumerate(solution.assembly.add_images(rigid_parts(solution.path, point))):
             parts.edge(ax, line, f"rigid-{pose}-{number}", color=color, linewidth=0.7, linestyle="--", zorder=2.4)
     index = int(np.argmax(np.where(np.isfinite(solution.stress), solution.stress, -np.inf)))
     return _peak(solution, ax, index)
@@ -194,16 +194,14 @@ def _box(shown: Sequence[PosedBody]) -> parts.Box:
 
 def _supports(solution: Solution, ax: Axes) -> None:
     """Mark the nodes by their support: squares where the rotation is held, else circles; hollow where they slide."""
-    axis = mirror_axis(solution.assembly)
     for name, node in solution.path.network.nodes.items():
         support = node.support
         if not (support.along or support.across or support.rotation) and name != solution.assembly.driven:
             continue
         color = LINE_VERMILLION if name == solution.assembly.driven else TEXT_INK
-        place = np.array([[float(np.real(node.x)), float(np.real(node.y))]])
-        for at in [place] if axis is None else [place, mirror_points(place, *axis)]:
+        for at in solution.assembly.add_images([node_place(solution.path.network, name)]):
             ax.plot(
-                *parts.mm(at[0]), marker="s" if support.rotation else "o", markersize=4.5, color=color, zorder=4,
+                *parts.mm(at), marker="s" if support.rotation else "o", markersize=4.5, color=color, zorder=4,
                 markerfacecolor=color if support.along or color != TEXT_INK else "white", linestyle="",
                 gid=f"at-{name}",
             )  # fmt: skip
@@ -335,7 +333,7 @@ def moving(result: Result) -> Moving | None:
     def draw(ax: Axes, number: int) -> None:
         parts.bodies(ax, made, 0, {})
         parts.bodies(ax, shown, number, {"beam": LINE_BLUE})
-        for line in both_halves(solution, rigid_parts(solution.path, int(solution.keep[points[number]]))):
+        for line in solution.assembly.add_images(rigid_parts(solution.path, int(solution.keep[points[number]]))):
             parts.edge(ax, line, "rigid", color=TEXT_GREY, linewidth=2.4, zorder=2.4, solid_capstyle="round")
         _supports(solution, ax)
         parts.to_scale(ax, box)
@@ -358,11 +356,11 @@ def rigid_parts(path: Path, point: int | None) -> list[FloatArray]:
     """Return links and the arms beside nodes as lines (2, 2) [m], at a point of the path or before any load."""
     network = path.network
     parts_of_links = [
-        np.array([place(path, link.master, point), place(path, link.node, point)]) for link in network.links
+        np.array([node_at(path, link.master, point), node_at(path, link.node, point)]) for link in network.links
     ]
     for beam in network.beams.values():
         for node, arm in ((beam.start, beam.start_offset), (beam.end, beam.end_offset)):
-            at = place(path, node, point)
+            at = node_at(path, node, point)
             angle = 0.0 if point is None else float(path.motion(node)[point, 2])
             turned = complex(*map(float, np.real(arm))) * np.exp(1j * angle)
             parts_of_links.append(np.array([at, at + np.array([turned.real, turned.imag])]))
@@ -375,12 +373,6 @@ def spring_lines(path: Path) -> list[FloatArray]:
     for spring in path.network.springs:
         if isinstance(spring, LineSpring):
             ground = np.array([float(np.real(x)) for x in spring.ground])
-            far_end = ground if spring.end is None else place(path, spring.end, None)
-            lines.append(np.array([place(path, spring.start, None), far_end]))
+            far_end = ground if spring.end is None else node_at(path, spring.end)
+            lines.append(np.array([node_at(path, spring.start), far_end]))
     return lines
-
-
-def place(path: Path, node: str, point: int | None) -> FloatArray:
-    """Return where a node is at a point of the path, or before any load [m]."""
-    at = np.real([path.network.nodes[node].x, path.network.nodes[node].y])
-    return at if point is None else at + path.motion(node)[point, :2]

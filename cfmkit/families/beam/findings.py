@@ -26,7 +26,6 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Fit
     from cfmkit.families.beam.solution import Solution
     from cfmkit.families.beam.strips_and_gaps import BeamGap
@@ -115,7 +114,7 @@ def _forced_beams(solution: Solution) -> Sentence:
     gaps = ", ".join(f"{name} by {format_short(fit.gap, 'length')}" for name, fit in _misfits(solution).items())
     return (
         f"beams miss their nodes ({gaps}) and are forced into place: at rest the drive carries "
-        f"{format_short(float(solution.effort[0]), _effort(solution))} and the stress is "
+        f"{format_short(float(solution.effort[0]), solution.spec.mechanism.drive.effort_dimension)} and the stress is "
         f"{format_short(float(solution.stress[0]), 'stress')}; closure 'rotscale' avoids both",
         "mechanism.closure=rotscale",
     )
@@ -129,10 +128,6 @@ def _fitted_beams(solution: Solution) -> Sentence:
         for name, fit in _misfits(solution).items()
     )
     return (f"beams were turned and scaled to fit between their nodes: {reported}",)
-
-
-def _effort(solution: Solution) -> str:
-    return "torque" if solution.spec.mechanism.drive.turns else "force"
 
 
 # --- events and stability -------------------------------------------------------------------------------------------
@@ -178,12 +173,9 @@ def _describe_bifurcation(solution: Solution) -> str:
 
 def _unstable_points(solution: Solution) -> Sentence:
     bad = ~solution.stable_equilibrium
-    low, high = (format_short(float(end), solution.motion_dimension) for end in _ends(solution.motion[bad]))
+    places = solution.motion[bad]
+    low, high = (solution.describe_motion(float(end)) for end in (places.min(), places.max()))
     return (f"{int(bad.sum())} of {len(bad)} points are not stable while the drive is held, from {low} to {high}",)
-
-
-def _ends(values: FloatArray) -> tuple[float, float]:
-    return values.min(), values.max()
 
 
 def _misses_flutter(solution: Solution) -> bool:
@@ -292,7 +284,7 @@ def _hindered_share(solution: Solution) -> tuple[float, str]:
     curling = solution.curling
     share, beam = curling.share[solution.keep], curling.beam[solution.keep]
     worst = int(share.argmax())
-    place = format_short(float(solution.motion[worst]), solution.motion_dimension)
+    place = solution.describe_motion(float(solution.motion[worst]))
     return float(share[worst]), f"at {place}, most of it in beam {beam[worst]}"
 
 

@@ -7,6 +7,7 @@ specification. Network and path are those of the analysis; metrics, findings and
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from cfmkit.elastica import PathStatus, gradient, trace
 from cfmkit.elastica.model.drive import Displacement
 from cfmkit.errors import CfmError
 from cfmkit.families.base import Sampled
-from cfmkit.families.beam.network_from_spec import assemble
+from cfmkit.families.beam.network_from_spec import assemble, change_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -56,15 +57,15 @@ def sample_poses(
 def _find_slopes(assembly: Assembly, path: Path, at: NDArray[np.int64], paths: Sequence[str]) -> dict[str, Sampled]:
     """Return derivatives of force and stress at some points of a path by values of the specification."""
     # other nodes of a chain follow from its beams, and other stages from the first, through numbers that stay real
-    spec, copies = assembly.spec, assembly.spec.mechanism.copies
-    if spec.mechanism.closure == "chain" or (copies is not None and copies.layers > 1):
+    spec = assembly.spec
+    if spec.mechanism.closure == "chain" or spec.mechanism.layers > 1:
         return {}
     smooth_keys = [name for name in paths if _SMOOTH_KEYS.fullmatch(name) and isinstance(spec.get_value(name), float)]
     if not smooth_keys:
         return {}
 
     def build(x: Any) -> Network:
-        return assemble(_replace_values(spec, dict(zip(smooth_keys, x, strict=True)))).network
+        return assemble(replace_values(spec, dict(zip(smooth_keys, x, strict=True)))).network
 
     try:
         slopes = gradient(path, build, np.array([spec.get_value(key) for key in smooth_keys]), at)
@@ -100,18 +101,12 @@ def _follow_path(spec: BeamSpec, places: FloatArray) -> tuple[Assembly, Path, ND
     return assembly, path, np.asarray(keep[np.searchsorted(np.abs(poses), np.abs(places))])
 
 
-def _replace_values(block: Any, values: Mapping[str, Any]) -> Any:
-    """Return a block, a mapping or a list with other values at dotted paths, which are not checked: complex ones."""
-    below: dict[str, dict[str, Any]] = {}
+def replace_values(spec: BeamSpec, values: Mapping[str, Any]) -> BeamSpec:
+    """Return a specification with other values at dotted paths, which are not checked: complex ones."""
+
+    def take(value: Any, _before: Any) -> Any:
+        return value
+
     for path, value in values.items():
-        head, _, rest = path.partition(".")
-        below.setdefault(head, {})[rest] = value
-
-    def item(now: Any, inside: dict[str, Any]) -> Any:
-        return inside[""] if "" in inside else _replace_values(now, inside)
-
-    if isinstance(block, tuple):
-        return tuple(item(child, below[str(k)]) if str(k) in below else child for k, child in enumerate(block))
-    if isinstance(block, dict):
-        return {name: item(child, below[name]) if name in below else child for name, child in block.items()}
-    return block.model_copy(update={name: item(getattr(block, name), inside) for name, inside in below.items()})
+        spec = change_at(spec, path, partial(take, value))
+    return spec

@@ -6,7 +6,6 @@ cubic is drawn again; so are the ends of the window and corners of the path.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -43,7 +42,7 @@ def largest(
 ) -> float | None:
     """Return the largest of some values along a path, where its motion is in a window; None if there is none."""
     path, law, winding = solution.path, solution.model_between_points, solution.winding
-    points = replace(solution, keep=np.arange(len(path)), ends=())
+    points = solution.replace_path(path)
     rows, reached = observe(path), points.motion
     ask: Callable[[FloatArray], Path]
     if law is not None:

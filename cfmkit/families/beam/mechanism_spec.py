@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.beam.contact_spec import (
+    Fault,
     MotionStop,
     ObstacleSpec,
     PartContact,
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
-Fault = tuple[tuple[str | int, ...], str]
 _NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 _SAME_DIRECTION = 1e-6  # rad; the support's direction is used
 
@@ -258,6 +258,21 @@ class Mechanism(RoundedCorners, Model):
         usual = getattr(self, key)
         return {name: getattr(beam, key) or usual for name, beam in self.beams.items()}
 
+    def list_thicknesses(self, beam: str) -> tuple[float, ...]:
+        """Return the thicknesses that are stated along a beam, from its start to its end [m]."""
+        thickness = self.beams[beam].thickness or self.thickness
+        return tuple(value for _, value in thickness) if isinstance(thickness, tuple) else (thickness,)
+
+    @property
+    def legs(self) -> int:
+        """Number of equal parts side by side."""
+        return 1 if self.copies is None else self.copies.legs
+
+    @property
+    def layers(self) -> int:
+        """Number of equal stages in series."""
+        return 1 if self.copies is None else self.copies.layers
+
     @property
     def has_contacts(self) -> bool:
         """True if any contact is stated."""
@@ -281,11 +296,7 @@ class Mechanism(RoundedCorners, Model):
     @property
     def thinnest(self) -> float:
         """Smallest thickness of all beams [m]."""
-        thicknesses = self.collect_beam_values("thickness").values()
-        return min(
-            thickness if isinstance(thickness, float) else min(value for _, value in thickness)
-            for thickness in thicknesses
-        )
+        return min(min(self.list_thicknesses(name)) for name in self.beams)
 
     @model_validator(mode="after")
     def _names_match(self) -> Self:

@@ -49,7 +49,7 @@ from cfmkit.families.rows import (
     values_of_one,
 )
 from cfmkit.metrics import split_name
-from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
+from cfmkit.metrics.curve_rows import CurveRows, RowSamples, StressRows
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
@@ -60,10 +60,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.curves import Kind
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.results.between_points import BetweenPoints
-    from cfmkit.elastica.results.path import ContactEvent
     from cfmkit.families.beam.solution import LazyColumns
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.families.beam.tip_on_uneven_surface import SurfaceResult
@@ -71,9 +69,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
-_MAX_TRAVEL_RATIO = (
-    3.0  # travel in lengths from the driven node to a support: at the end these are at least twice as long
-)
+_MAX_TRAVEL_RATIO = 3.0  # travel in lengths from the driven node to a support: these are at least twice as long then
 _COIL_PLACES = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms
 
 
@@ -87,7 +83,9 @@ def analyze(spec: BeamSpec, _run: Run) -> Result:
     if len(solution.keep) < 2:
         message = f"no curve: {ending_of(solution).message}"
         return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=tuple(findings_of(solution)))
-    status, message = _ending(solution)
+    status, message = Status.COMPLETE, ""
+    if solution.path.status is not PathStatus.COMPLETE:
+        status, message = Status.PARTIAL, ending_of(solution).message
     values, along = values_of_one(SCALAR_QUANTITIES, solution) | contact_values(solution), follow_surface(solution)
     curves: tuple[Curve, ...] = (_curve(solution),)
     if along is not None:
@@ -132,9 +130,8 @@ def solve(spec: BeamSpec) -> Solution:
         return Solution(assembly, path, *_keep_points(assembly, path))
     drive = assembly.drive()
     loading_and_unloading = replace(drive, points=np.concatenate([drive.points, drive.points[-2::-1]]))
-    load, unload = split_at_reversal(
-        trace(assembly.network, loading_and_unloading, assembly.control()), len(drive.points)
-    )
+    both = trace(assembly.network, loading_and_unloading, assembly.control())
+    load, unload = split_at_reversal(both, len(drive.points))
     back = None if unload is None else Solution(assembly, unload, *_keep_points(assembly, unload))
     return Solution(assembly, load, *_keep_points(assembly, load), back)
 
@@ -167,7 +164,7 @@ def _refuse_torn_beams(assembly: Assembly) -> None:
     if not drive.is_displacement or travel is None:
         return
     # each of several stages makes its share of the travel
-    most = _MAX_TRAVEL_RATIO * (spec.mechanism.copies.layers if spec.mechanism.copies is not None else 1)
+    most = _MAX_TRAVEL_RATIO * spec.mechanism.layers
     straight = {name: distance(network, beam.start, beam.end) for name, beam in network.beams.items()}
     if abs(spec.extent) <= most * _way_to_support(network, drive.node, straight):
         return
@@ -208,19 +205,11 @@ def _with_contacts(path: Path, points: Any) -> Any:
     return np.union1d(points, np.flatnonzero(path.changes_contact)) if path.contact_events else points
 
 
-def _ending(solution: Solution) -> tuple[Status, str]:
-    path = solution.path
-    if path.status is PathStatus.COMPLETE:
-        return Status.COMPLETE, ""
-    return Status.PARTIAL, ending_of(solution).message
-
-
 def _curve(solution: Solution) -> Curve:
     """Return the curve with stresses and the forces of each beam; with friction also of the way back."""
-    columns = _columns(solution)
-    if solution.back is None:
-        return _curve_of(solution, columns, solution.stable)
-    return join_branches(*(_curve_of(branch, _columns(branch), branch.stable) for branch in (solution, solution.back)))
+    branches = [solution] if solution.back is None else [solution, solution.back]
+    curves = [_curve_of(branch, _columns(branch), branch.stable) for branch in branches]
+    return curves[0] if len(curves) == 1 else join_branches(*curves)
 
 
 def _columns(solution: Solution) -> LazyColumns:
@@ -249,12 +238,8 @@ def _columns(solution: Solution) -> LazyColumns:
 def _curve_of(solution: Solution, columns: LazyColumns, stable: Any) -> Curve:
     """Return a curve with columns that are computed when they are read."""
     extra = LazyMapping(columns, lambda name: columns[name]())
-    return Curve(solution.motion, solution.effort, "load", stable, extra, kind_of(solution))  # type: ignore[arg-type]
-
-
-def kind_of(solution: Solution) -> Kind:
-    """Return what the effort of a curve is."""
-    return "torque" if solution.spec.mechanism.drive.turns else "force"
+    kind = solution.spec.mechanism.drive.effort_dimension
+    return Curve(solution.motion, solution.effort, "load", stable, extra, kind)  # type: ignore[arg-type]
 
 
 def _ends(solution: Solution) -> Curve | None:
@@ -262,9 +247,8 @@ def _ends(solution: Solution) -> Curve | None:
     if not len(solution.ends):
         return None
     ends_only = replace(solution, keep=solution.ends)
-    return _curve_of(
-        ends_only, {"max_stress": lambda: Column(ends_only.stress, "stress")}, np.array(ends_only.accurate)
-    )
+    stress: LazyColumns = {"max_stress": lambda: Column(ends_only.stress, "stress")}
+    return _curve_of(ends_only, stress, np.array(ends_only.accurate))
 
 
 def _frequencies(solution: Solution) -> LazyColumns:
@@ -298,20 +282,16 @@ def split_at_reversal(path: Path, count: int) -> tuple[Path, Path | None]:
     load, unload = path.take(np.arange(turn + 1)), path.take(np.arange(turn, last))
     # what is requested on the way back is numbered as on the way there
     numbers = np.where(unload.requested >= count, 2 * (count - 1) - unload.requested, unload.requested)
-    return (
-        replace(load, contact_events=tuple(events[k] for k, point in enumerate(places) if point < turn)),
-        replace(
-            unload,
-            contact_events=tuple(events[k] for k, point in enumerate(places) if point >= turn),
-            requested=read_only(numbers, np.int64),
-        ),
+    before, after = (
+        [events[k] for k, point in enumerate(places) if (point < turn) is early] for early in (True, False)
     )
+    load = replace(load, contact_events=tuple(before))
+    return load, replace(unload, contact_events=tuple(after), requested=read_only(numbers, np.int64))
 
 
 def _points_of_events(path: Path) -> Iterator[int]:
     """Yield the point at which each event of a contact is."""
     marked, number = np.flatnonzero(path.changes_contact), 0
-    event: ContactEvent
     for event in path.contact_events:
         same_place = SAME_PLACE * float(np.ptp(path.drive))
         while number < len(marked) - 1 and abs(path.drive[marked[number]] - event.drive) > same_place:
@@ -343,9 +323,8 @@ def equilibria_of_both_branches(solution: Solution) -> BothBranches | None:
     if loading is None or unloading is None:
         return None
     first, second = (np.array([branch.own_points[0], branch.own_points[-1]]) for branch in (loading, unloading))
-    return (
-        BothBranches({"load": loading, "unload": unloading}) if np.allclose(first, second, rtol=0, atol=1e-12) else None
-    )
+    same = np.allclose(first, second, rtol=0, atol=1e-12)
+    return BothBranches({"load": loading, "unload": unloading}) if same else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -402,8 +381,13 @@ class BeamRows:
         paths.solve_knots()
         pose = np.array([or_nan(solution.spec.analysis.reference) for solution in each])
         allowable = np.array([or_nan(solution.assembly.allowable_stress) for solution in each])
+        samples = RowSamples(
+            _pad_rows([solution.motion for solution in each]),
+            _pad_rows([solution.effort for solution in each]),
+            np.array([len(solution.motion) for solution in each]),
+        )
         curves = CurveRows(
-            _samples(each),
+            samples,
             lambda: _pad_rows([law.places for law in self._laws]),
             paths.effort,
             np.array([or_nan(solution.effort_error) for solution in each]),
@@ -412,7 +396,7 @@ class BeamRows:
             (np.array([solution.motion[0] for solution in each]), np.array([solution.motion[-1] for solution in each])),
             self._part_efforts,
             StressRows(tuple, self._stress_at, allowable, paths.largest_stress),
-            kind_of(each[0]),
+            each[0].spec.mechanism.drive.effort_dimension,
             None if np.isnan(pose).any() else pose,
             _pad_rows([law.peaks for law in self._laws], np.nan),
             traced=True,
@@ -432,13 +416,6 @@ def _pad_rows(rows: Sequence[FloatArray], behind: float | None = None) -> FloatA
     """Return rows of different lengths as one array, filled up with a value; None: with the last of each."""
     most = max(map(len, rows))
     return np.array([np.append(row, np.full(most - len(row), row[-1] if behind is None else behind)) for row in rows])
-
-
-def _samples(each: Sequence[Solution]) -> RowSamples:
-    count = np.array([len(solution.motion) for solution in each])
-    return RowSamples(
-        _pad_rows([solution.motion for solution in each]), _pad_rows([solution.effort for solution in each]), count
-    )
 
 
 @one_blas_thread
@@ -473,7 +450,7 @@ def _kind(solution: Solution) -> Hashable:
     path, analysis = solution.path, solution.spec.analysis
     stated = analysis.reference is None, solution.assembly.allowable_stress is None
     arrays = path.mesh.degree, path.mesh.elements.unknowns.tobytes(), tuple(path.network.beams)
-    return *arrays, kind_of(solution), solution.spec.stress, *stated
+    return *arrays, solution.spec.mechanism.drive.turns, solution.spec.stress, *stated
 
 
 def solve_rows(specs: Sequence[BeamSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[BeamRows]]]:
@@ -485,7 +462,5 @@ def solve_rows(specs: Sequence[BeamSpec]) -> Iterator[tuple[NDArray[np.intp], So
         for members in alike.values():
             solved = BeamRows(tuple(members.values()))
             rules = [each_rule(rule) for rule in rules_of(solved.each[0])]
-            yield (
-                np.array(list(members)),
-                SolvedRows(solved, ROW_COLUMNS, rules, np.ones(len(members), bool), traced=True),
-            )
+            rows = SolvedRows(solved, ROW_COLUMNS, rules, np.ones(len(members), bool), traced=True)
+            yield np.array(list(members)), rows

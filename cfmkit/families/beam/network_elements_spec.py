@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from cfmkit.elastica.model import network as engine
 from cfmkit.families.beam.shapes_spec import Point, ShapeSpec, Straight
 from cfmkit.specs.spec import Model, PositiveLength
 from cfmkit.specs.units import (
@@ -25,9 +26,6 @@ from cfmkit.specs.units import (
 )
 from cfmkit.stock.material_and_part_spec import MaterialSpec, PaddedPart, material_input
 from cfmkit.stock.materials import material
-
-if TYPE_CHECKING:
-    from cfmkit.elastica.model import network as engine
 
 Station = tuple[Annotated[Ratio, Field(ge=0, le=1)], PositiveLength]
 Thickness = PositiveLength | Annotated[tuple[Station, ...], Field(min_length=2)]
@@ -173,9 +171,7 @@ class LineSpringSpec(SpringElement):
 
     def build(self) -> engine.Spring:
         """Return the spring as the engine has it."""
-        from cfmkit.elastica.model.network import LineSpring
-
-        return LineSpring(self.start, self.end, self.stiffness, self.free_length, self.ground or (0.0, 0.0))
+        return engine.LineSpring(self.start, self.end, self.stiffness, self.free_length, self.ground or (0.0, 0.0))
 
 
 class TorsionSpringSpec(SpringElement):
@@ -189,9 +185,7 @@ class TorsionSpringSpec(SpringElement):
 
     def build(self) -> engine.Spring:
         """Return the spring as the engine has it."""
-        from cfmkit.elastica.model.network import TorsionSpring
-
-        return TorsionSpring(self.start, self.end, self.stiffness, self.free_angle)
+        return engine.TorsionSpring(self.start, self.end, self.stiffness, self.free_angle)
 
 
 class SlideSpringSpec(SpringElement):
@@ -205,9 +199,7 @@ class SlideSpringSpec(SpringElement):
 
     def build(self) -> engine.Spring:
         """Return the spring as the engine has it."""
-        from cfmkit.elastica.model.network import SlideSpring
-
-        return SlideSpring(self.node, self.direction, self.stiffness, self.free_displacement)
+        return engine.SlideSpring(self.node, self.direction, self.stiffness, self.free_displacement)
 
 
 SpringSpec = Annotated[LineSpringSpec | TorsionSpringSpec | SlideSpringSpec, Field(discriminator="kind")]
@@ -243,9 +235,7 @@ class PointLoadSpec(Load):
 
     def build(self, share: float = 1.0) -> engine.LoadOn:
         """Return a share of the load as the engine has it."""
-        from cfmkit.elastica.model.network import PointLoad
-
-        return PointLoad(self.node, share * self.fx, share * self.fy, share * self.moment, self.follows)
+        return engine.PointLoad(self.node, share * self.fx, share * self.fy, share * self.moment, self.follows)
 
 
 class LineLoadSpec(Load):
@@ -260,9 +250,7 @@ class LineLoadSpec(Load):
 
     def build(self, share: float = 1.0) -> engine.LoadOn:
         """Return a share of the load as the engine has it."""
-        from cfmkit.elastica.model.network import LineLoad as LineLoadOn
-
-        return LineLoadOn(self.beam, share * self.wx, share * self.wy)
+        return engine.LineLoad(self.beam, share * self.wx, share * self.wy)
 
 
 LoadSpec = Annotated[PointLoadSpec | LineLoadSpec, Field(discriminator="kind")]
@@ -284,6 +272,16 @@ class Drive(Model):
     def is_displacement(self) -> bool:
         """Whether a displacement is given."""
         return self.by_motion and not self.turns
+
+    @property
+    def motion_dimension(self) -> Literal["length", "angle"]:
+        """Dimension of the abscissa of the curve: the displacement or the angle of the driven node."""
+        return "angle" if self.turns else "length"
+
+    @property
+    def effort_dimension(self) -> Literal["force", "torque"]:
+        """Dimension of the ordinate of the curve."""
+        return "torque" if self.turns else "force"
 
     def text(self, value: float, copies: int) -> str:
         """Return a value of the drive on one copy [SI] as a reader wants it, of all copies together."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,6 +38,8 @@ from cfmkit.families.rows import with_values
 from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
@@ -52,6 +54,25 @@ if TYPE_CHECKING:
 _LARGEST_TURN = 0.35  # of a rotation in one step [rad]
 _ON_AXIS = 0.5  # thicknesses from the mirror axis within which a node is on it
 _SMOOTH_PITCH_SHARE = 0.07  # the same where every step is a point of the curve
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """Axis about which the half of a part that is described is mirrored."""
+
+    at: complex  # a point of it [m]
+    direction: float  # [rad]
+
+    def reflect(self, points: FloatArray) -> FloatArray:
+        """Return the images of points (..., 2) [m]."""
+        turn = np.exp(1j * self.direction)
+        z = self.at + turn * np.conj((points @ np.array([1, 1j]) - self.at) / turn)
+        return np.stack([z.real, z.imag], axis=-1)
+
+    def reflect_motion(self, motion: FloatArray) -> FloatArray:
+        """Return the images of motions or loads of nodes (..., 3): along x, along y, about the node."""
+        along = Mirror(0j, self.direction).reflect(motion[..., :2])
+        return np.concatenate([along, -motion[..., 2:]], axis=-1)
 
 
 @dataclass(frozen=True, repr=False)
@@ -73,6 +94,32 @@ class Assembly(ShortRepr):
         if not support.across:
             return asked
         return support.direction if math.cos(asked - support.direction) > 0 else support.direction + math.pi
+
+    @property
+    def mirror(self) -> Mirror | None:
+        """Axis of the mirrored half, which runs along the drive; None if nothing is mirrored."""
+        copies = self.spec.mechanism.copies
+        return None if copies is None or copies.mirror is None else Mirror(complex(*copies.mirror), self.direction)
+
+    def add_images(self, lines: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return lines (..., 2) of what is described [m], and then those of its mirrored half."""
+        return [*lines, *(self.mirror.reflect(line) for line in lines)] if self.mirror is not None else list(lines)
+
+    @property
+    def moving_nodes(self) -> set[str]:
+        """Nodes that the drive moves: its own, and those of further stages, which have a number behind a dot."""
+        first = self.spec.mechanism.drive.node
+        return {node for node in self.network.nodes if node.split(".")[0] == first}
+
+    def stands(self, node: str) -> bool:
+        """Return True if a node is held in all its motions, and not driven."""
+        support = self.network.nodes[node].support
+        return support.along and support.across and support.rotation and node not in self.moving_nodes
+
+    @property
+    def thinnest(self) -> float:
+        """Smallest thickness of all beams [m]."""
+        return min(beam.section.thinnest for beam in self.network.beams.values())
 
     @property
     def _even(self) -> FloatArray:
@@ -173,29 +220,24 @@ def assemble(spec: BeamSpec) -> Assembly:
     driven = mechanism.drive.node
     if copies is not None and copies.layers > 1:
         network, driven = stack_stages(network, driven, copies.layers, copies.layer_pitch)
-    return Assembly(spec, network, driven, parallel_parts(spec), allowable_stress(spec))
+    is_mirrored = copies is not None and copies.mirror is not None
+    strengths = known_allowable_stresses(spec)
+    allowable = min(strengths.values()) if len(strengths) == len(mechanism.beams) else None
+    return Assembly(spec, network, driven, mechanism.legs * (2 if is_mirrored else 1), allowable)
 
 
-def parallel_parts(spec: BeamSpec) -> int:
-    """Return how many of the part that is described act side by side."""
-    copies = spec.mechanism.copies
-    return 1 if copies is None else copies.legs * (1 if copies.mirror is None else 2)
-
-
-def mirror_axis(assembly: Assembly) -> tuple[complex, float] | None:
-    """Return a point [m] and the direction [rad] of the mirror axis; None if nothing is mirrored."""
-    copies = assembly.spec.mechanism.copies
-    if copies is None or copies.mirror is None:
-        return None
-    return complex(*copies.mirror), assembly.direction
+def node_place(network: Network, name: str) -> FloatArray:
+    """Return where a node is before any load, (2,) [m]."""
+    node = network.nodes[name]
+    return np.array([float(np.real(node.x)), float(np.real(node.y))])
 
 
 def is_on_axis(assembly: Assembly, node: str) -> bool:
     """Return True if a node is on the mirror axis, by the thickness of the beams that meet there."""
-    place, axis = assembly.network.nodes[node], mirror_axis(assembly)
-    if axis is None:
+    place, mirror = assembly.network.nodes[node], assembly.mirror
+    if mirror is None:
         return False
-    away = ((complex(place.x, place.y) - axis[0]) / np.exp(1j * axis[1])).imag
+    away = ((complex(place.x, place.y) - mirror.at) / np.exp(1j * mirror.direction)).imag
     beams = assembly.network.beams.values()
     joined_beams = [beam for beam in beams if node in (beam.start, beam.end)] or beams
     return bool(abs(away) < _ON_AXIS * max(thickest_of(beam.section) for beam in joined_beams))
@@ -208,31 +250,11 @@ def constant_load(assembly: Assembly, node: str) -> FloatArray:
     return np.asarray(components.sum(axis=0))
 
 
-def moving_nodes(assembly: Assembly) -> set[str]:
-    """Return the nodes that the drive moves: its own, and those of further stages, which have a number behind a dot."""
-    first = assembly.spec.mechanism.drive.node
-    return {node for node in assembly.network.nodes if node.split(".")[0] == first}
-
-
-def allowable_stress(spec: BeamSpec) -> float | None:
-    """Return yield strength over safety factor [Pa], of the weakest beam; None if that of a beam is not known."""
-    strengths = known_allowable_stresses(spec)
-    return min(strengths.values()) if len(strengths) == len(spec.mechanism.beams) else None
-
-
 def known_allowable_stresses(spec: BeamSpec) -> dict[str, float]:
     """Return yield strength over safety factor of the beams whose strength is known, by name [Pa]."""
-    mechanism = spec.mechanism
-    limits = {
-        name: material.allowable(mechanism.safety_factor)
-        for name, material in mechanism.collect_beam_values("material").items()
-    }
+    materials, factor = spec.mechanism.collect_beam_values("material"), spec.mechanism.safety_factor
+    limits = {name: material.allowable(factor) for name, material in materials.items()}
     return {name: limit for name, limit in limits.items() if limit is not None}
-
-
-def thickest(thickness: Thickness) -> float:
-    """Return the largest of a thickness along a beam [m]."""
-    return max(value for _, value in thickness) if isinstance(thickness, tuple) else thickness
 
 
 def thickest_of(section: engine.Section) -> float:
@@ -296,6 +318,23 @@ def resolve(spec: BeamSpec) -> BeamSpec:
     return with_values(spec, {**model, "analysis.fidelity": fidelity, "analysis.stress": spec.stress})
 
 
+def change_at(block: Any, path: str, change: Callable[[Any], Any]) -> Any:
+    """Return a block with what is at a dotted path changed, of every item where the path has *; if there is anything.
+
+    Nothing is validated: values may be complex.
+    """
+    if block is None or not path:
+        return block if block is None else change(block)
+    head, _, rest = path.partition(".")
+    if isinstance(block, dict):
+        return {name: change_at(item, rest, change) if head in ("*", name) else item for name, item in block.items()}
+    if isinstance(block, tuple):
+        return tuple(change_at(item, rest, change) if head in ("*", str(k)) else item for k, item in enumerate(block))
+    if getattr(block, head, None) is None:
+        return block
+    return block.model_copy(update={head: change_at(getattr(block, head), rest, change)})
+
+
 def move_free_nodes(network: Network) -> Network:
     """Return the network with its free nodes moved to where the beams end."""
     placed = {
@@ -344,16 +383,13 @@ def stack_stages(
         below = _name_node(driven, stage - 1)
         for name, node in network.nodes.items():
             clamped = node.support.along and name != driven
-            moved = Node(
-                node.x + (stage - 1) * dx, node.y + (stage - 1) * dy, FREE_SUPPORT if clamped else node.support
-            )
-            nodes[_name_node(name, stage)] = moved
+            support = FREE_SUPPORT if clamped else node.support
+            nodes[_name_node(name, stage)] = Node(node.x + (stage - 1) * dx, node.y + (stage - 1) * dy, support)
             if clamped:
                 links.append(Link(below, _name_node(name, stage)))
         for name, beam in network.beams.items():
-            beams[_name_node(name, stage)] = replace(
-                beam, start=_name_node(beam.start, stage), end=_name_node(beam.end, stage)
-            )
+            start, end = (_name_node(node, stage) for node in (beam.start, beam.end))
+            beams[_name_node(name, stage)] = replace(beam, start=start, end=end)
         links += [Link(_name_node(link.master, stage), _name_node(link.node, stage)) for link in network.links]
     return Network(nodes, beams, tuple(links)), _name_node(driven, count)
 

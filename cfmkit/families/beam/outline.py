@@ -6,6 +6,7 @@ Warnings say what the drawing joins although the mechanism does not.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -24,9 +25,8 @@ from cfmkit.export.fixing_holes_and_labels import add_fixing_holes
 from cfmkit.export.union import OutlinePiece
 from cfmkit.families.beam.drawn_pieces import STANDING_DISTANCE, both_halves, drawn_parts
 from cfmkit.families.beam.finding_names import finding
-from cfmkit.families.beam.network_from_spec import assemble, is_on_axis, mirror_axis, moving_nodes
+from cfmkit.families.beam.network_from_spec import assemble, is_on_axis, node_place
 from cfmkit.families.beam.part import (
-    OUTLINE_TOLERANCE,
     POLYGON_TOLERANCE_SHARE,
     drawn_fillet,
     drawn_frame,
@@ -34,13 +34,11 @@ from cfmkit.families.beam.part import (
     held_places,
     strips_of,
 )
-from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from cfmkit.arrays import FloatArray
     from cfmkit.export.drawn_as_specified import Join
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
@@ -49,47 +47,37 @@ if TYPE_CHECKING:
 
 
 def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
-    """Return the part, its centre lines, and the point table of every beam; `FINE` is the default tolerance.
+    """Return the part, its centre lines, and the point table of every beam; `fine_tolerance` is the default.
 
     Raises `GeometryError` if the outline of a beam, or its area, is not that of the specification.
     """
     from cfmkit.export.union import merge_pieces
 
-    assembly = assemble(spec)
-    fine = fine_tolerance(assembly)
+    assembly, part, fillet, legs = assemble(spec), spec.mechanism.cut_part, drawn_fillet(spec), spec.mechanism.legs
+    fine, thinnest = fine_tolerance(assembly), assembly.thinnest
     tolerance = tolerance or fine
     beams = strips_of(assembly, tolerance)
-    halves = both_halves(assembly, beams)
     solid = drawn_parts(assembly, beams, POLYGON_TOLERANCE_SHARE * tolerance)
     frame = drawn_frame(assembly, beams, tolerance)
-    lines = [_line(strip) for strips_of in halves.values() for strip in strips_of]
-    part, fillet = spec.mechanism.cut_part, drawn_fillet(spec)
     pieces = [*solid.pieces, *map(OutlinePiece.polygon, frame)]
-    contours = merge_pieces(pieces, fine / OUTLINE_TOLERANCE, fillet, solid.holes)
-    thinnest, holes = (
-        fine / OUTLINE_TOLERANCE,
-        [area for hole in solid.holes for area in hole.to_polygons(fine / OUTLINE_TOLERANCE)],
-    )
+    contours = merge_pieces(pieces, thinnest, fillet, solid.holes)
+    holes = [area for hole in solid.holes for area in hole.to_polygons(thinnest)]
     sections = check_outline(contours, tuple(_specified_pieces(beams, pieces, thinnest)), thinnest, fillet, holes)
     contours += tuple(circle(hole.at, 0.5 * hole.diameter, "cut", hole=True) for hole in part.holes)
-    paths = [Contour((line,), "path") for line in lines]
-    moving = moving_nodes(assembly)
+    paths = [Contour((_line(strip),), "path") for strips in both_halves(assembly, beams).values() for strip in strips]
     places = held_places(assembly, beams, tolerance)
-    marks = [mark(shape, place.node in moving) for place in places for shape in place.shapes]
+    marks = [mark(shape, place.node in assembly.moving_nodes) for place in places for shape in place.shapes]
     marks += [mark(shape, False) for shape in frame]
-    tables = tuple(_table(f"beam-{name}", strips) for name, strips in beams.items())
-    legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
     contours, bare = add_fixing_holes(contours, marks, part.screws)
     notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
-    dimensions, facts = tuple(_dimensions(assembly)), tuple(_facts(assembly, fillet))
     return Drawing(
         "beams",
         (*contours, *paths, *marks),
-        tables,
+        tuple(_table(f"beam-{name}", strips) for name, strips in beams.items()),
         (*notes, *bare),
         _sheet(assembly, beams),
-        dimensions=dimensions,
-        facts=facts,
+        dimensions=tuple(_dimensions(assembly)),
+        facts=tuple(_facts(assembly, fillet)),
         warnings=(*pins_drawn_solid(spec), *joined_unasked(assembly, beams, solid.blocks, contours, fillet)),
         tolerance=fine,
         sections=sections,
@@ -100,10 +88,9 @@ def _specified_pieces(
     beams: dict[str, list[BeamStrip]], pieces: Sequence[OutlinePiece], size: float
 ) -> Iterator[SpecifiedPiece]:
     """Yield the pieces that a part is united from, the first of which are the strips of beams, with their sections."""
-    strips_of = [(name, strip) for name, strips in beams.items() for strip in strips]
+    sections = [strip.section(name) for name, strips in beams.items() for strip in strips]
     for number, piece in enumerate(pieces):
-        sections = (strips_of[number][1].section(strips_of[number][0]),) if number < len(strips_of) else ()
-        yield SpecifiedPiece(piece.to_polygons(size), sections)
+        yield SpecifiedPiece(piece.to_polygons(size), tuple(sections[number : number + 1]))
 
 
 def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
@@ -113,8 +100,7 @@ def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
     held = {name: node for name, node in nodes.items() if node.support.along and node.support.across}
     if not held:
         return
-    at, axis = np.array([(node.x, node.y) for node in held.values()]), mirror_axis(assembly)
-    at = at if axis is None else np.vstack([at, mirror_points(at, *axis)])
+    at = np.vstack(assembly.add_images([np.array([(node.x, node.y) for node in held.values()])]))
     words = "across clamps" if all(node.support.rotation for node in held.values()) else "across supports"
     first, last = at[at.argmin(axis=0)], at[at.argmax(axis=0)]
     yield from _distances(words, first[0], last[0], ("x",))
@@ -138,8 +124,8 @@ def _facts(assembly: Assembly, fillet: float) -> Iterator[tuple[str, str]]:
     yield "material", _group_by_text(materials) if len({*materials.values()}) > 1 else next(iter(materials.values()))
     yield "fillets", format_short(fillet, "length") if fillet else "none"
     thick = {}
-    for name, thickness in mechanism.collect_beam_values("thickness").items():
-        ends = [thickness] if isinstance(thickness, float) else [value for _, value in thickness]
+    for name in mechanism.beams:
+        ends = mechanism.list_thicknesses(name)
         thick[name] = " ... ".join(dict.fromkeys(format_short(value, "length") for value in (min(ends), max(ends))))
     yield "thickness", _group_by_text(thick)
 
@@ -154,16 +140,13 @@ def _group_by_text(texts: Mapping[str, str]) -> str:
 
 def _sheet(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Sheet:
     """Return the mechanism's width, and where beams have another one."""
-    mechanism, axis = assembly.spec.mechanism, mirror_axis(assembly)
+    mechanism, regions = assembly.spec.mechanism, list[Region]()
     widths = mechanism.collect_beam_values("width")
-    regions = [
-        Region(strip.polygon, width)
-        for name, strips in beams.items()
-        for width in {widths[name.split(".")[0]]} - {mechanism.width}
-        for strip in strips
-    ]
-    if axis is not None:
-        regions += [Region(mirror_points(region.polygon, *axis), region.thickness) for region in regions]
+    for name, strips in beams.items():
+        if (width := widths[name.split(".")[0]]) != mechanism.width:
+            regions += [Region(strip.polygon, width) for strip in strips]
+    if (mirror := assembly.mirror) is not None:
+        regions += [Region(mirror.reflect(region.polygon), region.thickness) for region in regions]
     return Sheet(mechanism.width, tuple(regions))
 
 
@@ -199,25 +182,15 @@ def joined_unasked(
     fillet: float,  # its inside corners [m]
 ) -> Iterator[Finding]:
     """Yield a warning that names what the outline joins although the network has it apart."""
-    strips = [_draw_strip(assembly, name, strips_of_beam) for name, strips_of_beam in beams.items()]
-    blocks = [*blocks]
-    if (axis := mirror_axis(assembly)) is not None:
-        strips += [
-            DrawnStrip(
-                f"{strip.name}'", mirror_points(strip.points, *axis), strip.thickness,
-                (_image(assembly, strip.ends[0]), _image(assembly, strip.ends[1])),
-            )
-            for strip in strips
-        ]  # fmt: skip
-        blocks += [
-            DrawnBlock(
-                f"{block.name}'",
-                tuple(_image(assembly, node) for node in block.nodes),
-                mirror_points(block.shape, *axis),
-            )
-            for block in blocks
-            if not any(node.endswith("'") for node in block.nodes)  # bars between the halves are their own image
-        ]
+    strips, blocks = [_draw_strip(assembly, name, strips_of_beam) for name, strips_of_beam in beams.items()], [*blocks]
+    if (mirror := assembly.mirror) is not None:
+        for strip in [*strips]:
+            ends = _image(assembly, strip.ends[0]), _image(assembly, strip.ends[1])
+            strips.append(replace(strip, name=f"{strip.name}'", points=mirror.reflect(strip.points), ends=ends))
+        # bars between the halves are their own image
+        for block in [block for block in blocks if not any(node.endswith("'") for node in block.nodes)]:
+            nodes = tuple(_image(assembly, node) for node in block.nodes)
+            blocks.append(DrawnBlock(f"{block.name}'", nodes, mirror.reflect(block.shape)))
     joins = joined_away_from_nodes(strips, blocks, _nodes_and_bodies(assembly), contours, fillet)
     if joins:
         more = f" and {len(joins) - MAX_NAMED_PAIRS} more" if len(joins) > MAX_NAMED_PAIRS else ""
@@ -238,9 +211,8 @@ def pins_drawn_solid(spec: BeamSpec) -> Iterator[Finding]:
         if joint == "pin"
     ]
     if ends:
-        yield finding(
-            "pins_not_drawn", f"drawn as one piece with what they turn on: {', '.join(ends)}; add the pins by hand"
-        )
+        text = f"drawn as one piece with what they turn on: {', '.join(ends)}; add the pins by hand"
+        yield finding("pins_not_drawn", text)
 
 
 def _phrase(join: Join) -> str:
@@ -263,20 +235,15 @@ def _image(assembly: Assembly, node: str) -> str:
 
 def _nodes_and_bodies(assembly: Assembly) -> NodesAndBodies:
     """Return the nodes of both halves and their rigid bodies: the ground, and what links and bars join."""
-    network, axis, moving = assembly.network, mirror_axis(assembly), moving_nodes(assembly)
-    places: dict[str, FloatArray] = {name: np.array([node.x, node.y]) for name, node in network.nodes.items()}
-    held = {name for name, node in network.nodes.items() if _stands(assembly, name) and name not in moving}
+    network, mirror = assembly.network, assembly.mirror
+    places = {name: node_place(network, name) for name in network.nodes}
+    held = {name for name in network.nodes if assembly.stands(name)}
     pairs = [(link.master, link.node) for link in network.links] + list(combinations(sorted(held), 2))
-    if axis is not None:
+    if mirror is not None:
         pairs += [(_image(assembly, first), _image(assembly, second)) for first, second in pairs]
-        pairs += [(name, _image(assembly, name)) for name in sorted(held | moving)]
-        places |= {_image(assembly, name): mirror_points(at[None], *axis)[0] for name, at in places.items()}
+        pairs += [(name, _image(assembly, name)) for name in sorted(held | assembly.moving_nodes)]
+        places |= {_image(assembly, name): mirror.reflect(at) for name, at in places.items()}
     return NodesAndBodies(places, _bodies(pairs))
-
-
-def _stands(assembly: Assembly, node: str) -> bool:
-    support = assembly.network.nodes[node].support
-    return support.along and support.across and support.rotation
 
 
 def _bodies(pairs: Sequence[tuple[str, str]]) -> dict[str, str]:

@@ -31,8 +31,8 @@ from cfmkit.families.beam.drawn_pieces import (
     pads_behind,
     section_at_bend,
 )
-from cfmkit.families.beam.network_from_spec import assemble, is_on_axis, mirror_axis, moving_nodes, thickest_of
-from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points, strips
+from cfmkit.families.beam.network_from_spec import Mirror, assemble, is_on_axis, node_place, thickest_of
+from cfmkit.families.beam.strips_and_gaps import BeamStrip, strips
 from cfmkit.families.run_control import Run
 
 if TYPE_CHECKING:
@@ -73,11 +73,13 @@ class HeldPlace:
     seams: tuple[FloatArray, ...] = ()  # lines at which it begins [m]
     padded: bool = False  # whether its shapes are pads
 
+    def reflect(self, mirror: Mirror) -> HeldPlace:
+        """Return the same place of the mirrored half."""
+        at, shapes, seams = mirror.reflect(self.at), map(mirror.reflect, self.shapes), map(mirror.reflect, self.seams)
+        return replace(self, name=f"{self.node}'", at=at, shapes=tuple(shapes), seams=tuple(seams))
 
-def regions(
-    spec: BeamSpec,  # whose part is drawn
-    tolerance: float | None = None,  # as for `drawing` [m]
-) -> tuple[HeldPlace, ...]:
+
+def regions(spec: BeamSpec, tolerance: float | None = None) -> tuple[HeldPlace, ...]:
     """Return where the part of `drawing` is held, driven or loaded: pads from the root plane on, the holes of eyes."""
     assembly = assemble(spec)
     tolerance = tolerance or fine_tolerance(assembly)
@@ -97,9 +99,7 @@ def held_places(
     assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float, loaded: Collection[str] = ()
 ) -> Iterator[HeldPlace]:
     """Yield where a part is held or driven, or loaded at some nodes; `strips_of` gives its beams."""
-    network, axis = assembly.network, mirror_axis(assembly)
-    moving = moving_nodes(assembly)
-    bars = bars_between_halves(assembly, beams, *axis) if axis is not None else {}
+    network, moving, bars = assembly.network, assembly.moving_nodes, bars_between_halves(assembly, beams)
     for node, about in network.nodes.items():
         ends = ends_at(assembly, beams, node)
         held = about.support.along or about.support.across or about.support.rotation
@@ -108,29 +108,21 @@ def held_places(
         region = _region(assembly, node, ends, POLYGON_TOLERANCE_SHARE * tolerance)
         joined = (bars[node],) if node in bars else ()
         yield replace(region, shapes=(*region.shapes, *joined))
-        if axis is not None and not is_on_axis(assembly, node):
-            yield HeldPlace(
-                f"{node}'",
-                node,
-                mirror_points(region.at[None], *axis)[0],
-                tuple(mirror_points(shape, *axis) for shape in region.shapes),
-                tuple(mirror_points(seam, *axis) for seam in region.seams),
-                region.padded,
-            )
+        if assembly.mirror is not None and not is_on_axis(assembly, node):
+            yield region.reflect(assembly.mirror)
 
 
 def _region(assembly: Assembly, node: str, ends: list[BeamEnd], bulge: float) -> HeldPlace:
     """Return the place of the described half at which a node is held or driven."""
-    about = assembly.network.nodes[node]
-    at = np.array([about.x, about.y])
-    pads = [] if not is_padded(assembly, node) else list(pads_behind(assembly, node, ends))
+    at, support, mirror = node_place(assembly.network, node), assembly.network.nodes[node].support, assembly.mirror
+    pads = list(pads_behind(assembly, node, ends)) if is_padded(assembly, node) else []
     if pads:
         return HeldPlace(node, node, at, tuple(pad for pad, _ in pads), tuple(end.cap for _, end in pads), True)
     end = ends[0]
-    if about.support.across and not about.support.rotation and not is_on_axis(assembly, node):
+    on_axis = is_on_axis(assembly, node)
+    if support.across and not support.rotation and not on_axis:
         return HeldPlace(node, node, at, (disc(end.at, HOLE_RADIUS * end.thickness, bulge),))
-    axis = mirror_axis(assembly)
-    mitre = axis[1] if axis is not None and is_on_axis(assembly, node) else mitre_direction(ends)
+    mitre = mirror.direction if mirror is not None and on_axis else mitre_direction(ends)
     section = end.cap if mitre is None else section_at_bend(ends, mitre, drawn_fillet(assembly.spec))
     return HeldPlace(node, node, at, (section,), (section,))
 
@@ -143,7 +135,7 @@ def drawn_fillet(spec: BeamSpec) -> float:
 
 def fine_tolerance(assembly: Assembly) -> float:
     """Return how far an outline may be from the exact one where nobody states it [m]."""
-    return OUTLINE_TOLERANCE * min(beam.section.thinnest for beam in assembly.network.beams.values())
+    return OUTLINE_TOLERANCE * assembly.thinnest
 
 
 def standing_frame(spec: BeamSpec) -> tuple[FloatArray, ...]:
@@ -155,27 +147,20 @@ def standing_frame(spec: BeamSpec) -> tuple[FloatArray, ...]:
 
 def drawn_frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> tuple[FloatArray, ...]:
     """Return the same for a mechanism that is built."""
-
-    part = assembly.spec.mechanism.cut_part
-    if part.frame is None or part.frame.ground is None:
+    frame = assembly.spec.mechanism.cut_part.frame
+    if frame is None or frame.ground is None:
         return ()
-    nodes, moving = assembly.network.nodes, moving_nodes(assembly)
     pads: dict[str, FloatArray] = {}
     covered: list[FloatArray] = []
     places = tuple(held_places(assembly, beams, tolerance))
     for place in places:
-        about = nodes[place.node].support
-        clamped = about.along and about.across and about.rotation and place.node not in moving
-        if clamped and place.padded:
+        if assembly.stands(place.node) and place.padded:
             pads |= {f"{place.name} ({k})" if k else place.name: shape for k, shape in enumerate(place.shapes)}
         else:
-            covered += list(place.shapes)
-            covered += [
-                place.at + EYE_RADIUS / HOLE_RADIUS * (shape - place.at) for shape in place.shapes if len(shape) > 4
-            ]
-    return ground_frame(
-        pads, _swept(assembly, places), covered, part.frame.ground, part.frame.clearance, part.frame.inside
-    ).pieces
+            holes = [shape for shape in place.shapes if len(shape) > 4]
+            covered += [*place.shapes, *(place.at + EYE_RADIUS / HOLE_RADIUS * (hole - place.at) for hole in holes)]
+    swept_area = _swept(assembly, places)
+    return ground_frame(pads, swept_area, covered, frame.ground, frame.clearance, frame.inside).pieces
 
 
 def _swept(assembly: Assembly, places: Sequence[HeldPlace]) -> Any:
@@ -210,15 +195,12 @@ def part_over_motion(result: Result) -> PosedPart | None:
         return None
     solution: Solution = result.state
     assembly, mechanism = solution.assembly, solution.spec.mechanism
-    legs = mechanism.copies.legs if mechanism.copies else 1
+    moving = bodies(solution, choose_points(solution, N_POSES), regions(solution.spec, BOX_TOLERANCE))
     return PosedPart(
-        (
-            *as_made(assembly),
-            *bodies(solution, choose_points(solution, N_POSES), regions(solution.spec, BOX_TOLERANCE)),
-        ),
-        direction=assembly.direction if solution.motion_dimension == "length" else 0.5 * np.pi,
-        depth=legs * max([mechanism.width or 0.0, *mechanism.collect_beam_values("width").values()]),
-        pieces=legs,
+        (*as_made(assembly), *moving),
+        direction=0.5 * np.pi if mechanism.drive.turns else assembly.direction,
+        depth=mechanism.legs * max(mechanism.width, *mechanism.collect_beam_values("width").values()),
+        pieces=mechanism.legs,
     )
 
 
@@ -252,36 +234,28 @@ def bodies(
 
 def _moved_bodies(assembly: Assembly, path: Path, place: HeldPlace, at: Sequence[int]) -> Iterator[PosedBody]:
     """Yield the shapes of what moves as one rigid piece."""
-    motion, axis = path.motion(place.node), mirror_axis(assembly)
+    motion, mirror = path.motion(place.node), assembly.mirror
     role: Role = "driven" if place.node == assembly.driven else "free"
     if not np.abs(motion).max(initial=0.0) > 0.0:
         role = "held"
-    poses = []
-    for x, y, turn in motion[at].tolist():
-        by = np.array([x, y])
-        if place.name != place.node and axis is not None:
-            by, turn = mirror_points(by[None], 0j, axis[1])[0], -turn
-        poses.append((by, turn))
+    poses = motion[at]
+    if place.name != place.node and mirror is not None:
+        poses = mirror.reflect_motion(poses)
     for shape in (shape for shape in place.shapes if len(shape) > 2):
-        cores = [move_polygon(shape, by, turn, place.at) for by, turn in poses] if role != "held" else [shape]
+        cores = [move_polygon(shape, pose[:2], pose[2], place.at) for pose in poses] if role != "held" else [shape]
         yield PosedBody.polygon("pad", role, np.array(cores).reshape(-1, *shape.shape))
 
 
 def made_strips(assembly: Assembly) -> list[PosedBody]:
     """Return the smooth pieces of all unloaded beams."""
-    made = [
-        PosedBody.polygon("strip", "free", strip.polygon) for strips in strips_of(assembly).values() for strip in strips
-    ]
-    return with_image(assembly, made)
+    made = itertools.chain.from_iterable(strips_of(assembly).values())
+    return with_image(assembly, [PosedBody.polygon("strip", "free", strip.polygon) for strip in made])
 
 
 def with_image(assembly: Assembly, described: Sequence[PosedBody]) -> list[PosedBody]:
     """Return bodies of the described half, and those of its mirror image."""
-    axis = mirror_axis(assembly)
-    if axis is None:
-        return list(described)
-    images = [mirror_points(element.core.reshape(-1, 2), *axis).reshape(element.core.shape) for element in described]
-    return [*described, *(replace(element, core=image) for element, image in zip(described, images, strict=True))]
+    mirror = assembly.mirror
+    return [*described, *(replace(body, core=mirror.reflect(body.core)) for body in described if mirror is not None)]
 
 
 def choose_points(solution: Solution, count: int) -> NDArray[Any]:

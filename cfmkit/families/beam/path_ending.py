@@ -19,6 +19,7 @@ from cfmkit.elastica import Displacement, PathStatus
 from cfmkit.elastica.mechanics.derived_arrays import make_inextensible
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.families.beam.solution import node_at
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -78,11 +79,7 @@ def _describe_beam(distance_of_ends: float, length: float) -> str:
 
 def _apart(path: Path, first: str, second: str, point: int) -> float:
     """Return how far two nodes are apart at a point of a path [m]."""
-    places = [
-        np.array([node.x, node.y]) + path.motion(name)[point, :2]
-        for name, node in ((name, path.network.nodes[name]) for name in (first, second))
-    ]
-    return math.hypot(*(places[1] - places[0]))
+    return math.hypot(*(node_at(path, second, point) - node_at(path, first, point)))
 
 
 def ways_to_supports(
@@ -156,7 +153,7 @@ def ending_of(solution: Solution) -> PathEnding:
     if not taut:
         return PathEnding(said)
     if kept:
-        where = format_short(float(solution.motion[-1]), solution.motion_dimension)
+        where = solution.describe_motion(float(solution.motion[-1]))
     else:
         where = drive_text(solution.assembly, float(path.drive[-1]))
     return PathEnding(

@@ -16,31 +16,22 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
-from cfmkit.export.fixing_holes_and_labels import remove_screws
 from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
 from cfmkit.families.beam.finding_names import finding
-from cfmkit.families.beam.network_from_spec import assemble, constant_load, is_on_axis, mirror_axis, resolve
+from cfmkit.families.beam.network_from_spec import assemble, resolve
 from cfmkit.families.beam.outline import drawing
-from cfmkit.families.beam.part import drawn_fillet, regions, standing_frame
+from cfmkit.families.beam.part import drawn_fillet
 from cfmkit.families.beam.scalar_results import EXTREME_METRICS, RANGE_METRICS, SCALAR_DEFINITIONS, number_of, target_of
-from cfmkit.families.beam.solid_under_load_nodes_and_fillets import (
-    SolidNodes,
-    driven_by_load,
-    fillets,
-    load_of_one,
-    moved_far_enough,
-)
+from cfmkit.families.beam.solid_nodes_and_fillets import SolidNodes, fillets
+from cfmkit.families.beam.solid_part import driven_part, ends_of_windows, load_of_one, moved_far_enough
 from cfmkit.families.beam.solution import output_columns
-from cfmkit.families.beam.strips_and_gaps import mirror_points
 from cfmkit.families.beam.tip_on_uneven_surface import N_PLACES, curve_of, findings_along, follow_surface, values_along
 from cfmkit.families.fem_results import (
     columns_of_solid,
-    drop_repeats,
     fillet_table,
     findings_of_mesh,
     largest_concentration,
     not_meshed,
-    remove_frame,
     stable_between_poses,
     stress_between_poses,
 )
@@ -55,16 +46,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.curves import Kind
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.beam.network_from_spec import Assembly
-    from cfmkit.families.beam.part import HeldPlace
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.families.fem_results import FilletRow
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
     from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart, MeshError
-    from cfmkit.solid.meshed_part import MeshSolution, Part
+    from cfmkit.solid.meshed_part import MeshSolution
     from cfmkit.solid.path_up_to_load import LoadPath
     from cfmkit.tables import Table
 
@@ -97,8 +86,7 @@ class SolidSolution(ShortRepr):
     @property
     def copies(self) -> int:
         """Number of drawn parts that act side by side."""
-        copies = self.spec.mechanism.copies
-        return copies.legs if copies is not None else 1
+        return self.spec.mechanism.legs
 
     @cached_property
     def effort(self) -> FloatArray:
@@ -191,9 +179,8 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         keys = ", ".join(f"mechanism.nodes.{name}.support" for name in spec.mechanism.nodes)
         message = f"no curve: {why}; check mechanism.drive, {keys}"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
-    solution = (
-        _solve_loaded_part(spec, assembly, solved) if driven_by_load(spec) else _solve_moved_part(assembly, solved)
-    )
+    by_load = spec.mechanism.drive.by_load
+    solution = _solve_loaded_part(spec, assembly, solved) if by_load else _solve_moved_part(assembly, solved)
     message = _explain_ending(solution)
     if len(solution.motion) < 2:
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, f"no curve: {message}")
@@ -227,8 +214,8 @@ def _solve_part(spec: BeamSpec, run: Run) -> tuple[Assembly, AdaptiveSolution]:
 
     Raises GeometryError if the part cannot be meshed.
     """
-    if driven_by_load(spec):
-        spec = moved_far_enough(spec, part_of, run.progress)
+    if spec.mechanism.drive.by_load:
+        spec = moved_far_enough(spec, run.progress)
     assembly = assemble(spec)
     return assembly, driven_part(spec, assembly).solve(run.progress)
 
@@ -247,7 +234,7 @@ def _solve_loaded_part(spec: BeamSpec, assembly: Assembly, solved: AdaptiveSolut
 
     load, through = load_of_one(spec), spec.analysis.through_folds
     fine, reached = follow_to_load(solved.solution, load, through)
-    solved = replace(solved, solution=with_poses(fine, _ends_of_windows(spec, reached.end)))
+    solved = replace(solved, solution=with_poses(fine, ends_of_windows(spec, reached.end)))
     if through:
         motion = read_only(np.linspace(0.0, reached.end, spec.analysis.points))
     else:
@@ -255,43 +242,11 @@ def _solve_loaded_part(spec: BeamSpec, assembly: Assembly, solved: AdaptiveSolut
     return SolidSolution(assembly, solved, motion, reached)
 
 
-def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
-    """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_in, rings_of
-    from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
-
-    frame = standing_frame(spec)
-    pads = [shape for place in regions(spec) for shape in place.shapes if place.padded]
-    bare = remove_screws(spec)
-    drawn = drawing(remove_frame(bare, frame, pads) if frame else bare)
-    cut = [contour for contour in drawn.contours if contour.layer == "cut"]
-    material, width = (next(iter(spec.mechanism.collect_beam_values(key).values())) for key in ("material", "width"))
-    law = MATERIAL_LAWS[material.law](material.modulus, material.poisson)
-    places = [
-        HeldOrDriven(
-            region.name, region.shapes, region.at, *_motions(assembly, region), region.seams, _load(assembly, region)
-        )
-        for region in regions(spec)
-    ]
-    thinnest = _thinnest(assembly)
-    rings = rings_of(cut, thinnest)
-    largest = largest_in(rings, thinnest)
-    return Part(rings, thinnest, width, law, tuple(places), (), largest, frame, drawn.sections)
-
-
-def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:
-    """Return the part with the travels that it is solved for."""
-    from cfmkit.solid.adaptive_solution import DrivenPart
-
-    analysis, reacting = spec.analysis, bool(spec.analysis.outputs.reactions)
-    return DrivenPart("beams", part_of(spec, assembly), analysis.solid.error, tuple(_stops(spec)), reacting)
-
-
 def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
     """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
     spec = spec.replace({"analysis.fidelity": "solid"})
-    if driven_by_load(spec):
-        spec = moved_far_enough(spec, part_of)
+    if spec.mechanism.drive.by_load:
+        spec = moved_far_enough(spec)
     return (driven_part(spec, assemble(spec)),)
 
 
@@ -308,62 +263,14 @@ def elastic_networks(spec: BeamSpec) -> tuple[DrivenNetwork, ...]:
     return (DrivenNetwork("beams", assembly.network, drive),) if isinstance(drive, Displacement) else ()
 
 
-def _thinnest(assembly: Assembly) -> float:
-    return min(beam.section.thinnest for beam in assembly.network.beams.values())
-
-
-def _stops(spec: BeamSpec) -> list[float]:
-    """Return the travels to solve for [m or rad]: even ones, and the ends of every window."""
-    end = spec.extent
-    inside = [place for place in _ends_of_windows(spec, end) if 0.0 < place / end < 1.0]
-    even = np.linspace(0.0, end, spec.analysis.solid.poses)
-    # ends of windows that are an even pose but for rounding are that pose
-    return drop_repeats(np.concatenate([even, inside]), end)[:: 1 if end > 0 else -1].tolist()  # type: ignore[no-any-return]
-
-
-def _ends_of_windows(spec: BeamSpec, end: float) -> list[float]:
-    """Return where every window starts and ends on a travel [m or rad]."""
-    windows = [spec.analysis.window, *(requirement.over for requirement in spec.requirements)]
-    return [place for window in windows if window is not None for place in window_places(window, (0.0, end))]
-
-
-def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArray]:
-    """Return how a region is driven, (3,), and which motions it is free in, (3, f)."""
-    about = assembly.network.nodes[place.node].support
-    flip = place.name != place.node
-    direction = about.direction
-    if flip and (axis := mirror_axis(assembly)) is not None:
-        direction = 2 * axis[1] - direction
-    driven = np.zeros(3)
-    along, across, turn = about.along, about.across, about.rotation
-    if place.node == assembly.driven:
-        if assembly.spec.mechanism.drive.turns:
-            driven[2], turn = (-1.0 if flip else 1.0), True
-        else:
-            direction, along = assembly.direction, True
-            driven[:2] = np.cos(direction), np.sin(direction)
-    c, s = np.cos(direction), np.sin(direction)
-    ways = ((along, (c, s, 0.0)), (across, (-s, c, 0.0)), (turn, (0.0, 0.0, 1.0)))
-    return driven, np.array([direction for held, direction in ways if not held]).reshape(-1, 3).T
-
-
-def _load(assembly: Assembly, place: HeldPlace) -> FloatArray:
-    """Return the constant load on a region (3,): force [N] and moment [N m]; on the mirror axis of both halves."""
-    load, axis = constant_load(assembly, place.node), mirror_axis(assembly)
-    if axis is None:
-        return load
-    image = np.array([*mirror_points(load[None, :2], 0j, axis[1])[0], -load[2]])
-    return load + image if is_on_axis(assembly, place.node) else load if place.name == place.node else image
-
-
 def _explain_ending(solution: SolidSolution) -> str:
     """Return why the curve ends early, and where; empty if it does not."""
     from cfmkit.solid.path_up_to_load import LoadEnd
 
-    course, turns = solution.fine.course, _turns(solution.spec)
-    where = format_short(solution.end if solution.reached else float(course.travel[-1]), "angle" if turns else "length")
+    course, drive = solution.fine.course, solution.spec.mechanism.drive
+    where = format_short(solution.end if solution.reached else float(course.travel[-1]), drive.motion_dimension)
     if solution.reached is not None and solution.reached.how is LoadEnd.MAXIMUM:
-        largest = format_short(solution.copies * solution.reached.effort, "torque" if turns else "force")
+        largest = format_short(solution.copies * solution.reached.effort, drive.effort_dimension)
         reported = f"the part snaps at {largest}, at {where}: the load cannot grow further"
         return f"{reported}; follow the curve beyond its maximum (analysis.through_folds)"
     if course.ended:
@@ -373,13 +280,9 @@ def _explain_ending(solution: SolidSolution) -> str:
     return ""
 
 
-def _turns(spec: BeamSpec) -> bool:
-    return spec.mechanism.drive.turns
-
-
 def _curve(solution: SolidSolution) -> Curve:
     extra = columns_of_solid(solution.fine.course, solution.motion, solution.stress, solution.spec.extent)
-    kind: Kind = "torque" if _turns(solution.spec) else "force"
+    kind = solution.spec.mechanism.drive.effort_dimension
     return Curve(solution.motion, solution.effort, stable=solution.stable, extra=extra | _outputs(solution), kind=kind)
 
 
@@ -395,7 +298,8 @@ def _outputs(solution: SolidSolution) -> dict[str, Column]:
 
 
 def _fillet_table(solution: SolidSolution) -> Table:
-    return fillet_table(solution.fillets, ("angle", "angle") if _turns(solution.spec) else ("displacement", "length"))
+    motion = ("angle", "angle") if solution.spec.mechanism.drive.turns else ("displacement", "length")
+    return fillet_table(solution.fillets, motion)
 
 
 def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
@@ -406,7 +310,7 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     }
     if solution.worst is not None:
         numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()
-    if not _turns(solution.spec):
+    if not solution.spec.mechanism.drive.turns:
         numbers |= {"travel_end": float(solution.motion[-1])} | _limit(solution)
         names = (*EXTREME_METRICS, *(RANGE_METRICS if solution.reached is None else ()))
         numbers |= {name: number_of(name, solution) for name in names}
@@ -445,18 +349,18 @@ def _sharp(spec: BeamSpec) -> str:
 
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
-    spec, course = solution.spec, solution.fine.course
+    spec, course, drive = solution.spec, solution.fine.course, solution.spec.mechanism.drive
     if reported := _explain_ending(solution):
         yield finding("ends_early" if course.touching is None else "self_contact", reported)
     for point in solution.solved.critical_points:
-        at = format_short(point.travel, "angle" if _turns(spec) else "length")
-        load = format_short(solution.copies * point.effort, "torque" if _turns(spec) else "force")
+        at = format_short(point.travel, drive.motion_dimension)
+        load = format_short(solution.copies * point.effort, drive.effort_dimension)
         accuracy = "" if math.isnan(point.error) else f" (both within {100 * point.error:.2g} %)"
         yield finding("bifurcation", f"the part leaves its path at {at} and {load}{accuracy} for a stable branch")
     if reported := _sharp(spec):
         yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
     yield from drawing(spec).warnings
-    thinnest, section = _thinnest(solution.assembly), next(iter(solution.assembly.network.beams.values())).section
+    thinnest, section = solution.assembly.thinnest, next(iter(solution.assembly.network.beams.values())).section
     wide = spec.mechanism.wide_beams
     yield from findings_of_mesh(finding, solution.error, [(section.width, thinnest)], section.poisson_ratio, wide)
     allowable = solution.assembly.allowable_stress
@@ -464,9 +368,6 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         from cfmkit.solid.boundary_and_element_sizes import place_text
 
         largest, spot = solution.worst
-        yield finding(
-            "overstressed",
-            f"the stress reaches {format_short(largest, 'stress')} at {place_text(spot)}; the allowable stress is "
-            f"{format_short(allowable, 'stress')}",
-            short=f"{format_short(largest, 'stress')}, {format_short(allowable, 'stress')} allowed",
-        )
+        stress, allowed = (format_short(value, "stress") for value in (largest, allowable))
+        message = f"the stress reaches {stress} at {place_text(spot)}; the allowable stress is {allowed}"
+        yield finding("overstressed", message, short=f"{stress}, {allowed} allowed")

@@ -139,13 +139,8 @@ def propose(request: Request, run: Run) -> FamilyOffer:
 def _vary_by_turns(candidates: list[Candidate]) -> list[Candidate]:
     """Return candidates of all shapes by turns, that of the most promising one first."""
     kinds = list(dict.fromkeys(candidate.variant for candidate in candidates))
-    rows = [
-        sorted(
-            (candidate for candidate in candidates if candidate.variant == kind),
-            key=lambda candidate: candidate.promise,
-        )
-        for kind in kinds
-    ]
+    ordered = sorted(candidates, key=lambda candidate: candidate.promise)
+    rows = [[candidate for candidate in ordered if candidate.variant == kind] for kind in kinds]
     rows.sort(key=lambda row: row[0].promise)
     longest = max(map(len, rows))
     return [row[k] for k in range(longest) for row in rows if k < len(row)]
@@ -158,11 +153,8 @@ def _rescale_shape(
     length = request.travel / size
     low, high = float(kept.motion[0]), float(kept.motion[-1])
     if length > 0.98 * (high - low):
-        longest = 0.6 * (high - low) * size
-        return (
-            SAYS_LESS * length / (high - low),
-            f"beams that fit this envelope have a constant force over about {mm(longest)}",
-        )
+        reason = f"beams that fit this envelope have a constant force over about {mm(0.6 * (high - low) * size)}"
+        return SAYS_LESS * length / (high - low), reason
     starts = np.linspace(low, high - length, 200)
     ripple = ripples(kept.motion, kept.force, starts, length)
     ends = np.searchsorted(kept.motion, starts + length).clip(max=len(kept.motion) - 1)
@@ -209,21 +201,17 @@ def _size_section(
         thicker *= (wide / (MIN_WIDTH_RATIO * thicker * thin)) ** 0.25
         wide = _width(request, kept, size, stiffer, thicker, force)
     if thicker * thin < request.thinnest:
-        return request.thinnest / (
-            thicker * thin
-        ), f"beams would be {mm(thicker * thin)} thick, at least {mm(request.thinnest)} needed"
+        reason = f"beams would be {mm(thicker * thin)} thick, at least {mm(request.thinnest)} needed"
+        return request.thinnest / (thicker * thin), reason
     if request.depth is not None and wide > DEPTH_SHARE * request.depth:
-        return (
-            wide / request.depth,
-            f"the beams would be {mm(wide)} wide, at most {mm(DEPTH_SHARE * request.depth)} fit",
-        )
+        reason = f"the beams would be {mm(wide)} wide, at most {mm(DEPTH_SHARE * request.depth)} fit"
+        return wide / request.depth, reason
     spec = _write_shape(kept, size, block, (thicker * thin, wide), window)
     area = size**2 * kept.envelope.across * kept.envelope.along / (request.envelope[0] * request.envelope[1])
     # of made parts those with thick beams are most alike: an error of the thickness counts three times
     promise = area if request.good_parts is None else -thicker * thin
     strain = request.strength_used * strength / material.modulus
-    layers = 1 if kept.spec.mechanism.copies is None else kept.spec.mechanism.copies.layers
-    promise += layers - 1.0  # one layer is easier to make than two
+    promise += mechanism.layers - 1.0  # one layer is easier to make than two
     promise += WIDE_LAST * is_too_wide(request, wide, thicker * thin, strain)
     variant = name_variant(f"shape {kept.name}", request, block)
     module = "cfmkit.families.beam.proposals"

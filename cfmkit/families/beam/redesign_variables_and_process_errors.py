@@ -43,34 +43,21 @@ def _stated_paths(mechanism: Mechanism, key: Literal["thickness", "width"]) -> I
 
 def _list_shape_ranges(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tuple[float, float]]]:
     """Yield what a search of shapes may vary, with the ranges of the search or as far as a shape stays what it is."""
-    box = wanted.limits.envelope
-    for name, node in wanted.free.items():
-        inside = (box.x, box.y) if node.x is None and node.y is None and box is not None else (node.x, node.y)
-        for axis, ends in enumerate(inside):
-            if ends is not None:
-                yield f"mechanism.nodes.{name}.at.{axis}", (float(ends[0]), float(ends[1]))
-    limit = float(wanted.coefficient_limit)
+    for name, axis, (low, high) in wanted.list_ranges():
+        yield f"mechanism.nodes.{name}.at.{axis}", (float(low), float(high))
+    limit, reach = float(wanted.coefficient_limit), _MAX_COEFFICIENT_TURN
     for name in wanted.beams if wanted.beams is not None else designed.mechanism.beams:
         shape = designed.mechanism.beams[name].shape
         for k, value in enumerate(getattr(shape, "coefficients", ())):
             if k:  # the first turns with the chord
-                path = f"mechanism.beams.{name}.shape.coefficients.{k}"
-                yield (
-                    path,
-                    (
-                        max(-limit, float(value) - _MAX_COEFFICIENT_TURN),
-                        min(limit, float(value) + _MAX_COEFFICIENT_TURN),
-                    ),
-                )
+                ends = max(-limit, float(value) - reach), min(limit, float(value) + reach)
+                yield f"mechanism.beams.{name}.shape.coefficients.{k}", ends
 
 
 def errors(spec: BeamSpec) -> dict[str, str]:
     """Return which values a process errs in, and whether in thickness or in position: thicknesses and free nodes."""
-    errors = {
-        path: "thickness"
-        for path in _stated_paths(spec.mechanism, "thickness")
-        if isinstance(spec.get_value(path), float)
-    }
+    paths = _stated_paths(spec.mechanism, "thickness")
+    errors = {path: "thickness" for path in paths if isinstance(spec.get_value(path), float)}
     for name, node in spec.mechanism.nodes.items():
         if node.support == "free":
             errors |= {f"mechanism.nodes.{name}.at.{axis}": "position" for axis in (0, 1)}

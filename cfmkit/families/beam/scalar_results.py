@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -116,23 +115,19 @@ def _largest_stress(solution: Solution) -> float:
     return or_nan(largest(solution, lambda path: path.beam_stresses()[0], window_of(solution)))
 
 
-def _parasitic_motion(solution: Solution) -> float:
-    drive: Any = solution.spec.mechanism.drive
+def _largest_size(solution: Solution, read: Callable[[FloatArray, Any], FloatArray]) -> float:
+    """Return the largest size in the window of what is read from the driven node's motion (n, 3) and the drive."""
+    drive = solution.spec.mechanism.drive
 
     def observe(path: Path) -> FloatArray:
-        x, y, _ = path.motion(solution.assembly.driven).T
-        away = np.cos(drive.direction) * y - np.sin(drive.direction) * x
-        return np.array([away, -away])
+        values = read(path.motion(solution.assembly.driven), drive)
+        return np.array([values, -values])
 
     return math.nan if drive.turns else or_nan(largest(solution, observe, window_of(solution)))
 
 
-def _parasitic_rotation(solution: Solution) -> float:
-    def observe(path: Path) -> FloatArray:
-        turn = path.motion(solution.assembly.driven)[:, 2]
-        return np.array([turn, -turn])
-
-    return math.nan if _turns(solution) else or_nan(largest(solution, observe, window_of(solution)))
+def _move_across(motion: FloatArray, drive: Any) -> FloatArray:
+    return np.asarray(np.cos(drive.direction) * motion[:, 1] - np.sin(drive.direction) * motion[:, 0])
 
 
 def _cross_stiffness(solution: Solution) -> float:
@@ -142,7 +137,7 @@ def _cross_stiffness(solution: Solution) -> float:
     window = window_of(solution)
 
     def observe(path: Path) -> FloatArray:
-        return -replace(solution, path=path, keep=np.arange(len(path)), ends=()).cross_stiffness[None]
+        return -solution.replace_path(path).cross_stiffness[None]
 
     if _passes_pole(solution, drive.direction, window) or _has_pole(solution, observe, window):
         return math.nan
@@ -176,11 +171,10 @@ def _has_pole(solution: Solution, observe: Callable[[Path], FloatArray], window:
     law = solution.model_between_points
     if law is None or not solution.spec.mechanism.drive.is_displacement:
         return False
+    offsets = BIFURCATION_OFFSETS * float(np.ptp(solution.motion))
     for place in (event.drive for event in solution.path.events if event.kind == "bifurcation"):
         if window[0] <= place <= window[1]:
-            far_before, before, after, far_after = np.abs(
-                observe(law.solve_at(place + BIFURCATION_OFFSETS * float(np.ptp(solution.motion))))[0]
-            )
+            far_before, before, after, far_after = np.abs(observe(law.solve_at(place + offsets))[0])
             if before > 5.0 * far_before or after > 5.0 * far_after:
                 return True
     return False
@@ -344,9 +338,15 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         lambda solution: None if _turns(solution) else float(solution.motion[-1]),
     ),
     "parasitic_motion": _quantity(
-        "length", "largest motion of the driven node across the drive, in the window", _parasitic_motion
+        "length",
+        "largest motion of the driven node across the drive, in the window",
+        lambda solution: _largest_size(solution, _move_across),
     ),
-    "parasitic_rotation": _quantity("angle", "largest rotation of the driven node, in the window", _parasitic_rotation),
+    "parasitic_rotation": _quantity(
+        "angle",
+        "largest rotation of the driven node, in the window",
+        lambda solution: _largest_size(solution, lambda motion, _: motion[:, 2]),
+    ),
     "cross_stiffness": _quantity(
         "stiffness",
         "smallest stiffness of the driven node across the drive, in the window, of all copies: force over displacement "

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
+from cfmkit.elastica.model import shapes as engine
 from cfmkit.specs.spec import Model, PositiveLength
 from cfmkit.specs.units import Angle, Length
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-
-    from cfmkit.elastica.model import shapes as engine
 
 Point = tuple[Length, Length]
 
@@ -64,9 +63,7 @@ class Straight(Shape):
 
     def build(self) -> engine.Shape:
         """Return the shape as the engine has it."""
-        from cfmkit.elastica.model.shapes import STRAIGHT_SHAPE
-
-        return STRAIGHT_SHAPE
+        return engine.STRAIGHT_SHAPE
 
 
 class PolynomialShape(Shape):
@@ -90,9 +87,7 @@ class PolynomialShape(Shape):
 
     def build(self) -> engine.Shape:
         """Return the shape as the engine has it."""
-        from cfmkit.elastica.model.shapes import Polynomial
-
-        return Polynomial(self.coefficients, self.length)
+        return engine.Polynomial(self.coefficients, self.length)
 
     def find_faults(self, reach: float) -> Iterator[tuple[str, str]]:
         """Yield that it returns to its start, if it does."""
@@ -110,9 +105,7 @@ class ArcShape(Shape):
 
     def build(self) -> engine.Shape:
         """Return the shape as the engine has it."""
-        from cfmkit.elastica.model.shapes import arc
-
-        return arc(self.sweep)
+        return engine.arc(self.sweep)
 
     def find_faults(self, reach: float) -> Iterator[tuple[str, str]]:
         """Yield that it returns to its start, if it does."""
@@ -129,9 +122,7 @@ class CosineShape(Shape):
 
     def build(self) -> engine.Shape:
         """Return the shape as the engine has it."""
-        from cfmkit.elastica.model.shapes import CosineArch
-
-        return CosineArch(self.rise, 0.5 if self.half else 1.0)
+        return engine.CosineArch(self.rise, 0.5 if self.half else 1.0)
 
     def find_faults(self, reach: float) -> Iterator[tuple[str, str]]:
         """Yield that half an arch is too high for its ends, if it is."""
@@ -159,9 +150,7 @@ class PolylineShape(_ThroughPoints):
 
     def build(self) -> engine.Shape:
         """Return the shape as the engine has it."""
-        from cfmkit.elastica.model.shapes import Polyline
-
-        return Polyline(np.array(self.points))
+        return engine.Polyline(np.array(self.points))
 
 
 class SplineShape(_ThroughPoints):
@@ -172,9 +161,7 @@ class SplineShape(_ThroughPoints):
 
     def build(self) -> engine.Shape:
         """Return the shape as the engine has it."""
-        from cfmkit.elastica.model.shapes import Spline
-
-        return Spline(np.array(self.points))
+        return engine.Spline(np.array(self.points))
 
 
 ShapeSpec = Annotated[

@@ -22,8 +22,9 @@ from cfmkit.elastica.results.folding_path_between_points import interpolate_fold
 from cfmkit.elastica.results.member_efforts import effort_error, largest_member_efforts
 from cfmkit.elastica.results.path import most_stressed
 from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
-from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thickest_of
-from cfmkit.families.beam.strips_and_gaps import BeamGap, mirror_points, smallest_gap
+from cfmkit.families.beam.network_from_spec import Assembly, node_place, thickest_of
+from cfmkit.families.beam.strips_and_gaps import BeamGap, smallest_gap
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -75,10 +76,9 @@ class Solution(ShortRepr):
         along = moved[:, 0] * np.cos(angle) + moved[:, 1] * np.sin(angle)
         return read_only(np.where(np.abs(along) > _DISPLACEMENT_RTOL * np.abs(along).max(initial=0.0), along, 0.0))
 
-    @property
-    def motion_dimension(self) -> str:
-        """The dimension of the motion: "length" or "angle"."""
-        return "angle" if self.spec.mechanism.drive.turns else "length"
+    def describe_motion(self, motion: float) -> str:
+        """Return a motion [m or rad] as a user reads it."""
+        return format_short(motion, self.spec.motion)
 
     @cached_property
     def model_between_points(self) -> BetweenPoints | None:
@@ -105,7 +105,7 @@ class Solution(ShortRepr):
         """The equilibria at every place of the way of a path whose motion turns back."""
         if self.model_between_points is not None:
             return None
-        return interpolate_folding_path(self.path, lambda path: replace(self, path=path, keep=np.arange(len(path))))
+        return interpolate_folding_path(self.path, self.replace_path)
 
     @cached_property
     def with_ends(self) -> Solution:
@@ -154,17 +154,16 @@ class Solution(ShortRepr):
     def _solved_part_efforts(self, places: FloatArray) -> FloatArray:
         assert self.model_between_points is not None
         path = self.model_between_points.solve_at(places)
-        alone = replace(self, path=path, keep=np.arange(len(path)), ends=())
-        return np.where(path.accurate, alone.largest_member_efforts, np.nan)
+        return np.where(path.accurate, self.replace_path(path).largest_member_efforts, np.nan)
+
+    def replace_path(self, path: Path) -> Solution:
+        """Return the solution with another path, all of whose points make the curve."""
+        return replace(self, path=path, keep=np.arange(len(path)), ends=())
 
     @cached_property
     def largest_member_efforts(self) -> FloatArray:
         """Largest effort of one beam or spring of one copy at every point of the curve [N or N m]."""
-
-        def motion(path: Path) -> FloatArray:
-            return replace(self, path=path, keep=np.arange(len(path)), ends=()).motion
-
-        return read_only(largest_member_efforts(self.path, self.keep, motion))
+        return read_only(largest_member_efforts(self.path, self.keep, lambda path: self.replace_path(path).motion))
 
     @cached_property
     def accurate(self) -> Any:
@@ -248,14 +247,19 @@ class Solution(ShortRepr):
         network = self.path.network
         lines = {name: self.path.shape(name, point) for name in network.beams}
         halves = {name: 0.5 * thickest_of(beam.section) for name, beam in network.beams.items()}
-        axis = mirror_axis(self.assembly)
-        if axis is not None:
-            lines |= {f"{name}'": mirror_points(line, *axis) for name, line in lines.items()}
+        if (mirror := self.assembly.mirror) is not None:
+            lines |= {f"{name}'": mirror.reflect(line) for name, line in lines.items()}
         return smallest_gap(lines, halves, pairs_in_contact(network))
 
     def beam_force(self, beam: str) -> FloatArray:
         """Return force and moment that a beam exerts on its last node, (n, 3) [N, N, N m], of one copy."""
         return read_only(-self.path.end_force(beam, 1)[self.keep])
+
+
+def node_at(path: Path, node: str, point: int | None = None) -> FloatArray:
+    """Return where a node is at a point of a path, or before any load (2,) [m]."""
+    at = node_place(path.network, node)
+    return at if point is None else at + path.motion(node)[point, :2]
 
 
 def pairs_in_contact(network: Network) -> set[frozenset[str]]:

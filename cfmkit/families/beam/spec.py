@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from cfmkit.families.beam.contact_spec import contacts_of
+from cfmkit.families.beam.contact_spec import Fault, contacts_of
 from cfmkit.families.beam.mechanism_spec import Mechanism
-from cfmkit.families.beam.network_elements_spec import BeamMaterial, DisplacementDrive, Drive, LoadsDrive, MaterialField
+from cfmkit.families.beam.network_elements_spec import DisplacementDrive, Drive, LoadsDrive, MaterialField
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.families.end_stops_spec import contact_requirement_faults, travel_up_to_stop
 from cfmkit.metrics.fatigue_and_relaxation import Durability
@@ -236,22 +236,9 @@ class BeamSpec(Spec):
     analysis: BeamAnalysis = Field(description="how it is run")
 
     @model_validator(mode="after")
-    def _goes_as_far_as_the_drive_says(self) -> Self:
-        refuse("BeamSpec", {("analysis", *place): message for place, message in _extent_faults(self)})
-        return self
-
-    @model_validator(mode="after")
-    def _stock_is_sold(self, info: ValidationInfo) -> Self:
-        part, material = self.mechanism.part, self.mechanism.material
-        if part is not None and not is_made(info):
-            refuse("BeamSpec", stock_faults(part.stock, stated_sheet(part), material.name))
-        return self
-
-    @model_validator(mode="after")
-    def _is_cut_from_one_sheet(self) -> Self:
-        refuse("BeamSpec", sheet_faults(self.mechanism.part, self.out_of_plane_widths))
-        if self.design is not None and self.design.rescale is not None:
-            refuse("BeamSpec", self.design.rescale.sheet_fault(sheet_of(self.mechanism.part)))
+    def _keys_agree(self, info: ValidationInfo) -> Self:
+        for faults in _list_faults(self, is_made(info)):
+            refuse("BeamSpec", dict(faults))
         return self
 
     @property
@@ -259,53 +246,6 @@ class BeamSpec(Spec):
         """Of all beams, and of those that have their own; None if one has none."""
         widths = {f"beams.{name}.width": beam.width for name, beam in self.mechanism.beams.items()}
         return {"width": self.mechanism.width} | widths
-
-    @model_validator(mode="after")
-    def _can_be_rescaled(self) -> Self:
-        if obstacles := list(_rescale_faults(self)):
-            refuse("BeamSpec", {("design", "rescale"): "; ".join(obstacles)})
-        wanted = self.design.rescale if self.design else None
-        if wanted and wanted.to_allowable_stress and not _has_strength(self, wanted.material):
-            text = "no stress is allowable without a strength: give the material a 'yield_strength'"
-            refuse("BeamSpec", {("design", "rescale", "to_allowable_stress"): text})
-        return self
-
-    @model_validator(mode="after")
-    def _can_be_optimised(self) -> Self:
-        if self.design is not None and self.design.optimise is not None:
-            faults_of_request = [*optimise_faults(self.design.optimise, self.mechanism)]
-            if self.mechanism.loads and not self.analysis.loads_first:
-                faults_of_request.append(
-                    ((), "shapes are searched with constant loads applied first: drop analysis.loads_first")
-                )
-            refuse("BeamSpec", {("design", "optimise", *place): message for place, message in faults_of_request})
-        return self
-
-    @model_validator(mode="after")
-    def _can_be_in_contact(self) -> Self:
-        refuse("BeamSpec", dict(_contact_faults(self)))
-        return self
-
-    @model_validator(mode="after")
-    def _has_what_is_reported(self) -> Self:
-        refuse("BeamSpec", {("analysis", "outputs", *place): text for place, text in _output_faults(self)})
-        return self
-
-    @model_validator(mode="after")
-    def _weighs_what_swings(self) -> Self:
-        refuse("BeamSpec", dict.fromkeys([("analysis", "modes")], text) if (text := _no_density(self)) else {})
-        return self
-
-    @model_validator(mode="after")
-    def _is_a_part_where_it_is_solid(self) -> Self:
-        verified = self.design is not None and self.design.verify == "solid"
-        unsupported = list(_solid_faults(self)) if self.analysis.fidelity == "solid" or verified else []
-        place = ("design", "verify") if verified else ("analysis", "fidelity")
-        # no word in quotes: long lists between two would be shortened like a long quotation
-        limits = "; ".join(unsupported)
-        message = f"the model solid has limits: {limits}; leave these keys out, or use the beam model: reissner"
-        refuse("BeamSpec", {place: message} if unsupported else {})
-        return self
 
     @property
     def fidelity(self) -> Fidelity:
@@ -330,12 +270,12 @@ class BeamSpec(Spec):
     @property
     def motion(self) -> Literal["length", "angle"]:
         """Abscissa of the curve: the displacement or the angle of the driven node."""
-        return "angle" if self.mechanism.drive.turns else "length"
+        return self.mechanism.drive.motion_dimension
 
     def end_stop_changes(self, end: float) -> Mapping[str, Any]:
         """Return what puts a rigid stop at a motion of the driven node [m], just behind the end; not in stages."""
-        drive, copies = self.mechanism.drive, self.mechanism.copies
-        if not isinstance(drive, DisplacementDrive) or (copies is not None and copies.layers > 1):
+        drive = self.mechanism.drive
+        if not isinstance(drive, DisplacementDrive) or self.mechanism.layers > 1:
             return {}
         stop = {"node": drive.node, "direction": drive.direction, "gap": end}
         return {"mechanism.stops": {"end": stop}, "analysis.travel": travel_up_to_stop(end)}
@@ -347,49 +287,74 @@ class BeamSpec(Spec):
         return float(value)
 
 
-def _extent_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
+def _list_faults(spec: BeamSpec, as_made: bool) -> Iterator[Iterable[Fault]]:
+    """Yield what is wrong group by group: one is computed only where nothing was wrong in those before it."""
+    mechanism, part = spec.mechanism, spec.mechanism.part
+    yield _extent_faults(spec)
+    if part is not None and not as_made:
+        yield stock_faults(part.stock, stated_sheet(part), mechanism.material.name).items()
+    yield sheet_faults(part, spec.out_of_plane_widths).items()
+    if spec.design is not None and (rescale := spec.design.rescale) is not None:
+        yield rescale.sheet_fault(sheet_of(part)).items()
+        yield _rescale_faults(spec, rescale)
+    if spec.design is not None and (optimise := spec.design.optimise) is not None:
+        yield _optimise_faults(spec, optimise)
+    yield _contact_faults(spec)
+    yield _output_faults(spec)
+    yield _vibration_faults(spec)
+    yield _solid_faults(spec)
+
+
+def _optimise_faults(spec: BeamSpec, wanted: Optimise) -> Iterator[Fault]:
+    for place, text in optimise_faults(wanted, spec.mechanism):
+        yield ("design", "optimise", *place), text
+    if spec.mechanism.loads and not spec.analysis.loads_first:
+        yield ("design", "optimise"), "shapes are searched with constant loads applied first: drop analysis.loads_first"
+
+
+def _extent_faults(spec: BeamSpec) -> Iterator[Fault]:
     """Yield what is wrong with how far the drive is to go."""
     drive, analysis = spec.mechanism.drive, spec.analysis
     kind, wanted = drive.kind, drive.extent
     others = [name for name in EXTENT_KEYS if name != wanted and getattr(analysis, name) is not None]
     for name in others:
-        yield (name,), f"does not go with a drive of kind {kind!r}: give {wanted!r}"
+        yield ("analysis", name), f"does not go with a drive of kind {kind!r}: give {wanted!r}"
     value = getattr(analysis, wanted)
     if value is None and not others:
-        yield (), f"the key {wanted!r} is missing: how far a drive of kind {kind!r} goes"
+        yield ("analysis",), f"the key {wanted!r} is missing: how far a drive of kind {kind!r} goes"
     if value == 0:
-        yield (wanted,), "must not be 0: the drive has to do something"
+        yield ("analysis", wanted), "must not be 0: the drive has to do something"
     if analysis.surface is not None and not drive.is_displacement:
-        yield ("surface",), "a surface needs a drive of kind 'displacement'"
+        yield ("analysis", "surface"), "a surface needs a drive of kind 'displacement'"
     if value is not None and drive.by_motion and value.dimension != drive.dimension:
-        yield (wanted,), f"must be {DIMENSIONS_BY_NAME[drive.dimension].phrase} for a drive of kind {kind!r}"
+        phrase = DIMENSIONS_BY_NAME[drive.dimension].phrase
+        yield ("analysis", wanted), f"must be {phrase} for a drive of kind {kind!r}"
 
 
-def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
+def _output_faults(spec: BeamSpec) -> Iterator[Fault]:
     """Yield what is wrong with the nodes that are to be reported."""
-    mechanism, outputs = spec.mechanism, spec.analysis.outputs
+    mechanism, outputs, drive = spec.mechanism, spec.analysis.outputs, spec.mechanism.drive
     moved = {link.node: link.master for link in mechanism.links}
     for group in ("nodes", "reactions"):
         for number, name in enumerate(getattr(outputs, group)):
+            place = ("analysis", "outputs", group, number)
             if name not in mechanism.nodes:
                 node_names = ", ".join(repr(node) for node in list(mechanism.nodes)[:20])
-                yield (group, number), f"there is no node {name!r}; nodes: {node_names}"
+                yield place, f"there is no node {name!r}; nodes: {node_names}"
             elif group == "reactions" and name in moved:
-                yield (group, number), f"a link moves {name!r}: what is held is its master, {moved[name]!r}"
-            elif group == "reactions" and not (mechanism.nodes[name].support != "free" or name == mechanism.drive.node):
-                yield (group, number), f"nothing holds {name!r}: it has no support and is not driven"
-    if outputs.cross_stiffness and mechanism.drive.turns:
-        yield (
-            ("cross_stiffness",),
-            f"a drive of kind {mechanism.drive.kind!r} has no direction, and so no stiffness across it",
-        )
-    for name in outputs.nodes:
-        for beam in mechanism.beams:
-            if name == f"{beam}_force":
-                yield ("nodes",), f"the columns of {name!r} would have the names of those of the beam {beam!r}"
+                yield place, f"a link moves {name!r}: what is held is its master, {moved[name]!r}"
+            elif group == "reactions" and mechanism.nodes[name].support == "free" and name != drive.node:
+                yield place, f"nothing holds {name!r}: it has no support and is not driven"
+    if outputs.cross_stiffness and drive.turns:
+        text = f"a drive of kind {drive.kind!r} has no direction, and so no stiffness across it"
+        yield ("analysis", "outputs", "cross_stiffness"), text
+    for beam in mechanism.beams:
+        if (name := f"{beam}_force") in outputs.nodes:
+            text = f"the columns of {name!r} would have the names of those of the beam {beam!r}"
+            yield ("analysis", "outputs", "nodes"), text
 
 
-def _contact_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
+def _contact_faults(spec: BeamSpec) -> Iterator[Fault]:
     """Yield what cannot be done with contacts, and requirements on those that are not there."""
     contacts = dict.fromkeys(contact.name for contact in contacts_of(spec.mechanism))
     yield from contact_requirement_faults(contacts, "a stop, an obstacle or a contact", spec.requirements)
@@ -397,8 +362,19 @@ def _contact_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str
         yield ("analysis", "modes"), "natural frequencies are not known with contacts: leave it out"
 
 
-def _solid_faults(spec: BeamSpec) -> Iterator[str]:
-    """Yield what the model of the part as a solid cannot do: the key, and why."""
+def _solid_faults(spec: BeamSpec) -> Iterator[Fault]:
+    """Yield that the model of the part as a solid cannot do what is asked of it: each key, and why."""
+    verified = spec.design is not None and spec.design.verify == "solid"
+    unsupported = list(_list_unsupported(spec)) if spec.analysis.fidelity == "solid" or verified else []
+    if unsupported:
+        # no word in quotes: long lists between two would be shortened like a long quotation
+        limits = "; ".join(unsupported)
+        message = f"the model solid has limits: {limits}; leave these keys out, or use the beam model: reissner"
+        yield ("design", "verify") if verified else ("analysis", "fidelity"), message
+
+
+def _list_unsupported(spec: BeamSpec) -> Iterator[str]:
+    """Yield the keys that are not supported by the model of the part as a solid, and why."""
     mechanism, analysis, beams = spec.mechanism, spec.analysis, spec.mechanism.beams
     by_load = mechanism.drive.by_load
     moved = [f"mechanism.nodes.{name}.moved" for name, node in mechanism.nodes.items() if node.moved is not None]
@@ -408,24 +384,15 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
         for joint in ("start_joint", "end_joint")
         if getattr(beam, joint) == "pin"
     ]
+    by_loads = isinstance(mechanism.drive, LoadsDrive)
+    unusual_loads = any(load.acts_on != "node" or getattr(load, "follows", False) for load in mechanism.loads)
+    verified_loads = mechanism.loads and spec.design is not None and spec.design.verify == "solid"
     things: tuple[tuple[str, object, str], ...] = (
-        (
-            "mechanism.drive",
-            isinstance(mechanism.drive, LoadsDrive),
-            "one node is moved or loaded, and no path of loads followed",
-        ),
+        ("mechanism.drive", by_loads, "one node is moved or loaded, and no path of loads followed"),
         ("mechanism.drive.follows", getattr(mechanism.drive, "follows", False), "its loads keep their direction"),
         ("mechanism.loads", mechanism.loads and by_load, "they act on a part whose motion is given"),
-        (
-            "mechanism.loads",
-            any(load.acts_on != "node" or getattr(load, "follows", False) for load in mechanism.loads),
-            "constant loads act on nodes, and keep their direction",
-        ),
-        (
-            "mechanism.loads",
-            mechanism.loads and spec.design is not None and spec.design.verify == "solid",
-            "with constant loads the force is not proportional to the width",
-        ),
+        ("mechanism.loads", unusual_loads, "constant loads act on nodes, and keep their direction"),
+        ("mechanism.loads", verified_loads, "with constant loads the force is not proportional to the width"),
         ("analysis.loads_first", mechanism.loads and not analysis.loads_first, "constant loads act from the start"),
         ("mechanism.stops", not mechanism.ends_before_stops(analysis.travel), "contact is not modelled"),
         ("mechanism.obstacles", mechanism.obstacles, "contact is not modelled"),
@@ -433,11 +400,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
         ("mechanism.springs", mechanism.springs, "only the part that is cut is meshed, and springs are not part of it"),
         (", ".join(moved), moved, "the part is solved as drawn, and supports stay where they are"),
         (", ".join(pins), pins, "the outline is one piece at every node"),
-        (
-            "mechanism.closure",
-            mechanism.closure == "raw",
-            "beams that are forced into place are drawn as if they fitted",
-        ),
+        ("mechanism.closure", mechanism.closure == "raw", "beams forced into place are drawn as if they fitted"),
         ("analysis.modes", analysis.modes, "it has no masses"),
         ("analysis.imperfection", analysis.imperfection, "the part is meshed as drawn"),
         ("analysis.outputs.cross_stiffness", analysis.outputs.cross_stiffness, "the driven piece is held across"),
@@ -455,40 +418,38 @@ def _several(spec: BeamSpec, key: Literal["material", "width"]) -> bool:
     return len({*spec.mechanism.collect_beam_values(key).values()}) > 1
 
 
-def _no_density(spec: BeamSpec) -> str:
-    """Return what is missing for natural frequencies; nothing if nothing is."""
-    if not spec.analysis.modes:
-        return ""
-    if spec.mechanism.wide_beams:
-        return "natural frequencies are known of narrow beams only: drop mechanism.wide_beams"
-    mechanism = spec.mechanism
-    keys = [
-        "mechanism.material.density" if beam.material is None else f"mechanism.beams.{name}.material.density"
-        for name, beam in mechanism.beams.items()
-        if (beam.material or mechanism.material).density is None
-    ]
-    listed = list(dict.fromkeys(keys))
-    return f"natural frequencies need a density: give {', '.join(listed[:5])}, such as 1410 kg/m^3" if listed else ""
+def _vibration_faults(spec: BeamSpec) -> Iterator[Fault]:
+    """Yield what is missing for natural frequencies, if they are requested."""
+    mechanism, place = spec.mechanism, ("analysis", "modes")
+    if spec.analysis.modes and mechanism.wide_beams:
+        yield place, "natural frequencies are known of narrow beams only: drop mechanism.wide_beams"
+    elif spec.analysis.modes:
+        keys = dict.fromkeys(
+            "mechanism.material.density" if beam.material is None else f"mechanism.beams.{name}.material.density"
+            for name, beam in mechanism.beams.items()
+            if (beam.material or mechanism.material).density is None
+        )
+        if keys:
+            listed = ", ".join([*keys][:5])
+            yield place, f"natural frequencies need a density: give {listed}, such as 1410 kg/m^3"
 
 
-def _has_strength(spec: BeamSpec, material: BeamMaterial | None) -> bool:
-    """Return True if the allowable stress is known of all beams, or of another material if there is one."""
-    of = [material] if material else spec.mechanism.collect_beam_values("material").values()
-    return all(material.allowable(spec.mechanism.safety_factor) is not None for material in of)
-
-
-def _rescale_faults(spec: BeamSpec) -> Iterator[str]:
-    """Yield why Eq. 6 does not hold for a mechanism."""
-    if spec.design is None or spec.design.rescale is None:
-        return
-    mechanism = spec.mechanism
+def _rescale_faults(spec: BeamSpec, wanted: Rescale) -> Iterator[Fault]:
+    """Yield why Eq. 6 does not hold for a mechanism, in one line; else that no stress is allowable."""
+    mechanism, reasons = spec.mechanism, list[str]()
     if not mechanism.drive.is_displacement:
-        yield "needs a drive of kind 'displacement': the force at the end of its window is scaled"
+        reasons.append("needs a drive of kind 'displacement': the force at the end of its window is scaled")
     moved = any(node.moved is not None for node in mechanism.nodes.values())
     if mechanism.springs or mechanism.loads or moved or spec.analysis.imperfection or mechanism.has_contacts:
-        yield (
-            "Eq. 6 is about beams alone: springs, loads, contacts, moved supports and imperfections do not scale with "
-            "them"
-        )
+        extras = "springs, loads, contacts, moved supports and imperfections"
+        reasons.append(f"Eq. 6 is about beams alone: {extras} do not scale with them")
     if _several(spec, "material"):
-        yield "Eq. 6 is about beams of one material"
+        reasons.append("Eq. 6 is about beams of one material")
+    materials = [wanted.material] if wanted.material else mechanism.collect_beam_values("material").values()
+    if reasons:
+        yield ("design", "rescale"), "; ".join(reasons)
+    elif wanted.to_allowable_stress and any(
+        material.allowable(mechanism.safety_factor) is None for material in materials
+    ):
+        text = "no stress is allowable without a strength: give the material a 'yield_strength'"
+        yield ("design", "rescale", "to_allowable_stress"), text

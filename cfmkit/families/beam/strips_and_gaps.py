@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.model.beam_fits import beam_end_at
 from cfmkit.errors import GeometryError
 from cfmkit.export.contours import BeamSection, Line, Smooth
 from cfmkit.export.union import OutlinePiece
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.beam import Beam, Fit
     from cfmkit.elastica.model.network import Network
     from cfmkit.export.contours import Edge
+    from cfmkit.families.beam.network_from_spec import Mirror
 
 STEP_LIMITS, MOST_STEPS = 160, 20_000
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -89,9 +91,9 @@ class BeamStrip:
             return OutlinePiece.polygon(np.array([right[0], right[-1], left[-1], left[0]]))
         return OutlinePiece(self.edges, tuple(self.polygons))
 
-    def mirror(self, at: complex, direction: float) -> BeamStrip:
-        """Return its mirror image about the line through a point [m] along a direction [rad]."""
-        points, angle = mirror_points(self.points, at, direction), 2.0 * direction - self.angle
+    def reflect(self, mirror: Mirror) -> BeamStrip:
+        """Return its mirror image."""
+        points, angle = mirror.reflect(self.points), 2.0 * mirror.direction - self.angle
         return replace(self, points=points, angle=angle, curvature=-self.curvature)
 
     @property
@@ -131,8 +133,7 @@ def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: floa
     Raises GeometryError if more points would be needed for that than a drawing can have.
     """
     beam, fit = network.beams[name], fits[name]
-    start = network.nodes[beam.start]
-    at = np.array([start.x + beam.start_offset[0], start.y + beam.start_offset[1]])
+    at = np.array(beam_end_at(network, name, 0))
     cuts = {*fit.course.breaks.tolist(), *(fit.parameter(float(place)) for place in beam.section.stations)}
     pieces = []
     for low, high in itertools.pairwise(sorted(cuts)):
@@ -166,13 +167,6 @@ def _piece(beam: Beam, fit: Fit, at: FloatArray, t: FloatArray) -> BeamStrip:
     slope = np.full(len(t), (thickness[-1] - thickness[0]) / ((place[-1] - place[0]) * float(np.real(fit.length))))
     angle = np.real(fit.angle(t, inside))
     return BeamStrip(*(read_only(column) for column in (points, angle, thickness, turn + np.zeros(len(t)), slope)))
-
-
-def mirror_points(points: FloatArray, at: complex, direction: float) -> FloatArray:
-    """Return the mirror image of points (n, 2) about the line through a point [m] along a direction [rad]."""
-    turn = np.exp(1j * direction)
-    z = at + turn * np.conj((points @ np.array([1, 1j]) - at) / turn)
-    return np.column_stack([z.real, z.imag])
 
 
 @dataclass(frozen=True, order=True)
@@ -231,10 +225,8 @@ def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], first: st
     a, b, half = lines[first], lines[second], halves[second.rstrip("'")]
     for i, j in itertools.product((0, -1), repeat=2):
         if np.hypot(*(lines[first][i] - lines[second][j])) < END_DISTANCE_RATIO * (halves[first] + half):
-            a, b = (
-                _away(a, i, 2 * COMMON_END_THICKNESSES * halves[first]),
-                _away(b, j, 2 * COMMON_END_THICKNESSES * half),
-            )
+            a = _away(a, i, 2 * COMMON_END_THICKNESSES * halves[first])
+            b = _away(b, j, 2 * COMMON_END_THICKNESSES * half)
     if len(a) < 2 or len(b) < 2:
         return None
     import shapely

@@ -19,7 +19,7 @@ from cfmkit.families.rows import rows_of
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
-    from cfmkit.families.cam.spec import Contact, Mechanism
+    from cfmkit.families.cam.spec import Mechanism
     from cfmkit.families.cam.statics import Assembly
     from cfmkit.stock.material_and_part_spec import MaterialSpec
 
@@ -27,19 +27,11 @@ if TYPE_CHECKING:
 YIELD_PRESSURE = 1.67  # pressure at which a line contact first yields, over the yield strength [J, eq. 6.4].
 
 
-def pressure(
-    force: FloatArray,  # contact force [N]
-    curvature: FloatArray,  # sum of the curvatures of roller and cam, 1/R [1/m]
-    contact: Contact,  # width and material
-) -> FloatArray:
-    """Return the Hertzian pressure p0 of a line contact [Pa]."""
-    return pressure_between(force, curvature, contact.material, contact.width)
+def pressure(force: FloatArray, curvature: FloatArray, solid: MaterialSpec, width: float | FloatArray) -> FloatArray:
+    """Return the Hertzian pressure p0 of line contacts of some width [m] between bodies of one material [Pa].
 
-
-def pressure_between(
-    force: FloatArray, curvature: FloatArray, solid: MaterialSpec, width: float | FloatArray
-) -> FloatArray:
-    """Return `pressure` of a contact of some width [m], or of many, between bodies of one material [Pa]."""
+    They press with forces [N]; the curvatures of roller and cam add up to `curvature`, 1/R [1/m].
+    """
     modulus = solid.modulus / (2.0 * (1.0 - solid.poisson**2))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.sqrt(force * modulus * curvature / (np.pi * width)))
@@ -58,7 +50,7 @@ def flank_pressure(assembly: Assembly, states: TrackStates, force: FloatArray, r
     law, cut_for, built, offset, width = numbers if rows is None else rows_of(numbers, rows)
     with np.errstate(divide="ignore", invalid="ignore"):
         curvature = 1.0 / built + 1.0 / (law.curvature_radius(states.parameter) - cut_for + offset)
-    pressures = pressure_between(force, curvature, contact.material, width)
+    pressures = pressure(force, curvature, contact.material, width)
     return np.where(states.on_corner, np.nan, pressures)
 
 

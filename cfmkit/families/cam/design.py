@@ -12,7 +12,7 @@ c = F' / (F' - 2 w), w the weight that hangs on one roller.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from math import isclose
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +32,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
     turns_vertical,
     weights_of,
 )
-from cfmkit.families.cam.outline import plate_notes
+from cfmkit.families.cam.outline import CutPlate
 from cfmkit.families.cam.statics import TRAVEL_RTOL, forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.findings import (
@@ -46,17 +46,19 @@ from cfmkit.families.findings import (
     refusals_answered,
 )
 from cfmkit.results import OVERWRITTEN_FINDING, Design, Finding, Status
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.offers import Miss, nearest
 from cfmkit.stock.springs.spec import offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism
     from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.families.cam.statics import Loads
     from cfmkit.families.run_control import Run
+    from cfmkit.numerics.interpolation import ThroughPoints
     from cfmkit.stock.springs.offers import Offer
 
 
@@ -64,12 +66,86 @@ if TYPE_CHECKING:
 class Choice:
     """A force constant with the springs that go with it."""
 
-    force_constant: float
+    force_constant: float  # [m]
     springs: Springs
-    active: tuple[str, ...] = ()
+    preload: float  # elongation of the springs at the start, with that which stands for their initial tension [m]
     note: str = ""
-    preload: float = 0.0
-    """Elongation of the springs at the start, with that which stands for their initial tension [m]."""
+    active: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Task:
+    """A specification with a `design` block, and what its targets ask of springs and profile."""
+
+    spec: CamSpec
+    target: CamDesign
+    pull: float  # force F' that the springs provide [N]
+    factor: float  # slope factor c of the profile
+
+    @classmethod
+    def from_spec(cls, spec: CamSpec, target: CamDesign) -> _Task:
+        """Return the task; raises Infeasible if the moving parts are too heavy."""
+        force = largest_force(target)
+        if not target.gravity:
+            return cls(spec, target, force, 1.0)
+        roller, slider = weights_of(spec.mechanism).along
+        least = slider + 2.0 * roller
+        if force <= least:
+            raise finding.infeasible(
+                "weight_too_large",
+                f"the moving parts weigh {newton(least)}: a force of {newton(force)} does not even carry them; request "
+                "more ('design.force'), or lighten the parts ('mechanism.masses')",
+                {"design.force": f"more than {newton(least)}"},
+            )
+        pull = force - slider
+        return cls(spec, target, pull, pull / (pull - 2.0 * roller))
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """Block `mechanism` of the specification."""
+        return self.spec.mechanism
+
+    @property
+    def curve(self) -> ThroughPoints | None:
+        """The target curve of force in shares of its largest; None if the force is to be constant."""
+        # the springs need not carry the weight of the slider where the profile carries weights
+        return target_shape(self.target, float(weights_of(self.mechanism).along[1]) if self.target.gravity else 0.0)
+
+    def law(self, force_constant: float, preload: float | None = None) -> SlopeLaw:
+        """Return the slope law of a designed profile; the elongation `preload` [m] is the mechanism's unless given."""
+        mechanism, target = self.mechanism, self.target
+        sizes = force_constant, mechanism.rest_half_width, mechanism.brace_length
+        half = 0.5 * (mechanism.effective_preload if preload is None else preload)
+        law = SlopeLaw(*sizes, target.friction, self.factor, half)
+        if (curve := self.curve) is None:
+            return law
+        try:
+            return with_curve(law, curve, target.stroke)
+        except CannotBuild as problem:
+            raise Infeasible(problem.finding) from None
+
+    @cached_property
+    def smallest(self) -> float | None:
+        """The smallest force constant without undercut [m]; None if undercut is accepted, or a preload avoids it."""
+        if not self.target.avoid_undercut or self.target.choose == "preload":
+            return None
+        radius, law = self.mechanism.roller_radius, self.law(self.mechanism.rest_half_width)
+        if (smallest := law.smallest_force_constant(radius)) is not None:
+            return smallest * (1 + 1e-12)
+        flat = SlopeLaw(1e6 * law.brace_length, law.rest_half_width, law.brace_length, law.friction, self.factor)
+        largest = mm(float(flat.curvature_radius(law.rest_half_width)))
+        raise finding.infeasible(
+            "undercut",
+            f"no force constant avoids undercut: the {mm(radius)} roller is larger than the radius of "
+            f"curvature that the brace alone gives ({largest}); use a smaller roller ('mechanism.roller_radius')",
+            {"mechanism.roller_radius": f"less than {largest}"},
+        )
+
+    def undercuts(self, law: SlopeLaw) -> bool:
+        """Return whether a force constant below `smallest` undercuts: with a preload some small ones do not."""
+        if self.smallest is None or law.force_constant >= self.smallest:
+            return False
+        return not law.constant or not law.preload or law.undercuts(self.mechanism.roller_radius)
 
 
 @refusals_answered
@@ -81,185 +157,98 @@ def design(spec: CamSpec, run: Run) -> Design:
     target = spec.design
     if target is None:
         return Design(None, Status.INVALID, "this spec has no 'design' block: add the targets 'force' and 'stroke'")
-    return _design(spec, target)
+    if target.target is not None:
+        check_target(target)
+    task = _Task.from_spec(spec, target)
+    _check_start_of(task)
+    best, *others = _CHOICE_FUNCTIONS[target.choose](task)
+    next_best = tuple(partial(_with_next, task, choice) for choice in others)
+    return replace(_with_choice(task, best), next_best=next_best)
 
 
 @refusals_answered
-def _with_next(spec: CamSpec, target: CamDesign, factor: float, choice: Choice) -> Design:
+def _with_next(task: _Task, choice: Choice) -> Design:
     """Return the design with springs that are not the best of the catalogue."""
-    return _with_choice(spec, target, factor, choice)
+    return _with_choice(task, choice)
 
 
-def _design(spec: CamSpec, target: CamDesign) -> Design:
-    if target.target is not None:
-        check_target(target)
-    pull, factor = shaping(spec, target)
-    _check_beginning(spec, target, factor)
-    smallest = None if target.choose == "preload" else _smallest_constant(spec, target, factor)
-    _check_room(spec)
-    if target.choose == "catalogue":
-        best, *others = _from_catalogue(spec, target, pull, factor, smallest)
-        next_best = tuple(partial(_with_next, spec, target, factor, choice) for choice in others)
-        return replace(_with_choice(spec, target, factor, best), next_best=next_best)
-    ways = {"force-constant": _from_springs, "stiffness": _from_constant, "preload": _with_preload}
-    return _with_choice(spec, target, factor, ways[target.choose](spec, target, pull, factor, smallest))
-
-
-def _with_choice(spec: CamSpec, target: CamDesign, factor: float, choice: Choice) -> Design:
-    law = _law(spec, target, choice.force_constant, factor, choice.preload)
-    _check_stroke(law, target, choice.springs)
-    _check_bend(spec, law, target)
-    written = _write_profile(spec, target, choice, factor)
-    reported = (*_overwritten(spec, written), *_plate_lacks(written))
+def _with_choice(task: _Task, choice: Choice) -> Design:
+    law = task.law(choice.force_constant, choice.preload)
+    _check_stroke(law, task.target, choice.springs)
+    _check_bend(task, law)
+    written = _write_profile(task, choice)
+    reported = (*_overwritten(task.spec, written), *_plate_lacks(written))
     return Design(written, Status.COMPLETE, choice.note, active_bounds=choice.active, warnings=reported)
 
 
-def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
-    """Return the force F' that the springs provide [N] and the slope factor c of the profile."""
-    force = largest_force(target)
-    if not target.gravity:
-        return force, 1.0
-    roller, slider = weights_of(spec.mechanism).along
-    least = slider + 2.0 * roller
-    if force <= least:
-        raise finding.infeasible(
-            "weight_too_large",
-            f"the moving parts weigh {newton(least)}: a force of {newton(force)} does not even carry them; request "
-            "more ('design.force'), or lighten the parts ('mechanism.masses')",
-            {"design.force": f"more than {newton(least)}"},
-        )
-    pull = force - slider
-    return pull, pull / (pull - 2.0 * roller)
-
-
-def _slider_weight(spec: CamSpec, target: CamDesign) -> float:
-    """Return the weight that the springs need not carry, where the profile carries weights [N]."""
-    return float(weights_of(spec.mechanism).along[1]) if target.gravity else 0.0
-
-
-def _law(
-    spec: CamSpec, target: CamDesign, force_constant: float, factor: float, preload: float | None = None
-) -> SlopeLaw:
-    """Return the slope law of a designed profile; the elongation `preload` [m] is the mechanism's unless given."""
-    mechanism = spec.mechanism
-    half = 0.5 * (mechanism.effective_preload if preload is None else preload)
-    law = SlopeLaw(force_constant, mechanism.rest_half_width, mechanism.brace_length, target.friction, factor, half)
-    shape = target_shape(target, _slider_weight(spec, target))
-    if shape is None:
-        return law
+def _check_start_of(task: _Task) -> None:
+    """Raise if no force constant gives a mechanism, none avoids undercut, or the rollers overlap at the start."""
+    x0, radius, brace = task.mechanism.rest_half_width, task.mechanism.roller_radius, task.mechanism.brace_length
     try:
-        return with_curve(law, shape, target.stroke)
+        check_start(task.law(x0), (radius, brace))
     except CannotBuild as problem:
-        raise Infeasible(problem.finding) from None
-
-
-def _undercuts(spec: CamSpec, law: SlopeLaw, smallest: float | None) -> bool:
-    """Return whether a force constant below `smallest` [m] undercuts: with a preload some small ones do not."""
-    if smallest is None or law.force_constant >= smallest:
-        return False
-    return not law.constant or not law.preload or law.undercuts(spec.mechanism.roller_radius)
-
-
-def _check_beginning(spec: CamSpec, target: CamDesign, factor: float) -> None:
-    """Raise if no force constant gives a mechanism."""
-    mechanism = spec.mechanism
-    law = _law(spec, target, mechanism.rest_half_width, factor)
-    try:
-        check_start(law, (mechanism.roller_radius, mechanism.brace_length))
-    except CannotBuild as problem:
-        longer = {"mechanism.brace_length": f"more than {mm(mechanism.rest_half_width)}"}
+        longer = {"mechanism.brace_length": f"more than {mm(x0)}"}
         raise Infeasible(problem.finding, longer if problem.finding.name == "brace_too_short" else None) from None
+    _ = task.smallest
+    if (gap := 2.0 * (x0 - radius)) < 0:
+        raise Infeasible(rollers_overlap(gap), {"mechanism.roller_radius": format_at_most(x0)})
 
 
-def _check_room(spec: CamSpec) -> None:
-    """Raise if the rollers overlap with the springs at rest."""
-    mechanism = spec.mechanism
-    if (gap := 2.0 * (mechanism.rest_half_width - mechanism.roller_radius)) < 0:
-        room = {"mechanism.roller_radius": format_at_most(mechanism.rest_half_width)}
-        raise Infeasible(rollers_overlap(gap), room)
-
-
-def _smallest_constant(spec: CamSpec, target: CamDesign, factor: float) -> float | None:
-    """Return the smallest force constant without undercut [m]; None if undercut is accepted."""
-    if not target.avoid_undercut:
-        return None
-    mechanism = spec.mechanism
-    law = _law(spec, target, mechanism.rest_half_width, factor)
-    smallest = law.smallest_force_constant(mechanism.roller_radius)
-    if smallest is None:
-        flat = SlopeLaw(1e6 * law.brace_length, law.rest_half_width, law.brace_length, law.friction, factor)
-        largest = mm(float(flat.curvature_radius(law.rest_half_width)))
-        raise finding.infeasible(
-            "undercut",
-            f"no force constant avoids undercut: the {mm(mechanism.roller_radius)} roller is larger than the radius of "
-            f"curvature that the brace alone gives ({largest}); use a smaller roller ('mechanism.roller_radius')",
-            {"mechanism.roller_radius": f"less than {largest}"},
-        )
-    return smallest * (1 + 1e-12)
-
-
-def _from_springs(spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None) -> Choice:
+def _from_springs(task: _Task) -> list[Choice]:
     """Choose A from the springs; where that would undercut, the smallest A that does not, and softer springs."""
-    springs = spec.mechanism.springs
-    constant = pull / (4.0 * springs.total)
-    if smallest is None or not _undercuts(spec, _law(spec, target, constant, factor), smallest):
-        return Choice(constant, springs, preload=spec.mechanism.effective_preload)
-    softer = springs.scaled_to(pull / (4.0 * smallest))
+    springs, preload = task.mechanism.springs, task.mechanism.effective_preload
+    constant = task.pull / (4.0 * springs.total)
+    if task.smallest is None or not task.undercuts(task.law(constant)):
+        return [Choice(constant, springs, preload)]
+    softer = springs.scaled_to(task.pull / (4.0 * task.smallest))
     note = (
-        f"to avoid undercut A is raised from {mm(constant)} to {mm(smallest)}; the springs must then add up to "
+        f"to avoid undercut A is raised from {mm(constant)} to {mm(task.smallest)}; the springs must then add up to "
         f"{rate(softer.total)} instead of {rate(springs.total)}"
     )
-    return Choice(smallest, softer, ("design.avoid_undercut",), note, spec.mechanism.effective_preload)
+    return [Choice(task.smallest, softer, preload, note, ("design.avoid_undercut",))]
 
 
-def _with_preload(spec: CamSpec, target: CamDesign, pull: float, factor: float, _smallest: float | None) -> Choice:
+def _with_preload(task: _Task) -> list[Choice]:
     """Choose A from the springs, and the smallest preload with which the roller can follow the path."""
-    mechanism, constant = spec.mechanism, pull / (4.0 * spec.mechanism.springs.total)
-    law = _law(spec, target, constant, factor, 0.0)
-    half = law.smallest_preload(mechanism.roller_radius)
+    mechanism, constant = task.mechanism, task.pull / (4.0 * task.mechanism.springs.total)
+    half = task.law(constant, 0.0).smallest_preload(mechanism.roller_radius)
     if half is None:
         raise finding.infeasible(
             "undercut",
-            f"no preload avoids undercut: cut for a friction of {target.friction:g} the path turns vertical before "
-            f"its start is wide enough for the {mm(mechanism.roller_radius)} roller; use a smaller roller "
+            f"no preload avoids undercut: cut for a friction of {task.target.friction:g} the path turns vertical "
+            f"before its start is wide enough for the {mm(mechanism.roller_radius)} roller; use a smaller roller "
             "('mechanism.roller_radius') or less friction ('design.friction')",
         )
     opened = mechanism.springs.tension_stretch
     preload = max(2.0 * half * (1 + 1e-12), opened)
-    return Choice(constant, mechanism.springs, note=_preload_note(mechanism, preload - opened), preload=preload)
+    note = "no preload is needed: the roller can follow the path with the springs at rest at the start"
+    if stretched := preload - opened:
+        note = (
+            f"to avoid undercut the springs are stretched by {mm(stretched)} at the start: with the same roller "
+            f"positions they are at rest at {mm(2.0 * mechanism.rest_half_width - stretched)} between the roller axes"
+        )
+    return [Choice(constant, mechanism.springs, preload, note)]
 
 
-def _preload_note(mechanism: Mechanism, preload: float) -> str:
-    """Return what the chosen preload means for who buys the springs."""
-    if not preload:
-        return "no preload is needed: the roller can follow the path with the springs at rest at the start"
-    return (
-        f"to avoid undercut the springs are stretched by {mm(preload)} at the start: with the same roller positions "
-        f"they are at rest at {mm(2.0 * mechanism.rest_half_width - preload)} between the roller axes"
-    )
-
-
-def _from_constant(spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None) -> Choice:
+def _from_constant(task: _Task) -> list[Choice]:
     """Choose the stiffness from a given A."""
-    constant = target.force_constant or spec.mechanism.profile.force_constant
-    if smallest is not None and _undercuts(spec, _law(spec, target, constant, factor), smallest):
+    constant = task.target.force_constant or task.mechanism.profile.force_constant
+    if task.smallest is not None and task.undercuts(task.law(constant)):
         raise finding.infeasible(
             "force_constant_too_small",
-            f"the force constant {mm(constant)} is below {mm(smallest)}, the smallest that avoids undercut "
+            f"the force constant {mm(constant)} is below {mm(task.smallest)}, the smallest that avoids undercut "
             "('design.avoid_undercut')",
-            {"design.force_constant": format_at_least(smallest)},
+            {"design.force_constant": format_at_least(task.smallest)},
         )
-    springs = spec.mechanism.springs.scaled_to(pull / (4.0 * constant))
-    return Choice(constant, springs, preload=spec.mechanism.effective_preload)
+    springs = task.mechanism.springs.scaled_to(task.pull / (4.0 * constant))
+    return [Choice(constant, springs, task.mechanism.effective_preload)]
 
 
-def _from_catalogue(
-    spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None
-) -> list[Choice]:
+def _from_catalogue(task: _Task) -> list[Choice]:
     """Return the springs and numbers within all limits, the one whose cam has the smallest two-way deviation first."""
     tried = [
-        _with_spring(spec, target, (pull, factor, smallest), item, count)
-        for item in offers(target.catalogue, "extension")
+        _with_spring(task, item, count)
+        for item in offers(task.target.catalogue, ExtensionSpring)
         for count in item.counts
     ]
     fitting = [outcome for outcome in tried if not isinstance(outcome, Miss)]
@@ -270,12 +259,29 @@ def _from_catalogue(
         none = "the catalogue has no extension spring, which is what pulls the rollers together"
         raise finding.infeasible("no_spring_fits", f"{none} ('design.catalogue')")
     reported = f"no spring of the catalogue fits: {nearest(rejected)}; add others to 'design.catalogue'"
-    raise finding.infeasible("no_spring_fits", f"{reported}, or change {_list_blocking_keys(reported)}")
+    keys = [key for word, key in _BLOCKING_KEYS.items() if f": {word}" in reported]
+    change = ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"
+    raise finding.infeasible("no_spring_fits", f"{reported}, or change {change}")
 
 
-def _with_spring(
-    spec: CamSpec, target: CamDesign, wanted: tuple[float, float, float | None], item: Offer, count: int
-) -> tuple[float, Choice] | Miss:
+_CHOICE_FUNCTIONS: dict[str, Callable[[_Task], list[Choice]]] = {
+    "force-constant": _from_springs,
+    "stiffness": _from_constant,
+    "preload": _with_preload,
+    "catalogue": _from_catalogue,
+}
+"""Functions by the word of `design.choose`: each returns the best choice, then those that are nearly as good."""
+_BLOCKING_KEYS = {
+    "undercut": "'design.avoid_undercut'",
+    "brace too short": "'mechanism.brace_length'",
+    "spring overstretched": "their 'max_elongation'",
+    "friction": "'mechanism.rolling_friction'",
+    "too long": "'mechanism.rest_half_width'",
+}
+"""Which key blocks a spring of the catalogue that is refused for a reason."""
+
+
+def _with_spring(task: _Task, item: Offer, count: int) -> tuple[float, Choice] | Miss:
     """Return the deviation of both ways and the choice of one spring of a catalogue, or why it does not fit.
 
     Between axes that are farther apart than its free length a spring is stretched at the start; its initial tension
@@ -283,21 +289,21 @@ def _with_spring(
     """
     from cfmkit.families.cam.springs_spec import Springs
 
-    label, (pull, factor, smallest) = f"{count} x {item.name}", wanted
+    label, target, mechanism = f"{count} x {item.name}", task.target, task.mechanism
     opened = item.initial_tension / item.rate
-    preload = spec.mechanism.preload + opened
+    preload = mechanism.preload + opened
     if item.free_length is not None:
-        room = 2.0 * spec.mechanism.rest_half_width
+        room = 2.0 * mechanism.rest_half_width
         if item.free_length > room * (1 + 1e-9):
             text = f"too long ({mm(item.free_length)} relaxed between axes {mm(room)} apart at the start)"
             return Miss(label, item.free_length / room - 1.0, text)
         preload = room - item.free_length + opened
     springs = Springs.from_offer(item, count)
-    constant = pull / (4.0 * springs.total)
-    law = _law(spec, target, constant, factor, preload)
-    if smallest is not None and _undercuts(spec, law, smallest):
-        text = f"undercut (A = {mm(constant)} < {mm(smallest)})"
-        return Miss(label, smallest / constant - 1.0, text)
+    constant = task.pull / (4.0 * springs.total)
+    law = task.law(constant, preload)
+    if task.smallest is not None and task.undercuts(law):
+        text = f"undercut (A = {mm(constant)} < {mm(task.smallest)})"
+        return Miss(label, task.smallest / constant - 1.0, text)
     try:
         _check_stroke(law, target, springs)
     except Infeasible as problem:
@@ -308,21 +314,20 @@ def _with_spring(
     use = SpringInUse.from_offer(item, preload - opened, most - opened)
     if weak := use.why_too_weak(target.spring_life, target.spring_safety):
         return Miss(label, *weak)
-    rest = spec.mechanism.rest_half_width - 0.5 * preload
-    gap = two_way_gap(law, target, loads_of(spec, springs.total, rest), spec.mechanism.rolling_friction)
+    rest = mechanism.rest_half_width - 0.5 * preload
+    gap = two_way_gap(law, target, loads_of(task.spec, springs.total, rest), mechanism.rolling_friction)
     if gap == float("inf"):
         return Miss(label, float("inf"), "friction holds the roller")
-    note = f"{label} of the catalogue: A = {mm(constant)}"
-    return gap, Choice(constant, springs, note=note, preload=preload)
+    return gap, Choice(constant, springs, preload, f"{label} of the catalogue: A = {mm(constant)}")
 
 
-def _check_bend(spec: CamSpec, law: SlopeLaw, target: CamDesign) -> None:
+def _check_bend(task: _Task, law: SlopeLaw) -> None:
     """Raise where a roller cannot follow a path that may be bent most behind its start: of a curve, or with weights."""
     if law.constant and law.slope_factor >= 1:
         return
-    path, end = reach(law, target.stroke)
+    path, end = reach(law, task.target.stroke)
     try:
-        cut_profile(path, spec.mechanism.roller_radius, end)
+        cut_profile(path, task.mechanism.roller_radius, end)
     except CannotBuild as problem:
         raise Infeasible(
             problem.finding, {"mechanism.roller_radius": format_at_most(law.tightest(end)[1] * (1 - 1e-6))}
@@ -338,37 +343,16 @@ def _stroke_of(law: SlopeLaw, target: CamDesign, springs: Springs) -> float:
     return max(float(path.travel(end)), 0.0) if end > law.rest_half_width else 0.0
 
 
-_BLOCKING_KEYS = {
-    "undercut": "'design.avoid_undercut'",
-    "brace too short": "'mechanism.brace_length'",
-    "spring overstretched": "their 'max_elongation'",
-    "friction": "'mechanism.rolling_friction'",
-    "too long": "'mechanism.rest_half_width'",
-}
-"""Which key blocks a spring of the catalogue that is refused for a reason."""
-
-
-def _list_blocking_keys(reported: str) -> str:
-    """Return the keys that block springs of the catalogue: those of their reasons, and what all of them are to do."""
-    keys = [key for word, key in _BLOCKING_KEYS.items() if f": {word}" in reported]
-    return ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"
-
-
-def two_way_gap(
-    law: SlopeLaw,  # what the cam is cut for
-    target: CamDesign,  # the stroke
-    loads: Loads,  # springs, weights, and what rubs beside the rollers
-    friction: float,  # rolling friction
-) -> float:
+def two_way_gap(law: SlopeLaw, target: CamDesign, loads: Loads, friction: float) -> float:
     """Return the largest |F/F0 - 1| of both directions over the stroke, the first fiftieth left out.
 
-    Infinite if friction holds the roller somewhere.
+    Of a cam cut for a slope law with a rolling friction; infinite if friction holds the roller somewhere.
     """
     path, end = reach(law, target.stroke)
     x = np.linspace(law.rest_half_width, end, 801)
     x = x[path.travel(x) >= 0.02 * target.stroke]
     tangent, on_flank = brace_tangent(x, loads.brace_length), np.zeros(len(x), dtype=bool)
-    states = TrackStates(x, np.zeros_like(x), law.slope(x), tangent, on_flank, x, partial(law.slope_derivative, x))
+    states = TrackStates(x, np.zeros_like(x), law.slope(x), tangent, on_flank, x, lambda: law.slopes(x)[1])
     ways = np.stack([forces(states, loads, direction * friction, direction).slider for direction in (1.0, -1.0)])
     if not np.isfinite(ways).all():
         return float("inf")
@@ -391,10 +375,10 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
             "('design.stroke')",
             {"design.stroke": format_at_most(reached)},
         )
-    limit, opened = springs.max_elongation, springs.tension_stretch
-    elongation = 2.0 * (end - law.rest_half_width + law.preload) - opened
+    limit = springs.max_elongation
+    elongation = 2.0 * (end - law.rest_half_width + law.preload) - springs.tension_stretch
     if limit and elongation > limit:
-        shorter = max(float(path.travel(law.rest_half_width + 0.5 * (limit + opened) - law.preload)), 0.0)
+        shorter = _stroke_of(law, target, springs)
         raise finding.infeasible(
             "spring_overstretched",
             f"at full stroke the springs would be stretched by {mm(elongation)}, their limit is {mm(limit)} "
@@ -441,17 +425,17 @@ def _plate_lacks(spec: CamSpec) -> Iterator[Finding]:
         sides = assemble_sides(spec)
     except CannotBuild:
         return
-    for note in plate_notes((sides[0].profile, sides[1].profile), spec.mechanism.plate):
+    for note in CutPlate((sides[0].profile, sides[1].profile), spec.mechanism.plate).notes:
         yield finding("plate_incomplete", note)
 
 
-def _write_profile(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) -> CamSpec:
+def _write_profile(task: _Task, choice: Choice) -> CamSpec:
     """Return the spec with the designed profile written out, so that it is a fixed part from now on."""
-    mechanism = spec.mechanism
+    mechanism, target = task.mechanism, task.target
     profile: dict[str, Any] = {
         "force_constant": choice.force_constant,
         "friction": target.friction,
-        "slope_factor": factor,
+        "slope_factor": task.factor,
         "stroke": target.stroke,
         "brace_length": mechanism.brace_length,
         "rest_half_width": mechanism.rest_half_width,
@@ -465,9 +449,9 @@ def _write_profile(spec: CamSpec, target: CamDesign, choice: Choice, factor: flo
         if stretched := max(choice.preload - choice.springs.tension_stretch, 0.0):
             springs["preload"] = stretched
     changes: dict[str, Any] = {"mechanism.profile": profile, "mechanism.springs": springs}
-    if (shape := target_shape(target, _slider_weight(spec, target))) is not None and target.target is not None:
+    if (shape := task.curve) is not None and target.target is not None:
         points = tuple(zip(shape.places, shape.values, strict=True))
         profile["curve"] = {"points": points, "interpolation": "smooth" if shape.smooth else "linear"}
         changes["design.target"] = target.target.written_out(target.force)
         changes["design.force"] = None
-    return spec.replace(changes)
+    return task.spec.replace(changes)

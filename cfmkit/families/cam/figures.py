@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.part import moment, pivoting, pose, scene, start_curve, swallowtail
-from cfmkit.families.cam.part_sizes_and_clearances import count_of, nearest_pairs
+from cfmkit.families.cam.part_sizes_and_clearances import nearest_pairs
 from cfmkit.families.cam.statics import constant_force
 from cfmkit.numerics.holes_in_samples import holes_between
 from cfmkit.plots import parts
@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.measured_cam import MeasuredCam
     from cfmkit.families.cam.part import Scene
     from cfmkit.families.cam.solution import Solution
-    from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam
     from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result
 
@@ -66,25 +66,20 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 
         return draw_dynamics.figures(result)
     if result.spec.get_value("mechanism.profile.file"):
-        return built_figures(result)
+        as_measured = partial(curve_figure, result, None, "force over travel, with the measured profile")
+        return {"loop": as_measured, "profile": partial(profile, result), "shares": partial(shares, result)}
     makers = [loop, mechanism, curvature, contact, springs, assembly]
-    if solution.corner_travel > 0:
-        makers.append(undercut)
-    if solution.assembly.spec.mechanism.envelope is not None:
-        makers.append(clearance)
-    return {maker.__name__: partial(maker, result) for maker in makers} | band_figures(result)
+    makers += [undercut] if solution.corner_travel > 0 else []
+    makers += [clearance] if solution.mechanism.envelope is not None else []
+    makers += [manufacturing] if solution.band is not None else []
+    return {maker.__name__: partial(maker, result) for maker in makers}
 
 
 @apply_style
-def draw_mechanism(
-    solution: Solution,  # a solved mechanism
-    index: int,  # which of its points
-    ax: Axes,  # to draw on
-    view: Scene | None = None,  # of the same solution, where several positions are drawn
-) -> Axes:
+def draw_mechanism(solution: Solution, index: int, ax: Axes, view: Scene | None = None) -> Axes:
     """Draw the mechanism to scale at one point of the solution; return the axes, which are in millimetres."""
     view, drawn_pose = view or scene(solution), pose(solution, index)
-    radius, height = solution.assembly.spec.mechanism.roller_radius, view.box[3] - view.box[1]
+    radius, height = solution.mechanism.roller_radius, view.box[3] - view.box[1]
     parts.plate(ax, view.plate)
     parts.axis_of_symmetry(ax, view.box[1], view.box[3])
     for side, name, at in ((1.0, "right", drawn_pose), (-1.0, "left", drawn_pose.mirror())):
@@ -166,12 +161,8 @@ def _names_at_start(solution: Solution, index: int, _view: Scene) -> list[Label]
 
 
 def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
-    drawn_pose, number, height = (
-        pose(solution, index),
-        count_of(solution.assembly.spec.mechanism.springs),
-        view.box[3] - view.box[1],
-    )
-    radius, (x, y) = solution.assembly.spec.mechanism.roller_radius, drawn_pose.roller
+    drawn_pose, mechanism, height = pose(solution, index), solution.mechanism, view.box[3] - view.box[1]
+    radius, number, (x, y) = mechanism.roller_radius, mechanism.springs.number, drawn_pose.roller
     roller, pin = np.array(drawn_pose.roller), np.array(drawn_pose.slider)
     spring = np.column_stack([np.linspace(-0.5, 0.5, 20) * x, np.full(20, y - 0.45 * radius)])
     return [
@@ -201,7 +192,7 @@ def curvature(result: Result) -> Figure:
     flank = np.where(
         radius - profile.roller_radius > 0.5 * np.nan_to_num(radius[0]), radius - profile.roller_radius, np.nan
     )
-    cut_for, built = profile.roller_radius, solution.assembly.spec.mechanism.roller_radius
+    cut_for, built = profile.roller_radius, solution.mechanism.roller_radius
     limits = [Limit(cut_for, f"roller {value_text(cut_for, 'length')}", trouble=profile.corner is not None)]
     if built != cut_for:
         limits.append(Limit(built, f"roller built in {value_text(built, 'length')}"))
@@ -225,7 +216,7 @@ def curvature(result: Result) -> Figure:
 def contact(result: Result) -> Figure:
     """Return the forces at the contact and in a brace, and the pressure angle, over the travel."""
     solution: Solution = result.state
-    over, up, down = solution.travel + solution.origin, solution.up, solution.down
+    over, up, down = solution.displacement, solution.up, solution.down
     _, highest = finite_range(up.contact) or (0.0, 0.0)
     alike = not np.any(np.abs(up.contact - down.contact) > 0.02 * highest)
     series = [
@@ -234,7 +225,7 @@ def contact(result: Result) -> Figure:
     ]
     if not alike:
         series.append(Series(down.contact, "contact, down", LINE_VERMILLION, prefer=0.3))
-    angle = [Series(solution.pressure_angle, "between the brace's pull and the roller's motion", LINE_BLUE)]
+    angle = [Series(solution.states.pressure_angle, "between the brace's pull and the roller's motion", LINE_BLUE)]
     ranges = regions(solution)
     limits = [Limit(np.pi / 2, "90 deg: no leverage on the roller"), *limits_on(result, "pressure_angle_max")]
     unnamed = [replace(region, text="") for region in ranges]
@@ -248,30 +239,26 @@ def contact(result: Result) -> Figure:
 def springs(result: Result) -> Figure:
     """Return the elongation of the springs over the travel, with its limit, and the force of all of them."""
     solution: Solution = result.state
-    limit, limits = (
-        solution.assembly.spec.mechanism.springs.max_elongation,
-        [*limits_on(result, "spring_elongation_max")],
-    )
-    if limit:
+    springs, limits = solution.mechanism.springs, [*limits_on(result, "spring_elongation_max")]
+    if limit := springs.max_elongation:
         beyond = float(solution.elongation.max()) > limit * (1 + 1e-9)
         limits.append(Limit(limit, f"limit {value_text(limit, 'length')}", trouble=beyond))
-    line, over = [Series(solution.elongation, "", LINE_BLUE)], solution.travel + solution.origin
-    diagram = Diagram(over, TRAVEL_SCALE, Scale("elongation", "length"), line, limits, regions(solution))
-    figure = diagram_figure(Heading.from_result(result, "elongation of the springs"), [diagram], right_mm=17.0)
-    stiffness, count = (
-        float(to_border(solution.assembly.loads.stiffness, "stiffness")),
-        count_of(solution.assembly.spec.mechanism.springs),
+    line = [Series(solution.elongation, "", LINE_BLUE)]
+    diagram = Diagram(
+        solution.displacement, TRAVEL_SCALE, Scale("elongation", "length"), line, limits, regions(solution)
     )
-    words = "the spring" if count == 1 else f"the {count} springs"
-    tension = count * solution.assembly.spec.mechanism.springs.initial_tension
-    right_axis(figure.axes[0], stiffness, f"force of {words} [N]", float(to_border(tension, "force")))
+    figure = diagram_figure(Heading.from_result(result, "elongation of the springs"), [diagram], right_mm=17.0)
+    words = "the spring" if springs.number == 1 else f"the {springs.number} springs"
+    stiffness, tension = solution.assembly.loads.stiffness, springs.number * springs.initial_tension
+    ends = float(to_border(stiffness, "stiffness")), f"force of {words} [N]", float(to_border(tension, "force"))
+    right_axis(figure.axes[0], *ends)
     return figure
 
 
 def clearance(result: Result) -> Figure:
     """Return how far the moving parts stay from plate, screws and each other over the travel, with the gap wanted."""
     solution: Solution = result.state
-    envelope, gaps = solution.assembly.spec.mechanism.envelope, nearest_pairs(solution)
+    envelope, gaps = solution.mechanism.envelope, nearest_pairs(solution)
     colors = (LINE_BLUE, LINE_VERMILLION, LINE_PURPLE, SPRING_OCHRE, LINE_BLACK, LINE_BROWN, TEXT_GREY)
     order = sorted(gaps, key=lambda pair: float(gaps[pair].min()))
     series = [
@@ -282,7 +269,7 @@ def clearance(result: Result) -> Figure:
     passed = any(float(gap.min()) < wanted - 1e-9 for gap in gaps.values())
     text = f"wanted {value_text(wanted, 'length')}" if wanted else "touching"
     limits = [*limits_on(result, "clearance_min"), Limit(wanted, text, trouble=passed)]
-    diagram = Diagram(solution.travel + solution.origin, TRAVEL_SCALE, Scale("distance", "length"), series, limits)
+    diagram = Diagram(solution.displacement, TRAVEL_SCALE, Scale("distance", "length"), series, limits)
     return diagram_figure(Heading.from_result(result, "clearances of the moving parts"), [diagram])
 
 
@@ -306,7 +293,7 @@ def undercut(result: Result) -> Figure:
 
 def _roller_on_corner(solution: Solution, ax: Axes, view: Scene) -> None:
     """Draw the roller at the start and where it leaves the corner."""
-    radius, (start, leaves) = solution.assembly.spec.mechanism.roller_radius, pivoting(solution)
+    radius, (start, leaves) = solution.mechanism.roller_radius, pivoting(solution)
     corner = _cam_with_corner(solution, ax, view)
     parts.roller(ax, start, radius, "roller-start")
     parts.roller(ax, leaves, radius, "roller-leaves", ghost=True)
@@ -354,15 +341,6 @@ def _cam_with_corner(solution: Solution, ax: Axes, view: Scene) -> FloatArray:
 N_HEIGHTS = 400  # heights at which the errors of measured flanks are drawn
 
 
-def built_figures(result: Result) -> dict[str, Callable[[], Figure]]:
-    """Return what draws each picture of a measured cam, by file stem."""
-    return {
-        "loop": partial(curve_figure, result, None, "force over travel, with the measured profile"),
-        "profile": partial(profile, result),
-        "shares": partial(shares, result),
-    }
-
-
 def profile(result: Result) -> Figure:
     """Return the errors of both flanks over the height, along the normal and in x."""
     built: MeasuredCam = result.state
@@ -404,15 +382,10 @@ def shares(result: Result) -> Figure:
     return diagram_figure(Heading.from_result(result, "where the force comes from"), [diagram])
 
 
-def band_figures(result: Result) -> dict[str, Callable[[], Figure]]:
-    """Return what draws the forces of cams that are cut with errors; nothing where none are stated."""
-    return {} if result.state.band is None else {"manufacturing": partial(manufacturing, result)}
-
-
 def manufacturing(result: Result) -> Figure:
     """Return the band of forces, without friction, of cams that are cut with the stated errors."""
     solution: Solution = result.state
-    band, over = solution.band, solution.travel + solution.origin
+    band, over = solution.band, solution.displacement
     assert band is not None
     shown = solution.travel >= solution.corner_travel + 0.005 * solution.travel[-1]
     lines = (
@@ -435,5 +408,8 @@ def moving(result: Result) -> Moving | None:
     if solution is None or not hasattr(solution, "states"):
         return None
     view, points = scene(solution), choose_poses(len(solution.travel))
-    motion = solution.origin + solution.travel[points]
-    return Moving(motion, view.box, lambda ax, number: draw_mechanism(solution, int(points[number]), ax, view))
+    return Moving(
+        solution.displacement[points],
+        view.box,
+        lambda ax, number: draw_mechanism(solution, int(points[number]), ax, view),
+    )

@@ -10,22 +10,17 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, worst
-from cfmkit.families.cam.scalar_results import errors_used, half_extent, largest, pressure_of, root_mean_square
+from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress
 from cfmkit.families.cam.statics import spring_force
 from cfmkit.families.findings import Finder, format_at_least, mm, mpa, newton
 from cfmkit.families.largest_next_to_samples import largest_of_each
 from cfmkit.families.rows import FindingRule
-from cfmkit.numerics.robust_statistics import neighbour_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Solution
-    from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam
     from cfmkit.families.cam.spec import CamSpec, Mechanism
     from cfmkit.results import Finding
 
@@ -96,12 +91,8 @@ def is_overstretched(longest: FloatArray | float, limit: float) -> Any:
     return np.asarray(longest > limit * (1 + LIMIT_RTOL))
 
 
-def find_overstress(
-    mechanism: Mechanism,  # with its contact
-    largest: float | None,  # largest pressure [Pa]
-    place: str,  # where that is
-) -> Finding | None:
-    """Return what to say where the contact yields; None if it does not."""
+def find_overstress(mechanism: Mechanism, largest: float | None, place: str) -> Finding | None:
+    """Return what to say where the contact yields under the largest pressure [Pa]; None if it does not."""
     allowable = allowable_stress(mechanism)
     if mechanism.contact is None or allowable is None or largest is None or not yields(largest, allowable):
         return None
@@ -153,7 +144,7 @@ def _undercut(solution: Solution) -> tuple[str, ...]:
     profile, travel = solution.assembly.track.profile, solution.corner_travel
     assert profile.corner is not None
     law, point = profile.path.law, profile.corner.point
-    (place, radius), missing = law.tightest(profile.end), max(-_offset(solution), 0.0)
+    (place, radius), missing = law.tightest(profile.end), max(-float(solution.mechanism.profile.offset), 0.0)
     where = "at the start" if place <= law.rest_half_width else f"at x = {mm(place)}"
     roller = f"the {mm(profile.roller_radius - missing)} roller"
     roller += f", with {mm(missing)} of the flank missing," if missing else ""
@@ -175,8 +166,7 @@ def _undercut(solution: Solution) -> tuple[str, ...]:
 
 def _undercut_in_short(solution: Solution) -> str:
     law = solution.assembly.track.profile.path.law
-    what = "force not constant" if law.constant else "force not as cut"
-    return f"{what} up to {mm(solution.corner_travel)}"
+    return f"force not {'constant' if law.constant else 'as cut'} up to {mm(solution.corner_travel)}"
 
 
 def _corner_pressure(solution: Solution) -> tuple[str, ...]:
@@ -186,16 +176,10 @@ def _corner_pressure(solution: Solution) -> tuple[str, ...]:
 
 def _preload_cure(solution: Solution) -> float | None:
     """Return the least elongation at the start with which the roller can follow the path [m]; None if none helps."""
-    profile, spec = solution.assembly.track.profile, solution.assembly.spec
-    law = profile.path.law
-    half = law.smallest_preload(profile.roller_radius)
-    if half is None or half >= spec.mechanism.rest_half_width or _offset(solution) < 0:
-        return None
-    return 2.0 * half
-
-
-def _offset(solution: Solution) -> float:
-    return float(solution.mechanism.profile.offset)
+    profile, mechanism = solution.assembly.track.profile, solution.mechanism
+    half = profile.path.law.smallest_preload(profile.roller_radius)
+    is_cure = half is not None and half < mechanism.rest_half_width and mechanism.profile.offset >= 0
+    return 2.0 * half if half is not None and is_cure else None
 
 
 def _jam(number: int) -> FindingRule[Solution]:
@@ -276,8 +260,12 @@ def _is_overstretched(solution: Solution) -> Any:
 
 def _describe_overstretch(solution: Solution) -> tuple[str, ...]:
     limit, longest = solution.mechanism.springs.max_elongation, float(solution.elongation[-1])
-    past = _travel_at(solution, limit)
-    return (f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",)
+    return (describe_overstretch(longest, limit, _travel_at(solution, limit)),)
+
+
+def describe_overstretch(longest: float, limit: float, travel: float) -> str:
+    """Return the sentence on springs stretched beyond a limit that is reached at a travel [m]."""
+    return f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(travel)} of travel"
 
 
 def _slack_cable(direction: Literal["up", "down"]) -> FindingRule[Solution]:
@@ -286,10 +274,9 @@ def _slack_cable(direction: Literal["up", "down"]) -> FindingRule[Solution]:
         return np.asarray((solution.elongation > 0) & (getattr(solution, direction).slider <= 0))
 
     def message(solution: Solution) -> tuple[str, ...]:
-        return (
-            f"on the way {direction} the force on the slider is not positive from "
-            f"{_where(solution.travel, places(solution))} of travel: a cable would go slack",
-        )
+        low, high = (mm(end) for end in solution.travel[places(solution)][[0, -1]].tolist())
+        where = f"from {low} to {high} of travel"
+        return (f"on the way {direction} the force on the slider is not positive {where}: a cable would go slack",)
 
     return FindingRule("slack_cable", lambda solution: places(solution).any(axis=-1), message)
 
@@ -332,26 +319,21 @@ def _is_overloaded(solution: Solution) -> Any:
 
 
 def _describe_overload(solution: Solution) -> tuple[str, ...]:
-    bearings, most = solution.mechanism.bearings, largest(solution.up.contact, solution.down.contact)
+    bearings, (most,) = solution.mechanism.bearings, largest_of_each(solution.up.contact, solution.down.contact)
     return (
-        f"a roller presses with {newton(most or 0.0)} on {bearings.per_roller} bearing(s) with a static rating of "
+        f"a roller presses with {newton(float(most))} on {bearings.per_roller} bearing(s) with a static rating of "
         f"{newton(bearings.static_rating)} each ('mechanism.bearings.static_rating')",
     )
 
 
 def _is_overstressed(solution: Solution) -> Any:
     allowable = allowable_stress(solution.mechanism)
-    return allowable is not None and yields(solution.flank.largest_pressure[0], allowable)
+    return allowable is not None and yields(solution.largest_pressure[0], allowable)
 
 
 def _describe_overstress(solution: Solution) -> tuple[str, ...]:
-    top, travel = (float(values[0, 0]) for values in solution.flank.largest_pressure)
+    top, travel = (float(values[0, 0]) for values in solution.largest_pressure)
     return overstress(solution.mechanism, top, f"at {mm(travel)} of travel")
-
-
-def _where(travel: FloatArray, mask: NDArray[np.bool_]) -> str:
-    hits = np.flatnonzero(mask)
-    return f"{mm(float(travel[hits[0]]))} to {mm(float(travel[hits[-1]]))}"
 
 
 def _is_undercut(solution: Solution) -> Any:
@@ -378,118 +360,3 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
         FindingRule("bearing_overloaded", _is_overloaded, _describe_overload),
         FindingRule("overstressed", _is_overstressed, _describe_overstress),
     )
-
-
-TOO_NOISY = 2.0  # points are noisier than stated if their neighbours say so by this factor
-
-
-def findings_of_built(built: MeasuredCam) -> list[Finding]:
-    """Return what the user must know about the measured profile."""
-    warnings = [*_built_mechanics(built), *_weak_registration(built), *_doubtful_points(built)]
-    last = built.assembly.stroke
-    if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0 or built.unmeasured:
-        ends = [
-            float(built.travel[0]),
-            *(place for hole in built.unmeasured for place in hole),
-            float(built.travel[-1]),
-        ]
-        spans = [f"{mm(low)} to {mm(high)}" for low, high in zip(ends[::2], ends[1::2], strict=True)]
-        warnings.append(
-            finding(
-                "part_measured",
-                f"the flanks were measured for {' and '.join(spans)} of the travel only, which is {mm(last)}",
-            )
-        )
-    if built.unmeasured:
-        warnings.append(finding("profile_hole", describe_unmeasured(built)))
-    return warnings
-
-
-def describe_unmeasured(built: MeasuredCam) -> str:
-    """Return what is said of parts of the flanks without points."""
-    spans = " and ".join(f"{mm(low)} to {mm(high)}" for low, high in built.unmeasured)
-    return f"a flank has no points where the rollers touch it from {spans} of travel: the force there is not known"
-
-
-def _built_mechanics(built: MeasuredCam) -> Iterator[Finding]:
-    """Yield what is wrong with the mechanism that the measured cam is built into."""
-    limit, longest = built.assembly.spec.mechanism.springs.max_elongation, float(built.elongation.max())
-    if limit and is_overstretched(longest, limit):
-        past = float(built.travel[np.argmax(built.elongation > limit)])
-        yield finding(
-            "spring_overstretched",
-            f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",
-        )
-    if (slack := built.elongation < 0).any():
-        last = float(built.travel[slack][-1])
-        yield finding("spring_slack", f"the springs carry no force up to {mm(last)} of travel: they are too long")
-    pressed = pressure_of(built, 1.0)
-    if (top := worst(pressed)) is not None:
-        place = f"at {mm(float(built.travel[top]))} of travel"
-        if reported := find_overstress(built.assembly.spec.mechanism, float(pressed[top]), place):
-            yield reported
-    held = ~np.isfinite(built.forces(1.0)[0]) & np.isfinite(built.sides.slope[0]) & np.isfinite(built.sides.slope[1])
-    if held.any():
-        friction, places = built.assembly.spec.mechanism.rolling_friction, built.travel[held]
-        yield finding(
-            "up_jam",
-            f"on the way up friction ({friction:g}) holds a roller at {int(held.sum())} of {len(held)} points, from "
-            f"{mm(float(places[0]))} to {mm(float(places[-1]))} of travel: no force moves the slider there",
-        )
-
-
-def _weak_registration(built: MeasuredCam) -> Iterator[Finding]:
-    """Yield how uncertain the place of the cam is along the direction that the points tell least of."""
-    direction, deviation = built.registration.weakest(half_extent(built))
-    rmse, lifted = root_mean_square(errors_used(built)), float(built.registration.growth[1])
-    if built.registration.width:
-        more = "more" if built.registration.width > 0 else "less"
-        yield finding(
-            "width_error",
-            f"the points are those of a cam with {mm(abs(built.registration.width))} {more} material on both flanks, "
-            f"± {mm(built.registration.width_deviation)} (one standard deviation), which the registration allows for; "
-            "'mechanism.profile.registration: motion' treats it as a shift of the cam, 'datum' moves no points",
-        )
-    if deviation > 0.1 * rmse and rmse > 0:
-        names = ("the angle", "the shift in x", "the shift in y")
-        parts = [f"{100 * part**2:.0f} % {name}" for part, name in zip(direction, names, strict=True) if part**2 > 0.05]
-        taken = (
-            f"; 0.01 mm more material on both flanks would be mistaken for a cam that lies {mm(1e-5 * abs(lifted))} "
-            f"{'lower' if lifted > 0 else 'higher'}: the flanks are steep"
-        )
-        yield finding(
-            "registration_weak",
-            f"the position of the cam is known to ± {mm(deviation)} (one standard deviation) along its weakest "
-            f"direction: {', '.join(parts)}{'' if built.registration.width else taken}",
-        )
-
-
-def _doubtful_points(built: MeasuredCam) -> Iterator[Finding]:
-    """Yield what speaks against the measured points, or against what is said of their noise."""
-    outliers = sum(int((~keep).sum()) for keep in built.registration.used)
-    if outliers:
-        count = sum(len(keep) for keep in built.registration.used)
-        yield finding(
-            "profile_outliers", f"{outliers} of {count} points are far off or beyond the flank and are omitted"
-        )
-    stated = float(built.assembly.spec.mechanism.profile.noise or 0.0)
-    seen = max(neighbour_noise(errors, use) for errors, use in _errors_along(built))
-    if seen > TOO_NOISY * stated:
-        yield finding(
-            "noise_understated",
-            f"neighbouring points scatter like a noise of {mm(seen)}, but 'mechanism.profile.noise' is {mm(stated)}; "
-            "the difference is treated as waviness of the flank, and the force depends on its slope",
-        )
-    elif root_mean_square(errors_used(built)) < 0.8 * stated:
-        yield finding(
-            "noise_overstated",
-            f"the points are {mm(root_mean_square(errors_used(built)))} (rms) off the design, less than the stated "
-            f"noise of {mm(stated)}: the errors of the profile cannot be distinguished from noise",
-        )
-
-
-def _errors_along(built: MeasuredCam) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Yield path coordinates and errors of the points that count, one flank after the other [m]."""
-    registration = built.registration
-    for place, error, keep in zip(registration.parameters, registration.errors, registration.used, strict=True):
-        yield place[keep], error[keep]

@@ -12,19 +12,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc
 from cfmkit.export.posed_part import PosedBody
-from cfmkit.families.cam.outline import plate_contours
+from cfmkit.families.cam.outline import CutPlate
 from cfmkit.families.cam.part_sizes_and_clearances import (
     BRACE_WIDTH,
     PLATE_THICKNESS,
-    count_of,
-    pin_path,
-    roller_path,
     stack_height,
     wire_and_coil,
 )
@@ -59,7 +56,7 @@ if TYPE_CHECKING:
     from cfmkit.export.contours import Contour
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.spec import Mechanism
-    from cfmkit.stock.stock_series import Bearing, Screw, System
+    from cfmkit.stock.stock_series import Bearing, Screw
 
 BEARING_IN_ROLLER = 0.9  # outside diameter of a bearing over that of the roller around it, at most
 SHAFT_IN_ROLLER = 0.7
@@ -72,6 +69,7 @@ MAX_BAR_WIDTH = 1.0
 class _SizingLoads:
     """Largest forces, thicknesses, and stresses that parts may have: sizes of parts follow from these."""
 
+    mechanism: Mechanism
     strength: PartStrength
     thickness: float  # of plate, rollers and slider [m]
     brace: float  # thickness of a brace [m]
@@ -84,101 +82,113 @@ class _SizingLoads:
     @classmethod
     def from_solution(cls, solution: Solution) -> _SizingLoads:
         """Return those of a solved mechanism."""
-        spec = solution.assembly.spec
-        plate, contact = spec.mechanism.plate, spec.mechanism.contact
+        spec, loads = solution.assembly.spec, solution.assembly.loads
+        mechanism, plate, contact = spec.mechanism, spec.mechanism.plate, spec.mechanism.contact
         strength = PartStrength.from_material(contact.material if contact else None, required_safety(spec))
         thickness = plate.thickness or (contact.width if contact else PLATE_THICKNESS)
         brace = min(thickness, BRACE_WIDTH)
         pull, press, force = (_largest(solution, name) for name in ("brace", "contact", "slider"))
-        loads, side = solution.assembly.loads, 2.0 * spec.mechanism.roller_radius
         across, travel = float(np.hypot(abs(loads.sideways[1]), loads.off_plane)), float(np.ptp(solution.travel))
-        rods = guide_rods(4, across, force, travel, side, spec.mechanism.guide, plate.stock, strength)
+        side = 2.0 * mechanism.roller_radius
+        rods = guide_rods(4, across, force, travel, side, mechanism.guide, plate.stock, strength)
         hooks = _hooks(solution, brace, rods.slider_thickness)
-        return cls(strength, thickness, brace, pull, press, force, rods, hooks)
+        return cls(mechanism, strength, thickness, brace, pull, press, force, rods, hooks)
 
     @property
-    def arm(self) -> float:
-        """Distance from the middle of the plate to that of a brace [m]."""
-        return 0.5 * (self.thickness + self.brace)
+    def material(self) -> str:
+        """Material of plates and links, as the list has it."""
+        return self.strength.name + (", assumed" if self.strength.assumed else "")
 
-    def thinnest_shaft(self, system: System | None) -> float:
-        """Return the shaft that bears half of the press at each brace, and the springs of a side beyond it [m]."""
-        arm = 0.5 * self.arm + self.hooks.pull * self.hooks.arm / max(self.press, 1e-9)
-        return pin_for(self.press, arm, self.thickness, self.strength, system)[0]
+    @property
+    def side(self) -> float:
+        """Diameter of a roller, and side of the slider [m]."""
+        return 2.0 * self.mechanism.roller_radius
+
+    @property
+    def thinnest_shaft(self) -> float:
+        """Shaft that bears half of the press at each brace, and the springs of a side beyond it [m]."""
+        arm = 0.25 * (self.thickness + self.brace) + self.hooks.pull * self.hooks.arm / max(self.press, 1e-9)
+        return pin_for(self.press, arm, self.thickness, self.strength, self.mechanism.plate.stock)[0]
+
+
+class _Sizes(NamedTuple):
+    """Diameters of slider pin and shafts, what is on a shaft, and widths of braces and of bars for springs [m]."""
+
+    pin: float
+    shaft: float
+    bearing: Bearing | None
+    brace: float
+    bar: float
 
 
 def hardware(solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism."""
     mechanism, loads, faults = solution.assembly.spec.mechanism, _SizingLoads.from_solution(solution), dict[str, str]()
-    strength, thick, hooks = loads.strength, loads.thickness, loads.hooks
-    pin = _slider_pin(mechanism, loads, faults)
-    shaft, bearing = _shaft(mechanism, loads, faults)
+    hooks, rods, side = loads.hooks, loads.rods, loads.side
+    pin, (shaft, bearing) = _slider_pin(loads, faults), _shaft(loads, faults)
     for place, diameter in (("slider pin", pin), ("shafts of the rollers", shaft)):
-        if diameter > SHAFT_IN_ROLLER * 2.0 * mechanism.roller_radius:
+        if diameter > SHAFT_IN_ROLLER * side:
             faults[place] = (
                 f"{length_in_words(diameter)} thick for {newton(max(loads.pull, loads.press))}, too thick for a roller "
-                f"and a slider of {length_in_words(2.0 * mechanism.roller_radius)}: make them larger"
+                f"and a slider of {length_in_words(side)}: make them larger"
             )
     stated = mechanism.envelope.brace_width if mechanism.envelope else 0.0
-    width = stated or link_width(loads.pull, loads.brace, max(pin, shaft), strength)
-    bar = hooks.bar_width(shaft, strength)
-    if bar > MAX_BAR_WIDTH * mechanism.rest_half_width:
+    width = stated or link_width(loads.pull, loads.brace, max(pin, shaft), loads.strength)
+    sizes = _Sizes(pin, shaft, bearing, width, hooks.bar_width(shaft, loads.strength))
+    if sizes.bar > MAX_BAR_WIDTH * mechanism.rest_half_width:
         faults["springs to the shafts"] = (
-            f"{length_in_words(bar)} wide for springs {length_in_words(hooks.height)} high: use fewer springs"
+            f"{length_in_words(sizes.bar)} wide for springs {length_in_words(hooks.height)} high: use fewer springs"
         )
-    rods, side = loads.rods, 2.0 * mechanism.roller_radius
     if 0.5 * rods.slider_width(pin) + 0.5 * shaft > mechanism.rest_half_width:
         faults["guide of the slider"] = (
             f"{length_in_words(rods.slider_width(pin))} wide with rods of {length_in_words(rods.diameter)}, in the "
             "way of the rollers' shafts: start farther out ('mechanism.rest_half_width')"
         )
     holes = [edge for contour in cut_plate(solution)[1:] for edge in contour.edges if isinstance(edge, Arc)]
-    screw = _screw(mechanism, loads, len(holes), faults)
-    slider = mm(max(side, rods.slider_width(pin)), side, rods.slider_thickness)
-    parts = (*_parts(solution, loads, width, (pin, shaft, bearing), slider), *_hook_bars(hooks, bar, shaft, strength))
-    parts = (*parts, guide_part(rods, pin, mechanism.guide is None))
+    screw = _screw(loads, len(holes), faults)
+    parts = [*_parts(solution, loads, sizes), guide_part(rods, pin, mechanism.guide is None)]
     if holes:
-        parts = (*parts, screw_part("plate to its base", len(holes), screw, thick, "screw"))
+        parts.append(screw_part("plate to its base", len(holes), screw, loads.thickness, "screw"))
     standing = tuple(_standing(solution, rods, pin, holes, screw))
-    drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft), bearing, (hooks, bar)))
+    drawn = tuple(_drawn_bodies(solution, standing, hooks, sizes))
     rubbing: dict[str, dict[str, float]] = {"pins": {"diameter": pin}, "guide": {}}
     if bearing is None and mechanism.bearings is None:
         rubbing["bearings"] = {"bore": shaft}
-    heads = screw.head_height if holes else 0.0
-    around = *(body for body in drawn if body.name == "brace"), *_box_of_springs(solution, hooks, bar)
+    around = *(body for body in drawn if body.name == "brace"), *_box_of_springs(solution, hooks, sizes.bar)
     return Hardware(
         with_faults(parts, faults),
         (*standing, *around),
         drawn,
         rubbing,
         describe_faults(faults),
-        heads,
+        screw.head_height if holes else 0.0,
         2.0 * rods.slider_thickness,
     )
 
 
-def _slider_pin(mechanism: Mechanism, loads: _SizingLoads, faults: dict[str, str]) -> float:
+def _slider_pin(loads: _SizingLoads, faults: dict[str, str]) -> float:
     """Return the stated slider pin, or the thinnest that bears [m]; faults are added."""
+    stated = loads.mechanism.pins
     arm, thin = 0.5 * (loads.brace + loads.rods.slider_thickness), min(loads.brace, loads.rods.slider_thickness)
-    pin, bears = pin_for(loads.pull, arm, thin, loads.strength, mechanism.plate.stock)
+    pin, bears = pin_for(loads.pull, arm, thin, loads.strength, loads.mechanism.plate.stock)
     if not bears:
         faults["slider pin"] = f"no pin of the series bears the {newton(loads.pull)} of a brace"
-    if mechanism.pins is None:
+    if stated is None:
         return pin
     allowable = loads.strength.allowable, loads.strength.pins
-    if pin_that_bears(loads.pull, arm, thin, *allowable, (mechanism.pins.diameter,)) is None:
+    if pin_that_bears(loads.pull, arm, thin, *allowable, (stated.diameter,)) is None:
         faults["slider pin"] = (
             f"too weak for the {newton(loads.pull)} of a brace {length_in_words(arm)} beside it: use at least "
             f"{length_in_words(pin)} ('mechanism.pins.diameter')"
         )
-    return mechanism.pins.diameter
+    return stated.diameter
 
 
-def _screw(mechanism: Mechanism, loads: _SizingLoads, holes: int, faults: dict[str, str]) -> Screw:
+def _screw(loads: _SizingLoads, holes: int, faults: dict[str, str]) -> Screw:
     """Return the screw that goes through the holes of the plate, or one that bears; faults are added."""
     count = max(holes, 2)
     needed = screw_for(loads.force, loads.thickness, count, loads.strength)
-    screw = (screw_through(mechanism.plate.hole_diameter) if holes else None) or needed
+    screw = (screw_through(loads.mechanism.plate.hole_diameter) if holes else None) or needed
     if not screw_bears(screw, loads.force, loads.thickness, count, loads.strength):
         faults["plate to its base"] = (
             f"too weak for {newton(loads.force)}: use {needed.name}, with holes of {length_in_words(needed.hole)} "
@@ -224,28 +234,12 @@ class _Hooks:
 def _hooks(solution: Solution, brace: float, slider: float) -> _Hooks:
     springs = solution.assembly.spec.mechanism.springs
     stretch, half_width = float(solution.elongation.max()), solution.assembly.spec.mechanism.rest_half_width
-    count, (wire, coil) = count_of(springs), wire_and_coil(springs, stretch, half_width) or (0.0, math.inf)
+    count, (wire, coil) = springs.number, wire_and_coil(springs, stretch, half_width) or (0.0, math.inf)
     outer = wire + coil if wire else 0.0
     share = (count + 1) // 2 / count
     pull = share * (springs.total * stretch + springs.initial_tension * count)
     height = stack_height(outer, count) if count > 2 else 0.0
     return _Hooks(pull, 0.5 * (brace + outer) + slider, outer, coil - wire, height, min(brace, outer))
-
-
-def _hook_bars(hooks: _Hooks, width: float, shaft: float, strength: PartStrength) -> Iterator[ListedPart]:
-    """Yield the bars that carry springs above each other, at both ends of both shafts."""
-    if hooks.height:
-        of = strength.name + (", assumed" if strength.assumed else "")
-        data = f"{of}; a hole of {mm(shaft)} in its middle and one for each hook, bears {newton(hooks.pull)}"
-        yield ListedPart(
-            "springs to the shafts",
-            "hook bar",
-            4,
-            data,
-            "make",
-            mm(hooks.height, width, hooks.thickness),
-            body="hook bar",
-        )
 
 
 def _largest(solution: Solution, name: str) -> float:
@@ -257,18 +251,17 @@ def _largest(solution: Solution, name: str) -> float:
 def cut_plate(solution: Solution) -> tuple[Contour, ...]:
     """Return the outline of the plate and its holes."""
     profile = solution.assembly.track.profile
-    return plate_contours((profile, profile), solution.assembly.spec.mechanism.plate)
+    return CutPlate((profile, profile), solution.assembly.spec.mechanism.plate).contours
 
 
 def roller_shaft(solution: Solution) -> tuple[float, Bearing | None]:
     """Return the diameter of the rollers' shafts [m] and the ball bearing on each; None if the roller turns on it."""
-    return _shaft(solution.assembly.spec.mechanism, _SizingLoads.from_solution(solution), {})
+    return _shaft(_SizingLoads.from_solution(solution), {})
 
 
-def _shaft(mechanism: Mechanism, loads: _SizingLoads, faults: dict[str, str]) -> tuple[float, Bearing | None]:
+def _shaft(loads: _SizingLoads, faults: dict[str, str]) -> tuple[float, Bearing | None]:
     """Return the stated shaft of a roller or the thinnest that bears [m], and its ball bearing; faults are added."""
-    least, most = loads.thinnest_shaft(mechanism.plate.stock), BEARING_IN_ROLLER * 2.0 * mechanism.roller_radius
-    stated = mechanism.bearings
+    least, most, stated = loads.thinnest_shaft, BEARING_IN_ROLLER * loads.side, loads.mechanism.bearings
     if stated is None:
         inside = [entry for entry in BALL_BEARINGS if entry.outer <= most and entry.width <= loads.thickness]
         fitting = [entry for entry in inside if entry.bore >= least]
@@ -294,36 +287,22 @@ def _shaft(mechanism: Mechanism, loads: _SizingLoads, faults: dict[str, str]) ->
 def _springs_in_words(mechanism: Mechanism, hooks: _Hooks, shaft: float) -> str:
     """Return what the springs between the rollers must be, and how long: the insides of loops lie beyond the axes."""
     springs = mechanism.springs
-    rates = springs.each if isinstance(springs.each, tuple) else (springs.each,)
     limit = f", up to {length_in_words(springs.max_elongation)}" if springs.max_elongation else ""
     opens = f", initial tension {newton(springs.initial_tension)}" if springs.initial_tension else ""
     tight = f", stretched by {length_in_words(mechanism.preload)} at the start" if mechanism.preload else ""
-    reported = " to ".join(dict.fromkeys((rate(min(rates)), rate(max(rates)))))
+    reported = " to ".join(dict.fromkeys((rate(min(springs.rates)), rate(max(springs.rates)))))
     relaxed = 2.0 * mechanism.springs_rest + springs.tension_stretch
     where = "between the axes of the bars' holes" if hooks.height else "between the axes of the shafts"
     inside = "" if hooks.height else f" ({mm(relaxed + hooks.seat(shaft))} inside the loops)"
     return f"extension spring, {reported}{opens}{limit}{tight}, relaxed {mm(relaxed)} {where}{inside}"
 
 
-def _parts(
-    solution: Solution,
-    loads: _SizingLoads,
-    width: float,  # of a brace [m]
-    pins: tuple[float, float, Bearing | None],  # diameters of slider pin and shafts [m], and what is on a shaft
-    slider: str,  # its size
-) -> Iterator[ListedPart]:
-    """Yield plate, braces, rollers, slider, pins, shafts, bearings and springs."""
-    mechanism = solution.assembly.spec.mechanism
-    thick, brace, hooks, strength, (pin, shaft, bearing) = (
-        loads.thickness,
-        loads.brace,
-        loads.hooks,
-        loads.strength,
-        pins,
-    )
+def _parts(solution: Solution, loads: _SizingLoads, sizes: _Sizes) -> Iterator[ListedPart]:
+    """Yield plate, braces, rollers, slider, pins, shafts, bearings, springs, and the bars that these hook on."""
+    mechanism, thick, brace, hooks = loads.mechanism, loads.thickness, loads.brace, loads.hooks
+    (pin, shaft, bearing, width, bar), half, stated = sizes, loads.rods.slider_thickness, mechanism.bearings
+    of = loads.material
     x0, y0, x1, y1 = cut_plate(solution)[0].extents
-    of = strength.name + (", assumed" if strength.assumed else "")
-    radius = mechanism.roller_radius
     yield ListedPart("cam", "cam plate", 1, f"{of}; geometry/cam.dxf", "make", mm(x1 - x0, y1 - y0, thick), "", "plate")
     ends = " and ".join(hole_with_fit(diameter, 8) for diameter in (pin, shaft))
     data = (
@@ -332,19 +311,19 @@ def _parts(
     )
     length = mechanism.brace_length + width
     yield ListedPart("roller to slider", "brace", 4, data, "make", mm(length, width, brace), "", "brace")
-    size = f"diameter {mm(2.0 * radius)}, {mm(thick)} wide"
+    size = f"diameter {mm(loads.side)}, {mm(thick)} wide"
     seat = hole_with_fit(shaft, 8) if bearing is None else f"{hole_with_fit(bearing.outer, 7)} for its bearing"
     data = f"with a hole of {seat}, presses with {newton(loads.press)}"
     yield ListedPart("on the cam", "roller", 2, data, "make", size, "", "roller")
     data = f"half, outside of the braces, with a hole of {hole_with_fit(pin, 8)} between those of its guide"
-    yield ListedPart("on its guide", "slider", 2, data, "make", slider, "", "slider")
-    half = loads.rods.slider_thickness
+    size = mm(max(loads.side, loads.rods.slider_width(pin)), loads.side, half)
+    yield ListedPart("on its guide", "slider", 2, data, "make", size, "", "slider")
     yield pin_part("slider pin", 2, pin, brace + half, loads.pull, "slider pin")
-    long = thick + 2.0 * (brace + half) + min(count_of(mechanism.springs), 2) * hooks.outer
+    long = thick + 2.0 * (brace + half) + min(mechanism.springs.number, 2) * hooks.outer
     shafts = pin_part("shafts of the rollers", 2, shaft, long, loads.press, "shaft")
     end = hooks.seat(shaft)
     yield shafts if end == shaft else replace(shafts, data=f"{shafts.data}, ends turned to {mm(end)} for the loops")
-    stated, count = mechanism.bearings, 2 * (mechanism.bearings.per_roller if mechanism.bearings else 1)
+    count = 2 * (stated.per_roller if stated else 1)
     if stated is not None and stated.kind != "plain":
         rated = f", C {newton(stated.dynamic_rating)}" if stated.dynamic_rating else ""
         rated += f", C0 {newton(stated.static_rating)}" if stated.static_rating else ""
@@ -357,16 +336,20 @@ def _parts(
         size = mm(bearing.bore, bearing.outer, bearing.width)
         data = "ball bearing, its life not judged"
         yield ListedPart("in the rollers", bearing.name, count, data, "buy", size, "DIN 625-1", "bearing")
-    springs = mechanism.springs
-    wound = springs.wound
+    springs, wound = mechanism.springs, mechanism.springs.wound
     size = f"wire {mm(wound.wire)}, coil {mm(wound.coil)}, {wound.turns:g} turns" if wound else ""
-    data, number = _springs_in_words(mechanism, hooks, shaft), count_of(springs)
+    data, number = _springs_in_words(mechanism, hooks, shaft), springs.number
     yield ListedPart("between the rollers", springs.name or "", number, data, "buy", size, "", "spring")
+    if hooks.height:  # springs above each other, at both ends of both shafts
+        holes = f"a hole of {mm(shaft)} in its middle and one for each hook, bears {newton(hooks.pull)}"
+        size = mm(hooks.height, bar, hooks.thickness)
+        data = f"{of}; {holes}"
+        yield ListedPart("springs to the shafts", "hook bar", 4, data, "make", size, body="hook bar")
 
 
 def _standing(solution: Solution, rods: GuideRods, pin: float, holes: list[Arc], screw: Screw) -> Iterator[PosedBody]:
     """Yield the rods that guide the slider over its way, and the heads of the screws in the plate."""
-    heights = pin_path(solution)[:, 1]
+    heights = solution.pin_path[:, 1]
     ends = np.array([[0.0, float(heights.min()) - 0.5 * rods.bush], [0.0, float(heights.max()) + 0.5 * rods.bush]])
     yield from rods.bodies(ends, pin)
     yield from (PosedBody.line("screw", "held", np.array([hole.center]), 0.5 * screw.head) for hole in holes)
@@ -376,39 +359,35 @@ def _box_of_springs(solution: Solution, hooks: _Hooks, bar: float) -> Iterator[P
     """Yield the box of the springs, as high as those on one side above each other, with their loops or hook bars."""
     if hooks.outer:
         beyond, half = 0.5 * (bar or hooks.outer), 0.5 * max(hooks.height, hooks.outer)
-        x, y = roller_path(solution).T + np.array([[beyond], [0.0]])
+        x, y = solution.roller_path.T + np.array([[beyond], [0.0]])
         corners = np.stack([[-x, y - half], [x, y - half], [x, y + half], [-x, y + half]])
         yield PosedBody.polygon("springs", "free", corners.transpose(2, 0, 1))
 
 
 def _drawn_bodies(
-    solution: Solution,
-    standing: tuple[PosedBody, ...],
-    sizes: tuple[float, float, float],  # widths of braces, slider pin and shafts [m]
-    bearing: Bearing | None,
-    hooked: tuple[_Hooks, float],  # springs, and the width of the bars that carry them [m]
+    solution: Solution, standing: tuple[PosedBody, ...], hooks: _Hooks, sizes: _Sizes
 ) -> Iterator[PosedBody]:
     """Yield all parts as the assembly shows them, the lowest first (guide and slider are outside of the braces)."""
-    (width, pin, shaft), (hooks, bar) = sizes, hooked
-    rollers, pins, radius = roller_path(solution), pin_path(solution), solution.assembly.spec.mechanism.roller_radius
+    rollers, pins, mechanism = solution.roller_path, solution.pin_path, solution.assembly.spec.mechanism
+    radius = mechanism.roller_radius
     mirror = np.array([-1.0, 1.0])
     yield PosedBody.polygon("plate", "held", cut_plate(solution)[0].points(OUTLINE_TOLERANCE))
     yield from (body for body in standing if body.name == "screw")
-    thick = min(0.35 * width, 0.5 * hooks.outer)
-    for place in hooks.places(count_of(solution.assembly.spec.mechanism.springs)):
+    thick = min(0.35 * sizes.brace, 0.5 * hooks.outer)
+    for place in hooks.places(mechanism.springs.number):
         hook = rollers + np.array([0.0, place])
         yield PosedBody.line("spring", "free", np.stack([hook, hook * mirror], axis=1), thick)
     for side in (np.ones(2), mirror):
         yield PosedBody.line("roller", "contact", (rollers * side)[:, None], radius)
-        if bearing is not None:
-            yield PosedBody.line("bearing", "free", (rollers * side)[:, None], 0.5 * bearing.outer)
+        if sizes.bearing is not None:
+            yield PosedBody.line("bearing", "free", (rollers * side)[:, None], 0.5 * sizes.bearing.outer)
         ends: FloatArray = np.stack([rollers * side, pins], axis=1)
-        yield PosedBody.line("brace", "free", ends, 0.5 * width, round=True)
+        yield PosedBody.line("brace", "free", ends, 0.5 * sizes.brace, round=True)
         if hooks.height:
             tall = np.array([[0.0, -0.5], [0.0, 0.5]]) * hooks.height
-            yield PosedBody.line("hook bar", "free", (rollers * side)[:, None] + tall, 0.5 * bar)
-        yield PosedBody.line("shaft", "free", (rollers * side)[:, None], 0.5 * shaft)
+            yield PosedBody.line("hook bar", "free", (rollers * side)[:, None] + tall, 0.5 * sizes.bar)
+        yield PosedBody.line("shaft", "free", (rollers * side)[:, None], 0.5 * sizes.shaft)
     yield from (body for body in standing if body.name == "guide")
     corners = radius * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     yield PosedBody.polygon("slider", "driven", pins[:, None] + corners)
-    yield PosedBody.line("slider pin", "driven", pins[:, None], 0.5 * pin)
+    yield PosedBody.line("slider pin", "driven", pins[:, None], 0.5 * sizes.pin)

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.geometry.flank_from_roller_path import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.measured_cam import Sides
+from cfmkit.families.cam.measured_cam_analysis import track_over_slider
 from cfmkit.families.cam.solution import ForceBand
-from cfmkit.families.cam.solution_of_measured_cam import Sides
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -67,13 +68,8 @@ class DrawnError:
         return np.asarray((along, 1.0 - at.curvature * beside, np.zeros_like(along))[derivative])
 
 
-def force_band(
-    assembly: Assembly,  # the design and the loads
-    tolerance: Manufacturing,  # standard deviations of the errors
-    travel: FloatArray,  # (n,): where the force is wanted [m]
-    seed: int,  # of the generator: the same seed draws the same cams
-) -> ForceBand:
-    """Return the forces of cams that are cut with errors."""
+def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray, seed: int) -> ForceBand:
+    """Return the forces at travels (n,) [m] of cams that are cut with errors of those standard deviations."""
     generator = np.random.default_rng(seed)
     flank = DesignFlank(assembly.profile, 1.0)
     arc = arc_lengths(flank)
@@ -116,10 +112,7 @@ def _draw_error(
 def _track(assembly: Assembly, built: CurveFrame, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return x [m] and slope of the roller's centre, a radius away from every point of the flank; NaN outside."""
     mechanism = assembly.spec.mechanism
-    x, y = (built.points + mechanism.roller_radius * built.normals).T
-    height = y + np.sqrt((mechanism.brace_length - x) * (mechanism.brace_length + x))
-    rising = np.concatenate([[True], np.diff(np.maximum.accumulate(height)) > 0])
-    slope = built.normals[:, 0] / -built.normals[:, 1]
-    at = height[rising]
-    interpolated = tuple(np.interp(slider, at, values[rising], left=np.nan, right=np.nan) for values in (x, slope))
-    return interpolated[0], interpolated[1]
+    centers = built.points + mechanism.roller_radius * built.normals
+    track = track_over_slider(centers, built, np.zeros(len(centers)), mechanism.brace_length)
+    x, slope = (np.interp(slider, track.slider, of, left=np.nan, right=np.nan) for of in (track.x, track.slope))
+    return x, slope

@@ -26,8 +26,15 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
-from cfmkit.families.cam.findings import describe_unmeasured, finding, findings_of_built, left_out, rubbing_left_out
-from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.findings import finding, left_out, rubbing_left_out
+from cfmkit.families.cam.geometry.flank_from_roller_path import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.measured_cam import (
+    MEASURED_QUANTITIES,
+    MeasuredCam,
+    Sides,
+    describe_unmeasured,
+    findings_of_built,
+)
 from cfmkit.families.cam.mechanism_from_spec import (
     assemble,
     check_first_pose,
@@ -35,17 +42,10 @@ from cfmkit.families.cam.mechanism_from_spec import (
     count_before_overlap,
     displacement_origin,
 )
-from cfmkit.families.cam.scalar_results import (
-    SCALAR_DEFINITIONS,
-    curve_cut_for,
-    design_values,
-    largest,
-    pressure_of,
-    values_of_built,
-)
-from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides, large_holes, requested_travel
+from cfmkit.families.cam.scalar_results import curve_cut_for
 from cfmkit.families.cam.statics import Assembly, target_force
 from cfmkit.families.findings import CannotBuild, mm, no_result
+from cfmkit.families.rows import values_of_one
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between
 from cfmkit.numerics.rigid_point_registration import (
     CurveFrame,
@@ -56,14 +56,12 @@ from cfmkit.numerics.rigid_point_registration import (
     registered_where_it_is,
 )
 from cfmkit.numerics.smoothing_spline import fit_smoothing_spline
-from cfmkit.results import Quantity, Result, Status, quantities
+from cfmkit.results import Result, Status
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.units import window_places
 from cfmkit.tables.measured_outline import read_sides
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
@@ -91,8 +89,7 @@ def analyze_built(spec: CamSpec) -> Result:
         check_springs(built.elongation, built.forces(1.0)[1], assembly.loads.rest_half_width)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
-    holes = built.unmeasured
-    short = ended.message if ended else describe_unmeasured(built) if large_holes(built) else ""
+    short = ended.message if ended else describe_unmeasured(built) if built.has_large_hole else ""
     warnings = [ended] if ended else []
     asked = assembly.spec.analysis.model_copy(
         update={"travel": float(travel[-1]), "gravity": spec.gravity, "fidelity": "quasi-static"}
@@ -103,15 +100,15 @@ def analyze_built(spec: CamSpec) -> Result:
         message=short,
         curves=(_curve(built),),
         closed=LoopAsBuilt(built, tracks),
-        values=_values(built),
+        values=values_of_one(MEASURED_QUANTITIES, built),
         warnings=(
             *warnings,
             *left_out(spec),
             *rubbing_left_out(spec, "the model of a measured cam"),
             *findings_of_built(built),
         ),
-        travel=requested_travel(built),
-        valid=_intervals_between_holes(built, holes),
+        travel=built.requested,
+        valid=tuple((low + built.origin, high + built.origin) for low, high in built.measured),
         target=(
             target_force(spec, assembly)
             if spec.design or assembly.spec.mechanism.profile.curve
@@ -121,16 +118,6 @@ def analyze_built(spec: CamSpec) -> Result:
         allowable_stress=allowable_stress(spec.mechanism),
         state=built,
     )
-
-
-def _intervals_between_holes(
-    built: MeasuredCam, holes: Sequence[tuple[float, float]]
-) -> tuple[tuple[float, float], ...]:
-    """Return the intervals of displacement at which both contacts are on measured points [m]."""
-    inner = [place for hole in holes for place in hole]
-    ends = [float(built.travel[0]), *inner, float(built.travel[-1])]
-    pairs = zip(ends[::2], ends[1::2], strict=True)
-    return tuple((low + built.origin, high + built.origin) for low, high in pairs if low < high)
 
 
 def register_cam(assembly: Assembly) -> Registration:
@@ -294,7 +281,7 @@ class LoopAsBuilt(ShortRepr):
 
     def stress(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the stress below the more loaded contact at displacements of any shape [Pa]."""
-        return np.asarray(stress(pressure_of(self._move_to(places), _get_sign(branch))).reshape(np.shape(places)))
+        return np.asarray(stress(self._move_to(places).pressure(_get_sign(branch))).reshape(np.shape(places)))
 
     def _move_to(self, places: FloatArray) -> MeasuredCam:
         """Return the mechanism at other displacements."""
@@ -332,21 +319,6 @@ def shares_of(assembly: Assembly, designed: Sides, sides: Sides) -> dict[str, Fl
     }
 
 
-def _values(built: MeasuredCam) -> Mapping[str, Quantity]:
-    """Return the scalar results: those of any cam, and those of a measured one."""
-    (up, *pressed_up), (down, *pressed_down) = built.forces(1.0), built.forces(-1.0)
-    is_known = np.isfinite(up) & np.isfinite(down) & (up + down > 0)
-    numbers = design_values(built.assembly) | {
-        "spring_elongation_max": float(built.elongation.max()),
-        "contact_force_max": largest(*pressed_up, *pressed_down),
-        "friction_half_gap_max": largest((up - down)[is_known] / (up + down)[is_known]),
-    }
-    if built.assembly.spec.mechanism.contact:
-        numbers["contact_pressure_max"] = largest(pressure_of(built, 1.0))
-    shared = quantities(SCALAR_DEFINITIONS, numbers)
-    return shared | dict(values_of_built(built))
-
-
 def _curve(built: MeasuredCam) -> Curve:
     """Return the closed loop with the parts of the force."""
     up, down = built.forces(1.0), built.forces(-1.0)
@@ -367,7 +339,7 @@ def _curve(built: MeasuredCam) -> Curve:
         "added_by_friction": Column(loop(shares["friction_up"], shares["friction_down"]), "force"),
     }
     if built.assembly.spec.mechanism.contact:
-        pressed = loop(pressure_of(built, 1.0), pressure_of(built, -1.0))
+        pressed = loop(built.pressure(1.0), built.pressure(-1.0))
         extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
     with np.errstate(invalid="ignore"):
         stable = (loop(up[1], down[1]) > 0) & (loop(up[2], down[2]) > 0)
@@ -400,13 +372,11 @@ class BuiltTrack:
         return np.interp(slider, self.slider, self.x), slope
 
 
-def built_flank(
-    design: DesignFlank,  # the right flank
-    points: FloatArray,  # (n,): path coordinates of the points' feet [m], in any order; those at one place are averaged
-    errors: FloatArray,  # (n,): their distances from the design along its normal [m]
-    noise: float,  # standard deviation of the measurement [m]
-) -> BuiltFlank:
-    """Return a flank from registered points."""
+def built_flank(design: DesignFlank, points: FloatArray, errors: FloatArray, noise: float) -> BuiltFlank:
+    """Return a flank from registered points, whose distances from a right flank have a standard deviation [m].
+
+    Their feet are path coordinates (n,) in any order [m]; points at one place are averaged.
+    """
     arc = arc_lengths(design)
     along = np.interp(points, *arc)
     places, inverse, counts = np.unique(np.round(along, 9), return_inverse=True, return_counts=True)
@@ -414,13 +384,8 @@ def built_flank(
     return BuiltFlank(design, fit_smoothing_spline(places, mean, noise), arc)
 
 
-def built_track(
-    flank: BuiltFlank,  # mirrored to the right
-    # roller_radius, brace_length: of the parts built in [m]
-    roller_radius: float,
-    brace_length: float,
-) -> BuiltTrack:
-    """Return the track of a roller's centre on a built flank."""
+def built_track(flank: BuiltFlank, roller_radius: float, brace_length: float) -> BuiltTrack:
+    """Return the track of a roller's centre on a built flank, which is mirrored to the right."""
     low, high = flank.ends
     places = np.linspace(low, high, max(int((high - low) / PLACE_STEP), 50) + 1)
     base = flank.design.frame(np.interp(places, flank.arc[1], flank.arc[0]))
@@ -432,7 +397,7 @@ def built_track(
         gap = centers + lift[:, None] * base.normals - at.points
         lift = lift + (roller_radius - np.hypot(gap[:, 0], gap[:, 1])) / (at.normals * base.normals).sum(axis=1)
     centers = centers + lift[:, None] * base.normals
-    return _track_over_slider(centers, flank.frame(contact), contact, brace_length)
+    return track_over_slider(centers, flank.frame(contact), contact, brace_length)
 
 
 def _lift(
@@ -454,11 +419,11 @@ def _lift(
     return best, places[where]
 
 
-def _track_over_slider(centers: FloatArray, frame: CurveFrame, contact: FloatArray, brace: float) -> BuiltTrack:
+def track_over_slider(centers: FloatArray, frame: CurveFrame, contact: FloatArray, brace: float) -> BuiltTrack:
+    """Return the track of a roller's centre over the slider's position, of centres that touch a flank in frames."""
     x, y = centers.T
     slider = y + np.sqrt((brace - x) * (brace + x))
     # Where a wave makes the slider fall the roller jumps to the next place at which it rises beyond.
-    rising = slider >= np.maximum.accumulate(slider)
-    rising[1:] &= np.diff(np.maximum.accumulate(slider)) > 0
+    rising = np.concatenate([[True], np.diff(np.maximum.accumulate(slider)) > 0])
     slope = frame.normals[:, 0] / -frame.normals[:, 1]
     return BuiltTrack(slider[rising], x[rising], y[rising], slope[rising], contact[rising])

@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.scalar_results import DEVIATION_DEFINITIONS
+from cfmkit.families.cam.measured_cam import MeasuredCam, Sides, root_mean_square
 from cfmkit.families.cam.solution import Solution
-from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides
 from cfmkit.results import Quantity, quantities
 
 if TYPE_CHECKING:
@@ -30,14 +29,26 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.statics import Loads
     from cfmkit.results import Result
 
+DEVIATION_DEFINITIONS = {
+    "data_friction": (
+        "ratio",
+        "rolling friction whose loop has the measured area, over the displacements that are compared",
+    ),
+    "data_rest_error": (
+        "length",
+        "by how much the springs' rest length must exceed the stated one to explain the measured midline",
+    ),
+    "data_off_design": ("force", "root mean square of the measured force less that of the design without friction"),
+    "data_by_profile": ("force", "root mean square contribution of the measured errors of the profile"),
+    "data_by_friction": ("force", "root mean square contribution of the friction that gives the measured loop area"),
+    "data_by_rest_length": ("force", "root mean square contribution of the springs' rest length, its error included"),
+    "data_unexplained": ("force", "root mean square of the remainder"),
+}
 _MAX_ROUNDS = 12
 _DIFFERENCE_STEP = 1e-6  # of friction, and of the rest half width [m], for derivatives
 
 
-def attribute(
-    result: Result,  # with its state
-    loop: MeasuredLoop,  # inside what the model covers
-) -> Mapping[str, Quantity]:
+def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
     """Return what explains a measured loop of a mechanism at rest, by name; nothing for a motion."""
     state = result.state
     if not isinstance(state, MeasuredCam | Solution):
@@ -53,11 +64,11 @@ def attribute(
     numbers = {
         "data_friction": friction,
         "data_rest_error": 2.0 * (rest - loads.rest_half_width),
-        "data_off_design": _rms(loop.up - design, loop.down - design),
-        "data_by_profile": _rms(on_track - design),
-        "data_by_friction": _rms(up - smooth, down - smooth),
-        "data_by_rest_length": _rms(smooth - on_track),
-        "data_unexplained": _rms(loop.up - up, loop.down - down),
+        "data_off_design": root_mean_square(loop.up - design, loop.down - design),
+        "data_by_profile": root_mean_square(on_track - design),
+        "data_by_friction": root_mean_square(up - smooth, down - smooth),
+        "data_by_rest_length": root_mean_square(smooth - on_track),
+        "data_unexplained": root_mean_square(loop.up - up, loop.down - down),
     }
     if not np.isfinite(list(numbers.values())).all():
         why = "no friction and rest length of this model give the measured loop"
@@ -102,7 +113,3 @@ def _middle(sides: Sides, loads: Loads, friction: float, rest: float) -> FloatAr
     up, down = (sides.forces(loads, direction * friction, rest)[0] for direction in (1.0, -1.0))
     middle: FloatArray = 0.5 * (up + down)
     return middle
-
-
-def _rms(*parts: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.square(np.concatenate(parts)))))

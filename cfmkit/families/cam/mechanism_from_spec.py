@@ -26,42 +26,32 @@ from cfmkit.families.rows import agree, fails, refuse_columns, remember_plain
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.slope_law import Real
-    from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism, Mounting
+    from cfmkit.families.cam.geometry.spec import Profile
+    from cfmkit.families.cam.spec import CamSpec, Mechanism, Mounting
     from cfmkit.results import Finding
 
 
 def resolve(spec: CamSpec) -> CamSpec:
     """Return the spec with the cut profile written out: what was left to follow the mechanism is now fixed."""
     mechanism = spec.mechanism
-    profile = mechanism.profile
-    strokes = profile.stroke, spec.analysis.travel, spec.design.stroke if spec.design else None
+    strokes = mechanism.profile.stroke, spec.analysis.travel, spec.design.stroke if spec.design else None
     stroke = next((value for value in strokes if value is not None), 0.5 * mechanism.brace_length)
+    changes: dict[str, object] = {"profile": _write_out(mechanism.profile, mechanism, stroke)}
+    if (left := mechanism.left) and left.profile:
+        profile = _write_out(left.profile, left_side(spec).mechanism, left.profile.stroke or stroke)
+        changes["left"] = left.model_copy(update={"profile": profile})
+    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=changes)})
+
+
+def _write_out(profile: Profile, mechanism: Mechanism, stroke: float) -> Profile:
+    """Return a profile whose omitted values are those of the mechanism around it."""
     preload = mechanism.effective_preload if profile.preload is None else profile.preload
     written = {
         name: getattr(mechanism if getattr(profile, name) is None else profile, name)
         for name in ("brace_length", "rest_half_width", "roller_radius")
     }
     written |= {"preload": preload if np.any(preload) else None, "stroke": stroke}
-    changes: dict[str, object] = {"profile": profile.model_copy(update=written)}
-    if mechanism.left and mechanism.left.profile:
-        changes["left"] = _resolved_left(mechanism, mechanism.left, stroke)
-    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=changes)})
-
-
-def _resolved_left(mechanism: Mechanism, left: Left, stroke: float) -> Left:
-    """Return the left side with its own flank written out: what that leaves out follows the left side."""
-    profile = left.profile
-    if profile is None:
-        return left
-    written = {
-        "brace_length": profile.brace_length or left.brace_length or mechanism.brace_length,
-        "rest_half_width": profile.rest_half_width or mechanism.rest_half_width,
-        "roller_radius": profile.roller_radius or left.roller_radius or mechanism.roller_radius,
-        "preload": (mechanism.effective_preload if profile.preload is None else profile.preload) or None,
-        "stroke": profile.stroke or stroke,
-    }
-    return left.model_copy(update={"profile": profile.model_copy(update=written)})
+    return profile.model_copy(update=written)
 
 
 def left_side(spec: CamSpec) -> CamSpec:
@@ -90,18 +80,6 @@ def slope_law(spec: CamSpec) -> SlopeLaw:
     return with_curve(plain, profile.curve.shape, profile.stroke)
 
 
-def hanging_weights(masses: Masses | None) -> tuple[float, float]:
-    """Return the weight that hangs on one roller and on the slider [N]: each brace counts half at each end."""
-    if masses is None:
-        return 0.0, 0.0
-    return weights(masses.slider, masses.brace, masses.roller)
-
-
-def weights(slider: Real, brace: Real, roller: Real) -> tuple[Real, Real]:
-    """Return the weights that hang on one roller and on the slider [N] from the masses of the parts [kg]."""
-    return STANDARD_GRAVITY * (roller + 0.5 * brace), STANDARD_GRAVITY * (slider + brace)
-
-
 class Weights(NamedTuple):
     """Weight on one roller and on the slider, against the slider's way out and across it; and what the guide carries.
 
@@ -117,9 +95,9 @@ def directions(mounting: Mounting | None) -> tuple[float, float, float]:
     """Return the shares of gravity against the slider's way out, to the right of it and out of the cam's plane."""
     if mounting is None:
         return 1.0, 0.0, 0.0
-    elevation, roll = mounting.elevation, mounting.roll
-    across = _exact(np.cos(elevation))
-    return _exact(np.sin(elevation)), across * _exact(np.cos(roll)), across * _exact(np.sin(roll))
+    angles = mounting.elevation, mounting.roll
+    (up, turned), (across, upright) = ([_exact(function(angle)) for angle in angles] for function in (np.sin, np.cos))
+    return up, across * upright, across * turned
 
 
 def _exact(share: Any) -> Any:
@@ -128,8 +106,14 @@ def _exact(share: Any) -> Any:
 
 
 def weights_of(mechanism: Mechanism) -> Weights:
-    """Return what the parts weigh, in the directions that the mounting gives."""
-    roller, slider = hanging_weights(mechanism.masses)
+    """Return what the parts weigh, in the directions that the mounting gives: each brace counts half at each end."""
+    masses = mechanism.masses
+    if masses is None:
+        return Weights()
+    roller, slider = (
+        STANDARD_GRAVITY * (masses.roller + 0.5 * masses.brace),
+        STANDARD_GRAVITY * (masses.slider + masses.brace),
+    )
     along, right, off = directions(mechanism.mounting)
     return Weights((along * roller, along * slider), (right * roller, right * slider), off * (2.0 * roller + slider))
 
@@ -195,14 +179,11 @@ def displacement_origin(assembly: Assembly) -> float:
     return assembly.track.start - below
 
 
-def check_start(
-    law: SlopeLaw,  # the slope of the path
-    # radius and brace length of each roller: the one built in, the one the cam is cut for [m]
-    *rollers: tuple[float, float],
-) -> None:
-    """Raise if there is no mechanism to begin with, whatever the force constant.
+def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
+    """Raise CannotBuild if there is no mechanism to begin with, whatever the force constant.
 
-    Raises CannotBuild if the braces do not reach, the rollers have no room, or the path does not rise.
+    That is so if the braces do not reach, the rollers have no room, or the path does not rise. `rollers` are radius and
+    brace length [m] of the one built in, and of the one that the cam is cut for.
     """
     x0, shortest = law.rest_half_width, np.minimum(rollers[0][1], rollers[-1][1])
     if fails(x0 >= shortest * (1 - 1e-6)):
@@ -333,16 +314,6 @@ def cam_start_height(profile: CamProfile) -> float:
     return profile.flank(profile.path.law.rest_half_width)[1]
 
 
-def room_between(
-    # x, y: pair of (n,): axis of the right roller, and of the left one as seen in a mirror [m]
-    x: tuple[FloatArray, FloatArray],
-    y: tuple[FloatArray, FloatArray],
-    radii: float,  # sum of both radii [m]
-) -> FloatArray:
-    """Return the gap between the right and the left roller, negative where they overlap [m]."""
-    return np.asarray(np.hypot(x[0] + x[1], y[0] - y[1]) - radii)
-
-
 def rollers_overlap(gap: float, place: str = "at the start") -> Finding:
     """Return what to say about rollers that overlap, `gap` [m] being negative."""
     return finding(
@@ -361,11 +332,8 @@ def flanks_cross(x: float) -> Finding:
     )
 
 
-def flanks_crossing(
-    profile: CamProfile,  # the cam as cut
-    offset: float = 0.0,  # material left on it beyond the profile [m]
-) -> Finding | None:
-    """Return what to say where the flanks meet or cross, so that there is no plate between them."""
+def flanks_crossing(profile: CamProfile, offset: float = 0.0) -> Finding | None:
+    """Return what to say where flanks with so much material left on them [m] meet: no plate is between them."""
     x = profile.offset_points(profile.start, offset - profile.roller_radius)[0]
     return flanks_cross(x) if fails(x <= 0) else None
 
@@ -386,19 +354,16 @@ def check_first_pose(assembly: Assembly) -> None:
 
 
 def count_before_overlap(
-    # travel, slider: (n,): travel, and position of the slider [m]
-    travel: FloatArray,
-    slider: FloatArray,
-    x: tuple[FloatArray, FloatArray],  # pair of (n,): axes of both rollers, outwards [m]
-    mechanism: Mechanism,  # whose rollers and braces they are
+    travel: FloatArray, slider: FloatArray, x: tuple[FloatArray, FloatArray], mechanism: Mechanism
 ) -> tuple[int, Finding | None]:
     """Return the number of points before the rollers overlap, and what to say if they do.
 
-    Raises CannotBuild if they overlap at the first point.
+    At travels and slider positions, (n,), with both rollers' axes outwards at x [m]. Raises CannotBuild if they overlap
+    at the first point.
     """
     brace = mechanism.brace_length
     right, left = (slider - np.sqrt((brace - across) * (brace + across)) for across in x)
-    gap = room_between(x, (right, left), 2.0 * mechanism.roller_radius)
+    gap = np.hypot(x[0] + x[1], right - left) - 2.0 * mechanism.roller_radius
     overlap = np.flatnonzero(gap < -1e-12 * brace)
     if not overlap.size:
         return len(travel), None
@@ -408,15 +373,10 @@ def count_before_overlap(
     return first, rollers_overlap(float(gap.min()), f"from {mm(float(travel[first]))} of travel on")
 
 
-def check_springs(
-    # elongation, held: (n,): of the springs [m], and the contact force [N]
-    elongation: FloatArray,
-    held: FloatArray,
-    rest_half_width: float,  # half width at which the springs are at rest [m]
-) -> None:
-    """Raise if nothing holds the rollers on the cam anywhere: springs that are slack over the whole travel.
+def check_springs(elongation: FloatArray, held: FloatArray, rest_half_width: float) -> None:
+    """Raise CannotBuild if nothing holds the rollers on the cam anywhere: springs are slack, and no contact presses.
 
-    Raises CannotBuild if no contact is pressed and no spring is stretched.
+    From elongations of the springs [m] and contact forces [N], (n,); springs are at rest at a half width [m].
     """
     if elongation.max() < 0 and not (held > 0).any():
         short = mm(-float(elongation.max()))

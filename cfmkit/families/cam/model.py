@@ -32,16 +32,18 @@ from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, left_out, rules_of
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import select_profiles
 from cfmkit.families.cam.hardware import hardware
+from cfmkit.families.cam.measured_cam import PROFILE_DEFINITIONS
 from cfmkit.families.cam.mechanism_from_spec import assemble, check_first_pose, check_springs, displacement_origin
-from cfmkit.families.cam.part_sizes_and_clearances import smallest, touching
-from cfmkit.families.cam.scalar_results import ROW_COLUMNS, SCALAR_QUANTITIES, contact_pressure, curve_cut_for
-from cfmkit.families.cam.solution import DenseLoop, Solution
+from cfmkit.families.cam.part_sizes_and_clearances import touching
+from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS, SCALAR_QUANTITIES, curve_cut_for
+from cfmkit.families.cam.solution import Solution
 from cfmkit.families.cam.statics import TRAVEL_RTOL, Assembly, forces, target_force
 from cfmkit.families.findings import CannotBuild, mm, no_result
 from cfmkit.families.rows import (
     RowsDiffer,
     SolvedRows,
     agree,
+    columns_of_absent_values,
     drop_numbers,
     fails,
     findings_of_one,
@@ -102,8 +104,10 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     solution = with_band(solution, run.seed)
-    loop = DenseLoop(solution)
-    short = shortfalls(assembly, float(solution.travel[-1]))
+    first, last = solution.travel[[0, -1]].tolist()
+    short, requested = shortfalls(assembly, last), solution.requested
+    if short and not spec.analysis.travel:  # as far as the flank was to be cut
+        requested = float(assembly.spec.mechanism.profile.stroke or 0.0)
     failed = int(np.isnan(solution.up.slider[1:]).sum() + np.isnan(solution.down.slider[1:]).sum())
     status, message = Status.COMPLETE, ""
     if short:
@@ -115,24 +119,16 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         status=status,
         message=message,
         curves=(_curve(solution),),
-        values=values_of_one(SCALAR_QUANTITIES, solution) | smallest(solution),
+        values=values_of_one(SCALAR_QUANTITIES, solution),
         warnings=LazySequence(partial(_findings, solution, short)),
-        travel=(
-            solution.origin + float(solution.travel[0]),
-            solution.origin + _requested_travel(solution, bool(short)),
-        ),
-        valid=(
-            (
-                max(solution.corner_travel, float(solution.travel[0])) + solution.origin,
-                float(solution.travel[-1]) + solution.origin,
-            ),
-        ),
+        travel=(solution.origin + first, solution.origin + requested),
+        valid=((max(solution.corner_travel, first) + solution.origin, last + solution.origin),),
         target=target_force(spec, assembly),
         target_curve=None if spec.target_curve else curve_cut_for(assembly),
         allowable_stress=allowable_stress(spec.mechanism),
-        closed=loop,
+        closed=solution,
         effort_error=solution.effort_error,
-        part_efforts=loop.part_efforts,
+        part_efforts=solution.part_efforts,
         tables=parts_tables(partial(_hardware_parts, solution)),
         state=solution,
     )
@@ -155,30 +151,20 @@ def with_band(solution: Solution, seed: int) -> Solution:
     return replace(solution, band=force_band(solution.assembly, tolerance, solution.travel, seed))
 
 
-def _requested_travel(solution: Solution, short: bool) -> float:
-    """Return how far the slider was to go [m]; without a request, as far as the flank was to be cut."""
-    spec = solution.assembly.spec
-    return float(spec.mechanism.profile.stroke or 0.0) if short and not spec.analysis.travel else solution.requested
-
-
 def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:
     """Return the spec with the defaults of the analysis made explicit."""
-    travel = _requested_travel(solution, short=False)
-    analysis = spec.analysis.model_copy(update={"travel": travel, "gravity": spec.gravity, "fidelity": "quasi-static"})
-    return spec.model_copy(update={"analysis": analysis})
+    stated = {"travel": solution.requested, "gravity": spec.gravity, "fidelity": "quasi-static"}
+    return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=stated)})
 
 
 def _hardware_parts(solution: Solution) -> tuple[ListedPart, ...]:
-    return tuple(hardware(solution).parts)
+    return hardware(solution).parts
 
 
-def solve(
-    assembly: Assembly,  # one mechanism; or several whose numbers are columns
-    count: int = 1,  # number of mechanisms
-) -> Solution:
+def solve(assembly: Assembly, count: int = 1) -> Solution:
     """Return states and forces over the travel that the analysis asks for, as far as the track goes.
 
-    Raises CannotBuild if a stop leaves no travel.
+    Of one mechanism, or of `count` whose numbers are columns. Raises CannotBuild if a stop leaves no travel.
     """
     spec, track, loads = assembly.spec, assembly.track, assembly.loads
     low, end = reachable_travel(assembly)
@@ -215,32 +201,23 @@ def shortfalls(assembly: Assembly, reached: Any) -> tuple[Finding, ...]:
     """Return why the curve ends, at a travel [m], before what was requested, or before the flank does."""
     warnings = [assembly.shortfall] if assembly.shortfall else []
     asked = assembly.spec.analysis.travel
-    short = asked is not None and fails(reached < asked * (1 - TRAVEL_RTOL))
-    if asked is not None and short and travel_between_stops(assembly.spec)[1] <= reached * (1 + TRAVEL_RTOL):
-        warnings.append(
-            finding(
-                "end_stop",
-                f"the requested travel is {mm(asked)}, but the slider is stopped at {mm(reached)} "
-                "('mechanism.stops.upper')",
-            )
+    is_short = asked is not None and fails(reached < asked * (1 - TRAVEL_RTOL))
+    if asked is not None and is_short and travel_between_stops(assembly.spec)[1] <= reached * (1 + TRAVEL_RTOL):
+        stopped = f"but the slider is stopped at {mm(reached)} ('mechanism.stops.upper')"
+        warnings.append(finding("end_stop", f"the requested travel is {mm(asked)}, {stopped}"))
+    elif assembly.track.turns_back and (is_short or asked is None):
+        message = (
+            f"with a brace of {mm(assembly.track.brace_length)} on this cam the slider stops rising after "
+            f"{mm(reached)} of travel, before the flank ends, and the force is unbounded there; use a longer "
+            "brace ('mechanism.brace_length'), or a cam cut for this one ('mechanism.profile.brace_length')"
         )
-    elif assembly.track.turns_back and (short or asked is None):
-        warnings.append(
-            finding(
-                "brace_too_short",
-                f"with a brace of {mm(assembly.track.brace_length)} on this cam the slider stops rising after "
-                f"{mm(reached)} of travel, before the flank ends, and the force is unbounded there; use a longer "
-                "brace ('mechanism.brace_length'), or a cam cut for this one ('mechanism.profile.brace_length')",
-            )
+        warnings.append(finding("brace_too_short", message))
+    elif asked is not None and is_short:
+        message = (
+            f"the requested travel is {mm(asked)}, but the profile is cut for {mm(reached)} with these parts; "
+            "cut a longer profile ('mechanism.profile.stroke') or request less ('analysis.travel')"
         )
-    elif asked is not None and short:
-        warnings.append(
-            finding(
-                "outside_profile",
-                f"the requested travel is {mm(asked)}, but the profile is cut for {mm(reached)} with these parts; "
-                "cut a longer profile ('mechanism.profile.stroke') or request less ('analysis.travel')",
-            )
-        )
+        warnings.append(finding("outside_profile", message))
     return tuple(warnings)
 
 
@@ -259,7 +236,7 @@ def _curve(solution: Solution) -> Curve:
         "contact_force": Column(contact, "force"),
         "brace_force": Column(loop(up.brace, down.brace), "force"),
         "spring_elongation": Column(loop(solution.elongation), "length"),
-        "pressure_angle": Column(loop(solution.pressure_angle), "angle"),
+        "pressure_angle": Column(loop(solution.states.pressure_angle), "angle"),
         "roller_x": Column(loop(states.x), "length"),
         "roller_y": Column(loop(states.y), "length"),
         "contact": Column(loop(np.where(states.on_corner, "corner", "flank")), "text"),
@@ -272,10 +249,10 @@ def _curve(solution: Solution) -> Curve:
         shares = {kind: np.where(np.isfinite(share), share, np.nan) for kind, share in shares.items()}
         extra |= {f"lost_to_{kind}": Column(share, "force") for kind, share in shares.items()}
     if solution.assembly.spec.mechanism.contact:
-        pressed = loop(contact_pressure(solution), contact_pressure(solution, down))
+        pressed = loop(solution.contact_pressure(up), solution.contact_pressure(down))
         extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
     branch = np.repeat(["load", "unload"], points)
-    return Curve(loop(solution.travel) + solution.origin, force, branch, stable, extra)
+    return Curve(loop(solution.displacement), force, branch, stable, extra)
 
 
 MAX_SAMPLES_AT_ONCE = 250_000
@@ -435,6 +412,10 @@ def _solve_alike(
             parcel = replace(rows_of(assembly, some), track=track.select_rows(some), profile=profile)
         windows = windows_of(rows[some])
         yield rows[some], _solve_group(replace(solve(parcel, len(some)), windows=windows), rows[some])
+
+
+ROW_COLUMNS = columns_of_absent_values(SCALAR_DEFINITIONS | PROFILE_DEFINITIONS) | dict(SCALAR_QUANTITIES)
+"""What studies may ask of rows: of values that only motions and measured cams have their cells are empty."""
 
 
 def _solve_group(solution: Solution, chosen: Rows) -> SolvedRows[Solution]:

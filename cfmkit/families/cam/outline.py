@@ -7,6 +7,8 @@ can change. The tab is narrower than the space between the rollers at the start.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -49,39 +51,163 @@ def drawing(spec: CamSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     Raises `CannotBuild` if there is no cam to draw.
     """
     sides = assemble_sides(spec)
-    profiles = sides[0].profile, sides[1].profile
+    profiles, spec = (sides[0].profile, sides[1].profile), sides[0].spec
     for profile in dict.fromkeys(profiles):
         if crossing := flanks_crossing(profile):
             raise CannotBuild(crossing)
+    cut, contact = CutPlate(profiles, spec.mechanism.plate), spec.mechanism.contact
     paths = Contour((path_edge(profiles[0]),), "path"), Contour((path_edge(profiles[1]).mirror(),), "path")
-    plate = sides[0].spec.mechanism.plate
-    contours = (*plate_contours(profiles, plate), *paths)
-    contact = sides[0].spec.mechanism.contact
-    sheet = Sheet(plate.thickness or (contact.width if contact else None), key="mechanism.plate.thickness")
-    dimensions, facts = tuple(_dimensions(profiles, plate)), tuple(_facts(sides[0].spec))
+    thickness = cut.plate.thickness or (contact.width if contact else None)
     return Drawing(
         "cam",
-        contours,
+        (*cut.contours, *paths),
         tuple(_tables(profiles)),
-        plate_notes(profiles, plate),
-        sheet,
-        dimensions=dimensions,
-        facts=facts,
+        cut.notes,
+        Sheet(thickness, key="mechanism.plate.thickness"),
+        dimensions=tuple(cut.dimensions()),
+        facts=tuple(_facts(spec)),
     )
 
 
-def _dimensions(profiles: Profiles, plate: Plate) -> Iterator[DrawnDimension]:
-    """Yield the main lengths of the plate, and where the rollers start."""
-    right, left = (flank_edge(profile).points for profile in profiles)
-    yield DrawnDimension("cam", (0.0, float(right[0, 1])), (0.0, float(right[-1, 1])), "y")
-    yield DrawnDimension(
-        "top", (-float(left[-1, 0]), float(left[-1, 1])), (float(right[-1, 0]), float(right[-1, 1])), "x"
-    )
-    if half := 0.5 * tab_width(plate, profiles):
-        floor = float(min(right[0, 1], left[0, 1])) - plate.base_height
-        yield DrawnDimension("tab", (-half, floor), (half, floor), "x")
-    x0 = [profile.path.law.rest_half_width for profile in profiles]
-    yield DrawnDimension("roller axes at the start", (-x0[1], 0.0), (x0[0], 0.0), "x")
+@dataclass(frozen=True)
+class CutPlate:
+    """The plate between a right and a left flank; both are drawn on the right."""
+
+    profiles: Profiles
+    plate: Plate
+
+    @cached_property
+    def flanks(self) -> tuple[Smooth, Smooth]:
+        """Both flanks from their lowest points up."""
+        return flank_edge(self.profiles[0]), flank_edge(self.profiles[1])
+
+    @cached_property
+    def tab_width(self) -> float:
+        """Width of the tab below the cam [m]; 0 if the rollers leave no space for one."""
+        free, lowest = np.inf, np.inf
+        for profile in self.profiles:
+            x0, radius = profile.path.law.rest_half_width, profile.roller_radius
+            free = min(free, 2.0 * (x0 - (1.0 + TAB_CLEARANCE) * radius))
+            lowest = min(lowest, 2.0 * float(profile.flank(profile.start)[0]))
+        return min(self.plate.base_width, lowest) if self.plate.base_width else max(min(free, lowest), 0.0)
+
+    @property
+    def bottom(self) -> float:
+        """Height of the cam's bottom [m]."""
+        return float(min(flank.points[0, 1] for flank in self.flanks))
+
+    @property
+    def top(self) -> float:
+        """Height of the plate's top [m]."""
+        return float(max(flank.points[-1, 1] for flank in self.flanks)) + self.plate.top_margin
+
+    @property
+    def across(self) -> float:
+        """Half the width at the top [m]."""
+        return min(float(flank.points[-1, 0]) for flank in self.flanks)
+
+    @property
+    def tool_room(self) -> float:
+        """Largest radius that the inside corners beside the tab have room for [m]; 0 without a tab."""
+        beside = min(float(flank.points[0, 0]) for flank in self.flanks) - 0.5 * self.tab_width
+        return min(beside, self.plate.base_height) if self.tab_width > 0 else 0.0
+
+    @property
+    def has_holes_in_tab(self) -> bool:
+        """Whether the tab has room for two fixing holes."""
+        size = self.plate.hole_diameter
+        return bool(size and self.plate.base_height >= 2.0 * size and self.tab_width >= 6.0 * size)
+
+    @property
+    def has_holes_at_top(self) -> bool:
+        """Whether there is room for two fixing holes near the top."""
+        size = self.plate.hole_diameter
+        return bool(size and self.top - self.bottom >= 6.0 * size and self.across >= 4.0 * size)
+
+    @property
+    def contours(self) -> tuple[Contour, ...]:
+        """The outline of the plate, and its holes."""
+        return self.outline, *self.holes
+
+    @property
+    def outline(self) -> Contour:
+        """The closed outline: right flank up, top, left flank down, bottom with the tab.
+
+        Flanks that begin or end at different heights leave a step.
+        """
+        plate, flanks = self.plate, self.flanks
+        (low, high), (left_low, left_high) = ((flank.points[0], flank.points[-1]) for flank in flanks)
+        above = [(high[0], high[1]), (high[0], self.top), (-left_high[0], self.top), (-left_high[0], left_high[1])]
+        half, floor = 0.5 * self.tab_width, self.bottom - plate.base_height
+        if half > 0 and plate.base_height > 0:
+            tab = [(-half, left_low[1]), (-half, floor), (half, floor), (half, low[1])]
+        else:  # a slanted bottom could pass through the higher roller
+            tab = [(0.0, left_low[1]), (0.0, low[1])] if left_low[1] != low[1] else []
+        bottom: list[Edge] = list(_lines([(-left_low[0], left_low[1]), *tab, (low[0], low[1])]))
+        r = plate.tool_radius
+        if 0 < r <= self.tool_room:
+            left, right = left_low[1], low[1]
+            bottom = [
+                *_lines([(-left_low[0], left), (-half - r, left)]),
+                Arc((-half - r, float(left) - r), r, 0.5 * np.pi, 0.0),
+                *_lines([(-half, left - r), (-half, floor), (half, floor), (half, right - r)]),
+                Arc((half + r, float(right) - r), r, np.pi, 0.5 * np.pi),
+                *_lines([(half + r, right), (low[0], right)]),
+            ]
+        edges: list[Edge] = [flanks[0], *_lines(above), flanks[1].mirror().reverse(), *bottom]
+        return Contour(tuple(edges), "cut", closed=True)
+
+    @property
+    def holes(self) -> list[Contour]:
+        """The fixing holes: two in the tab and two near the top, where there is room for them."""
+        diameter, centers = self.plate.hole_diameter, list[tuple[float, float]]()
+        if self.has_holes_in_tab:
+            height = self.bottom - 0.5 * self.plate.base_height
+            centers += [(side * 0.3 * self.tab_width, height) for side in (-1.0, 1.0)]
+        if self.has_holes_at_top:
+            centers += [(side * 0.5 * self.across, self.top - 2.0 * diameter) for side in (-1.0, 1.0)]
+        return [circle((float(x), float(y)), 0.5 * diameter, "cut", hole=True) for x, y in centers]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on a tab or fixing holes that the plate lacks for want of room."""
+        plate, diameter, width, faults = self.plate, self.plate.hole_diameter, self.tab_width, []
+        if plate.base_height and not width:
+            faults.append("the rollers leave no room for the tab below the cam: the plate has none ('mechanism.plate')")
+        elif plate.base_height and diameter and not self.has_holes_in_tab:
+            faults.append(
+                f"the two {mm(diameter)} holes of the tab are left out: they need a tab of {mm(6 * diameter)} by "
+                f"{mm(2 * diameter)}, it is {mm(width)} by {mm(plate.base_height)} ('mechanism.plate.base_width', "
+                "'.base_height', '.hole_diameter')"
+            )
+        if plate.tool_radius > self.tool_room > 0:
+            faults.append(
+                f"inside corners beside the tab have room for a tool radius of {mm(self.tool_room)}, not "
+                f"{mm(plate.tool_radius)}: they are drawn sharp ('mechanism.plate.tool_radius', '.base_width')"
+            )
+        if diameter and not self.has_holes_at_top:
+            faults.append(
+                f"the two {mm(diameter)} holes near the top are left out: they need a cam {mm(6 * diameter)} high and "
+                f"{mm(8 * diameter)} wide, it is {mm(self.top - self.bottom)} by {mm(2 * self.across)} "
+                "('mechanism.plate.hole_diameter')"
+            )
+        return tuple(faults)
+
+    def dimensions(self) -> Iterator[DrawnDimension]:
+        """Yield the main lengths of the plate, and where the rollers start."""
+        right, left = (flank.points.tolist() for flank in self.flanks)
+        yield DrawnDimension("cam", (0.0, right[0][1]), (0.0, right[-1][1]), "y")
+        yield DrawnDimension("top", (-left[-1][0], left[-1][1]), (right[-1][0], right[-1][1]), "x")
+        if half := 0.5 * self.tab_width:
+            floor = self.bottom - self.plate.base_height
+            yield DrawnDimension("tab", (-half, floor), (half, floor), "x")
+        x0 = [profile.path.law.rest_half_width for profile in self.profiles]
+        yield DrawnDimension("roller axes at the start", (-x0[1], 0.0), (x0[0], 0.0), "x")
+
+
+def _lines(corners: list[tuple[float, float]]) -> list[Line]:
+    points = [(float(x), float(y)) for x, y in corners]
+    return [Line(a, b) for a, b in pairwise(points) if a != b]
 
 
 def _facts(spec: CamSpec) -> Iterator[tuple[str, str]]:
@@ -90,19 +216,12 @@ def _facts(spec: CamSpec) -> Iterator[tuple[str, str]]:
     yield "material", mechanism.contact.material.words if mechanism.contact else "not stated"
     yield "rollers", f"2, diameter {mm(2.0 * mechanism.roller_radius)}"
     yield "braces", f"2, {mm(mechanism.brace_length)} between pin and roller axis"
-    stated_rates, count = mechanism.springs.each, mechanism.springs.count or 1
-    rates = stated_rates if isinstance(stated_rates, tuple) else (stated_rates,) * count
+    rates = mechanism.springs.rates
     same = len(set(rates)) == 1
     yield "springs", f"{len(rates)} of {rate(rates[0])}" if same else f"{len(rates)}: {', '.join(map(rate, rates))}"
     if mechanism.preload:
         yield "preload", f"springs stretched by {mm(mechanism.preload)} at the start"
     yield "cut for", f"A {mm(profile.force_constant)}, rolling friction {profile.friction:g}"
-
-
-def plate_contours(profiles: Profiles, plate: Plate) -> tuple[Contour, ...]:
-    """Return the outline of the plate between a right and a left flank, and its holes."""
-    flanks = flank_edge(profiles[0]), flank_edge(profiles[1])
-    return plate_contour(flanks, plate, profiles), *holes(flanks, plate, profiles)
 
 
 def _coordinates(profile: CamProfile, start: float) -> FloatArray:
@@ -138,114 +257,6 @@ def path_edge(profile: CamProfile) -> Smooth:
 def _tangents(profile: CamProfile, u: FloatArray) -> FloatArray:
     nx, ny = profile.normal(u)
     return np.column_stack([-ny, nx])
-
-
-def plate_contour(flanks: tuple[Smooth, Smooth], plate: Plate, profiles: Profiles) -> Contour:
-    """Return the closed outline: right flank up, top, left flank down, bottom with the tab.
-
-    `flanks` are both drawn on the right; flanks that begin or end at different heights leave a step.
-    """
-    (low, high), (left_low, left_high) = ((flank.points[0], flank.points[-1]) for flank in flanks)
-    top = max(high[1], left_high[1]) + plate.top_margin
-    above = [(high[0], high[1]), (high[0], top), (-left_high[0], top), (-left_high[0], left_high[1])]
-    half = 0.5 * tab_width(plate, profiles)
-    if half > 0 and plate.base_height > 0:
-        floor = min(low[1], left_low[1]) - plate.base_height
-        tab = [(-half, left_low[1]), (-half, floor), (half, floor), (half, low[1])]
-    else:  # a slanted bottom could pass through the higher roller
-        tab = [(0.0, left_low[1]), (0.0, low[1])] if left_low[1] != low[1] else []
-    below = [(-left_low[0], left_low[1]), *tab, (low[0], low[1])]
-    bottom: list[Edge] = list(_lines(below))
-    r = plate.tool_radius
-    if 0 < r <= _room_for_tool(flanks, plate, profiles):
-        (left, right), floor = (left_low[1], low[1]), min(low[1], left_low[1]) - plate.base_height
-        bottom = [
-            *_lines([(-left_low[0], left), (-half - r, left)]),
-            Arc((-half - r, float(left) - r), r, 0.5 * np.pi, 0.0),
-            *_lines([(-half, left - r), (-half, floor), (half, floor), (half, right - r)]),
-            Arc((half + r, float(right) - r), r, np.pi, 0.5 * np.pi),
-            *_lines([(half + r, right), (low[0], right)]),
-        ]
-    edges: list[Edge] = [flanks[0], *_lines(above), flanks[1].mirror().reverse(), *bottom]
-    return Contour(tuple(edges), "cut", closed=True)
-
-
-def _room_for_tool(flanks: tuple[Smooth, Smooth], plate: Plate, profiles: Profiles) -> float:
-    """Return the largest radius that the inside corners beside the tab have room for [m]; 0 without a tab."""
-    half = 0.5 * tab_width(plate, profiles)
-    beside = min(float(flank.points[0, 0]) for flank in flanks) - half
-    return min(beside, plate.base_height) if half > 0 else 0.0
-
-
-def _lines(corners: list[tuple[float, float]]) -> list[Line]:
-    points = [(float(x), float(y)) for x, y in corners]
-    return [Line(a, b) for a, b in pairwise(points) if a != b]
-
-
-def tab_width(plate: Plate, profiles: Profiles) -> float:
-    """Return the width of the tab below the cam [m]; 0 if the rollers leave no space for one."""
-    free, lowest = np.inf, np.inf
-    for profile in profiles:
-        x0, radius = profile.path.law.rest_half_width, profile.roller_radius
-        free = min(free, 2.0 * (x0 - (1.0 + TAB_CLEARANCE) * radius))
-        lowest = min(lowest, 2.0 * float(profile.flank(profile.start)[0]))
-    widest = max(min(free, lowest), 0.0)
-    return min(plate.base_width, lowest) if plate.base_width else widest
-
-
-def holes(flanks: tuple[Smooth, Smooth], plate: Plate, profiles: Profiles) -> list[Contour]:
-    """Return the fixing holes: two in the tab and two near the top, where there is room for them."""
-    diameter, width = plate.hole_diameter, tab_width(plate, profiles)
-    bottom, top, across = _extents(flanks, plate)
-    centers: list[tuple[float, float]] = []
-    if _room_in_tab(plate, width):
-        centers += [(side * 0.3 * width, bottom - 0.5 * plate.base_height) for side in (-1.0, 1.0)]
-    if _room_at_top(plate, top - bottom, across):
-        centers += [(side * 0.5 * across, top - 2.0 * diameter) for side in (-1.0, 1.0)]
-    return [circle((float(x), float(y)), 0.5 * diameter, "cut", hole=True) for x, y in centers]
-
-
-def _extents(flanks: tuple[Smooth, Smooth], plate: Plate) -> tuple[float, float, float]:
-    """Return the heights of the cam's bottom and of the plate's top, and half its width there [m]."""
-    bottom, top = min(flank.points[0, 1] for flank in flanks), max(flank.points[-1, 1] for flank in flanks)
-    return bottom, top + plate.top_margin, min(float(flank.points[-1, 0]) for flank in flanks)
-
-
-def _room_in_tab(plate: Plate, width: float) -> bool:
-    return bool(
-        plate.hole_diameter and plate.base_height >= 2.0 * plate.hole_diameter and width >= 6.0 * plate.hole_diameter
-    )
-
-
-def _room_at_top(plate: Plate, height: float, across: float) -> bool:
-    return bool(plate.hole_diameter and height >= 6.0 * plate.hole_diameter and across >= 4.0 * plate.hole_diameter)
-
-
-def plate_notes(profiles: Profiles, plate: Plate) -> tuple[str, ...]:
-    """Return what the plate lacks for want of room: its tab, or some of its fixing holes."""
-    flanks, diameter = (flank_edge(profiles[0]), flank_edge(profiles[1])), plate.hole_diameter
-    width, (bottom, top, across) = tab_width(plate, profiles), _extents(flanks, plate)
-    faults = []
-    if plate.base_height and not width:
-        faults.append("the rollers leave no room for the tab below the cam: the plate has none ('mechanism.plate')")
-    elif plate.base_height and diameter and not _room_in_tab(plate, width):
-        faults.append(
-            f"the two {mm(diameter)} holes of the tab are left out: they need a tab of {mm(6 * diameter)} by "
-            f"{mm(2 * diameter)}, it is {mm(width)} by {mm(plate.base_height)} ('mechanism.plate.base_width', "
-            "'.base_height', '.hole_diameter')"
-        )
-    room = _room_for_tool(flanks, plate, profiles)
-    if plate.tool_radius > room > 0:
-        faults.append(
-            f"inside corners beside the tab have room for a tool radius of {mm(room)}, not {mm(plate.tool_radius)}: "
-            "they are drawn sharp ('mechanism.plate.tool_radius', '.base_width')"
-        )
-    if diameter and not _room_at_top(plate, top - bottom, across):
-        faults.append(
-            f"the two {mm(diameter)} holes near the top are left out: they need a cam {mm(6 * diameter)} high and "
-            f"{mm(8 * diameter)} wide, it is {mm(top - bottom)} by {mm(2 * across)} ('mechanism.plate.hole_diameter')"
-        )
-    return tuple(faults)
 
 
 def _tables(profiles: Profiles) -> Iterator[Curve2D]:

@@ -14,10 +14,8 @@ from cfmkit.families.cam.hardware import cut_plate, hardware
 from cfmkit.families.cam.part_sizes_and_clearances import (
     BRACE_WIDTH,
     PLATE_THICKNESS,
-    count_of,
     depth_of,
-    pin_path,
-    roller_path,
+    wire_and_coil,
 )
 from cfmkit.families.cam.statics import forces
 from cfmkit.specs.units import format_short
@@ -43,24 +41,20 @@ def part_over_motion(result: Result) -> PosedPart | None:
     if not hasattr(solution, "states"):
         return None
     mechanism = result.spec.get_value("mechanism")
-    thick = PLATE_THICKNESS if mechanism.contact is None else mechanism.contact.width
-    stretch = float(solution.elongation.max())
-    depth = depth_of(thick, mechanism.springs, stretch, mechanism.rest_half_width)
-    wound = (
-        f"springs {mechanism.springs.name or 'as wound'}" if mechanism.springs.wound else "springs wound of steel wire"
-    )
-    reported = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE_WIDTH):.4g} mm each, {wound}"
-    if depth is None:
-        reported = "no steel spring fits between the rollers"
-    # plate, two rollers, four braces, two halves of the slider
-    pieces = 9 + count_of(mechanism.springs)
+    springs, thick = mechanism.springs, PLATE_THICKNESS if mechanism.contact is None else mechanism.contact.width
+    wire = wire_and_coil(springs, float(solution.elongation.max()), mechanism.rest_half_width)
     joining = hardware(solution)
-    depth = None if depth is None else depth + joining.slider_excess
-    depth = None if depth is None else 0.5 * depth + max(0.5 * depth, 0.5 * thick + joining.screw_head_height)
+    if wire is None:
+        depth, reported = None, "no steel spring fits between the rollers"
+    else:
+        half = 0.5 * (depth_of(thick, sum(wire), springs.number) + joining.slider_excess)
+        depth = half + max(half, 0.5 * thick + joining.screw_head_height)
+        wound = f"springs {springs.name or 'as wound'}" if springs.wound else "springs wound of steel wire"
+        reported = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE_WIDTH):.4g} mm each, {wound}"
     return PosedPart(
         (*bodies(solution), *joining.bodies),
         depth=depth,
-        pieces=pieces,
+        pieces=9 + springs.number,  # plate, two rollers, four braces, two halves of the slider
         assumed=reported,
         rubbing=joining.rubbing,
         faults=joining.faults,
@@ -69,10 +63,10 @@ def part_over_motion(result: Result) -> PosedPart | None:
 
 def bodies(solution: Solution) -> tuple[PosedBody, ...]:
     """Return the boxes of the plate and its holes, the rollers, and the slider's pin as large, at every point."""
-    radius = solution.assembly.spec.mechanism.roller_radius
+    radius = solution.mechanism.roller_radius
     plate = [PosedBody.polygon("plate", "held", rectangle(*contour.extents)) for contour in cut_plate(solution)]
-    right = PosedBody.line("roller", "contact", roller_path(solution)[:, None], radius)
-    return (*plate, right, right.mirror(), PosedBody.line("slider", "driven", pin_path(solution)[:, None], radius))
+    right = PosedBody.line("roller", "contact", solution.roller_path[:, None], radius)
+    return (*plate, right, right.mirror(), PosedBody.line("slider", "driven", solution.pin_path[:, None], radius))
 
 
 # --- for pictures -----------------------------------------------------------------------------------------------
@@ -96,7 +90,7 @@ class PartsPose:
 
 def pose(solution: Solution, index: int) -> PartsPose:
     """Return the positions of the parts at one point of the solution."""
-    (x, y), (_, pin) = (path(solution)[index].tolist() for path in (roller_path, pin_path))
+    (x, y), (_, pin) = (path[index].tolist() for path in (solution.roller_path, solution.pin_path))
     return PartsPose((x, y), (0.0, pin), _contact(solution, index), bool(solution.states.on_corner[index]))
 
 
@@ -108,14 +102,14 @@ def _contact(solution: Solution, index: int) -> Point:
         normal = toward / np.hypot(*toward)
     else:
         normal = np.array(profile.normal(float(states.parameter[index])))
-    x, y = center - solution.assembly.spec.mechanism.roller_radius * normal
+    x, y = center - solution.mechanism.roller_radius * normal
     return float(x), float(y)
 
 
 def surface(solution: Solution, points: int = 400) -> FloatArray:
     """Return the right flank as the roller finds it, material left on it included, (n, 2) [m]."""
     profile = solution.assembly.track.profile  # with material missing: the flank cut for a larger roller
-    offset = max(solution.assembly.spec.mechanism.profile.offset, 0.0) - profile.roller_radius
+    offset = max(solution.mechanism.profile.offset, 0.0) - profile.roller_radius
     share = np.linspace(0.0, 1.0, points)
     u = profile.start + (profile.end - profile.start) * share**2
     return np.column_stack(profile.offset_points(u, offset))
@@ -137,7 +131,7 @@ def scene(solution: Solution) -> Scene:
     height = top - bottom
     half = max(1.06 * across, MIN_ASPECT_RATIO * height)
     view = (-half, bottom - 0.03 * height, half, top + 0.14 * height)
-    return Scene(polygons(cut_plate(solution), "cut"), surface(solution), roller_path(solution), view)
+    return Scene(polygons(cut_plate(solution), "cut"), surface(solution), solution.roller_path, view)
 
 
 def swallowtail(solution: Solution, points: int = 200) -> FloatArray:

@@ -13,11 +13,10 @@ import numpy as np
 from cfmkit.arrays import FloatArray
 from cfmkit.export.contours import Arc, Line
 from cfmkit.families.cam.findings import finding
-from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS
+from cfmkit.families.cam.outline import CutPlate
 from cfmkit.families.findings import mm
-from cfmkit.results import Quantity
-from cfmkit.stock.springs.offers import extension_spring
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.offers import slimmest_spring
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,50 +29,29 @@ if TYPE_CHECKING:
 PLATE_THICKNESS = 0.008  # thickness of the plate where no `contact.width` says it [m]: that of the contact's example
 
 
-def roller_path(solution: Solution) -> FloatArray:
-    """Return the positions of the right roller's axis over the solution, (n, 2) [m]."""
-    return np.column_stack([solution.states.x, solution.states.y])
-
-
-def pin_path(solution: Solution) -> FloatArray:
-    """Return the positions of the slider's pin over the solution, (n, 2) [m]."""
-    (x, y), length = roller_path(solution).T, solution.assembly.track.brace_length
-    return np.column_stack([0.0 * x, y + np.sqrt((length - x) * (length + x))])
-
-
 BRACE_WIDTH = 0.010
 """Thickness of a brace where the plate is thicker [m]: it is pulled along, the plate is pressed on its edge."""
 
 
-def depth_of(
-    thick: float,  # of the plate, and of each brace up to `BRACE_WIDTH` [m]
-    springs: Springs,  # how many of what stiffness: half of them on either side, above each other
-    # stretch, half_width: their largest elongation, and half their length at rest [m]
-    stretch: float,
-    half_width: float,
-    safety: float = 1.0,  # of springs whose wire is not known, against yield
-) -> float | None:
-    """Return the depth with springs of a known wire, else wound of steel wire [m]; None if no such spring fits."""
-    outer = coil_diameter(springs, stretch, half_width, safety)
-    return None if outer is None else thick + 2.0 * min(thick, BRACE_WIDTH) + min(count_of(springs), 2) * outer
+def depth_of(thick: float, outer: float, number: int) -> float:
+    """Return the depth of a plate, of a brace on both sides of it, and of so many springs beyond these [m].
 
-
-def coil_diameter(springs: Springs, stretch: float, half_width: float, safety: float = 1.0) -> float | None:
-    """Return the outer diameter of each spring, of its known wire or else wound of steel wire [m]; None if none fits.
-
-    `stretch`, `half_width`, `safety`: as of `depth_of`.
+    Half of the springs, of an outer diameter [m], are on either side, above each other.
     """
-    sizes = wire_and_coil(springs, stretch, half_width, safety)
-    return None if sizes is None else sum(sizes)
+    return thick + 2.0 * min(thick, BRACE_WIDTH) + min(number, 2) * outer
 
 
 def wire_and_coil(
     springs: Springs, stretch: float, half_width: float, safety: float = 1.0
 ) -> tuple[float, float] | None:
-    """Return the wire's diameter and the mean one of the coil of each spring [m], as `coil_diameter` has them."""
+    """Return the wire's diameter and the mean one of the coil of each spring [m], of known wire or else of steel.
+
+    Steel wire bears a stretch with a safety against yield, and fits between axes at rest two half widths apart [m];
+    None if none does.
+    """
     if springs.wound is not None:
         return springs.wound.wire, springs.wound.coil
-    made = extension_spring(springs.total / count_of(springs), stretch, 2.0 * half_width, safety)
+    made = slimmest_spring(ExtensionSpring, springs.total / springs.number, stretch, 2.0 * half_width, safety)
     return None if made is None else (made.wire, made.coil)
 
 
@@ -84,11 +62,6 @@ def stack_height(outer: float, count: int) -> float:
     (0.02, 0.03)
     """
     return outer * ((count + 1) // 2)
-
-
-def count_of(springs: Springs) -> int:
-    """Return how many springs there are."""
-    return len(springs.each) if isinstance(springs.each, tuple) else springs.count or 1
 
 
 BESIDE_FLANKS_PAIR, OVERLAP_TOL = "roller and plate beside the flanks", 1e-9
@@ -102,13 +75,13 @@ def clearances(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
 
     Only what `mechanism.envelope` gives a size is looked at. The cam's flank, on which the roller runs, is left out.
     """
-    mechanism, states = solution.assembly.spec.mechanism, solution.states
+    mechanism, states = solution.mechanism, solution.states
     sizes, radius = mechanism.envelope, mechanism.roller_radius
     if sizes is None:
         return
-    x, y, pin = states.x, states.y, pin_path(solution)[:, 1]
+    x, y, pin = states.x, states.y, solution.pin_path[:, 1]
     profile = solution.assembly.profile
-    contours = plate_contours((profile, profile), mechanism.plate)
+    contours = CutPlate((profile, profile), mechanism.plate).contours
     yield "roller and roller", 2.0 * (x - radius)
     # The ends of the edges beside the flanks lie on the flanks, which the rollers touch: rounding is no overlap.
     yield BESIDE_FLANKS_PAIR, _to_edges((x, y), contours[0].edges) - radius
@@ -137,16 +110,15 @@ def nearest_pairs(solution: Solution) -> dict[str, FloatArray]:
     return gaps
 
 
-def smallest(solution: Solution) -> dict[str, Quantity]:
-    """Return the smallest distance by name; nothing where no sizes are given."""
-    least = {pair: float(gap.min()) for pair, gap in nearest_pairs(solution).items()}
-    gaps = [gap for pair, gap in least.items() if pair != BESIDE_FLANKS_PAIR or gap < -OVERLAP_TOL]
-    return {"clearance_min": Quantity(min(gaps), *SCALAR_DEFINITIONS["clearance_min"])} if gaps else {}
+def smallest_gap(solution: Solution) -> float:
+    """Return the smallest distance of all pairs [m]."""
+    gaps = [(pair, float(gap.min())) for pair, gap in clearances(solution)]
+    return min(gap for pair, gap in gaps if pair != BESIDE_FLANKS_PAIR or gap < -OVERLAP_TOL)
 
 
 def touching(solution: Solution) -> Iterator[Finding]:
     """Yield which parts come nearer than wanted, the worst first."""
-    envelope, reported = solution.assembly.spec.mechanism.envelope, set()
+    envelope, reported = solution.mechanism.envelope, set()
     for pair, gap in sorted(clearances(solution), key=lambda item: float(item[1].min())):
         least = int(np.argmin(gap))
         if (

@@ -15,7 +15,7 @@ Reference
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,21 +23,24 @@ import numpy as np
 from cfmkit.errors import SolutionError
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.hardware import BEARING_IN_ROLLER, SHAFT_IN_ROLLER, roller_shaft
-from cfmkit.families.cam.part_sizes_and_clearances import BRACE_WIDTH, coil_diameter, count_of, depth_of, stack_height
+from cfmkit.families.cam.model import analyze
+from cfmkit.families.cam.part_sizes_and_clearances import BRACE_WIDTH, depth_of, stack_height, wire_and_coil
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
 from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, guide_rods, pin_for, series_sizes
 from cfmkit.families.proposals import Candidate, FamilyOffer, name_variant
+from cfmkit.families.run_control import Run
+from cfmkit.metrics import evaluate
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.springs.offers import as_stated, extension_spring
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.offers import as_stated, slimmest_spring
 from cfmkit.stock.stock_series import BALL_BEARINGS
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.proposals import Request
-    from cfmkit.families.run_control import Run
     from cfmkit.stock.stock_series import Bearing
 
 ROLLING_FRICTION = 0.002
@@ -172,83 +175,85 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
     """Return a design with springs that exist and a plate that bears the rollers; None if the depth is too small."""
     total = request.target / (4.0 * size["constant"])
     stretch = 2.0 * (size["end"] - size["start"])
+    press = CONTACT_MARGIN * size["contact"] * request.target
     for block in request.materials or ({"name": "steel-s235"},):
         material = MaterialSpec.model_validate(dict(block))
         if material.yield_strength is None:
             continue
         modulus = material.modulus / (2.0 * (1.0 - material.poisson**2))
         bearable = YIELD_PRESSURE * material.yield_strength / request.safety
-        press = CONTACT_MARGIN * size["contact"] * request.target
         thick = max(PLATE_MIN, press * modulus / (np.pi * size["roller"] * bearable**2))
         if request.hysteresis is not None and not size["plain"]:
-            thick = max(
-                thick, *(entry.width for entry in BALL_BEARINGS if _turn_on_bearings(0.0, size["roller"], entry))
-            )
-        slider = _slider(request, size, material)
+            fitting = (entry.width for entry in BALL_BEARINGS if _turn_on_bearings(0.0, size["roller"], entry))
+            thick = max(thick, *fitting)
+        joints = _Joints.from_size(request, size, press, thick, PartStrength.from_material(material, request.safety))
+        pin = joints.slider_pin(request, size)
         depths: dict[int, float] = {}
-        pin = _slider_pin(request, size, (thick, slider), material)
         for count in SPRING_COUNTS if pin is not None else ():
             springs = Springs(stiffness=total / count, count=count)
-            depth = depth_of(thick, springs, stretch, size["start"], request.safety)
-            if depth is None or depth + 2.0 * slider > (request.depth or sum(request.envelope)):
+            wire = wire_and_coil(springs, stretch, size["start"], request.safety)
+            if wire is None:
                 continue
-            outer = coil_diameter(springs, stretch, size["start"], request.safety) or 0.0
-            if not _shafts_as_assumed(request, size, (thick, slider, outer), material, 0.5 * total * stretch):
+            outer = sum(wire)
+            depth = depth_of(thick, outer, count) + 2.0 * joints.slider
+            if depth > (request.depth or sum(request.envelope)):
                 continue
-            stack = stack_height(outer, count)
-            below = 0.5 * stack - max(size["roller"], TAB_HEIGHT_RATIO * request.envelope[1])
+            is_on_bearings = request.hysteresis is not None and not size["plain"]
+            if is_on_bearings and not joints.turn_on_bearings(size["roller"], outer, 0.5 * total * stretch):
+                continue
+            below = 0.5 * stack_height(outer, count) - max(size["roller"], TAB_HEIGHT_RATIO * request.envelope[1])
             if size["height"] + max(below, 0.0) <= request.envelope[1]:
-                depths[count] = depth + 2.0 * slider
+                depths[count] = depth
         if depths:
             # as few springs as there is room for; without a depth they may be as deep as the envelope is wide
             modest = [count for count, depth in depths.items() if request.depth or depth <= max(request.envelope)]
-            count = modest[0] if modest else min(depths, key=lambda count_of_springs: depths[count_of_springs])
+            count = modest[0] if modest else min(depths, key=lambda number: depths[number])
             return _write_candidate(request, size | {"pin": float(pin or 0.0)}, dict(block), thick, count, total)
     return None
 
 
-def _slider_pin(
-    request: Request, size: dict[str, float], sizes: tuple[float, float], material: MaterialSpec
-) -> float | None:
-    """Return the slider's pin, for the pull of a brace at the end of the travel [m].
+@dataclass(frozen=True)
+class _Joints:
+    """Thicknesses and loads that pins and shafts of a candidate join."""
 
-    None if it, or the shaft of a roller, is too thick for roller and slider.
-    """
-    strength = PartStrength.from_material(material, request.safety)
-    thick, slider = sizes  # of the plate, and of half of the slider [m]
-    brace = min(thick, BRACE_WIDTH)
-    rise = np.sqrt(size["brace"] ** 2 - size["end"] ** 2)
-    pull = PULL_MARGIN * 0.5 * request.target * size["brace"] / float(rise)
-    pin, pin_bears = pin_for(pull, 0.5 * (brace + slider), min(brace, slider), strength, None)
-    press = CONTACT_MARGIN * size["contact"] * request.target
-    shaft, shaft_bears = pin_for(press, 0.5 * (thick + brace), thick, strength, None)
-    most = SHAFT_IN_ROLLER * 2.0 * size["roller"]
-    handy = next((entry for entry in series_sizes("pin", None) if entry >= PIN_SHARE * 2.0 * size["roller"]), pin)
-    return max(pin, handy) if pin_bears and shaft_bears and max(pin, shaft) <= most else None
+    strength: PartStrength
+    press: float  # of a roller on the cam [N]
+    thick: float  # of the plate [m]
+    slider: float  # of half of the slider around the rods that guide it [m]
 
+    @classmethod
+    def from_size(
+        cls, request: Request, size: dict[str, float], press: float, thick: float, strength: PartStrength
+    ) -> _Joints:
+        """Return those of a candidate's sizes."""
+        travel = size["run_in"] + request.travel + spare_stroke(request)
+        rods = guide_rods(4, 0.0, PULL_MARGIN * request.target, travel, 2.0 * size["roller"], None, None, strength)
+        return cls(strength, press, thick, rods.slider_thickness)
 
-def _shafts_as_assumed(
-    request: Request,
-    size: dict[str, float],
-    sizes: tuple[float, float, float],  # thickness of plate and half slider, diameter of a spring's coil [m]
-    material: MaterialSpec,
-    pull: float,  # of the springs of a side [N]
-) -> bool:
-    """Return True unless friction counts, and rollers that were to have ball bearings have too thick shafts."""
-    if request.hysteresis is None or size["plain"]:
-        return True
-    (thick, slider, outer), press = sizes, CONTACT_MARGIN * size["contact"] * request.target
-    brace = min(thick, BRACE_WIDTH)
-    arm = 0.25 * (thick + brace) + (0.5 * (brace + outer) + slider) * pull / press
-    shaft, bears = pin_for(press, arm, thick, PartStrength.from_material(material, request.safety), None)
-    return bears and bool(_turn_on_bearings(shaft, size["roller"]))
+    @property
+    def brace(self) -> float:
+        """Thickness of a brace [m]."""
+        return min(self.thick, BRACE_WIDTH)
 
+    def slider_pin(self, request: Request, size: dict[str, float]) -> float | None:
+        """Return the slider's pin, for the pull of a brace at the end of the travel [m].
 
-def _slider(request: Request, size: dict[str, float], material: MaterialSpec) -> float:
-    """Return how thick half of the slider is around the rods that guide it [m]."""
-    strength, travel = PartStrength.from_material(material, request.safety), size["run_in"] + request.travel
-    load = (0.0, PULL_MARGIN * request.target, travel + spare_stroke(request), 2.0 * size["roller"])
-    return guide_rods(4, *load, None, None, strength).slider_thickness
+        None if it, or the shaft of a roller, is too thick for roller and slider.
+        """
+        rise = np.sqrt(size["brace"] ** 2 - size["end"] ** 2)
+        pull = PULL_MARGIN * 0.5 * request.target * size["brace"] / float(rise)
+        arm, thin = 0.5 * (self.brace + self.slider), min(self.brace, self.slider)
+        pin, pin_bears = pin_for(pull, arm, thin, self.strength, None)
+        shaft, shaft_bears = pin_for(self.press, 0.5 * (self.thick + self.brace), self.thick, self.strength, None)
+        least, most = PIN_SHARE * 2.0 * size["roller"], SHAFT_IN_ROLLER * 2.0 * size["roller"]
+        handy = next((entry for entry in series_sizes("pin", None) if entry >= least), pin)
+        return max(pin, handy) if pin_bears and shaft_bears and max(pin, shaft) <= most else None
+
+    def turn_on_bearings(self, roller: float, outer: float, pull: float) -> bool:
+        """Return whether ball bearings fit around shafts that bear the springs of a side, too, of a pull [N]."""
+        arm = 0.25 * (self.thick + self.brace) + (0.5 * (self.brace + outer) + self.slider) * pull / self.press
+        shaft, bears = pin_for(self.press, arm, self.thick, self.strength, None)
+        return bears and bool(_turn_on_bearings(shaft, roller))
 
 
 def with_wire(spec: CamSpec, request: Request) -> CamSpec:
@@ -256,14 +261,11 @@ def with_wire(spec: CamSpec, request: Request) -> CamSpec:
 
     They are those that its depth counts with (`part.depth_of`).
     """
-    from cfmkit.families.cam.model import analyze
-    from cfmkit.families.run_control import Run
-
     springs, solution = spec.mechanism.springs, analyze(spec, Run()).state
     if springs.wound is not None or solution is None:
         return with_bearings(spec, request)
     stretch, length = float(solution.elongation.max()), 2.0 * spec.mechanism.rest_half_width
-    coil = extension_spring(springs.total / count_of(springs), stretch, length, request.safety)
+    coil = slimmest_spring(ExtensionSpring, springs.total / springs.number, stretch, length, request.safety)
     if coil is None:
         return with_bearings(spec, request)
     stated = {"count": springs.count, "preload": springs.preload} if springs.preload else {"count": springs.count}
@@ -275,9 +277,6 @@ def with_bearings(spec: CamSpec, request: Request) -> CamSpec:
 
     What ball bearings take is in the rolling friction, which was measured with them.
     """
-    from cfmkit.families.cam.model import analyze
-    from cfmkit.families.run_control import Run
-
     solution = analyze(spec, Run()).state if request.hysteresis is not None else None
     if solution is None:
         return spec
@@ -289,11 +288,7 @@ def with_bearings(spec: CamSpec, request: Request) -> CamSpec:
 
 def widen_plate(spec: CamSpec, request: Request) -> CamSpec:
     """Return a designed cam whose plate bears its rollers: the pressure goes with the root of force over thickness."""
-    from cfmkit.families.cam.model import analyze
-    from cfmkit.families.run_control import Run
-    from cfmkit.metrics import evaluate
-
-    if count_of(spec.mechanism.springs) % 2:
+    if spec.mechanism.springs.number % 2:
         raise SolutionError("an odd number of springs of the catalogue would pull on one side of the plate")
     springs = spec.mechanism.springs
     if springs.wound is not None:  # the rate is that of the wire

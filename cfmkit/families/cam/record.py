@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from cfmkit.families.base import DesignMethod, Family, Pictures, ResultNames
 from cfmkit.families.cam.findings import CAM_FINDINGS
+from cfmkit.families.cam.measured_cam import PROFILE_DEFINITIONS
+from cfmkit.families.cam.measured_deviation_causes import DEVIATION_DEFINITIONS
 from cfmkit.families.cam.mechanism_from_spec import resolve
-from cfmkit.families.cam.scalar_results import DEVIATION_DEFINITIONS, SCALAR_DEFINITIONS
+from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.deferred_imports import deferred_imports
 
@@ -26,7 +28,7 @@ FAMILY_RECORD = Family(
     spec_type=CamSpec,
     models={"quasi-static": analyze, "dynamic": analyze_motion},
     outputs=ResultNames(
-        values=SCALAR_DEFINITIONS,
+        values=SCALAR_DEFINITIONS | PROFILE_DEFINITIONS,
         causes=DEVIATION_DEFINITIONS,
         findings=CAM_FINDINGS,
         headline=(

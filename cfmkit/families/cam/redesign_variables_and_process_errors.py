@@ -10,10 +10,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec
 
 
-def free(
-    spec: CamSpec,  # with the `design` block
-    designed: CamSpec,  # what came out
-) -> dict[str, tuple[float, float]]:
+def free(spec: CamSpec, designed: CamSpec) -> dict[str, tuple[float, float]]:
     """Return the force constant of the cut, and the rate of the springs where the design may choose it."""
     wanted, mechanism = spec.design, designed.mechanism
     ranges = {"mechanism.profile.force_constant": range_about(mechanism.profile.force_constant)}

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, Trac
 from cfmkit.families.cam.statics import TRAVEL_RTOL, Forces, forces, jams, target_force
 from cfmkit.families.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.rows import PlacesKept, is_column, row_of, rows_of
-from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
+from cfmkit.metrics.curve_rows import CurveRows, RowSamples, StressRows
 from cfmkit.results import ROUND_OFF
 from cfmkit.specs.units import window_places
 
@@ -60,13 +60,6 @@ class ForceBand:
         return deviations
 
 
-def pressure_angle(states: TrackStates) -> FloatArray:
-    """Return the angle between a brace's pull and its roller's motion [rad]; at 90 deg the slider moves nothing."""
-    slope, tangent = states.slope, states.tangent
-    angle: FloatArray = np.arctan2(1.0 + slope * tangent, slope - tangent)
-    return angle
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(ShortRepr):
     """A solved mechanism, as the checks, the scalar values and the pictures need it; or several of one kind as rows.
@@ -104,14 +97,25 @@ class Solution(ShortRepr):
         parts = [row_of((cam.path.law, cam.roller_radius, cam.end), row) for row in range(self.count)]
         return np.array([[read(CamProfile(RollerPath(law, end), radius, end))] for law, radius, end in parts])
 
+    @cached_property
+    def displacement(self) -> FloatArray:
+        """Displacement of the slider, the travel from the origin that is asked for [m]."""
+        return np.asarray(self.travel + self.origin)
+
+    @cached_property
+    def roller_path(self) -> FloatArray:
+        """Positions of the right roller's axis, of one mechanism, (n, 2) [m]."""
+        return np.column_stack([self.states.x, self.states.y])
+
+    @cached_property
+    def pin_path(self) -> FloatArray:
+        """Positions of the slider's pin, of one mechanism, (n, 2) [m]."""
+        (x, y), length = self.roller_path.T, self.assembly.track.brace_length
+        return np.column_stack([0.0 * x, y + np.sqrt((length - x) * (length + x))])
+
     def column(self, value: Any) -> FloatArray:
         """Return a number of each mechanism, (m,)."""
         return np.broadcast_to(np.ravel(value), self.count)
-
-    @cached_property
-    def pressure_angle(self) -> FloatArray:
-        """Angle between the brace's pull and the roller's motion [rad]; at 90 deg the slider moves nothing."""
-        return pressure_angle(self.states)
 
     @cached_property
     def elongation(self) -> FloatArray:
@@ -124,13 +128,15 @@ class Solution(ShortRepr):
         """Up and down; one where they are alike."""
         return (self.up,) if self.up is self.down else (self.up, self.down)
 
+    def contact_pressure(self, state: Forces) -> FloatArray:
+        """Return the pressure of the line contact on the way up or down [Pa]; NaN on the corner."""
+        return flank_pressure(self.assembly, self.states, state.contact)
+
     @cached_property
     def effort_error(self) -> Any:
         """Rounding of the sum of springs and weights on the slider [N]."""
         weight = self.assembly.loads.slider_weight
-        most = reduce(
-            np.maximum, (largest_of_each(np.abs(way_forces.slider - weight)) for way_forces in self._ways)
-        ) + np.abs(weight)
+        most = largest_of_each(*(np.abs(state.slider - weight) for state in self._ways)) + np.abs(weight)
         return ROUND_OFF * (np.nan_to_num(most) if self.count > 1 else float(np.nan_to_num(most)[0]))
 
     @cached_property
@@ -142,29 +148,68 @@ class Solution(ShortRepr):
         return corner_travel if self.count > 1 else float(corner_travel[0])
 
     @cached_property
-    def flank(self) -> FlankSamples:
-        """Contacts on the flank."""
-        return FlankSamples.from_solution(self)
+    def flank(self) -> tuple[FlankSamples, ...]:
+        """Contacts on the flank: those at the samples, and before them that with which the roller leaves the corner."""
+        corner, travel, states = np.atleast_1d(self.corner_travel), self.travel, self.states
+        leaves = (corner > 0) & (corner <= travel[..., -1:])
+        samples = FlankSamples(travel, ~states.on_corner & (~leaves | (travel > corner)), states, self.up, self.down)
+        if not leaves.any():
+            return (samples,)
+        (first, up), (_, down) = (self.evaluate_travel(corner, sign, flank=True) for sign in (1.0, -1.0))
+        return FlankSamples(corner, leaves, first, up, down), samples
+
+    @property
+    def largest_angle_on_flank(self) -> FloatArray:
+        """Largest angle between a brace's pull and its roller's motion on the flank, (..., 1) [rad]."""
+        return largest_of_each(*(np.where(at.there, at.states.pressure_angle, np.nan) for at in self.flank))
+
+    @property
+    def largest_half_gap(self) -> FloatArray:
+        """Largest (up - down)/(up + down) on the flank, (..., 1)."""
+
+        def half_gap(at: FlankSamples) -> FloatArray:
+            up, down = at.up.slider, at.down.slider
+            usable = at.there & np.isfinite(up) & np.isfinite(down) & (up + down > self.effort_error)
+            return np.where(usable, (up - down) / np.where(usable, up + down, 1.0), np.nan)
+
+        return largest_of_each(*map(half_gap, self.flank))
+
+    @cached_property
+    def largest_pressure(self) -> tuple[FloatArray, FloatArray]:
+        """Largest pressure on the flank on the way up [Pa], NaN without a contact, and about its place [m], (m, 1)."""
+
+        def pressure(states: TrackStates, up: Forces) -> FloatArray:
+            return flank_pressure(self.assembly, states, up.contact)
+
+        def evaluate(travel: FloatArray) -> FloatArray:
+            return pressure(*self.evaluate_travel(travel, 1.0, flank=True))
+
+        pressed = (np.where(at.there, pressure(at.states, at.up), np.nan) for at in self.flank)
+        travel, values = (reduce(_append_column, parts) for parts in ((at.travel for at in self.flank), pressed))
+        return extreme_next_to(evaluate, travel, values, self.count)
 
     # --- at any travel ----------------------------------------------------------------------------------------------
 
     def evaluate_travel(
-        self,
-        travel: FloatArray,  # (k, m), or of any shape for one mechanism: travels of each mechanism, or of some
-        sign: float,  # 1 or -1
-        rows: Any = None,  # (k,) of int: which mechanisms; default: all
-        flank: bool = False,  # whether places are on the flank: rounding must not take the first one to the corner
+        self, travel: FloatArray, sign: float, rows: Any = None, flank: bool = False
     ) -> tuple[TrackStates, Forces]:
-        """Return where the rollers are, and the forces on the way up (1) or down (-1), at travels [m]."""
-        track, loads, friction = self.assembly.track, self.assembly.loads, self.mechanism.rolling_friction
-        if rows is not None:
-            track, loads, friction = track.select_rows(rows), rows_of(loads, rows), rows_of(friction, rows)
+        """Return where the rollers are, and the forces on the way up (1) or down (-1), at travels [m].
+
+        Of all mechanisms, or of `rows` (k,); `flank`: rounding must not take its first place to the corner.
+        """
+        track = self.assembly.track if rows is None else self.assembly.track.select_rows(rows)
         slider = track.start + travel
         if rows is None and not flank:
             states = self._states_at(slider)
         else:
             states = track.states(np.maximum(slider, track.corner_end) if flank else slider)
-        return states, forces(states, loads, sign * friction, sign)
+        return states, self.forces_at(states, sign, rows)
+
+    def forces_at(self, states: TrackStates, sign: float, rows: Any = None) -> Forces:
+        """Return the forces on the way up (1) or down (-1) where the rollers of all, or of some, are."""
+        acting = self.assembly.loads, self.mechanism.rolling_friction
+        loads, friction = acting if rows is None else rows_of(acting, rows)
+        return forces(states, loads, sign * friction, sign)
 
     @cached_property
     def _states_at(self) -> PlacesKept[TrackStates]:
@@ -195,24 +240,22 @@ class Solution(ShortRepr):
             return intervals
         is_looked_at = np.isnan(self.up.slider).any(axis=-1) | (self.travel.shape[-1] < FEW_SAMPLES)
         is_looked_at = np.broadcast_to(is_looked_at, self.count)
-        total = self.column(self.travel[..., -1:])
+        total, track = self.column(self.travel[..., -1:]), self.assembly.track
+        # springs and weights do not change leverage
+        are_alike = losses is None and not is_column(friction, self.travel[..., 0]) and not isinstance(track, TrackRows)
         for states, some in ((None, ~is_looked_at), (self.states, is_looked_at)):
-            rows, track = np.flatnonzero(some), self.assembly.track
+            rows, parts = np.flatnonzero(some), (track, friction, states, losses)
             if not len(rows):
                 continue
-            if losses is None and not is_column(friction, self.travel[..., 0]) and not isinstance(track, TrackRows):
-                # springs and weights do not change leverage
-                (jam,) = jams(track, friction, states)
-                clipped = [_clip_intervals(jam, float(total[0]))] * len(rows)
+            if are_alike:
+                jams_of_rows = jams(*parts) * len(rows)
             else:
-                parts = track, friction, states, losses
                 if len(rows) < self.count:
                     row_states = states and states.combine(partial(rows_of, rows=rows))
                     parts = track.select_rows(rows), rows_of(friction, rows), row_states, rows_of(losses, rows)
-                jams_and_ends = zip(jams(*parts, len(rows)), total[rows].tolist(), strict=True)
-                clipped = [_clip_intervals(jam, end) for jam, end in jams_and_ends]
-            for row, jam in zip(rows.tolist(), clipped, strict=True):
-                intervals[row] = jam
+                jams_of_rows = jams(*parts, len(rows))
+            for row, of_row, end in zip(rows.tolist(), jams_of_rows, total[rows].tolist(), strict=True):
+                intervals[row] = tuple((max(low, 0.0), min(high, end)) for low, high in of_row if low < end)
         return intervals
 
     @property
@@ -256,17 +299,18 @@ class Solution(ShortRepr):
 
     @cached_property
     def places(self) -> FloatArray:
-        """Increasing displacements so dense that the force hides nothing between two, (m, q), or (1, q) for all [m]."""
-        travel = np.atleast_2d(self.travel)
-        low, high = travel[:, 0], travel[:, -1]
-        grid = low[:, None] + nodes(high - low, np.maximum(np.ravel(self.corner_travel) - low, 0.0))
-        return np.asarray(grid + self.origin)
+        """Increasing displacements so dense that the force hides nothing between two, (m, q), or (q,) for all [m]."""
+        low, high = self.travel[..., :1], self.travel[..., -1:]
+        return np.asarray(low + nodes(high - low, np.maximum(self.corner_travel - low, 0.0)) + self.origin)
 
     @cached_property
     def peaks(self) -> FloatArray:
-        """Places all over the corner of an undercut cam, where the force has a peak between two samples, (m, k) [m]."""
-        corner = np.minimum(np.ravel(self.corner_travel), np.atleast_2d(self.travel)[:, -1])
-        return corner[:, None] * (ON_CORNER if corner.any() else ON_CORNER[:0]) + self.origin
+        """Places all over the corner of an undercut cam, where the force has a peak between two samples [m].
+
+        (m, k), or (k,) for all.
+        """
+        corner = np.minimum(self.corner_travel, self.travel[..., -1:])
+        return np.asarray(corner * (ON_CORNER if corner.any() else ON_CORNER[:0]) + self.origin)
 
     def effort(self, branch: str, places: FloatArray, rows: Any = None) -> FloatArray:
         """Return the force on the way up or down at displacements of each mechanism, or of some, (k, n) [N]."""
@@ -291,7 +335,7 @@ class Solution(ShortRepr):
     @cached_property
     def branches(self) -> dict[str, CurveRows]:
         """The curves by branch, up and down."""
-        motion = self._spread_over_rows(self.travel + self.origin)
+        motion = self._spread_over_rows(self.displacement)
         corner, first = self.column(self.corner_travel), self.column(self.travel[..., :1])
         valid = np.maximum(corner, first) + self.column(self.origin), motion[:, -1]
         target = target_force(self.assembly.spec, self.assembly)
@@ -329,7 +373,7 @@ class Solution(ShortRepr):
         allowable = allowable_stress(self.mechanism)
 
         def read() -> list[RowSamples]:
-            values = self._spread_over_rows(stress(flank_pressure(self.assembly, self.states, state.contact)))
+            values = self._spread_over_rows(stress(self.contact_pressure(state)))
             curve = self.branches[name].samples
             return [RowSamples(curve.motion, values, curve.count)]
 
@@ -339,77 +383,21 @@ class Solution(ShortRepr):
         return StressRows(read, evaluate, self.column(np.nan if allowable is None else allowable))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class FlankSamples(ShortRepr):
-    """Contacts on the flank: the samples there, and before them the place at which the roller leaves the corner."""
+class FlankSamples(NamedTuple):
+    """Places of which some are on the flank, (..., n) each."""
 
-    solution: Solution  # the mechanisms
-    travel: FloatArray  # (..., n) increasing [m]
-    there: NDArray[np.bool_]  # (..., n) which of the places are on the flank
-    states: TrackStates  # where the rollers are, (..., n)
-    # up, down: on the way up and on the way down, (..., n) each
+    travel: FloatArray  # increasing [m]
+    there: NDArray[np.bool_]  # which of the places are on the flank
+    states: TrackStates
+    # up, down: on the way up and on the way down
     up: Forces
     down: Forces
-
-    @classmethod
-    def from_solution(cls, solution: Solution) -> FlankSamples:
-        """Return those of solved mechanisms."""
-        corner, travel, states = np.atleast_1d(solution.corner_travel), solution.travel, solution.states
-        leaves = (corner > 0) & (corner <= travel[..., -1:])
-        on_flank = ~states.on_corner & (~leaves | (travel > corner))
-        if not leaves.any():
-            return cls(solution, travel, on_flank, states, solution.up, solution.down)
-        (first, up), (_, down) = (solution.evaluate_travel(corner, sign, flank=True) for sign in (1.0, -1.0))
-        return cls(
-            solution,
-            _append_column(corner, travel),
-            _append_column(leaves, on_flank),
-            first.combine(_append_column, states),
-            _forces_behind(up, solution.up),
-            _forces_behind(down, solution.down),
-        )
-
-    @property
-    def pressure_angle(self) -> FloatArray:
-        """Angle between the brace's pull and the roller's motion [rad]; NaN elsewhere."""
-        return np.where(self.there, pressure_angle(self.states), np.nan)
-
-    def pressure(self, travel: FloatArray) -> FloatArray:
-        """Return the pressure of the contact on the way up at travels [Pa]; NaN where there is none."""
-        states, contact_forces = self.solution.evaluate_travel(travel, 1.0, flank=True)
-        return flank_pressure(self.solution.assembly, states, contact_forces.contact)
-
-    @cached_property
-    def largest_pressure(self) -> tuple[FloatArray, FloatArray]:
-        """Largest pressure of the contact on the way up [Pa], NaN without one, and about where it is [m], (m, 1)."""
-        pressed = flank_pressure(self.solution.assembly, self.states, self.up.contact)
-        return extreme_next_to(self.pressure, self.travel, np.where(self.there, pressed, np.nan), len(self.solution))
-
-    @property
-    def half_gap(self) -> FloatArray:
-        """Largest (up - down)/(up + down), (..., 1)."""
-        up, down = self.up.slider, self.down.slider
-        usable = self.there & np.isfinite(up) & np.isfinite(down) & (up + down > self.solution.effort_error)
-        return largest_of_each(np.where(usable, (up - down) / np.where(usable, up + down, 1.0), np.nan))
-
-
-def _forces_behind(first: Forces, rest: Forces) -> Forces:
-    return Forces(_append_column(first.slider, rest.slider), partial(_split_inside_behind, first, rest))
-
-
-def _split_inside_behind(first: Forces, rest: Forces) -> tuple[FloatArray, FloatArray]:
-    return _append_column(first.contact, rest.contact), _append_column(first.brace, rest.brace)
 
 
 def _append_column(first: Any, rest: Any) -> Any:
     """Return (..., 1) and (..., n) as (..., n + 1)."""
     shape = np.broadcast_shapes(np.shape(first)[:-1], rest.shape[:-1])
     return np.concatenate([np.broadcast_to(column, (*shape, column.shape[-1])) for column in (first, rest)], axis=-1)
-
-
-def _clip_intervals(jams: tuple[tuple[float, float], ...], end: float) -> tuple[tuple[float, float], ...]:
-    """Return intervals as far as the travel goes [m]."""
-    return tuple((max(low, 0.0), min(high, end)) for low, high in jams if low < end)
 
 
 BRANCH_DIRECTIONS = {"load": 1.0, "unload": -1.0}  # up and down, by branch
@@ -427,43 +415,12 @@ _ON_CORNER = np.concatenate([np.geomspace(1e-9, 0.02, 30), np.linspace(0.0, 1.0,
 """The same on a corner, where it rises within a tenth of a millimetre."""
 
 
-def nodes(
-    # total, corner: (d,): travel of each cam, and that at which its roller leaves the corner; 0 without one [m]
-    total: FloatArray,
-    corner: FloatArray,
-) -> FloatArray:
-    """Return travels so dense that the force hides nothing between two of them, (d, n), increasing [m]."""
+def nodes(total: FloatArray, corner: FloatArray) -> FloatArray:
+    """Return travels so dense that the force hides nothing between two of them, (..., n), increasing [m].
+
+    `total` is the travel of each cam, `corner` that at which its roller leaves the corner, 0 without one, (..., 1) [m].
+    """
     if not corner.any():
-        return np.asarray(total[:, None] * _SORTED_SHARES)
+        return np.asarray(total * _SORTED_SHARES)
     total, on_corner = np.broadcast_arrays(total, np.minimum(corner, total))
-    shares = total[:, None] * _TRAVEL_SHARES, on_corner[:, None] * _ON_CORNER
-    return np.sort(np.concatenate(shares, axis=1), axis=1)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class DenseLoop(ShortRepr):
-    """The loop of one solved mechanism at every place (a `cfmkit.results.ClosedForm`)."""
-
-    solution: Solution
-
-    @property
-    def places(self) -> FloatArray:
-        """Increasing displacements [m]."""
-        return np.asarray(self.solution.places[0])
-
-    @property
-    def peaks(self) -> FloatArray:
-        """Places all over the corner of an undercut cam [m]."""
-        return np.asarray(self.solution.peaks[0])
-
-    def effort(self, branch: str, places: FloatArray, /) -> FloatArray:
-        """Return the force on the way up or down at displacements of any shape [N]."""
-        return self.solution.effort(branch, places)
-
-    def stress(self, branch: str, places: FloatArray, /) -> FloatArray:
-        """Return the stress below the contact at displacements of any shape [Pa]; NaN on the corner."""
-        return self.solution.stress(branch, places)
-
-    def part_efforts(self, branch: str, places: FloatArray, /) -> FloatArray:
-        """Return the force of the strongest spring on the slider, without any weight, at displacements [N]."""
-        return self.solution.part_efforts(branch, places)
+    return np.sort(np.concatenate([total * _TRAVEL_SHARES, on_corner * _ON_CORNER], axis=-1), axis=-1)

@@ -10,6 +10,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.specs.spec import Model, NonNegativeLength, PositiveLength
 from cfmkit.specs.units import Stiffness
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire, settle_rate, wire_of
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class Springs(Model):
 
     @model_validator(mode="after")
     def _rate_is_known(self, info: ValidationInfo) -> Self:
-        settle_rate(self, "extension", info)
+        settle_rate(self, ExtensionSpring, info)
         return self
 
     @model_validator(mode="after")
@@ -79,11 +80,19 @@ class Springs(Model):
         return 0.0 if self.stiffness is None else self.stiffness
 
     @property
+    def rates(self) -> tuple[float, ...]:
+        """Stiffness of every one of the springs [N/m]."""
+        return self.each if isinstance(self.each, tuple) else (self.each,) * self.number
+
+    @property
+    def number(self) -> int:
+        """Number of springs."""
+        return len(self.each) if isinstance(self.each, tuple) else 1 if self.count is None else self.count
+
+    @property
     def total(self) -> float:
         """K, the sum of all parallel springs [N/m]."""
-        if isinstance(self.each, tuple):
-            return sum(self.each)
-        return self.each * (1 if self.count is None else self.count)
+        return sum(self.each) if isinstance(self.each, tuple) else self.each * self.number
 
     @property
     def stiffest(self) -> float:
@@ -95,8 +104,7 @@ class Springs(Model):
         """Elongation at which springs without initial tension would pull as hard as these when they open [m]."""
         if not np.any(self.initial_tension):
             return 0.0
-        count = len(self.each) if isinstance(self.each, tuple) else 1 if self.count is None else self.count
-        return count * self.initial_tension / self.total
+        return self.number * self.initial_tension / self.total
 
     def scaled_to(self, total: float) -> Springs:
         """Return springs of the same number whose stiffness adds up to `total` [N/m]: of another wire, if of any.

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -124,12 +124,7 @@ class Forces(ShortRepr):
 def load_on_slider(turn: Real, slope: Real, friction: Any, spring: Real, weight: Any = None) -> Real:
     """Return what one roller pulls the slider with, times its lever: S (1 + mu f) + w (f - mu) [SS, eq. 1; N].
 
-    Parameters
-    ----------
-    turn, slope, friction : float or array
-        1 + mu f of `levers`, f, and mu.
-    spring, weight : float or array
-        Spring force and weight on the roller [N]; no weight: None.
+    `turn` is 1 + mu f of `levers`; `spring` and `weight` pull at the roller [N].
     """
     load: Real = spring * turn
     return load if weight is None else load + weight * (slope - friction)
@@ -181,11 +176,9 @@ def forces(states: TrackStates, loads: Loads, friction: Any, direction: float = 
     turn, lever = levers(slope, tangent, friction)
     spring = spring_force(states, loads)
     pull, limit = safe_divide(2.0 * load_on_slider(turn, slope, friction, spring, weight), lever), None
-    if weight is None and (idle := np.abs(lever) < 1e-13).any():
-        idle &= np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
-        parts = loads.rest_half_width, loads.brace_length, loads.stiffness
+    if weight is None and (idle := _is_dead_point(states, loads, lever)).any():
         with np.errstate(divide="ignore", invalid="ignore"):
-            pull, limit = np.where(idle, dead_point_limit(slope, states.bend, parts, friction), pull), (idle, turn)
+            pull, limit = np.where(idle, _dead_point_limit(states, loads, friction), pull), (idle, turn)
     return Forces(
         pull + loads.slider_weight, partial(_inner_forces, (slope, tangent, spring, weight), lever, 0.5 * pull, limit)
     )
@@ -217,29 +210,28 @@ def safe_divide(load: FloatArray, lever: FloatArray) -> FloatArray:
     return np.where(moves | (load == 0), force, np.nan)
 
 
-def dead_point_limit(
-    # slope, bend: float or (n,): first and second derivative of the roller's track there [1, 1/m]
-    slope: Real,
-    bend: Real,
-    # half width at which the springs are at rest [m], length of the brace [m], stiffness of all springs [N/m]
-    parts: tuple[float, float, float],
-    friction: float,  # rolling friction mu: positive on the way up, negative on the way down
-) -> Real:
-    """Return the limit of 0/0, the ratio of the derivatives [N].
+def _is_dead_point(states: TrackStates, loads: Loads, lever: FloatArray) -> NDArray[np.bool_]:
+    """Return where the slider has no lever on a roller whose springs carry nothing."""
+    idle = np.abs(lever) < 1e-13
+    if idle.any():
+        idle &= np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
+    return idle
 
-    At the first point of an ideal profile the springs carry nothing and the slider has
-    no leverage on the roller; the force has a limit there, which is the constant force.
+
+def _dead_point_limit(states: TrackStates, loads: Loads, friction: Any) -> FloatArray:
+    """Return the limit of 0/0 at the first point of an ideal profile, the ratio of the derivatives [N].
+
+    The springs carry nothing there and the slider has no leverage on the roller: the limit is the constant force.
     """
-    x, brace, stiffness = parts
+    x, brace = loads.rest_half_width, loads.brace_length
     across = (brace - x) * (brace + x)
-    turn = 1.0 + friction * slope
-    lever_rate = bend * (1.0 - friction * brace_tangent(x, brace)) - brace**2 / across**1.5 * turn
-    limit: Real = 4.0 * stiffness * turn / lever_rate
+    turn = 1.0 + friction * states.slope
+    lever_rate = states.bend * (1.0 - friction * brace_tangent(x, brace)) - brace**2 / across**1.5 * turn
+    limit: FloatArray = 4.0 * loads.stiffness * turn / lever_rate
     return limit
 
 
-@dataclass(frozen=True)
-class _Side:
+class _Side(NamedTuple):
     """One roller and its brace, each (n,): pull on the slider along and across its way, contact, axial force [N]."""
 
     along: FloatArray
@@ -254,15 +246,11 @@ def normal_turn(losses: Losses, rolling: Any) -> Any:
     return (rolling + kappa * np.sqrt(1.0 + rolling**2 - kappa**2)) / (1.0 - kappa**2)
 
 
-def leverage(
-    # x, slope: (n,): of the roller's track [m, 1]
-    x: FloatArray,
-    slope: FloatArray,
-    brace_length: Any,  # [m]
-    losses: Losses,  # what rubs
-    friction: Any,  # rolling friction: positive on the way up, negative on the way down
-) -> FloatArray:
-    """Return the slider's lever on a roller with all friction: no force moves it where this is not positive."""
+def leverage(x: FloatArray, slope: FloatArray, brace_length: Any, losses: Losses, friction: Any) -> FloatArray:
+    """Return the slider's lever on a roller with all friction: no force moves it where this is not positive.
+
+    At places of its track, x [m] and dy/dx, (n,); `friction` is that of rolling, negative on the way down.
+    """
     direction = -1.0 if np.any(friction < 0) else 1.0
     turn = direction * normal_turn(losses, np.abs(friction))
     tangent = brace_tangent(x, brace_length)
@@ -290,34 +278,23 @@ def _side(states: TrackStates, loads: Loads, losses: Losses, direction: float, o
     pulled, hooks = spring - outward, losses.pin * spring
     bearing = losses.bearing * np.sqrt(1.0 + turn**2)
     load = pulled * load_factor + weight * (slope - turn)
-    # A pin rubs whichever way its brace is loaded: the sign is that of the axial force.
-    for sign in (1.0, -1.0):
-        pin = sign * losses.pin
+
+    def balance(pin: Any) -> tuple[FloatArray, FloatArray]:
+        """Return T cos a and V of a brace whose pins rub with this sign; NaN where no force moves the slider."""
         scale = cos * length * lever - direction * (pin * (load_factor / cos + sin * lever) - bearing * along)
-        held = (scale <= 0) & (load != 0) if sign > 0 else (scale <= 0)
         scale = np.where(scale > 0, scale, np.nan)
-        pull = (
-            load * (cos * length - direction * pin * sin)
-            + direction * load_factor * hooks
-            + direction * bearing * along * weight
-        ) / scale
-        bend = direction * (pin * load / cos + hooks * lever - bearing * along * (pulled + weight * tangent)) / scale
-        pull, bend = np.where(held, np.nan, pull), np.where(held, np.nan, bend)
-        if sign > 0:
-            normal_force_and_moment = pull, bend
-            continue
-        pushed = (normal_force_and_moment[0] + normal_force_and_moment[1] * cos * sin) < 0
-        normal_force_and_moment = (
-            np.where(pushed, pull, normal_force_and_moment[0]),
-            np.where(pushed, bend, normal_force_and_moment[1]),
-        )
-    pull, bend = normal_force_and_moment
+        moved = load * (cos * length - direction * pin * sin) + direction * load_factor * hooks
+        rubbed = pin * load / cos + hooks * lever - bearing * along * (pulled + weight * tangent)
+        return (moved + direction * bearing * along * weight) / scale, direction * rubbed / scale
+
+    # A pin rubs whichever way its brace is loaded: the sign is that of the axial force.
+    pulling, pushing = balance(losses.pin), balance(-losses.pin)
+    is_pushed = pulling[0] + pulling[1] * cos * sin < 0
+    pull, bend = (np.where(is_pushed, pushed, drawn) for pushed, drawn in zip(pushing, pulling, strict=True))
     idle = (load == 0) & (hooks == 0) & (weight == 0)
     pull, bend = np.where(idle, 0.0, pull), np.where(idle, 0.0, bend)
     if not any(map(np.any, (turn, losses.pin, weight, outward))):
-        dead = (np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width) & (np.abs(lever) < 1e-13)
-        parts = loads.rest_half_width, loads.brace_length, loads.stiffness
-        pull = np.where(dead, 0.5 * dead_point_limit(slope, states.bend, parts, 0.0), pull)
+        pull = np.where(_is_dead_point(states, loads, lever), 0.5 * _dead_point_limit(states, loads, 0.0), pull)
     contact = ((slope - turn) * (pulled + bend + pull * tangent) + load_factor * (pull - weight)) / (
         (1.0 + turn**2) * along
     )
@@ -380,11 +357,12 @@ def jams(
         if rows.size:
             grid = np.broadcast_to(grid, held.shape)
             place_here, earlier, begins = grid[rows, at], grid[rows, np.maximum(at - 1, 0)], held[rows, at]
-            moves, rests = (
-                np.where(begins, earlier, place_here)[:, None],
-                np.where(begins, place_here, earlier)[:, None],
-            )
-            place = last_places(partial(_shortage, lever, rows), moves, rests)
+            moves, rests = np.where(begins, (earlier, place_here), (place_here, earlier))[..., None]
+
+            def shortage(parameter: FloatArray, ends: Any, lever: Any = lever, rows: Any = rows) -> FloatArray:
+                return np.asarray(-lever(parameter, rows[ends]))
+
+            place = last_places(shortage, moves, rests)
             row_track = track.select_rows(rows)
             travel = list(row_track.stretches())[number].at(place)[0] - row_track.start
             for row, first, edge in zip(rows.tolist(), (at == 0).tolist(), travel[:, 0].tolist(), strict=True):
@@ -409,12 +387,6 @@ def _lever(
     if losses is not None:
         return leverage(x, slope, track.brace_length, losses, friction) + 1e-12
     return np.asarray(levers(slope, brace_tangent(x, track.brace_length), friction)[1] + 1e-12)
-
-
-def _shortage(
-    lever: Callable[..., FloatArray], rows: NDArray[np.intp], parameter: FloatArray, ends: NDArray[np.intp]
-) -> FloatArray:
-    return -lever(parameter, rows[ends])
 
 
 def _places(part: TrackStretch, states: TrackStates | None) -> FloatArray:

@@ -23,6 +23,7 @@ from cfmkit.families.slider_crank.sprung_linkage_proposals import (
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.stock.springs.offers import generic
 from cfmkit.stock.springs.spec import CatalogueSpring
+from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 
 if TYPE_CHECKING:
     from cfmkit.families.proposals import Candidate, Request
@@ -71,9 +72,9 @@ def _catalogue_springs(spec: SliderCrankSpec, request: Request, sheet: float) ->
     link = linkage_of(spec.mechanism)
     deep, widest = 0.5 * depth_of_springs(request, sheet), min(link.crank, link.coupler)
     listed = []
-    for offer in generic("torsion"):
+    for offer in generic(HelicalTorsionSpring):
         # wound up by as much as it bears
-        long = math.inf if offer.wound is None else offer.wound.body_length_wound_up(offer.largest or 0.0)
+        long = math.inf if offer.wound is None else offer.wound.room_for(offer.largest or 0.0)
         counts = tuple(count for count in offer.counts if count * long <= deep)
         if counts and (offer.outer_diameter or math.inf) <= widest:
             listed.append(CatalogueSpring.from_offer(replace(offer, counts=counts)))

@@ -34,21 +34,17 @@ from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemb
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.springs.helical_spring_formulas import YOUNGS_MODULUS, HelicalSpring
-from cfmkit.stock.springs.offers import (
-    MAX_INDEX,
-    as_stated,
-    extension_spring,
-    largest_load,
-    shortest_torsion_spring,
-    torsion_spring,
-)
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.helical_spring_formulas import YOUNGS_MODULUS
+from cfmkit.stock.springs.offers import MAX_INDEX, as_stated, largest_load, shortest_spring, slimmest_spring
+from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 from cfmkit.stock.stock_series import series_of
 
 if TYPE_CHECKING:
     from cfmkit.families.proposals import MaterialBlock, Request
     from cfmkit.families.slider_crank.flattest_springs_that_fit import HeldEffort
     from cfmkit.families.slider_crank.springs.hardware import LinkLoads
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
 
 @dataclass(frozen=True)
@@ -123,7 +119,7 @@ def _too_weak(request: Request, most: float) -> str:
 
 def explain_overfilled(request: Request) -> str | None:
     """Return what is wrong where springs at pins would fill more than the envelope, taken as deep as it is wide."""
-    thin = HelicalSpring("torsion", 1e-3, MAX_INDEX * 1e-3, 1.0)
+    thin = HelicalTorsionSpring(1e-3, MAX_INDEX * 1e-3, 1.0)
     stress = float(32.0 * largest_load(thin, request.safety) / (math.pi * thin.wire**3))
     wire = 8.0 * YOUNGS_MODULUS * request.target * request.travel / stress**2
     deep = wire / (request.envelope[0] * request.envelope[1])
@@ -394,16 +390,16 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
     deep = room = depth_of_springs(request, (part.sheet if part else None) or 0.0)
     if request.depth is not None and "pivot" in turns:
         # that of the pivot is on the other side of the links: first it takes as little as it can
-        least = shortest_torsion_spring(*turns["pivot"], widest, pin, request.safety)
-        deep = room - (0.0 if least is None else least.body_length_wound_up(turns["pivot"][1]))
+        least = shortest_spring(HelicalTorsionSpring, *turns["pivot"], widest, request.safety, pin)
+        deep = room - (0.0 if least is None else least.room_for(turns["pivot"][1]))
     bought: dict[str, HelicalSpring] = {}
     for name in sorted(turns, key="pivot".__eq__):
         if name == "pivot" and request.depth is not None:
             deep = room - max((height_of(joint, coil, turns[joint][1]) for joint, coil in bought.items()), default=0.0)
         if name == "slider":
-            coil = extension_spring(*turns[name], rest if pulled else 0.0, request.safety)
+            coil = slimmest_spring(ExtensionSpring, *turns[name], rest if pulled else 0.0, request.safety)
         else:
-            coil = torsion_spring(*turns[name], deep, pin, request.safety)
+            coil = slimmest_spring(HelicalTorsionSpring, *turns[name], deep, request.safety, pin)
         if coil is None or coil.outer_diameter > (deep if name == "slider" else widest):
             raise SolutionError(_no_spring(name, turns[name], coil))
         bought[name] = coil

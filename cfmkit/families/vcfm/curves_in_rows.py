@@ -5,17 +5,18 @@ Curves are (r, n) arrays, one preload of one mechanism a row, from where the shu
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.rows import rows_of
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.longest_interval_in_band import flat_window
+from cfmkit.results import ROUND_OFF
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -55,51 +56,42 @@ class Characteristics:
     linear: tuple[Any, Any]
 
 
-class ForceSampler(Protocol):
-    """The forces of leaves and spring: all that decides where a shuttle rests."""
-
-    def leaf_force(self, travel: FloatArray) -> FloatArray:
-        """Return the force of all leaves alone [N]."""
-
-    def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
-
-    def select_rows(self, rows: Any) -> Self:
-        """Return the model of some of the rows."""
-
-
-class PartSampler(Protocol):
+class PartSampler(ABC):
     """A model of leaves and spring: at travels of any shape of one mechanism, or (r, n) of r mechanisms."""
 
-    @property
-    def problem(self) -> str:
-        """Why a part could not be followed to the end; empty if all could."""
+    problem: str = ""
+    """Why a part could not be followed to the end; empty if all could."""
+    accuracy: float = ROUND_OFF
+    """Error of the force, in parts of what leaves and spring bear."""
 
     @property
-    def accuracy(self) -> float:
-        """Error of the force, in parts of what leaves and spring bear."""
-
-    @property
+    @abstractmethod
     def character(self) -> Characteristics:
         """Stiffnesses and linear range."""
 
+    @abstractmethod
     def leaves(self, travel: FloatArray) -> LeafSamples:
-        """Return what all leaves do at some travels [m]."""
+        """Return what all leaves do at some travels [m]; NaN beyond what was reached."""
 
-    def leaf_force(self, travel: FloatArray) -> FloatArray:
-        """Return the force of all leaves alone [N]."""
-
-    def leaf_stress(self, travel: FloatArray) -> FloatArray:
-        """Return the largest stress of the leaves [Pa]."""
-
+    @abstractmethod
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
 
-    def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
-        """Return at which travels [m] leaves and spring were solved for, not interpolated; None if all are known."""
+    def leaf_force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of all leaves alone [N]."""
+        return self.leaves(travel).force
 
-    def select_rows(self, rows: Any) -> Self:
-        """Return the model of some of the rows."""
+    def leaf_stress(self, travel: FloatArray) -> FloatArray:
+        """Return the largest stress of the leaves [Pa]."""
+        return self.leaves(travel).stress
+
+    def find_solved(self, _travel: FloatArray, _preload: float) -> NDArray[np.bool_] | None:
+        """Return at which travels [m] leaves and spring were solved for, not interpolated; None if all are known."""
+        return None
+
+    def select_rows(self, _rows: Any) -> Self:
+        """Return the model of some of the rows; all may be curves of one mechanism."""
+        return self
 
 
 @dataclass(frozen=True, repr=False)
@@ -123,22 +115,35 @@ class Push(ShortRepr):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Rows(ShortRepr):
-    """Curves of one model, one preload of one mechanism a row."""
+class Preloaded(ShortRepr):
+    """Mechanisms under preloads, one preload of one mechanism a row: their force at any travel."""
 
     sampler: PartSampler
     preload: FloatArray  # (r, 1) [m]
+    stops: EndStops  # of all shuttles
+
+    def force_at(self, places: FloatArray, rows: Any = None) -> FloatArray:
+        """Return the force at some travels of each row, or of some rows, (k, m), by the model [N]."""
+        sampler, preload = self.sampler, self.preload
+        if rows is not None:
+            sampler, preload = sampler.select_rows(rows), preload[rows]
+        total = np.asarray(sampler.leaf_force(places) + sampler.spring(places + preload)[0])
+        return total + self.stops.force(places) if self.stops else total
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rows(Preloaded):
+    """Curves of one model, one preload of one mechanism a row."""
+
     rest: FloatArray  # (r,) where the shuttle rests [m]; NaN if nothing holds it short of the end
     travel: FloatArray  # (r, n), increasing; after the end of a row its last place is repeated [m]
     count: NDArray[np.intp]  # (r,) points of each row
-    stops: EndStops = NO_STOPS  # of the shuttle
 
     def select_rows(self, rows: Any) -> Rows:
         """Return some of the curves, with what is known of them."""
-        chosen = Rows(
-            self.sampler.select_rows(rows), self.preload[rows], self.rest[rows], self.travel[rows], self.count[rows],
-            self.stops,
-        )  # fmt: skip
+        columns = (self.preload, self.rest, self.travel, self.count)
+        preload, *others = (column[rows] for column in columns)
+        chosen = Rows(self.sampler.select_rows(rows), preload, self.stops, *others)
         for name in ("leaves", "leaf_force", "spring_samples"):
             if name in self.__dict__:
                 chosen.__dict__[name] = rows_of(self.__dict__[name], rows)
@@ -174,14 +179,6 @@ class Rows(ShortRepr):
     def ends(self) -> Ends:
         """First and last travel of each row, (r,) [m]."""
         return self.travel[:, 0], self.travel[:, -1]
-
-    def force_at(self, places: FloatArray, rows: Any = None) -> FloatArray:
-        """Return the force at some travels of each row, or of some rows, (k, m), by the model [N]."""
-        sampler, preload = self.sampler, self.preload
-        if rows is not None:
-            sampler, preload = sampler.select_rows(rows), preload[rows]
-        total = np.asarray(sampler.leaf_force(places) + sampler.spring(places + preload)[0])
-        return total + self.stops.force(places) if self.stops else total
 
     def evaluate_within_ends(self, places: FloatArray) -> FloatArray:
         """Return the same, NaN beyond the ends of a row [N]."""

@@ -30,18 +30,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.errors import SolutionError
 from cfmkit.families.findings import format_at_least, mm, mpa, newton, no_design, refusals_answered
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.leaf_laws_from_spec import parts, share_of
+from cfmkit.families.vcfm.leaf_laws_from_spec import share_of
 from cfmkit.families.vcfm.leaf_sizing import (
-    FITTED_REGION_SHARE,
     FORCE_RTOL,
     MAX_PASSES,
     MIN_WIDTH_RATIO,
     N_RESCALES,
     check_guide,
     complete_analysis,
+    fit_exact_force,
     followable_stroke,
+    leaf_changes,
     leaf_of_sheet,
     next_leaf,
     next_spring_leaf,
@@ -55,15 +57,13 @@ from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.v_beam import onset_and_exit
 from cfmkit.families.vcfm.leaves_around_bought_springs import with_bought_springs
-from cfmkit.families.vcfm.model import LawSampler, rest_of
-from cfmkit.numerics.roots import bracketed_root
+from cfmkit.families.vcfm.model import farthest_back
 from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
-    from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
@@ -174,19 +174,10 @@ def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
 
 def write_sizes(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
     """Return the spec with the sizes written into its mechanism."""
-    leaf, spring_leaf = sizes.leaf, sizes.spring_leaf
-    return spec.replace(
-        {
-            "mechanism.bistable.half_beams": sizes.half_beams,
-            "mechanism.bistable.length": float(leaf.length),
-            "mechanism.bistable.angle": float(leaf.angle),
-            "mechanism.bistable.thickness": float(leaf.thickness),
-            "mechanism.bistable.width": float(leaf.width),
-            "mechanism.positive.length": float(spring_leaf.length),
-            "mechanism.positive.thickness": float(spring_leaf.thickness),
-            "mechanism.positive.width": float(spring_leaf.width),
-        }
-    )
+    spring_leaf = {
+        f"mechanism.positive.{key}": float(getattr(sizes.spring_leaf, key)) for key in ("length", "thickness", "width")
+    }
+    return spec.replace(leaf_changes(sizes.half_beams, sizes.leaf) | spring_leaf)
 
 
 LENGTH_MARGIN = 1.01
@@ -276,39 +267,24 @@ def _refined_for_sheet(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes, s
 def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[DesignSizes, tuple[float, float]]:
     """Return the sizes with widths that make the exact force flattest, and the exact stress of leaves and spring [Pa].
 
-    The fit is over the middle 84 % of the linear region, without preload; the stress of the leaves is the largest from
-    where the whole preload pulls them to the end of that region, that of the spring the one there under that preload.
-
     Raises Infeasible if the exact leaves cannot be followed that far.
     """
-    from cfmkit.families.vcfm.exact_model import ExactSampler
-
-    first, last = sizes.linear
-    middle, half = 0.5 * (first + last), 0.5 * FITTED_REGION_SHARE * (last - first)
-    places = np.linspace(middle - half, middle + half, 101)
-    full = target.preload_stroke
+    full, curve = target.preload_stroke, target.curve
     made = write_sizes(spec, sizes).replace(
         {"analysis.preloads": (0.0, full) if full else (0.0,), "analysis.branch": "stable"}
     )
-    back = -(rest_of(LawSampler(parts(made)), full, places) or 0.0)
-    sampler = ExactSampler(made, last, 1.2 * back)
-    if sampler.problem:
+    wanted = partial(_follow_curve, curve) if curve is not None else lambda _places: target.required_force
+    try:
+        fit = fit_exact_force(made, sizes.linear, full, 1.2 * farthest_back(made, (full,)), wanted)
+    except SolutionError as error:
         raise finding.infeasible(
             "no_linear_region",
-            f"the exact model does not confirm the 'design.stroke' of {mm(target.stroke)}: {sampler.problem}",
+            f"the exact model does not confirm the 'design.stroke' of {mm(target.stroke)}: {error}",
             followable_stroke(target.height, sizes.leaf),
-        )
-    leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
-    wanted = (
-        np.full(len(places), target.required_force) if target.curve is None else _follow_curve(target.curve, places)
-    )
-    (wide, stiff), *_ = np.linalg.lstsq(np.column_stack([leaves, spring]), wanted, rcond=None)
+        ) from None
     leaf, spring_leaf = sizes.leaf, sizes.spring_leaf
-    wider = replace(leaf, width=float(leaf.width * wide)), replace(spring_leaf, width=float(spring_leaf.width * stiff))
-    fitted = replace(sizes, leaf=wider[0], spring_leaf=wider[1])
-    end = np.concatenate([[_rest(sampler, full, (wide, stiff))], np.linspace(0.0, last, 201)])
-    stresses = float(sampler.leaves(end).stress.max()), float(sampler.spring(np.array([last + full]))[1].max())
-    return fitted, stresses
+    wider = replace(leaf, width=leaf.width * fit.wide), replace(spring_leaf, width=spring_leaf.width * fit.stiff)
+    return replace(sizes, leaf=wider[0], spring_leaf=wider[1]), fit.stresses
 
 
 def _follow_curve(curve: TargetCurve, places: FloatArray) -> FloatArray:
@@ -331,16 +307,3 @@ def _follow_curve(curve: TargetCurve, places: FloatArray) -> FloatArray:
             "('design.target')",
         )
     return np.asarray(curve.evaluate(places))
-
-
-def _rest(sampler: ExactSampler, preload: float, factors: tuple[float, float]) -> float:
-    """Return where the shuttle rests at a preload with both widths changed by factors [m]."""
-
-    def force(travel: float) -> float:
-        place = np.array([travel])
-        return float((factors[0] * sampler.leaf_force(place) + factors[1] * sampler.spring(place + preload)[0])[0])
-
-    if not preload:
-        return 0.0
-    farthest = max(-preload, sampler.pulled.edges[-1])
-    return farthest if force(farthest) >= 0 else bracketed_root(force, farthest, 0.0)

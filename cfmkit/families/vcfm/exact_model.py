@@ -7,21 +7,19 @@ one leaf or one chain is traced, by symmetry. How that is interpolated, `interpo
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.curves_in_rows import Characteristics, LeafSamples
+from cfmkit.families.vcfm.curves_in_rows import Characteristics, LeafSamples, PartSampler
 from cfmkit.families.vcfm.interpolated_equilibrium_path import COEFFICIENT_RTOL, trace_leaf
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring, parts
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
-from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
+from cfmkit.families.vcfm.model import farthest_back, result_of, solve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
@@ -111,7 +109,7 @@ def elastic_networks(spec: VcfmSpec) -> tuple[DrivenNetwork, ...]:
     return tuple(networks)
 
 
-class ExactSampler:
+class ExactSampler(PartSampler):
     """Samples of a mechanism's leaves and spring, traced over what an analysis needs.
 
     `end`: how far the shuttle goes [m]; `back`: how far it is pulled back at most, positive [m].
@@ -152,18 +150,6 @@ class ExactSampler:
         )
         return LeafSamples(self.each * force, stress, stable, buckled)
 
-    def leaf_force(self, travel: FloatArray) -> FloatArray:
-        """Return the force of all leaves alone [N]."""
-        return self.leaves(travel).force
-
-    def leaf_stress(self, travel: FloatArray) -> FloatArray:
-        """Return the largest stress of the leaves [Pa]."""
-        return self.leaves(travel).stress
-
-    def select_rows(self, _rows: Any) -> Self:
-        """Return the same: all rows are curves of one mechanism."""
-        return self
-
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
         if self.coils is not None:
@@ -175,9 +161,6 @@ class ExactSampler:
         )
         force, stress = (np.where(place < 0, stretched[k], pressed[k]).reshape(np.shape(compression)) for k in (0, 1))
         return self.chain.count * force, stress
-
-    def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
-        """Return None: between its nodes a traced path is known to its tolerance."""
 
     @cached_property
     def character(self) -> Characteristics:
@@ -223,9 +206,3 @@ def analyze(spec: VcfmSpec, _run: Run) -> Result:
     # the real shuttle goes back as far as that of the closed form within a few percent
     back = 1.2 * farthest_back(spec, spec.analysis.preloads)
     return result_of(solve(spec, made, ExactSampler(spec, spec.travel, back)))
-
-
-def farthest_back(spec: VcfmSpec, preloads: Sequence[float]) -> float:
-    """Return how far preloads push the shuttle back by the closed form [m]."""
-    sampler, grid = LawSampler(parts(spec)), travel_grid(spec)
-    return max([-(rest_of(sampler, preload, grid) or 0.0) for preload in preloads] + [0.0])

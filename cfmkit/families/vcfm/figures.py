@@ -11,6 +11,7 @@ import numpy as np
 from cfmkit.curves import Curve
 from cfmkit.export.posed_part import box
 from cfmkit.families.fem_results import number_fillets
+from cfmkit.families.vcfm.curves_in_rows import Preloaded
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, rest_shift
 from cfmkit.families.vcfm.model import rests_of
 from cfmkit.families.vcfm.part import bodies
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cfmkit.arrays import FloatArray
     from cfmkit.export.posed_part import PosedBody
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.results import Result
@@ -167,12 +167,10 @@ def adjustability(result: Result) -> Figure:
     over = np.linspace(preloads.min(), preloads.max(), N_PRELOADS)
     character = solution.character
     places = np.linspace(*solution.window_of_one, 41)
-    stops = solution.curves.stops
-    leaves = solution.sampler.leaves(places).force
-    leaves = leaves + stops.force(places) if stops else leaves
-    mean = np.array([(leaves + solution.sampler.spring(places + preload)[0]).mean() for preload in over])
     grid = np.linspace(0.0, float(solution.first.travel[-1]), 241)
-    rests = -rests_of(solution.sampler, over, grid, stops)
+    pushed = Preloaded(solution.sampler, over[:, None], solution.curves.stops)
+    rests = -rests_of(pushed, grid)
+    mean = pushed.force_at(places).mean(axis=1)
     nominal = float(np.interp(solution.first.preload, over, mean))
     straight = nominal + force_change(character.positive_stiffness, over - solution.first.preload)
     by_rule = rest_shift(character.positive_stiffness, character.first_stiffness, over)
@@ -185,7 +183,8 @@ def adjustability(result: Result) -> Figure:
         Series(rests, "shift of the rest position", LINE_PURPLE, prefer=0.4),
         Series(by_rule, "K_p dr/(K_p + K_b1)", TEXT_GREY, dashed=True, prefer=0.7),
     ]
-    starts = _starts(solution, over)
+    travel = np.linspace(0.0, float(solution.first.travel[-1]), N_WINDOW_PLACES)
+    starts = flat_window(travel, pushed.force_at(travel), solution.spec.analysis.flatness, pushed.force_at)[0]
     begins = [
         Series(starts, "start of the window, from the unloaded position", LINE_BLUE, prefer=0.4),
         Series(starts + rests, "start of the window, from rest", LINE_PURPLE, prefer=0.7),
@@ -194,19 +193,6 @@ def adjustability(result: Result) -> Figure:
     if np.isfinite(starts + rests).any():
         diagrams.append(Diagram(over, x, Scale("start", "length"), begins))
     return diagram_figure(Heading.from_result(result, "what the preload adjusts"), diagrams)
-
-
-def _starts(solution: Solution, preloads: FloatArray) -> FloatArray:
-    """Return where the longest window within the flatness starts at each preload [m]; NaN where there is none."""
-    travel = np.linspace(0.0, float(solution.first.travel[-1]), N_WINDOW_PLACES)
-
-    def force_at(places: FloatArray) -> FloatArray:
-        sampler = solution.sampler
-        total = sampler.leaf_force(places) + sampler.spring(places + preloads[:, None])[0]
-        return np.asarray(total + solution.curves.stops.force(places) if solution.curves.stops else total)
-
-    forces = force_at(np.broadcast_to(travel, (len(preloads), N_WINDOW_PLACES)))
-    return flat_window(travel, forces, solution.spec.analysis.flatness, force_at)[0]
 
 
 def stress_map(result: Result) -> Figure:
@@ -262,7 +248,7 @@ def mechanism(result: Result) -> Figure:
 def hangs(solution: Solution) -> bool:
     """Return True if the spring hangs above the shuttle."""
     springs = solution.spec.mechanism.springs
-    return springs is not None and springs.kind == "extension"
+    return springs is not None and springs.hang
 
 
 def _pushed_at(shown: Sequence[PosedBody], pose: int) -> parts.Point:

@@ -9,7 +9,7 @@ leaf buckles, and has kinks where its place changes: it is interpolated monotoni
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -164,7 +164,7 @@ def trace_leaf(network: Network, node: str, end: float, **control: Any) -> Trace
     """Return what a network does while a node moves down by up to `end` [m], or up where that is negative."""
     route = Route(network, node, control)
     for count in GRID_SIZES:
-        first = _begin_path(route, end, count)
+        first, grid = _begin_path(route, end, count)
         gaps = np.abs(np.diff(first.edges[1:-1]))
         # bifurcations close together may come from a point requested next to one: other points tell
         if first.problem or not (gaps < BIFURCATION_DISTANCE * abs(end)).any():
@@ -175,22 +175,12 @@ def trace_leaf(network: Network, node: str, end: float, **control: Any) -> Trace
         if not wavy.problem:
             return wavy
     if not first.edges[-1]:
-        return Traced(first.points, None, first.edges, first.problem)
+        return first
     for number in PANEL_COUNTS:
-        panels, points, kept = _resolve_panels(route, first, number)
+        panels, points, kept = _resolve_panels(route, first, grid, number)
         if kept:
             break
-    return Traced(points, panels, first.edges, first.problem)
-
-
-@dataclass(frozen=True)
-class First:
-    """A first path: its points with that of zero, zero, bifurcations and end [m], what was requested, why it ends."""
-
-    points: PathPoints
-    edges: tuple[float, ...]
-    grid: FloatArray
-    problem: str
+    return replace(first, points=points, panels=panels)
 
 
 @dataclass
@@ -227,8 +217,8 @@ class Route:
         return max(COEFFICIENT_RTOL, self.tolerances[0], self.rounding)
 
 
-def _begin_path(route: Route, end: float, count: int) -> First:
-    """Return a first path through so many places at equal distances up to `end` [m]."""
+def _begin_path(route: Route, end: float, count: int) -> tuple[Traced, FloatArray]:
+    """Return a first path through so many places at equal distances up to `end`, without panels, and these [m]."""
     from cfmkit.elastica import PathStatus
 
     places = end * np.arange(1, count + 1) / count
@@ -243,7 +233,7 @@ def _begin_path(route: Route, end: float, count: int) -> First:
             inner.append(event)
     problem = "" if path.status is PathStatus.COMPLETE and whole else path.message
     zero = PathPoints(*(np.array([value]) for value in (0.0, 0.0, 0.0, True, False)))  # the unloaded position
-    return First(zero.merge(points), (0.0, *inner, reached), places, problem)
+    return Traced(zero.merge(points), None, (0.0, *inner, reached), problem), places
 
 
 def _points(path: Path, places: FloatArray) -> PathPoints:
@@ -261,17 +251,19 @@ def _points(path: Path, places: FloatArray) -> PathPoints:
     return PathPoints(drive[kept], path.effort[kept], stress[kept], path.stable[kept].astype(bool), buckled[kept])
 
 
-def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevPanels, PathPoints, bool]:
-    """Return the force as panels that have converged, all points traced for them, and whether these keep their branch.
-
-    `first`: the path that bifurcations are known from; `number`: panels of a piece at first.
-    """
+def _resolve_panels(
+    route: Route,
+    first: Traced,  # path that bifurcations are known from
+    grid: FloatArray,  # places that were requested of it [m]
+    number: int,  # panels of a piece at first
+) -> tuple[ChebyshevPanels, PathPoints, bool]:
+    """Return the force as converged panels, all points traced for them, and whether these keep their branch."""
     points, sense = first.points, np.sign(first.edges[-1])
     ends, count = sense * np.array(first.edges), N_CORNER_PANELS if route.control.get("imperfection") else number
     pieces, apart = list(pairwise(ends.tolist())), BIFURCATION_CLEARANCE * float(ends[-1])
     # points in every piece and those of the first path: none that follows may step over a bifurcation that this one saw
     guards = [np.linspace(*piece, 5)[1:-1] for piece in pieces]
-    steps = sense * first.grid
+    steps = sense * grid
     near_edge = np.abs(steps[:, None] - ends[1:-1]).min(axis=1, initial=np.inf) < apart
     guards.append(steps[(steps < ends[-1]) & ~near_edge])
     early = min(float(ends[1]), PEAK_TRAVEL_SHARE * float(ends[-1]))
@@ -309,8 +301,8 @@ def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevP
     return ChebyshevPanels(borders, spans, np.array([done[panel] for panel in ordered])), points, kept
 
 
-def _alike(first: First, points: PathPoints) -> bool:
+def _alike(first: Traced, points: PathPoints) -> bool:
     """Return True if points are on the branch that a first path took in each piece, where it has points there."""
-    first_traced, traced = Traced(first.points, None, first.edges), Traced(points, None, first.edges)
-    both = np.isin(np.arange(len(first.edges) - 1), first_traced.piece(first.points.places))
-    return bool(((first_traced.stable == traced.stable) & (first_traced.buckled == traced.buckled))[both].all())
+    traced = replace(first, points=points)
+    both = np.isin(np.arange(len(first.edges) - 1), first.piece(first.points.places))
+    return bool(((first.stable == traced.stable) & (first.buckled == traced.buckled))[both].all())

@@ -79,9 +79,7 @@ def spring_room(spec: VcfmSpec) -> float:
 
 def room_of_coils(springs: BoughtSprings) -> float:
     """Return how far bought springs can be compressed until their turns meet [m]; infinite where they are pulled."""
-    if springs.kind == "extension" or springs.free_length is None:
-        return inf
-    return max(springs.free_length - closed_length(springs), 0.0)
+    return max(springs.spring_type.deflection_until_closed(springs.free_length, closed_length(springs)), 0.0)
 
 
 def closed_length(springs: BoughtSprings) -> float:

@@ -11,22 +11,28 @@ t/L^2, too: both together give its thickness and length.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import asin, ceil, floor, log10, pi, sin, sqrt
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from cfmkit.errors import SolutionError
 from cfmkit.families.findings import format_at_least, format_at_most, mm, mpa
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import MAX_LEAF_ANGLE, buckled_stress, critical_force, stress_overestimate
+from cfmkit.numerics.roots import bracketed_root
 from cfmkit.specs.units import format_short
 from cfmkit.specs.units.fields import TravelShare
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.findings import Infeasible
+    from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
 
 
@@ -40,6 +46,75 @@ WIDTH_RTOL = 1e-6  # share of the width by which it may be off when sizes are fo
 MAX_PASSES, FORCE_RTOL = 12, 1e-5
 """Of the exact model for a sheet, and how far its force may then be off: five passes are usual."""
 MOST_LEAVES = 1000  # as `mechanism.bistable.half_beams` allows
+
+
+@dataclass(frozen=True)
+class ExactFit:
+    """Factors on the widths of leaves and spring that make the exact force flattest, and what is borne then."""
+
+    wide: float
+    stiff: float  # 1 of bought springs, which are as they are
+    stresses: tuple[float, float]  # largest of leaves and spring, with the whole preload [Pa]
+
+
+def fit_exact_force(
+    spec: VcfmSpec,
+    linear: tuple[float, float],  # ends of the region in which the stiffness of the leaves is constant [m]
+    # preload, back: the whole preload, and how far it pushes the shuttle back at most [m]
+    preload: float,
+    back: float,
+    wanted: Callable[[FloatArray], FloatArray | float],  # force at places [N]
+) -> ExactFit:
+    """Return the widths with which the exact force is nearest to a wanted one.
+
+    The fit is over the middle 84 % of the linear region, without preload; stresses are those up to its end.
+
+    Raises SolutionError if the exact leaves cannot be followed that far.
+    """
+    from cfmkit.families.vcfm.exact_model import ExactSampler
+
+    first, last = map(float, linear)
+    middle, half = 0.5 * (first + last), 0.5 * FITTED_REGION_SHARE * (last - first)
+    places = np.linspace(middle - half, middle + half, 101)
+    sampler = ExactSampler(spec, last, back)
+    if sampler.problem:
+        raise SolutionError(sampler.problem)
+    wide, stiff = fit_factors(sampler, places, wanted(places))
+    end = np.concatenate([[_rest(sampler, preload, (wide, stiff))], np.linspace(0.0, last, 201)])
+    stresses = sampler.leaf_stress(end), sampler.spring(np.array([last + preload]))[1]
+    return ExactFit(wide, stiff, (float(stresses[0].max()), float(stresses[1].max())))
+
+
+def fit_factors(sampler: ExactSampler, places: FloatArray, force: FloatArray | float) -> tuple[float, float]:
+    """Return the factors on the widths of leaves and spring that make their force at places nearest to a wanted one.
+
+    Bought springs are as they are.
+    """
+    leaves, spring = sampler.leaf_force(places), sampler.spring(places)[0]
+    columns = np.column_stack([leaves, spring] if sampler.coils is None else [leaves])
+    fixed = 0.0 if sampler.coils is None else spring
+    factors, *_ = np.linalg.lstsq(columns, force - fixed + np.zeros(len(places)), rcond=None)
+    wide, stiff = (*factors.tolist(), 1.0)[:2]
+    return wide, stiff
+
+
+def _rest(sampler: ExactSampler, preload: float, factors: tuple[float, float]) -> float:
+    """Return where the shuttle rests at a preload with both widths changed by factors [m]."""
+
+    def force(travel: float) -> float:
+        place = np.array([travel])
+        return float((factors[0] * sampler.leaf_force(place) + factors[1] * sampler.spring(place + preload)[0])[0])
+
+    if not preload:
+        return 0.0
+    farthest = max(-preload, sampler.pulled.edges[-1])
+    return farthest if force(farthest) >= 0 else bracketed_root(force, farthest, 0.0)
+
+
+def leaf_changes(half_beams: int, leaf: LeafStrip) -> dict[str, object]:
+    """Return what writes the number of leaves, and one of them, into a specification."""
+    sizes = {key: float(getattr(leaf, key)) for key in ("length", "angle", "thickness", "width")}
+    return {f"mechanism.bistable.{key}": value for key, value in ({"half_beams": half_beams} | sizes).items()}
 
 
 def check_guide(spec: VcfmSpec) -> None:

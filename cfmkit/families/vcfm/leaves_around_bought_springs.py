@@ -14,17 +14,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.errors import SolutionError
 from cfmkit.families.findings import Infeasible, mm, mpa, no_design, refusals_answered
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws, room_of_coils
 from cfmkit.families.vcfm.leaf_sizing import (
-    FITTED_REGION_SHARE,
     FORCE_RTOL,
     MAX_PASSES,
     MIN_WIDTH_RATIO,
     N_RESCALES,
     check_guide,
     complete_analysis,
+    fit_exact_force,
+    leaf_changes,
     leaf_of_sheet,
     next_leaf,
     shortest_leaf,
@@ -33,8 +35,10 @@ from cfmkit.families.vcfm.leaf_sizing import (
 )
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.families.vcfm.leaves.v_beam import MAX_LEAF_ANGLE, VBeam, onset_and_exit
+from cfmkit.families.vcfm.model import farthest_back, rests_by_laws
 from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
+from cfmkit.stock.springs.kinds import PRESSED_FIRST
 from cfmkit.stock.springs.offers import Miss, guide_rod_for, nearest
 from cfmkit.stock.springs.spec import offers, support_of, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse
@@ -43,7 +47,6 @@ from cfmkit.stock.springs.support_spec import guide_words
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
     from cfmkit.families.vcfm.surroundings_spec import BoughtSprings
@@ -150,14 +153,14 @@ def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings
         if stated is not None:
             yield stated, None
         return
-    kinds = (stated.kind,) if stated is not None else ("compression", "extension")
-    for offer in offers(target.catalogue, *kinds):
+    spring_types = PRESSED_FIRST if stated is None else (stated.spring_type,)
+    for offer in offers(target.catalogue, *spring_types):
         for count in offer.counts:
             about = {
-                "kind": offer.kind,
+                "kind": offer.spring_type.kind,
                 "stiffness": offer.rate,
                 "count": count,
-                "initial_tension": offer.initial_tension if offer.kind == "extension" else 0.0,
+                "initial_tension": offer.initial_tension,
                 "max_elongation": offer.largest,
                 "free_length": offer.free_length,
                 "body_length": None if offer.wound is not None else offer.body_length,
@@ -266,58 +269,41 @@ def _find_miss(spec: VcfmSpec, target: VcfmDesign, leaves: LeavesAroundSprings, 
 
 def _list_springs_in_use(spec: VcfmSpec, leaves: LeavesAroundSprings, offer: Offer) -> Iterator[SpringInUse]:
     """Yield a spring between rest and the end of the travel at each preload, by the closed form of the leaves."""
-    from cfmkit.families.vcfm.model import LawSampler, rest_of
-
     springs, end = leaves.springs, max(float(leaves.linear[1]), spec.analysis.travel or 0.0)
-    sampler = LawSampler(LeafLaws(VBeam(leaves.leaf), Coils.from_springs(springs), leaves.half_beams))
+    laws = LeafLaws(VBeam(leaves.leaf), Coils.from_springs(springs), leaves.half_beams)
     stated = "analysis" in spec.model_fields_set and "preloads" in spec.analysis.model_fields_set
-    for preload in {*(spec.analysis.preloads if stated else (0.0,)), leaves.target.preload_stroke}:
-        rest = rest_of(sampler, preload, np.linspace(0.0, end, 101)) or 0.0
+    preloads = (*{*(spec.analysis.preloads if stated else (0.0,)), leaves.target.preload_stroke},)
+    rests = rests_by_laws(laws, preloads, np.linspace(0.0, end, 101)).tolist()
+    for preload, rest in zip(preloads, rests, strict=True):
         least, most = (springs.load(place + preload) for place in (rest, end))
         yield SpringInUse(offer.wound, least, most, offer.fatigue, offer.life)
 
 
 def _write_design(spec: VcfmSpec, leaves: LeavesAroundSprings) -> VcfmSpec:
     """Return the spec with springs and leaves written into its mechanism."""
-    leaf = leaves.leaf
-    return spec.replace(
-        {
-            "mechanism.positive": None,
-            "mechanism.springs": leaves.held_springs.model_dump(exclude_unset=True),
-            "mechanism.bistable.half_beams": leaves.half_beams,
-            "mechanism.bistable.length": float(leaf.length),
-            "mechanism.bistable.angle": float(leaf.angle),
-            "mechanism.bistable.thickness": float(leaf.thickness),
-            "mechanism.bistable.width": float(leaf.width),
-        }
-    )
+    springs = leaves.held_springs.model_dump(exclude_unset=True)
+    changes = {"mechanism.positive": None, "mechanism.springs": springs}
+    return spec.replace(changes | leaf_changes(leaves.half_beams, leaves.leaf))
 
 
 def _fit_width(spec: VcfmSpec, target: VcfmDesign, sized: LeavesAroundSprings) -> LeavesAroundSprings | Miss:
     """Return the leaves with the width that makes the exact force flattest, long enough for their exact stress."""
-    from cfmkit.families.vcfm.exact_model import ExactSampler, farthest_back
-
-    allowable, own_target = spec.mechanism.allowable_stress or 0.0, sized.target
-    first, last = sized.linear
-    middle, half = 0.5 * (first + last), 0.5 * FITTED_REGION_SHARE * (last - first)
-    places = np.linspace(middle - half, middle + half, 101)
+    allowable, preload = spec.mechanism.allowable_stress or 0.0, sized.target.preload_stroke
     worst, sheet = np.inf, sheet_of(spec.mechanism.part)
     for _ in range(N_RESCALES if sheet is None else MAX_PASSES):
         made = _write_design(spec, sized).replace({"analysis.preloads": (0.0,), "analysis.branch": "stable"})
         # leaves are followed as far as the spring can push them, not through all of a long preload
-        back = min(own_target.preload_stroke, RETURN_TRAVEL_RATIO * farthest_back(made, (own_target.preload_stroke,)))
-        sampler = ExactSampler(made, last, back)
-        if sampler.problem:
-            return Miss(sized.label, 1.0, f"the exact model does not confirm the stroke: {sampler.problem}")
-        leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
-        wide = float(leaves @ (target.required_force - spring) / (leaves @ leaves))
-        fitted = replace(sized, leaf=replace(sized.leaf, width=sized.leaf.width * wide))
-        ends = np.linspace(-_rest(sampler, wide, own_target.preload_stroke), last, 201)
-        worst = float(sampler.leaves(ends).stress.max()) / allowable
+        back = min(preload, RETURN_TRAVEL_RATIO * farthest_back(made, (preload,)))
+        try:
+            fit = fit_exact_force(made, sized.linear, preload, back, lambda _places: target.required_force)
+        except SolutionError as error:
+            return Miss(sized.label, 1.0, f"the exact model does not confirm the stroke: {error}")
+        fitted = replace(sized, leaf=replace(sized.leaf, width=sized.leaf.width * fit.wide))
+        worst = fit.stresses[0] / allowable
         if sheet is not None:
-            if worst <= 1.0 + 1e-4 and abs(wide - 1.0) <= FORCE_RTOL:
+            if worst <= 1.0 + 1e-4 and abs(fit.wide - 1.0) <= FORCE_RTOL:
                 return _find_miss(spec, target, sized, None) or sized
-            count, leaf = next_leaf(sized.half_beams, sized.leaf, wide, worst, own_target.height)
+            count, leaf = next_leaf(sized.half_beams, sized.leaf, fit.wide, worst, sized.target.height)
             sized = replace(sized, leaf=leaf, linear=onset_and_exit(leaf), half_beams=count)
             continue
         if worst <= 1.0 + 1e-4:
@@ -325,22 +311,11 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, sized: LeavesAroundSprings) -
         if target.leaf_length is not None:
             break
         # stress falls with the square of a length
-        longer = sized_leaf(spec, own_target, sized.leaf.thickness, float(sized.leaf.length) * sqrt(1.0005 * worst))
+        longer = sized_leaf(spec, sized.target, sized.leaf.thickness, float(sized.leaf.length) * sqrt(1.0005 * worst))
         sized = replace(sized, leaf=longer, linear=onset_and_exit(longer))
     return Miss(
         sized.label, worst - 1.0, f"the exact stress of the leaves is {mpa(worst * allowable)} of {mpa(allowable)}"
     )
-
-
-def _rest(sampler: ExactSampler, wide: float, preload: float) -> float:
-    """Return how far the whole preload pushes the shuttle back with leaves `wide` times as wide [m]."""
-    if not preload:
-        return 0.0
-    back = np.linspace(0.0, preload, 401)
-    force = wide * sampler.leaf_force(-back) + sampler.spring(preload - back)[0]
-    # beyond where they were followed leaves pull still harder
-    pushed = np.flatnonzero(np.nan_to_num(force, nan=-1.0) <= 0)
-    return float(back[pushed[0]]) if len(pushed) else preload
 
 
 def _make_design(spec: VcfmSpec, target: VcfmDesign, leaves: LeavesAroundSprings) -> Design:

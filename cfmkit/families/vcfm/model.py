@@ -17,7 +17,14 @@ from cfmkit.arrays import LazySequence, ShortRepr, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.rows import SolvedRows, findings_of_one, rows_of, valid, values_of_one, with_values
-from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, LeafSamples, Rows
+from cfmkit.families.vcfm.curves_in_rows import (
+    LEAST_POINTS,
+    Characteristics,
+    LeafSamples,
+    PartSampler,
+    Preloaded,
+    Rows,
+)
 from cfmkit.families.vcfm.findings import FINDING_RULES, closed_spring, finding, is_closed
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
 from cfmkit.families.vcfm.leaves.kinds import stack_laws
@@ -25,18 +32,18 @@ from cfmkit.families.vcfm.quantities import ROW_COLUMNS, SCALAR_QUANTITIES, adju
 from cfmkit.families.vcfm.solution import Solution, target_of
 from cfmkit.families.vcfm.surroundings import parts_of
 from cfmkit.numerics.roots import last_places
-from cfmkit.results import ROUND_OFF, Result, Status
+from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import parts_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterator, Sequence
+    from collections.abc import Callable, Hashable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.end_stops import EndStops
     from cfmkit.families.run_control import Run
-    from cfmkit.families.vcfm.curves_in_rows import ForceSampler, PartSampler, Push
+    from cfmkit.families.vcfm.curves_in_rows import Push
     from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Finding
@@ -126,7 +133,8 @@ def solve(spec: VcfmSpec, made: LeafLaws, sampler: PartSampler) -> Solution:
     """
     preloads = np.array(spec.analysis.preloads)
     room = np.full(len(preloads), spring_room(spec))
-    curves = _curves(sampler, preloads, travel_grid(spec)[None, :], room, spec.mechanism.end_stops)
+    pushed = Preloaded(sampler, preloads[:, None], spec.mechanism.end_stops)
+    curves = _curves(pushed, travel_grid(spec)[None, :], room)
     curves.leaves  # noqa: B018  force and stress come of one root, and a curve has both
     is_known = np.isfinite(curves.force)
     if (is_known != curves.there).any():
@@ -181,30 +189,22 @@ def _solve_kind(specs: Sequence[VcfmSpec]) -> Solution:
     made.linear  # noqa: B018  once for all preloads
     sampler = LawSampler(made)
     sampler = sampler if count == 1 or len(specs) == 1 else sampler.select_rows(mechanism_of_row)
-    return Solution(
-        tuple(specs), made, _curves(sampler, preloads, grid[mechanism_of_row], room[mechanism_of_row]), count
-    )
+    pushed = Preloaded(sampler, preloads[:, None], NO_STOPS)
+    return Solution(tuple(specs), made, _curves(pushed, grid[mechanism_of_row], room[mechanism_of_row]), count)
 
 
-def _curves(
-    sampler: PartSampler, preloads: FloatArray, grid: FloatArray, room: FloatArray, stops: EndStops = NO_STOPS
-) -> Rows:
-    """Return one curve for each preload (r,), from where the shuttle rests up to where the spring is closed [m].
-
-    Stops are those of all rows.
-    """
-    rest = rests_of(sampler, preloads, grid, stops)
-    travel, count = _travels(np.nan_to_num(rest), np.broadcast_to(grid, (len(preloads), grid.shape[1])))
+def _curves(pushed: Preloaded, grid: FloatArray, room: FloatArray) -> Rows:
+    """Return one curve for each preload, from where the shuttle rests up to where the spring is closed [m]."""
+    rest, preload, stops = rests_of(pushed, grid), pushed.preload, pushed.stops
+    travel, count = _travels(np.nan_to_num(rest), np.broadcast_to(grid, (len(preload), grid.shape[1])))
     if stops:
         marked = stops.mark_rows(row[:points] for row, points in zip(travel, count, strict=True))
         count = np.array([len(row) for row in marked])
         travel = np.array([np.append(row, np.full(max(count.max(), 1) - len(row), row[-1:])) if len(row) else
                            np.full(max(count.max(), 1), start)
                            for row, start in zip(marked, travel[:, 0], strict=True)])  # fmt: skip
-    is_open = (travel + preloads[:, None] <= room[:, None] * (1 + 1e-12)) & (
-        np.arange(travel.shape[1]) < count[:, None]
-    )
-    return Rows(sampler, preloads[:, None], rest, *_compress_rows(travel, is_open), stops)
+    is_open = (travel + preload <= room[:, None] * (1 + 1e-12)) & (np.arange(travel.shape[1]) < count[:, None])
+    return Rows(pushed.sampler, preload, stops, rest, *_compress_rows(travel, is_open))
 
 
 def _travels(start: FloatArray, grid: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
@@ -233,43 +233,29 @@ def _compress_rows(travel: FloatArray, kept: NDArray[np.bool_]) -> tuple[FloatAr
 
 
 def rests_of(
-    sampler: ForceSampler,  # of one mechanism, or of one for each preload
-    preloads: FloatArray | Sequence[float],  # (r,): [m]
+    pushed: Preloaded,
     grid: FloatArray,  # (n,) or (r, n): travels at which a shuttle whose spring is pulled is looked for first [m]
-    stops: EndStops = NO_STOPS,  # of the shuttle: it may rest on one
 ) -> FloatArray:
     """Return where the shuttle rests at each preload, (r,) [m]: the first place without force from the unloaded one on.
 
     NaN where there is none, or where the spring could not be followed so far.
     """
-    if stops:
-        return _rests_on_stops(sampler, np.asarray(preloads, dtype=float), grid, stops)
-    preload = np.asarray(preloads, dtype=float)
+    preload, (low, high) = pushed.preload[:, 0], pushed.stops.rigid_ends
     grid = np.broadcast_to(grid, (len(preload), np.shape(grid)[-1]))
     rest = np.where(preload == 0, 0.0, np.nan)
     for rows, search in ((np.flatnonzero(preload < 0), _pulled_ahead), (np.flatnonzero(preload > 0), _pushed_back)):
         if rows.size:
-            rest[rows] = search(sampler.select_rows(rows), preload[rows], grid[rows])
-    return rest
-
-
-def _rests_on_stops(sampler: ForceSampler, preload: FloatArray, grid: FloatArray, stops: EndStops) -> FloatArray:
-    """Return where the shuttle rests at each preload between stops, (r,) [m]."""
-    rest, (low, high) = rests_of(StoppedSampler(sampler, stops), preload, grid), stops.rigid_ends
-    if math.isfinite(low):
-        pressed = _force(sampler, np.full((len(preload), 1), low), preload)[:, 0] + stops.force(np.array(low)) > 0
-        rest = np.where((preload > 0) & ~(rest > low) & pressed, low, rest)
+            chosen = replace(pushed, sampler=pushed.sampler.select_rows(rows), preload=pushed.preload[rows])
+            rest[rows] = search(chosen, grid[rows])
+    if math.isfinite(low):  # a rigid stop may hold it before it rests
+        is_pressed = pushed.force_at(np.full((len(preload), 1), low))[:, 0] > 0
+        rest = np.where((preload > 0) & ~(rest > low) & is_pressed, low, rest)
     return np.minimum(rest, high)
 
 
-def _force(sampler: ForceSampler, travel: FloatArray, preload: FloatArray) -> FloatArray:
-    """Return the force at travels (r, n) and preloads (r,) [N]."""
-    return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload[:, None])[0])
-
-
-def _pulled_ahead(sampler: ForceSampler, preload: FloatArray, grid: FloatArray) -> FloatArray:
+def _pulled_ahead(pushed: Preloaded, grid: FloatArray) -> FloatArray:
     """Return where the shuttle rests at negative preloads, (r,) [m]."""
-    force, rows = _force(sampler, grid, preload), np.arange(len(preload))
+    force, rows = pushed.force_at(grid), np.arange(len(grid))
     beyond = force >= 0
     first = beyond.argmax(axis=1)
     before = np.maximum(first - 1, 0)
@@ -278,47 +264,49 @@ def _pulled_ahead(sampler: ForceSampler, preload: FloatArray, grid: FloatArray) 
     some = beyond.any(axis=1) & (first > 0)
 
     def excess(travel: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
-        excess_share = (
-            _force(sampler.select_rows(ends), travel, preload[ends]) / np.abs(force[ends, first[ends]])[:, None]
-        )
+        excess_share = pushed.force_at(travel, ends) / np.abs(force[ends, first[ends]])[:, None]
         # no value: farther back than the leaves were followed, where they pull still harder
         return np.where(np.isfinite(excess_share), excess_share, -1.0)
 
     low, high = grid[rows, before], grid[rows, first]
-    some &= force[rows, first] != 0
-    exact = beyond.any(axis=1) & (first > 0) & ~some
+    exact = some & (force[rows, first] == 0)
+    some &= ~exact
     place = last_places(excess, low[:, None], np.where(some, high, low)[:, None])[:, 0]
-    place = _polish_rest(sampler, preload, place, 1e-9 * (high - low))
+    place = _polish_rest(pushed, place, 1e-9 * (high - low))
     return np.where(slack, 0.0, np.where(exact, high, np.where(some, place, np.nan)))
 
 
-def _pushed_back(sampler: ForceSampler, preload: FloatArray, _grid: FloatArray) -> FloatArray:
+def _pushed_back(pushed: Preloaded, _grid: FloatArray) -> FloatArray:
     """Return where the shuttle rests at positive preloads, (r,) [m]."""
-    nothing = np.zeros((len(preload), 1))
-    force_unloaded, force_behind = (_force(sampler, at, preload)[:, 0] for at in (nothing, -preload[:, None]))
+    nothing, preload = np.zeros_like(pushed.preload), pushed.preload[:, 0]
+    force_unloaded, force_behind = (pushed.force_at(at)[:, 0] for at in (nothing, -pushed.preload))
     # No number unloaded: leaves too thin for the engine could not be moved at all. No number farther back: than they
     # were followed, where they pull still harder. The closed form of arches pulls the wrong way far out of its range.
     rests = (force_unloaded > 0) & ~(force_behind > 0)
 
     def excess(travel: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
-        return -_force(sampler.select_rows(ends), travel, preload[ends]) / force_unloaded[ends][:, None]
+        return -pushed.force_at(travel, ends) / force_unloaded[ends][:, None]
 
     place = last_places(excess, nothing, np.where(rests, -preload, 0.0)[:, None])[:, 0]
-    return np.where(rests, _polish_rest(sampler, preload, place, 1e-9 * preload), np.nan)
+    return np.where(rests, _polish_rest(pushed, place, 1e-9 * preload), np.nan)
 
 
-def _polish_rest(sampler: ForceSampler, preload: FloatArray, place: FloatArray, step: FloatArray) -> FloatArray:
+def _polish_rest(pushed: Preloaded, place: FloatArray, step: FloatArray) -> FloatArray:
     """Return rest positions after one secant more over what is left of their brackets: known to rounding."""
-    force_here, force_ahead = (_force(sampler, at[:, None], preload)[:, 0] for at in (place, place + step))
+    force_here, force_ahead = (pushed.force_at(at[:, None])[:, 0] for at in (place, place + step))
     with np.errstate(all="ignore"):
         change = force_here * step / (force_ahead - force_here)
     return place - np.where(np.abs(change) < step, change, 0.0)
 
 
-def rest_of(sampler: ForceSampler, preload: float, grid: FloatArray) -> float | None:
-    """Return `rests_of` for one preload [m]; None if the shuttle does not rest."""
-    rest = float(rests_of(sampler, [preload], grid)[0])
-    return None if np.isnan(rest) else rest
+def rests_by_laws(laws: LeafLaws, preloads: Sequence[float], grid: FloatArray) -> FloatArray:
+    """Return `rests_of` one mechanism of closed forms at each preload, (p,) [m]; zero where nothing holds it."""
+    return np.nan_to_num(rests_of(Preloaded(LawSampler(laws), np.array(preloads)[:, None], NO_STOPS), grid))
+
+
+def farthest_back(spec: VcfmSpec, preloads: Sequence[float]) -> float:
+    """Return how far preloads push the shuttle back by closed forms [m]."""
+    return max(0.0, -float(rests_by_laws(parts(spec), preloads, travel_grid(spec)).min()))
 
 
 def _curve(push: Push, stops: EndStops, pressed: bool) -> Curve:
@@ -339,20 +327,14 @@ def _curve(push: Push, stops: EndStops, pressed: bool) -> Curve:
 
 
 @dataclass(frozen=True)
-class LawSampler:
+class LawSampler(PartSampler):
     """Samples of closed forms: of one mechanism, or of one for each row."""
 
     parts: LeafLaws
 
-    problem = ""
-    accuracy = ROUND_OFF
-
     def select_rows(self, rows: Any) -> Self:
         """Return the laws of some rows."""
         return type(self)(rows_of(self.parts, rows))
-
-    def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
-        """Return None: closed forms know every travel."""
 
     def leaves(self, travel: FloatArray) -> LeafSamples:
         """Return what all leaves do at some travels [m]."""
@@ -382,26 +364,6 @@ class LawSampler:
         return Characteristics(parts.positive_stiffness, parts.negative_stiffness, parts.first_stiffness, parts.linear)
 
 
-@dataclass(frozen=True)
-class StoppedSampler:
-    """The force of leaves and spring with that of elastic stops, as far as it decides where a shuttle rests."""
-
-    sampler: ForceSampler
-    stops: EndStops
-
-    def select_rows(self, rows: Any) -> Self:
-        """Return those of some rows."""
-        return type(self)(self.sampler.select_rows(rows), self.stops)
-
-    def leaf_force(self, travel: FloatArray) -> FloatArray:
-        """Return the force of leaves and stops [N]."""
-        return self.sampler.leaf_force(travel) + self.stops.force(travel)
-
-    def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
-        return self.sampler.spring(compression)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class DenseCurve(ShortRepr):
     """The force of one mechanism at the nominal preload (a `cfmkit.results.ClosedForm`), with the stress of all."""
@@ -422,24 +384,26 @@ class DenseCurve(ShortRepr):
         """Return the force at travels of any shape [N]."""
         if places is self.places or (places.base is self.places and places.size == self.places.size):
             return self._known.reshape(places.shape)
-        return self._force(places)
+        return _evaluate_at(self.solution.nominal.force_at, places)
 
     @cached_property
     def _known(self) -> FloatArray:
         """The force at all of `places`, which each metric begins with [N]."""
-        return self._force(self.places)
-
-    def _force(self, places: FloatArray) -> FloatArray:
-        return self.solution.nominal.force_at(np.reshape(places, (1, -1))).reshape(np.shape(places))
+        return _evaluate_at(self.solution.nominal.force_at, self.places)
 
     def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress of leaves and spring at travels of any shape, of all preloads there [Pa]."""
-        return self.solution.stress(np.reshape(places, (1, -1))).reshape(np.shape(places))
+        return _evaluate_at(self.solution.stress, places)
 
     def own_stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress of leaves and spring at travels of any shape, of the nominal preload [Pa]."""
-        return self.solution.stress(np.reshape(places, (1, -1)), alone=True).reshape(np.shape(places))
+        return _evaluate_at(partial(self.solution.stress, alone=True), places)
 
     def part_efforts(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest force of one leaf, or of one spring, at travels of any shape [N]."""
-        return self.solution.part_efforts(np.reshape(places, (1, -1))).reshape(np.shape(places))
+        return _evaluate_at(self.solution.part_efforts, places)
+
+
+def _evaluate_at(law: Callable[[FloatArray], FloatArray], places: FloatArray) -> FloatArray:
+    """Return a law of places (1, n) at places of any shape."""
+    return law(np.reshape(places, (1, -1))).reshape(np.shape(places))

@@ -133,9 +133,9 @@ def _coils(spec: VcfmSpec, bottom: float, head: float, deflection: float, farthe
     """
     springs, frame = spec.mechanism.springs, spec.mechanism.frame
     assert springs is not None
-    hangs = springs.kind == "extension"
     across = springs.outer_diameter or 1.5 * frame.block
-    length = (springs.free_length or max(2.0 * frame.corner, 1.5 * farthest)) + (deflection if hangs else -deflection)
+    hangs, relaxed = springs.hang, springs.free_length or max(2.0 * frame.corner, 1.5 * farthest)
+    length = relaxed + springs.spring_type.lengthening * deflection
     start = head if hangs else bottom
     end = start + length if hangs else start - length
     wire = springs.wound.wire if springs.wound else 0.06 * across

@@ -34,7 +34,7 @@ from cfmkit.families.vcfm.exact_model import DOWN_ANGLE, ExactSampler, leaf_netw
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, strip_of
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
-from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
+from cfmkit.families.vcfm.model import farthest_back, result_of, solve
 from cfmkit.families.vcfm.outline import drawing, sharp_corners
 from cfmkit.families.vcfm.part import solved_leaf, solved_spring
 from cfmkit.results import Result, Status
@@ -228,8 +228,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     As `cfmkit.families.vcfm.exact_model.analyze`; NO_EQUILIBRIUM if a part cannot be meshed.
     """
     made = parts(spec)
-    rests = [rest_of(LawSampler(made), preload, travel_grid(spec)) for preload in spec.analysis.preloads]
-    back = 1.3 * max([-(rest or 0.0) for rest in rests] + [0.0])
+    back = 1.3 * farthest_back(spec, spec.analysis.preloads)
     try:
         outlines(drawing(spec))  # what cannot be cut is not solved: fillets too large make mountains of elements
         sampler = SolidSampler(spec, spec.travel, back, run)

@@ -5,6 +5,7 @@ At last they are those that its leaves and its spring need as planar solids.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import asin, sin, sqrt
 from typing import TYPE_CHECKING
 
@@ -14,34 +15,54 @@ from cfmkit.families.proposals import WINDOW_EXTENSION_SHARE, aim_below_stiffeni
 from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm.exact_model import analyze
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
+from cfmkit.families.vcfm.leaf_sizing import fit_factors
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.families.vcfm.plane_fem_analysis import SolidSampler
 from cfmkit.specs.units import Place
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.proposals import Request
     from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
-def fit_in_window(
-    sampler: ExactSampler, at: float, force: float, travel: float
-) -> tuple[float, float, float, float] | None:
-    """Return what is left of the force around a place, the place and both factors; None if one is not above zero."""
-    places: FloatArray = np.linspace(at - 0.5 * travel, at + 0.5 * travel, 61)
-    columns = np.column_stack([sampler.leaves(places).force, sampler.spring(places)[0]])
-    if not np.isfinite(columns).all():
+@dataclass(frozen=True)
+class WindowFit:
+    """Window in which widths fit a force best, and leaves and spring as wide as they are to be."""
+
+    wide: float  # factor on the width of the leaves
+    stiff: float  # factor on that of the spring; 1 of bought ones
+    end: float  # of the window [m]
+    leaf_stress: float  # largest of the leaves up to there [Pa]
+    spring_stress: float  # of the spring there, without preload [Pa]
+    stiffness: float  # of the spring over the window [N/m]
+
+
+def fit_best_window(sampler: ExactSampler, centres: Sequence[float], force: float, travel: float) -> WindowFit | None:
+    """Return the window as long as a travel around one of some centres [m] that leaves the least of the force [N].
+
+    None if no widths above zero fit.
+    """
+    fits: list[tuple[float, float, float, float]] = []
+    for at in centres:
+        places: FloatArray = np.linspace(at - 0.5 * travel, at + 0.5 * travel, 61)
+        columns = np.column_stack([sampler.leaf_force(places), sampler.spring(places)[0]])
+        if not np.isfinite(columns).all():
+            continue
+        factors = fit_factors(sampler, places, force)
+        if min(factors) > 0.0:
+            fits.append((float(np.abs(columns @ np.array(factors) / force - 1.0).max()), at, *factors))
+    if not fits:
         return None
-    if sampler.coils is None:
-        (wide, stiff), *_ = np.linalg.lstsq(columns, np.full(len(places), force), rcond=None)
-    else:  # bought springs are as they are
-        stiff = 1.0
-        (wide,), *_ = np.linalg.lstsq(columns[:, :1], force - columns[:, 1], rcond=None)
-    if not (wide > 0.0 and stiff > 0.0):
-        return None
-    left = np.abs(columns @ np.array([wide, stiff]) / force - 1.0).max()
-    return float(left), at, float(wide), float(stiff)
+    _, at, wide, stiff = min(fits)
+    end = at + 0.5 * travel
+    at_ends, stresses = sampler.spring(np.array([end - travel, end]))
+    leaf_stress = float(sampler.leaf_stress(np.linspace(0.0, end, 201)).max())
+    stiffness = stiff * float(at_ends[1] - at_ends[0]) / travel
+    return WindowFit(wide, stiff, end, leaf_stress, float(np.max(stresses)), stiffness)
 
 
 def lengthen(spec: VcfmSpec, factors: list[float]) -> VcfmSpec:
@@ -106,32 +127,25 @@ def correct(spec: VcfmSpec, request: Request) -> VcfmSpec:
     solid = spec.replace({"analysis.fidelity": "solid", "requirements": (), "sensitivity": None})
     window = solid.analysis.window
     middle = 0.5 * (float(window[0]) + float(window[1])) if window else 0.5 * spec.travel
-    ends = [
-        share * middle + 0.5 * request.travel for share in WINDOW_CENTRE_RATIOS if share * middle > 0.5 * request.travel
-    ]
-    if not ends:
+    centres = [share * middle for share in WINDOW_CENTRE_RATIOS if share * middle > 0.5 * request.travel]
+    if not centres:
         return solid
-    free = {"analysis.travel": max(ends), "analysis.window": None, "analysis.preloads": (0.0,)}
-    sampler = SolidSampler(solid.replace(free), max(ends), 0.0, Run())
-    tried = [fit_in_window(sampler, end - 0.5 * request.travel, request.target, request.travel) for end in ends]
-    fitted = [fit for fit in tried if fit is not None]
-    if not fitted:
+    farthest = max(centres) + 0.5 * request.travel
+    free = {"analysis.travel": farthest, "analysis.window": None, "analysis.preloads": (0.0,)}
+    sampler = SolidSampler(solid.replace(free), farthest, 0.0, Run())
+    fit = fit_best_window(sampler, centres, request.target, request.travel)
+    if fit is None:
         return solid
-    _, at, wide, stiff = min(fitted)
-    last = at + 0.5 * request.travel
-    leaf = float(sampler.leaves(np.linspace(0.0, last, 201)).stress.max())
-    preloads, largest = solid.analysis.preloads, max(solid.analysis.preloads)
-    force, stress = sampler.spring(np.array([last - request.travel, last]))
-    rate = stiff * float(force[1] - force[0]) / request.travel
+    last, preloads = fit.end, solid.analysis.preloads
     strength = request.strength_used * (solid.mechanism.material.allowable(1.0) or np.inf)
-    longer = [max(1.0, sqrt(1.02 * leaf / strength)), 1.0]
+    longer = [max(1.0, sqrt(1.02 * fit.leaf_stress / strength)), 1.0]
     if solid.mechanism.springs is None:
         law = parts(solid).spring
-        side = float(np.max(stress) * law.stress(last + largest) / law.stress(last))
+        side = fit.spring_stress * law.stress(last + max(preloads)) / law.stress(last)
         longer[1] = max(1.0, sqrt(1.02 * side / strength))
-        preloads = preloads_for(spec, request, 1.0 / rate, preloads)
+        preloads = preloads_for(spec, request, 1.0 / fit.stiffness, preloads)
     made = lengthen(solid, longer)
-    made = widen(made, wide * longer[0] ** 3, stiff * longer[1] ** 3)
+    made = widen(made, fit.wide * longer[0] ** 3, fit.stiff * longer[1] ** 3)
     begin = last - request.travel * (1.0 + WINDOW_EXTENSION_SHARE)
     changes = {
         "analysis.window": (Place(begin, "length"), Place(last, "length")), "analysis.travel": last,

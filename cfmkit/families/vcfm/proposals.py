@@ -13,7 +13,7 @@ family's own design.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain, product
 from math import pi, sin, sqrt
 from typing import TYPE_CHECKING, Any
@@ -27,10 +27,11 @@ from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
-from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthen, open_corners, preloads_for, widen
+from cfmkit.families.vcfm.proposal_sizes import fit_best_window, lengthen, open_corners, preloads_for, widen
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
+from cfmkit.stock.springs.kinds import PRESSED_FIRST
 from cfmkit.stock.springs.offers import generic
 from cfmkit.stock.springs.spec import CatalogueSpring
 
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
     from cfmkit.families.proposals import MaterialBlock, Request
     from cfmkit.families.vcfm.design import DesignSizes
+    from cfmkit.families.vcfm.proposal_sizes import WindowFit
 
 
 RISE_RATIOS = (3.7, 4.0, 4.25, 4.5, 5.5, 7.0)
@@ -271,10 +273,10 @@ def _springs_beside(request: Request, spec: VcfmSpec, travel: float, place: floa
     target = spec.design
     assert target is not None
     softest, preload = target.required_force / target.height, target.preload_stroke
-    for spring in chain(generic("compression"), generic("extension")):
+    for spring in chain.from_iterable(map(generic, PRESSED_FIRST)):
         wide = spring.outer_diameter or 0.0
         # a pulled spring stands above a shuttle that goes down, and the preload moves its other end up
-        long = (spring.free_length or 0.0) + (target.stroke + preload if spring.kind == "extension" else 0.0)
+        long = (spring.free_length or 0.0) + max(spring.spring_type.lengthening, 0.0) * (target.stroke + preload)
         stretched = (spring.largest or 0.0) > MIN_RISE_RATIO * (travel + preload)
         if long > place or wide > (request.depth or np.inf) or not stretched:
             continue
@@ -343,20 +345,6 @@ WINDOW_CENTRES = np.linspace(0.5, 1.5, 41)
 N_LENGTHENINGS = 3  # times that parts are made longer: stress falls a little less than with the square of the length
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """The best window of a structure: what both widths are to be multiplied by, the stresses [Pa] and the end [m].
-
-    `stiffness` is that of the spring over the window, as wide as it is to be [N/m].
-    """
-
-    wide: float
-    stiff: float
-    stresses: tuple[float, float]
-    end: float
-    stiffness: float
-
-
 def with_structure(
     spec: VcfmSpec,  # with a diamond and straight leaves
     name: str,  # of `STRUCTURE_BLOCKS`
@@ -377,48 +365,36 @@ def with_structure(
     changes = {f"mechanism.{block}.{key}": value for key, value in keys}
     made = spec.replace({**changes, "design": None, "requirements": (), "mechanism.safety_factor": 1.0})
     made = made.replace({"analysis.fidelity": "exact", "analysis.preloads": (0.0,), "analysis.window": None})
-    widths = _fit_widths(made, forces, travel)
     for _ in range(N_LENGTHENINGS):
-        over = [stress / strength for stress in widths.stresses]
+        fit = _fit_exact_window(made, forces[0], travel)
+        # the exact path ends with the travel: from there on by the closed form
+        law, preload = parts(made).spring, (forces[1] - forces[0]) / fit.stiffness
+        spring_stress = fit.spring_stress * float(law.stress(fit.end + preload) / law.stress(fit.end))
+        over = [stress / strength for stress in (fit.leaf_stress, spring_stress)]
         if max(over) <= 1.0:
             break
         made = lengthen(made, [max(1.0, sqrt(1.02 * overstress)) for overstress in over])
-        widths = _fit_widths(made, forces, travel)
-    made = widen(made, widths.wide, widths.stiff)
-    return made, widths.end, widths.stiffness
+    else:
+        fit = _fit_exact_window(made, forces[0], travel)
+    return widen(made, fit.wide, fit.stiff), fit.end, fit.stiffness
 
 
-def _fit_widths(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _Fit:
-    """Return the window and the widths with which the force departs least from the wanted one.
-
-    The stress of the spring is that at the end of the window with the preload that the largest force needs.
-    """
+def _fit_exact_window(spec: VcfmSpec, force: float, travel: float) -> WindowFit:
+    """Return the window and the widths with which the exact force departs least from the wanted one."""
     from cfmkit.families.vcfm.exact_model import ExactSampler
 
     rise = spec.mechanism.bistable.length * sin(spec.mechanism.bistable.angle)
     centres = [share * rise for share in WINDOW_CENTRES if share * rise > 0.51 * travel]
     if not centres:
         raise SolutionError("the leaves are too flat for the travel")
-    end = max(centres) + 0.5 * travel
-    sampler = ExactSampler(spec, end, 0.0)
+    sampler = ExactSampler(spec, centres[-1] + 0.5 * travel, 0.0)
     while sampler.problem and len(centres) > 1:
         # leaves that cannot be followed so far: windows that end earlier
         centres = centres[: len(centres) // 2]
-        end = centres[-1] + 0.5 * travel
-        sampler = ExactSampler(spec, end, 0.0)
+        sampler = ExactSampler(spec, centres[-1] + 0.5 * travel, 0.0)
     if sampler.problem:
         raise SolutionError(sampler.problem)
-    tried = [
-        widths for widths in (fit_in_window(sampler, at, forces[0], travel) for at in centres) if widths is not None
-    ]
-    if not tried:
+    fit = fit_best_window(sampler, centres, force, travel)
+    if fit is None:
         raise SolutionError("no widths of this structure give the force over the travel")
-    _, at, wide, stiff = min(tried)
-    last = at + 0.5 * travel
-    leaf = float(sampler.leaves(np.linspace(0.0, last, 201)).stress.max())
-    at_ends, stresses = sampler.spring(np.array([last - travel, last]))
-    stiffness = stiff * float(at_ends[1] - at_ends[0]) / travel
-    # the exact path ends with the travel: from there on by the closed form
-    law, preload = parts(spec).spring, (forces[1] - forces[0]) / stiffness
-    more = float(law.stress(last + preload) / law.stress(last))
-    return _Fit(wide, stiff, (leaf, more * float(stresses[1])), last, stiffness)
+    return fit

@@ -47,10 +47,6 @@ def _linear_stroke(solution: Solution) -> FloatArray:
     return np.where(np.isfinite(high - low), high - low, 0.0)
 
 
-def _window_length(solution: Solution) -> FloatArray:
-    return np.nan_to_num(solution.flat[1] - solution.flat[0])
-
-
 def _why_not_constant(solution: Solution) -> str:
     """Return why no single force stands for the curve."""
     alone, flat = float(solution.spring_alone[0]), float(solution.window_force[0])
@@ -58,10 +54,6 @@ def _why_not_constant(solution: Solution) -> str:
         return "the leaves carry a force where they are flat, or the spring has no constant stiffness"
     flat_part = "" if np.isnan(flat) else f"; its flat part is at {newton(flat)}"
     return f"where the leaves carry nothing the force is {newton(alone)}, but the curve is not flat there{flat_part}"
-
-
-def _rest_position(solution: Solution) -> FloatArray:
-    return solution.nominal.rest
 
 
 def _rest_shift_max(solution: Solution) -> FloatArray:
@@ -104,11 +96,6 @@ def _largest_change(solution: Solution) -> tuple[FloatArray, FloatArray]:
     return changes[rows, largest], (preload - preload[:, :1])[rows, largest]
 
 
-def _force_per_preload(solution: Solution) -> FloatArray:
-    change, preload = _largest_change(solution)
-    return change / preload
-
-
 def _value_over_preloads(solution: Solution, read: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Return a value of the forces (m, p, places) of all preloads; NaN where one of them has no force in the window."""
     forces = solution.window_forces
@@ -130,13 +117,9 @@ def _list_springs_in_use(solution: Solution, number: int) -> list[SpringInUse]:
     springs = solution.specs[number].mechanism.springs
     if springs is None:
         return []
-    fatigue = None if springs.wound is None or springs.wound.fatigue is None else springs.wound.fatigue.law
-    used, curves = [], solution.curves
-    for row in range(number * solution.preloads, (number + 1) * solution.preloads):
-        ends = (float(end[row] + curves.preload[row, 0]) for end in curves.ends)
-        least, most = (springs.load(deflection) for deflection in ends)
-        used.append(SpringInUse(springs.coil, least, most, fatigue, springs.life))
-    return used
+    rows, curves = slice(number * solution.preloads, (number + 1) * solution.preloads), solution.curves
+    ends = [(end[rows] + curves.preload[rows, 0]).tolist() for end in curves.ends]
+    return [springs.put_under(springs.load(first), springs.load(last)) for first, last in zip(*ends, strict=True)]
 
 
 def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
@@ -191,13 +174,17 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "length", "end of the longest window within analysis.flatness", lambda solution: solution.flat[1]
     ),
     "window_length": ScalarQuantity(
-        "length", "length of the longest window within analysis.flatness; 0 if there is none", _window_length
+        "length",
+        "length of the longest window within analysis.flatness; 0 if there is none",
+        lambda solution: np.nan_to_num(solution.flat[1] - solution.flat[0]),
     ),
     "window_force": ScalarQuantity(
         "force", "mean force in the longest window within analysis.flatness", lambda solution: solution.window_force
     ),
     "rest_position": ScalarQuantity(
-        "length", "rest position of the shuttle at the nominal preload, from the unloaded position", _rest_position
+        "length",
+        "rest position of the shuttle at the nominal preload, from the unloaded position",
+        lambda solution: solution.nominal.rest,
     ),
     "rest_shift_max": ScalarQuantity(
         "length", "largest distance of a rest position from the unloaded position, over all preloads", _rest_shift_max
@@ -227,7 +214,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "force_per_preload": ScalarQuantity(
         "stiffness",
         "largest change of the mean force due to a preload, over the change of the preload",
-        _force_per_preload,
+        lambda solution: np.divide(*_largest_change(solution)),
     ),
     "least_force": ScalarQuantity(
         "force",

@@ -18,8 +18,8 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.vcfm.curves_in_rows import LeafSamples, Push
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
+from cfmkit.metrics.curve_rows import CurveRows, RowSamples, StressRows
 from cfmkit.metrics.longest_interval_in_band import extremes
-from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:

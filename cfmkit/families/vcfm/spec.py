@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from cfmkit.families.end_stops import EndStops
 from cfmkit.families.end_stops_spec import EndStop, stop_faults, travel_up_to_stop
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS, Bistable, Positive
-from cfmkit.families.vcfm.surroundings_spec import BoughtSprings, CutLeaves, VcfmPart
+from cfmkit.families.vcfm.surroundings_spec import BoughtSprings, CutLeaves, StandingFrame, VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.block import keys_of
 from cfmkit.specs.spec import (
@@ -29,9 +29,11 @@ from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Force, Length, Ratio, Stiffness, format_short
 from cfmkit.stock.material_and_part_spec import MaterialField, SafetyFactor, sheet_faults, stated_sheet
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringSafety
-from cfmkit.stock.stock_series import StockSize, stock_faults
+from cfmkit.stock.stock_series import Path, StockSize, stock_faults
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
@@ -145,17 +147,13 @@ class VcfmDesign(DesignBlock):
     refine: bool = Field(True, description="correct both widths by one pass of the exact model")
 
     @model_validator(mode="after")
-    def _one_length(self) -> Self:
+    def _one_length_and_target(self) -> Self:
         if self.preload is not None and self.rise is not None:
             raise ValueError(
                 "give either 'preload' or 'rise': one follows from the other, rise = force/adjustment preload"
             )
         if self.adjustment is None and self.preload is not None:
             raise ValueError("'preload' needs the 'adjustment' that it gives; without one give the leaves' 'rise'")
-        return self
-
-    @model_validator(mode="after")
-    def _one_target(self) -> Self:
         if self.by_requirements:
             return self
         if self.stroke == 0.0:
@@ -283,30 +281,50 @@ class VcfmSpec(Spec):
         return self
 
     @model_validator(mode="after")
-    def _is_cut_from_one_sheet(self) -> Self:
-        part = self.mechanism
-        sheet = None if part.part is None else part.part.sheet
-        if sheet is not None and self.design is not None and self.design.leaf_length is not None:
-            reported = "the length of leaves from a sheet follows from the force: drop it, or 'mechanism.part.sheet'"
-            refuse("Spec", {("design", "leaf_length"): reported})
-        refuse("Spec", sheet_faults(part.part, self.out_of_plane_widths))
+    def _is_consistent(self) -> Self:
+        widths = sheet_faults(self.mechanism.part, self.out_of_plane_widths)
+        refuse("Spec", widths | dict(stop_faults(self.mechanism.stops, self.requirements)) | dict(self._list_faults()))
         return self
 
-    @model_validator(mode="after")
-    def _stop_and_seat_leave_the_travel(self) -> Self:
-        frame = self.mechanism.part.frame if self.mechanism.part is not None else None
-        if frame is None:
-            return self
+    def _list_faults(self) -> Iterator[tuple[Path, str]]:
+        """Yield what of mechanism, analysis and design does not go together, by path."""
+        mechanism, analysis, design = self.mechanism, self.analysis, self.design
+        part = mechanism.part or VcfmPart()
+        frame = part.frame or StandingFrame()
+        if part.sheet is not None and design is not None and design.leaf_length is not None:
+            yield (
+                ("design", "leaf_length"),
+                "the length of leaves from a sheet follows from the force: drop it, or 'mechanism.part.sheet'",
+            )
         if frame.stop is not None and frame.stop < self.travel * (1 - 1e-9):
             stop, travel = (format_short(length, "length") for length in (frame.stop, self.travel))
-            reported = (
-                f"the stop holds the shuttle at {stop}, but the travel is {travel}: make the stop or 'analysis' agree"
+            yield (
+                ("mechanism", "part", "frame", "stop"),
+                f"the stop holds the shuttle at {stop}, but the travel is {travel}: make the stop or 'analysis' agree",
             )
-            refuse("Spec", {("mechanism", "part", "frame", "stop"): reported})
-        if frame.seat is not None and self.mechanism.springs is not None:
-            reported = "a seat is drawn for a spring of leaves; these springs are bought: leave it out"
-            refuse("Spec", {("mechanism", "part", "frame", "seat"): reported})
-        return self
+        if frame.seat is not None and mechanism.springs is not None:
+            yield (
+                ("mechanism", "part", "frame", "seat"),
+                "a seat is drawn for a spring of leaves; these springs are bought: leave it out",
+            )
+        most = MOST_PRELOAD * mechanism.bistable.length
+        for index, preload in enumerate(analysis.preloads):
+            if abs(preload) > most:
+                yield (
+                    ("analysis", "preloads", index),
+                    f"is more than {MOST_PRELOAD:g} times the length of a leaf ('mechanism.bistable.length'): at most "
+                    f"{format_short(most, 'length')}",
+                )
+        if mechanism.wide_beams and analysis.fidelity in ("truss", "analytic"):
+            yield ("mechanism", "wide_beams"), "no closed form includes it: add 'analysis.fidelity: exact'"
+        if analysis.fidelity == "solid" or (design is not None and design.verify == "solid"):
+            if mechanism.bistable.waviness:
+                yield (
+                    ("mechanism", "bistable", "waviness"),
+                    "the model 'solid' does not support it: leaves are as drawn",
+                )
+            if analysis.branch == "primary":
+                yield ("analysis", "branch"), "the model 'solid' follows the stable branch only"
 
     @property
     def out_of_plane_widths(self) -> Mapping[str, float | None]:
@@ -316,30 +334,6 @@ class VcfmSpec(Spec):
         return {"bistable.width": self.mechanism.bistable.width} | spring_width
 
     @model_validator(mode="after")
-    def _has_the_stops_that_it_names(self) -> Self:
-        refuse("Spec", dict(stop_faults(self.mechanism.stops, self.requirements)))
-        return self
-
-    @model_validator(mode="after")
-    def _preloads_are_within_reach(self) -> Self:
-        most = MOST_PRELOAD * self.mechanism.bistable.length
-        faults: dict[tuple[str | int, ...], str] = {
-            ("analysis", "preloads", index): f"is more than {MOST_PRELOAD:g} times the length of a leaf "
-            f"('mechanism.bistable.length'): at most {format_short(most, 'length')}"
-            for index, preload in enumerate(self.analysis.preloads)
-            if abs(preload) > most
-        }
-        refuse("Spec", faults)
-        return self
-
-    @model_validator(mode="after")
-    def _wide_leaves_are_traced(self) -> Self:
-        if self.mechanism.wide_beams and self.analysis.fidelity in ("truss", "analytic"):
-            reported = "no closed form includes it: add 'analysis.fidelity: exact'"
-            refuse("Spec", {("mechanism", "wide_beams"): reported})
-        return self
-
-    @model_validator(mode="after")
     def _truss_has_two_laws(self) -> Self:
         both = self.mechanism.positive, self.mechanism.bistable
         if self.analysis.fidelity == "truss" and any(strip is None or strip.kind.truss is None for strip in both):
@@ -347,19 +341,6 @@ class VcfmSpec(Spec):
                 f"'{kind.name}'" for kind in (*SPRING_KINDS.values(), *LEAF_KINDS.values()) if kind.truss is not None
             ]
             raise ValueError(f"the truss laws are for {' and '.join(names)}; choose another 'analysis.fidelity'")
-        return self
-
-    @model_validator(mode="after")
-    def _solid_is_of_what_is_made(self) -> Self:
-        if self.analysis.fidelity == "solid" or (self.design is not None and self.design.verify == "solid"):
-            faults: dict[tuple[str | int, ...], str] = {}
-            if self.mechanism.bistable.waviness:
-                faults["mechanism", "bistable", "waviness"] = (
-                    "the model 'solid' does not support it: leaves are as drawn"
-                )
-            if self.analysis.branch == "primary":
-                faults["analysis", "branch"] = "the model 'solid' follows the stable branch only"
-            refuse("Spec", faults)
         return self
 
     @model_validator(mode="after")

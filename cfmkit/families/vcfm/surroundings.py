@@ -54,7 +54,7 @@ def _list_springs(springs: BoughtSprings) -> ListedPart:
         size = f"wire {exact(wire.wire)}, coil {exact(wire.coil)}, {wire.turns:g} turns"
         data.append(f"wire {mm(wire.wire)}, mean coil {mm(wire.coil)}, {wire.turns:g} turns")
     data += guide_words(springs)
-    place = "below the shuttle" if springs.kind == "compression" else "above the shuttle"
+    place = "above the shuttle" if springs.hang else "below the shuttle"
     return ListedPart(place, springs.name or "", springs.count, ", ".join(data), "buy", size)
 
 

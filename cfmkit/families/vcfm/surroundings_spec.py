@@ -9,12 +9,17 @@ from pydantic import Field, ValidationInfo, model_validator
 from cfmkit.specs.spec import NonNegativeLength, PositiveLength
 from cfmkit.specs.units import Stiffness
 from cfmkit.stock.material_and_part_spec import CutPart, PartFrame, RoundedCorners
-from cfmkit.stock.springs.offers import unguided_deflection
+from cfmkit.stock.springs.compression_springs import CompressionSpring
+from cfmkit.stock.springs.kinds import AXIAL_KINDS
 from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire, settle_rate
-from cfmkit.stock.springs.support_spec import SpringSupport
+from cfmkit.stock.springs.support_spec import BuiltInSpring
 
 if TYPE_CHECKING:
     from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
+
+    AxialKind = str
+else:
+    AxialKind = Literal[tuple(AXIAL_KINDS)]
 
 
 class StandingFrame(PartFrame):
@@ -47,14 +52,14 @@ class CutLeaves(RoundedCorners):
         return min(float(strip.thickness) for strip in (self.bistable, self.positive) if strip is not None)
 
 
-class BoughtSprings(SpringSupport):
+class BoughtSprings(BuiltInSpring):
     """Equal helical springs side by side, in place of leaves: the preload moves their far ends.
 
     Compression springs stand below the shuttle, extension springs hang above it; neither carries anything where it is
     shorter (longer) than relaxed, and all are relaxed when unloaded.
     """
 
-    kind: Literal["compression", "extension"] = Field("compression", description="how they are loaded")
+    kind: AxialKind = Field(CompressionSpring.kind, description="how they are loaded")
     stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(None, description="of one; default: from 'wound'")
     count: int = Field(1, ge=1, le=1000, description="how many in parallel")
     initial_tension: InitialTension = 0.0
@@ -74,26 +79,19 @@ class BoughtSprings(SpringSupport):
 
     @model_validator(mode="after")
     def _rate_is_known(self, info: ValidationInfo) -> Self:
-        settle_rate(self, self.kind, info)
-        if self.initial_tension and self.kind == "compression":
-            raise ValueError("'initial_tension' applies to extension springs only: compression springs have none")
-        self.check_guide(self.kind, self.coil, self.outer_diameter)
+        settle_rate(self, self.spring_type, info)
+        self.check_guide(self.spring_type, self.coil, self.outer_diameter)
         return self
 
     @property
-    def coil(self) -> HelicalSpring | None:
-        """Its wire, coil and turns; None if they are not stated."""
-        return None if self.wound is None else self.wound.to_wound(self.kind)
+    def spring_type(self) -> type[HelicalSpring]:
+        """Their kind."""
+        return AXIAL_KINDS[self.kind]
 
     @property
-    def is_guided(self) -> bool:
-        """True if a rod or a tube keeps it from buckling."""
-        return self.guides(self.coil)
-
-    @property
-    def unguided(self) -> float:
-        """Deflection up to which it does not buckle without a guide [m]; infinite if it never does."""
-        return unguided_deflection(self.kind, self.free_length, self.coil, self.outer_diameter, self.seats)
+    def hang(self) -> bool:
+        """True if they hang above the shuttle and are pulled; else they stand below it."""
+        return self.spring_type.lengthening > 0
 
     @property
     def rate(self) -> float:

@@ -51,20 +51,14 @@ def step_along(
     bend: FloatArray | None = None,
 ) -> ArcStep | None:
     """Return the equilibrium at a length along the unit tangent from here; `bend` is added to the first guess."""
-    weights, place = arc_weights(problem, span), _place(here)
+    weights, place = arc_weights(problem, span), here.place
     guess, row = place + length * tangent, weights * tangent
     first = guess if bend is None else guess + bend
     new = correct(problem, first[:-1], float(first[-1]), Border(row, float(row @ place) + length))
     if new is None:
         return None
-    missed = _place(new) - guess
+    missed = new.place - guess
     return ArcStep(new, unit_tangent(problem, new, tangent, span), math.sqrt(weights @ (missed * missed)))
-
-
-def _place(at: PathEquilibrium) -> FloatArray:
-    place = np.empty(len(at.x) + 1)
-    place[:-1], place[-1] = at.x, at.drive
-    return place
 
 
 class ArcMove(NamedTuple):
@@ -78,8 +72,7 @@ class ArcMove(NamedTuple):
 
     def interpolate(self, goal: float) -> FloatArray:
         """Return the unknowns at a drive between its ends by the cubic in the arc length through them."""
-        first, last = _place(self.old), _place(self.new)
-        starts, ends = self.length * self.tangent_before, self.length * self.tangent
+        first, last, starts, ends = self._ends
         drives = float(first[-1]), float(last[-1]), float(starts[-1]), float(ends[-1])
         low, high, rising = 0.0, 1.0, self.new.drive > self.old.drive
         for _ in range(N_HALVINGS):
@@ -90,10 +83,13 @@ class ArcMove(NamedTuple):
 
     def bend(self, length: float) -> FloatArray:
         """Return by how much the cubic through both ends leaves the last tangent at a length behind them."""
-        share = length / self.length
-        first, last = _place(self.old), _place(self.new)
-        starts, ends = self.length * self.tangent_before, self.length * self.tangent
-        return np.asarray(_cubic(first, last, starts, ends, 1 + share) - last - length * self.tangent)
+        cubic = _cubic(*self._ends, 1 + length / self.length)
+        return np.asarray(cubic - self.new.place - length * self.tangent)
+
+    @property
+    def _ends(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Places and slopes at both ends."""
+        return self.old.place, self.new.place, self.length * self.tangent_before, self.length * self.tangent
 
     @property
     def folds(self) -> bool:

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.numerics.continuation.events import locate_stability_change
-from cfmkit.numerics.continuation.path import PathEvent
 from cfmkit.numerics.continuation.problem import Border, keep_motions, largest_motion
 from cfmkit.numerics.continuation.steps import correct
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.events import Located
-    from cfmkit.numerics.continuation.path import Walk
+    from cfmkit.numerics.continuation.path import PathEvent, Walk
     from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
 
@@ -107,16 +106,18 @@ def find_beside(
     curved = 2 * (entered.drive - drive) * entered.rate - chord if problem.motions.all() else np.zeros_like(x)
     direction, tolerance = keep_motions(problem, chord), getattr(problem, "drive_tolerance", BESIDE_TOLERANCE)
     row = direction / (np.linalg.norm(direction) or 1.0)
+
+    def guess(share: float) -> FloatArray:
+        return np.asarray(x + share * chord - share * (1 - share) * curved)
+
     share = float(np.sqrt(max(part, 0.0)))
-    at = correct(problem, x + share * chord - share * (1 - share) * curved, goal)
+    at = correct(problem, guess(share), goal)
     slack = getattr(problem, "amplitude_slack", AMPLITUDE_SLACK) * share
     if at is not None and at.unstable <= unstable and abs(row @ (at.x - x) / (row @ direction) - share) < slack:
         return at
     for _ in range(8 if share > SMALLEST_AMPLITUDE else 1):
-        level = float(row @ (x + share * direction))
-        at = correct(
-            problem, x + share * chord - share * (1 - share) * curved, goal, Border(np.append(row, 0.0), level)
-        )
+        border = Border(np.append(row, 0.0), float(row @ (x + share * direction)))
+        at = correct(problem, guess(share), goal, border)
         if at is None or abs(at.drive - goal) <= tolerance * abs(entered.drive - drive):
             break
         reached = (at.drive - drive) / (entered.drive - drive)
@@ -144,7 +145,7 @@ def find_passed_end(walk: Walk, new: PathEquilibrium) -> PathEvent | Literal["un
     that the branch has joined, before its end.
     """
     problem, here = walk.problem, walk.here
-    back = correct(problem, new.x + (here.drive - new.drive) * new.rate, here.drive)
+    back = correct(problem, new.extrapolate(here.drive), here.drive)
     moved = walk.measure_motion(new)
     if back is None:
         return "unsure" if moved > IN_DOUBT[0] else None
@@ -153,9 +154,7 @@ def find_passed_end(walk: Walk, new: PathEquilibrium) -> PathEvent | Literal["un
     if back.unstable <= new.unstable:
         return "unsure" if moved > IN_DOUBT[1] else None
     found = locate_stability_change(problem, back, new)
-    if found is None:
-        return "unsure"
-    return PathEvent("bifurcation", found.drive, back.unstable, new.unstable, found.near, within=found.within)
+    return "unsure" if found is None else found.as_bifurcation(back.unstable, new.unstable)
 
 
 def _find_end_at(walk: Walk, new: PathEquilibrium) -> PathEvent | None:
@@ -167,7 +166,7 @@ def _find_end_at(walk: Walk, new: PathEquilibrium) -> PathEvent | None:
         prior = _least_stable_before(walk, here.drive, new, walk.sense * share * walk.options.span)
         found = None if prior is None else locate_stability_change(problem, prior, new)
         if prior is not None and found is not None:
-            return PathEvent("bifurcation", found.drive, prior.unstable, new.unstable, found.near, within=found.within)
+            return found.as_bifurcation(prior.unstable, new.unstable)
     return None
 
 
@@ -196,9 +195,8 @@ def find_joined_path(walk: Walk, fold: Located, unstable: int) -> tuple[PathEqui
             continue
         before = _least_stable_before(walk, fold.drive, beyond, ahead)
         if before is not None:
-            within = before, beyond
-            event = PathEvent("bifurcation", fold.drive, before.unstable, beyond.unstable, fold.near, modes, within)
-            return beyond, event
+            end = fold._replace(within=(before, beyond))
+            return beyond, end.as_bifurcation(before.unstable, beyond.unstable, modes)
     return None
 
 
@@ -209,7 +207,7 @@ def _least_stable_before(walk: Walk, drive: float, beyond: PathEquilibrium, ahea
         if least is not None and least.unstable - beyond.unstable >= walk.modes:
             break
         goal = drive - factor * ahead
-        prior = correct(walk.problem, at.x + (goal - at.drive) * at.rate, goal)
+        prior = correct(walk.problem, at.extrapolate(goal), goal)
         if prior is not None and prior.unstable > beyond.unstable:
             least = prior if least is None or prior.unstable > least.unstable else least
             at = prior

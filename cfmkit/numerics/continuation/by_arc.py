@@ -6,6 +6,7 @@ Behind a limit point of the drive, too, the path is followed by its arc length u
 from __future__ import annotations
 
 import itertools
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,10 +16,10 @@ from cfmkit.numerics.continuation.branches import find_beside, find_joined_path
 from cfmkit.numerics.continuation.events import locate_fold, locate_stability_change_on_arc
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import PathEquilibrium, largest_motion
-from cfmkit.numerics.continuation.steps import correct, correct_each
+from cfmkit.numerics.continuation.steps import correct
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.events import Located
@@ -113,10 +114,9 @@ def _pass_values(walk: Walk, run: range, step: ArcMove, fold: Located | None) ->
     for side, (low, high) in enumerate(itertools.pairwise(turns)):
         inside = np.flatnonzero(((targets - low) * (targets - high) <= 0) & (targets != low))
         inside = inside[np.abs(targets[inside] - low).argsort(kind="stable")]
-        goals = targets[inside].tolist()
-        guesses = [_guess(step, fold, side, goal) for goal in goals]
-        found = zip((run.start + inside).tolist(), correct_each(walk.problem, guesses, goals), guesses, strict=True)
-        for number, at, guess in found:
+        for number, goal in zip((run.start + inside).tolist(), targets[inside].tolist(), strict=True):
+            guess = _guess(step, fold, side, goal)
+            at = correct(walk.problem, guess, goal)
             if at is not None and largest_motion(walk.problem, at.x - guess) <= room:
                 yield Point(at, number, walk.branch)
                 if number == run[-1]:
@@ -153,7 +153,7 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
         if move.new.unstable > move.old.unstable:  # a bifurcation: by the drive it is located
             step = 0.5 * abs(move.new.drive - move.old.drive)
             return walk.restart(move.old, step, same_piece=True) if count > 1 else None
-        passed = yield from _pass_targets(walk, move)
+        passed = yield from walk.deliver_values(move.new.drive, partial(_solve_within, problem, move))
         if passed is None:
             return None
         yield Point(move.new, -1, walk.branch)
@@ -164,34 +164,18 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
         )
         steady = steady + 1 if leads else 0
         if walk.done or (walk.targets[walk.number] - move.new.drive) * sense < 0:
-            return _natural(walk)
+            return walk._replace(rejections=0)
         if steady >= STEADY_STEPS and count >= STEADY_STEPS and drive_step > STEADY_STEP * options.span:
-            return _natural(walk)
+            return walk._replace(rejections=0)
         if count > LOCKED_STEPS and abs(move.new.drive - begin.drive) < LOCKED_SHARE * options.span:
-            return PathStop(
-                WhyStopped.LIMIT_POINT,
-                move.new.drive,
-                TOO_SHARP,
-            )
+            return PathStop(WhyStopped.LIMIT_POINT, move.new.drive, TOO_SHARP)
         if count > MAX_STEPS:
             return None
     return None
 
 
-def _natural(walk: Walk) -> Walk:
-    return walk._replace(rejections=0)
-
-
-def _pass_targets(walk: Walk, move: ArcMove) -> Generator[Point, None, Walk | None]:
-    """Yield the requested values within a step; return the walk with the next one, or None if one is not found."""
-    for number in walk.targets_up_to(move.new.drive):
-        goal = float(walk.targets[number])
-        at = correct(walk.problem, move.interpolate(goal), goal)
-        if at is None:
-            return None
-        yield Point(at, number, walk.branch)
-        walk = walk._replace(number=number + 1)
-    return walk
+def _solve_within(problem: ContinuationProblem, move: ArcMove, goal: float) -> PathEquilibrium | None:
+    return correct(problem, move.interpolate(goal), goal)
 
 
 def _end_at_fold(
@@ -229,12 +213,12 @@ def _end_at_fold(
     walk = walk._replace(branch=None)
     if walk.done:
         return walk
-    for number in walk.targets_up_to(beyond.drive):
-        goal = float(walk.targets[number])
-        guess = beyond.x + (goal - beyond.drive) * beyond.rate
-        at = correct(walk.problem, guess, goal) or PathEquilibrium(guess, goal, beyond.rate, beyond.unstable)
-        yield Point(at, number, walk.branch)
-        walk = walk._replace(number=number + 1)
+
+    def solve_joined(goal: float) -> PathEquilibrium:
+        guess = beyond.extrapolate(goal)
+        return correct(walk.problem, guess, goal) or PathEquilibrium(guess, goal, beyond.rate, beyond.unstable)
+
+    walk = (yield from walk.deliver_values(beyond.drive, solve_joined)) or walk
     yield Point(beyond, -1, walk.branch)
     span = walk.options.span
     return walk.restart(beyond, min(0.02 * span, max(abs(beyond.drive - fold.drive), 1e-3 * span)))
@@ -249,13 +233,13 @@ def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> I
     """Yield what is left before a limit point of the drive, where the path ends."""
     problem, sense = walk.problem, walk.sense
     last = _last_before(problem, begin, fold, sense)
-    for number in walk.targets_up_to(fold.drive):
-        goal = float(walk.targets[number])
+
+    def solve_before(goal: float) -> PathEquilibrium | None:
         share = (goal - begin.drive) / (last.drive - begin.drive)
         at = correct(problem, begin.x + share * (last.x - begin.x), goal) or correct(problem, last.x, goal)
-        if at is None or at.unstable > begin.unstable:
-            break
-        yield Point(at, number, walk.branch)
+        return None if at is None or at.unstable > begin.unstable else at
+
+    yield from walk.deliver_values(fold.drive, solve_before)
     if (last.drive - begin.drive) * sense > 0:
         yield Point(last, -1, walk.branch)
     return PathStop(WhyStopped.LIMIT_POINT, fold.drive, LIMIT_POINT)

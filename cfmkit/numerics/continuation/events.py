@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.numerics.continuation.arc import step_along, unit_tangent
+from cfmkit.numerics.continuation.path import PathEvent
 from cfmkit.numerics.continuation.problem import Border, arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import correct, hermite, predict
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.arc import ArcMove
-    from cfmkit.numerics.continuation.path import PathEvent, Walk
+    from cfmkit.numerics.continuation.path import Walk
     from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
 CLOSE_TO_BIFURCATION, CLOSE_TO_FOLD = 1e-6, 3e-4
@@ -41,6 +42,10 @@ class Located(NamedTuple):
     share: float  # of the way between the first two
     within: tuple[PathEquilibrium, PathEquilibrium]  # the first two
     rounded: bool = False  # whether an imperfection rounds a bifurcation so that they lie on two paths
+
+    def as_bifurcation(self, before: int, after: int, modes: Any = None) -> PathEvent:
+        """Return the event between two numbers of unstable directions."""
+        return PathEvent("bifurcation", self.drive, before, after, self.near, modes, self.within)
 
 
 class _Sample(NamedTuple):
@@ -198,10 +203,9 @@ def relocate(
     """
     if event.kind == "limit point" and event.near is not None:
         near = event.near._replace(x=lift(event.near.x), rate=lift(event.near.rate))
-        weights = arc_weights(problem, span)
-        place, along = np.append(near.x, near.drive), np.append(near.rate, 1.0)
-        row = weights * along / np.linalg.norm(along)
-        found = correct(problem, near.x, near.drive, Border(row, float(row @ place)))
+        along = np.append(near.rate, 1.0)
+        row = arc_weights(problem, span) * along / np.linalg.norm(along)
+        found = correct(problem, near.x, near.drive, Border(row, float(row @ near.place)))
         return None if found is None else event.drive + found.drive - near.drive
     if event.within is None:
         return None
@@ -217,7 +221,7 @@ def relocate(
 
 def locate_stability_change_on_arc(problem: ContinuationProblem, move: ArcMove, span: float) -> Located | None:
     """Return the change of stability within a step along the arc."""
-    first, last = np.append(move.old.x, move.old.drive), np.append(move.new.x, move.new.drive)
+    first, last = move.old.place, move.new.place
     row = arc_weights(problem, span) * (last - first)
     row /= np.linalg.norm(row)
 

@@ -101,16 +101,20 @@ def follow_together(
     branch: PathBranch | None = None,
 ) -> Iterator[Item | MarchedSteps]:
     """Yield what `follow` does, but the points of every march together, and no corners that are rounded."""
-    left = options.most_points
-    for item in _items(problem, start, targets, options, branch):
-        if isinstance(item, MarchedSteps) and (between := int(np.count_nonzero(item.target < 0))) <= left:
+    yield from limit_points(_items(problem, start, targets, options, branch), options.most_points)
+
+
+def limit_points(items: Iterable[Any], most: int) -> Iterator[Any]:
+    """Yield the items of a path, at most so many points besides those requested."""
+    for item in items:
+        if isinstance(item, MarchedSteps) and (between := int(np.count_nonzero(item.target < 0))) <= most:
             yield item
-            left -= between
+            most -= between
             continue
         for single in each_point((item,)):
             yield single
-            left -= isinstance(single, Point) and single.target < 0
-            if left < 0:
+            most -= isinstance(single, Point) and single.target < 0
+            if most < 0:
                 yield PathStop(WhyStopped.FULL, single.at.drive, "more points than allowed at {place}")
                 return
 
@@ -243,13 +247,12 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
     assert new is not None
     step = abs(goal - here.drive)
     if new.unstable != here.unstable:
-        found = locate_loss(walk, new)
-        drive, near = (found.drive, found.near) if found else (new.drive, None)
-        lost = new.unstable - here.unstable
+        found, lost = locate_loss(walk, new), new.unstable - here.unstable
         modes = walk.problem.modes(found.near, lost)[1] if found and lost > 0 else None
-        within = found.within if found else None
-        yield PathEvent("bifurcation", drive, here.unstable, new.unstable, near, modes, within)
-        if abs(new.drive - drive) <= AT_EVENT * walk.options.span:  # the slope there is that of a mode
+        event = PathEvent("bifurcation", new.drive, here.unstable, new.unstable)
+        event = found.as_bifurcation(here.unstable, new.unstable, modes) if found else event
+        yield event
+        if abs(new.drive - event.drive) <= AT_EVENT * walk.options.span:  # the slope there is that of a mode
             _, critical = walk.problem.modes(new, abs(lost))
             new = new._replace(rate=primary_slope(walk.problem, new, critical))
     elif walk.branch is not None and not walk.options.corner:  # else it is the end of a branch that bends the curve

@@ -54,26 +54,20 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
     found = locate_loss(walk, new)
     if found is None:
         return None
-    far = next(
-        (
-            e
-            for e in walk.look_back()
-            if abs(e.drive - found.drive) > FARTHER_BACK * abs(found.drive - walk.origin.drive)
-        ),
-        here,
-    )
+    far = _well_before(walk, found.drive, FARTHER_BACK * abs(found.drive - walk.origin.drive)) or here
     slope = (found.x - far.x) / (found.drive - far.drive) if found.drive != far.drive else here.rate
     modes, after = problem.modes(found.near, 1)[1], here.unstable + 1
     if options.branch == "primary":
         modes = problem.modes(found.near, max(1, new.unstable - here.unstable))[1]
-        yield PathEvent("bifurcation", found.drive, here.unstable, new.unstable, found.near, modes, found.within)
+        yield found.as_bifurcation(here.unstable, new.unstable, modes)
         walk = yield from _reach_bifurcation(walk, found, far, slope)
-        for number in walk.targets_up_to(new.drive):  # just behind it their count is rounding
-            goal = float(walk.targets[number])
+
+        def solve_behind(goal: float) -> PathEquilibrium:  # just behind it their count is rounding
             guess = found.x + (goal - found.drive) / (new.drive - found.drive) * (new.x - found.x)
             at = correct(problem, guess, goal) or PathEquilibrium(guess, goal, new.rate, new.unstable)
-            yield Point(at._replace(unstable=new.unstable), number, walk.branch)
-            walk = walk._replace(number=number + 1)
+            return at._replace(unstable=new.unstable)
+
+        walk = (yield from walk.deliver_values(new.drive, solve_behind)) or walk
         return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
     if options.branch == "stop":
         yield from _reach_bifurcation(walk, found, far, slope)
@@ -88,8 +82,7 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
         if onto is not None:
             break
     corner = _find_rounded_corner(walk, found, onto) if found.rounded and onto is not None else None
-    event = PathEvent("bifurcation", found.drive, here.unstable, after, found.near, modes, found.within)
-    yield replace(corner, after=after, modes=modes) if corner else event
+    yield replace(corner, after=after, modes=modes) if corner else found.as_bifurcation(here.unstable, after, modes)
     walk = yield from _reach_bifurcation(walk, found, far, slope)
     if onto is None and options.through_folds:
         return walk._replace(options=options._replace(branch="primary")).restart(new, walk.step, same_piece=True)
@@ -105,7 +98,7 @@ def _find_rounded_corner(walk: Walk, found: Located, onto: PathEquilibrium) -> P
     problem, width = walk.problem, walk.sense * walk.options.corner * walk.options.span
     first, drive = _well_before(walk, found.drive, abs(width)) or walk.origin, found.drive - width
     if (drive - first.drive) * width > 0:
-        near = correct(problem, first.x + (drive - first.drive) * first.rate, drive)
+        near = correct(problem, first.extrapolate(drive), drive)
         first = first if near is None or near.unstable > walk.here.unstable else near
     way = onto.drive - found.drive
     goal = found.drive + min(max(BESIDE_CORNER * way, width, key=abs), way, key=abs)
@@ -154,30 +147,30 @@ def _reach_bifurcation(
 ) -> Generator[Point, None, Walk]:
     """Yield the requested values before a bifurcation, on the path itself; return the walk with the next one."""
     problem, unstable = walk.problem, walk.here.unstable
-    for number in walk.targets_up_to(found.drive):
-        goal = float(walk.targets[number])
+
+    def solve_before(goal: float) -> PathEquilibrium:
         guess = found.x + (goal - found.drive) * slope
         at = advance(walk, goal).new
         if at is None or at.unstable > unstable:
             at = correct(problem, guess, goal)
         if at is None or at.unstable > unstable or largest_motion(problem, at.x - guess) > ON_PATH:
             at = PathEquilibrium(guess, goal, far.rate, unstable)  # at the singular point itself
-        yield Point(at, number, walk.branch)
-        walk = walk._replace(number=number + 1)
-    return walk
+        return at
+
+    return (yield from walk.deliver_values(found.drive, solve_before)) or walk
 
 
 def _begin_branch(walk: Walk, found: Located, onto: PathEquilibrium, after: int) -> Generator[Point, None, Walk]:
     """Yield the first points of a branch; return the walk on it."""
-    branch = PathBranch(found.drive, walk.options.sign)
-    for number in walk.targets_up_to(onto.drive) if not walk.done else ():
-        goal = float(walk.targets[number])
-        yield Point(find_beside(walk.problem, found.x, found.drive, onto, goal, walk.here.unstable), number, branch)
-        walk = walk._replace(number=number + 1)
-    yield Point(onto, -1, branch)
-    modes = after - walk.here.unstable
-    walk = walk.restart(onto, 0.5 * abs(onto.drive - found.drive))
-    return walk._replace(branch=branch, modes=modes)
+    problem, unstable = walk.problem, walk.here.unstable
+    walk = walk._replace(branch=PathBranch(found.drive, walk.options.sign), modes=after - unstable)
+
+    def solve_beside(goal: float) -> PathEquilibrium:
+        return find_beside(problem, found.x, found.drive, onto, goal, unstable)
+
+    walk = (yield from walk.deliver_values(onto.drive, solve_beside)) or walk
+    yield Point(onto, -1, walk.branch)
+    return walk.restart(onto, 0.5 * abs(onto.drive - found.drive))
 
 
 def look_past(walk: Walk, goal: float) -> Items:
@@ -190,7 +183,7 @@ def look_past(walk: Walk, goal: float) -> Items:
     for share in LOOK_PAST_BY:
         for origin in (here.drive, goal):
             drive = origin + walk.sense * share * span
-            guess = far.x + (drive - far.drive) * far.rate
+            guess = far.extrapolate(drive)
             past = correct(problem, guess, drive)
             if (
                 past is not None

@@ -12,7 +12,7 @@ import numpy as np
 from cfmkit.numerics.continuation.problem import PathEquilibrium, largest_motion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Generator, Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.problem import ContinuationProblem
@@ -233,6 +233,19 @@ class Walk(NamedTuple):
                 break
             end += 1
         return range(self.number, end)
+
+    def deliver_values(
+        self, drive: float, solve: Callable[[float], PathEquilibrium | None]
+    ) -> Generator[Point, None, Walk | None]:
+        """Yield the points at requested values up to a drive; return the walk behind them, None if one is not found."""
+        walk = self
+        for number in () if self.done else self.targets_up_to(drive):
+            at = solve(float(self.targets[number]))
+            if at is None:
+                return None
+            yield Point(at, number, self.branch)
+            walk = walk._replace(number=number + 1)
+        return walk
 
     def measure_motion(self, new: PathEquilibrium) -> float:
         """Return the largest motion between here and another equilibrium."""

@@ -33,7 +33,19 @@ class LinearisedProblem(Protocol):
         """Return the tangent's inverse times columns (n, k), or None if it is singular."""
 
 
-class ContinuationProblem(Protocol):
+class ScaledUnknowns(Protocol):
+    """Sizes and kinds of n unknowns: motions, which are of size one, and forces."""
+
+    @property
+    def unit(self) -> FloatArray:
+        """Natural sizes of the unknowns, (n,): 1 for motions."""
+
+    @property
+    def motions(self) -> Any:
+        """Which unknowns are motions, (n,) of bool."""
+
+
+class ContinuationProblem(ScaledUnknowns, Protocol):
     """A structure with n unknowns: motions, which are of size one, and forces.
 
     A mode is a direction in which the structure gives way, a column of n. A problem may have these numbers, too:
@@ -45,14 +57,6 @@ class ContinuationProblem(Protocol):
 
     def __hash__(self) -> int:
         """Return a number for this very object."""
-
-    @property
-    def unit(self) -> FloatArray:
-        """Natural sizes of the unknowns, (n,): 1 for motions."""
-
-    @property
-    def motions(self) -> Any:
-        """Which unknowns are motions, (n,) of bool."""
 
     def linearise(self, x: FloatArray, drive: float) -> LinearisedProblem:
         """Return residual and tangent at any place."""
@@ -74,6 +78,17 @@ class PathEquilibrium(NamedTuple):
     effort: float = math.nan  # what works with the drive, if the problem says so
     stiffness: float = math.nan  # derivative of the effort along the path, if the problem says so
 
+    @property
+    def place(self) -> FloatArray:
+        """Unknowns and drive, (n + 1,)."""
+        place = np.empty(len(self.x) + 1)
+        place[:-1], place[-1] = self.x, self.drive
+        return place
+
+    def extrapolate(self, drive: float) -> FloatArray:
+        """Return the unknowns at a drive by the slope here."""
+        return self.x + (drive - self.drive) * self.rate
+
 
 class Border(NamedTuple):
     """A linear condition in place of a held drive: row . (x, drive) = level."""
@@ -89,7 +104,7 @@ def arc_weights(problem: ContinuationProblem, span: float) -> FloatArray:
     return np.append(np.where(problem.motions, share, FORCE_WEIGHT / problem.unit**2), 1.0 / span**2)
 
 
-def largest_motion(problem: ContinuationProblem, x: FloatArray) -> float:
+def largest_motion(problem: ScaledUnknowns, x: FloatArray) -> float:
     """Return the largest size of a motion."""
     return _largest(np.abs(x[problem.motions]))
 
@@ -99,7 +114,7 @@ def keep_motions(problem: ContinuationProblem, x: FloatArray) -> FloatArray:
     return np.where(problem.motions, x, 0.0)
 
 
-def force_change(problem: ContinuationProblem, old: FloatArray, new: FloatArray, largest: float, share: float) -> float:
+def force_change(problem: ScaledUnknowns, old: FloatArray, new: FloatArray, largest: float, share: float) -> float:
     """Return the largest change of a force over what a step may change: `largest` units and a share of the force."""
     allowed = largest * problem.unit + share * np.abs(old)
     return _largest((np.abs(new - old) / allowed)[~problem.motions])

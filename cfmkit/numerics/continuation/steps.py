@@ -18,11 +18,9 @@ import numpy as np
 from cfmkit.numerics.continuation.problem import Border, PathEquilibrium, force_change, largest_motion
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.path import Walk
-    from cfmkit.numerics.continuation.problem import ContinuationProblem
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, ScaledUnknowns
 
 
 STEP_TOLERANCE = 1e-10  # of a step: of motions, and of forces over their size or ten units
@@ -78,16 +76,6 @@ def correct(
     return None
 
 
-def correct_each(
-    problem: ContinuationProblem, guesses: Sequence[FloatArray], drives: Sequence[float]
-) -> list[PathEquilibrium | None]:
-    """Return the equilibria near guesses at their drives; a problem may have a method `solve_each` for that."""
-    own = getattr(problem, "solve_each", None)
-    if own is not None and len(drives) > 1:
-        return own(guesses, drives)  # type: ignore[no-any-return]
-    return [correct(problem, *pair) for pair in zip(guesses, drives, strict=True)]
-
-
 def _drive_change(border: Border, x: FloatArray, drive: float, rate: FloatArray) -> float:
     row = border.row
     return float((border.level - row[:-1] @ x - row[-1] * drive) / (row[-1] + row[:-1] @ rate))
@@ -106,6 +94,7 @@ class Trial(NamedTuple):
     new: PathEquilibrium | None  # None if it is rejected
     misfit: float = np.inf  # error of the prediction as a share of the step
     excess: float = 0.0  # by how much a rejected step changes forces too much, if that is all
+    motion: float = 0.0  # largest one
 
 
 def hermite(a: PathEquilibrium, b: PathEquilibrium, drive: float) -> FloatArray:
@@ -129,34 +118,44 @@ def predict(walk: Walk, goal: float) -> FloatArray:
     if guess is not None:
         return guess
     if before is None or before.drive == here.drive:
-        return here.x + (goal - here.drive) * here.rate
+        return here.extrapolate(goal)
     return hermite(before, here, goal)
 
 
 def advance(walk: Walk, goal: float) -> Trial:
     """Try a step by the drive to a goal."""
-    problem, here, options = walk.problem, walk.here, walk.options
-    guess = predict(walk, goal)
-    new = correct(problem, guess, goal)
+    guess, options = predict(walk, goal), walk.options
+    new = correct(walk.problem, guess, goal)
+    return judge(walk.problem, walk.here, new, guess, (options.largest_motion, options.largest_force))
+
+
+def judge(
+    problem: ScaledUnknowns,
+    here: PathEquilibrium,
+    new: PathEquilibrium | None,
+    guess: FloatArray,
+    limits: tuple[float, float],  # largest motion, and largest change of a force, in its unit besides half of it
+) -> Trial:
+    """Return a step from one equilibrium to another, which is near a guess, with what is to be said of it."""
     if new is None:
         return Trial(None)
-    moved, missed = walk.measure_motion(new), largest_motion(problem, new.x - guess)
-    if moved > options.largest_motion:
+    moved, missed = (largest_motion(problem, new.x - near) for near in (here.x, guess))
+    if moved > limits[0]:
         return Trial(None)
-    excess = force_change(problem, here.x, new.x, options.largest_force, FORCE_SHARE)
+    excess = force_change(problem, here.x, new.x, limits[1], FORCE_SHARE)
     if excess > 1:
         return Trial(None, excess=excess)
-    if missed > MISSED_SHARE * moved + MOTION_ROUNDING or not _keeps_direction(walk, new, moved):
+    if missed > MISSED_SHARE * moved + MOTION_ROUNDING or not _keeps_direction(problem, here, new, moved):
         return Trial(None)
-    return Trial(new, missed / (moved + 1e-8))
+    return Trial(new, missed / (moved + 1e-8), motion=moved)
 
 
-def _keeps_direction(walk: Walk, new: PathEquilibrium, moved: float) -> bool:
+def _keeps_direction(problem: ScaledUnknowns, here: PathEquilibrium, new: PathEquilibrium, moved: float) -> bool:
     """Return True if the chord of a step agrees with the slopes at its ends, in direction and length.
 
     Without the second a step hops from the end of a branch onto the path that it joins, unnoticed.
     """
-    here, motions = walk.here, walk.problem.motions
+    motions = problem.motions
     if moved <= MOTION_ROUNDING or new.unstable != here.unstable:
         return True
     change = new.drive - here.drive

@@ -5,8 +5,11 @@ from cfmkit.lazy_names import lazy_names
 __getattr__, __all__ = lazy_names(
     __name__,
     {
-        "helical_spring_formulas": "HelicalSpring",
+        "compression_springs": "CompressionSpring",
+        "extension_springs": "ExtensionSpring",
+        "kinds": "HELICAL_KINDS",
         "offers": "generic",
+        "torsion_springs": "HelicalTorsionSpring",
         "wire_materials": "WIRES_BY_NAME",
     },
 )

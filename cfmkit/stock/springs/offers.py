@@ -21,19 +21,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import pi
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from cfmkit.specs.units import format_short
-from cfmkit.stock.springs.helical_spring_formulas import (
-    HelicalSpring,
-    Kind,
-    Seats,
-    buckling_deflection,
-    tensile_strength,
-)
+from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE
 from cfmkit.stock.stock_series import ALL_SERIES
 
@@ -42,27 +35,24 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring, Seats
 
 
 GENERIC_SERIES = "generic"  # the word for the series that ships with the package
 GENERIC_WIRE_DIAMETERS = (0.4, 0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
 SPRING_INDICES = (6.0, 8.0, 10.0, 12.5)
-COIL_COUNTS = (6, 8, 10, 12, 16, 20, 25, 32, 40, 50, 63, 80, 100, 125, 160)
-TORSION_TURNS = (3, 4, 5, 6, 8, 10, 12)
-SPRING_COUNTS = (1, 2, 4)  # the generic series: wires [mm] and numbers of turns are preferred numbers (ISO 3, R10)
-SHEAR_SHARE, BENDING_SHARE = 0.38, 0.60
+SPRING_COUNTS = (1, 2, 4)  # the generic series: wires [mm] are preferred numbers (ISO 3, R10)
+SERIES_SHARES = {"shear": 0.38, "bending": 0.60}
 """Shares of the tensile strength that the generic series allows: assumed. At 38 % in the turns the loops of an
 extension spring bear up to 74 % in bending; Shigley, Table 10-7, allows 75 % there."""
-SOLID_RESERVE = 1.15
-"""A compression spring of the series touches its turns at so many times its largest deflection: assumed."""
 
 
 @dataclass(frozen=True)
 class Offer:
-    """A spring on offer; SI, deflections are angles and loads couples where it is a torsion spring."""
+    """A spring on offer; SI, deflections are angles and loads couples where it is wound up."""
 
     name: str  # by which it is bought
-    kind: Kind  # what it is loaded by
+    spring_type: type[HelicalSpring]  # its kind
     rate: float  # [N/m or N m/rad]
     largest: float | None = None  # largest deflection from the relaxed state [m or rad]; None if not stated
     free_length: float | None = None  # relaxed, between the hooks or over the ends [m]
@@ -81,29 +71,30 @@ class Offer:
     @property
     def unguided(self) -> float:
         """Deflection up to which it does not buckle without a guide [m or rad]; infinite if it never does."""
-        return unguided_deflection(self.kind, self.free_length, self.wound, self.outer_diameter, self.seats)
+        return self.spring_type.unguided_deflection(self.free_length, self.wound, self.outer_diameter, self.seats)
 
     def stress(self, deflection: float) -> float | None:
         """Return the stress in the wire at a deflection [Pa]; None if the wire is not known."""
         return None if self.wound is None else self.wound.stress(self.initial_tension + self.rate * deflection)
 
 
-@lru_cache(maxsize=3)
-def generic(kind: Kind) -> tuple[Offer, ...]:
+@lru_cache
+def generic(spring_type: type[HelicalSpring]) -> tuple[Offer, ...]:
     """Return the generic series of one kind.
 
     Examples
     --------
-    >>> generic("torsion")[0].name
+    >>> from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
+    >>> generic(HelicalTorsionSpring)[0].name
     'generic-torsion-d0.4-D2.4-n3'
     """
-    series = []
-    for wire in GENERIC_WIRE_DIAMETERS:
-        for index in SPRING_INDICES:
-            for turns in TORSION_TURNS if kind == "torsion" else COIL_COUNTS:
-                coil = round(index * wire, 6)  # 4.8, not 4.800000000000001, in what is written of it
-                series.append(_generic(HelicalSpring(kind, wire * 1e-3, coil * 1e-3, float(turns))))
-    return tuple(series)
+    # 4.8, not 4.800000000000001, in what is written of a coil
+    coils = [(wire, round(index * wire, 6)) for wire in GENERIC_WIRE_DIAMETERS for index in SPRING_INDICES]
+    return tuple(
+        _generic(spring_type(wire * 1e-3, coil * 1e-3, float(turns)))
+        for wire, coil in coils
+        for turns in spring_type.series_turns
+    )
 
 
 def largest_load(wound: HelicalSpring, safety: float) -> Any:
@@ -116,23 +107,17 @@ def largest_load(wound: HelicalSpring, safety: float) -> Any:
 
 def _allowed_stress(wound: HelicalSpring) -> float:
     """Return the stress that the series allows [Pa]."""
-    return (BENDING_SHARE if wound.kind == "torsion" else SHEAR_SHARE) * tensile_strength(wound.wire)
+    return SERIES_SHARES[wound.wire_stress] * tensile_strength(wound.wire)
 
 
 def _generic(wound: HelicalSpring) -> Offer:
     largest = wound.deflection_at(_allowed_stress(wound))
-    free_length = {
-        "extension": wound.body_length + 2.0 * (wound.coil - wound.wire),
-        "compression": wound.body_length + SOLID_RESERVE * largest,
-        "torsion": wound.body_length,
-    }[wound.kind]
-    name = f"generic-{wound.kind}-d{wound.wire * 1e3:g}-D{wound.coil * 1e3:g}-n{wound.turns:g}"
     offer = Offer(
-        name,
-        wound.kind,
+        f"generic-{wound.kind}-d{wound.wire * 1e3:g}-D{wound.coil * 1e3:g}-n{wound.turns:g}",
+        type(wound),
         wound.rate,
         largest,
-        free_length,
+        wound.free_length_for(largest),
         wound.body_length,
         outer_diameter=wound.outer_diameter,
         wound=wound,
@@ -145,21 +130,6 @@ def _generic(wound: HelicalSpring) -> Offer:
 def guide_rod_for(wound: HelicalSpring) -> float:
     """Return the diameter of a rod that guides a compression spring, in whole hundredths of a mm [m]."""
     return math.floor(1e5 * wound.thickest_guide_rod * (1 + 1e-9)) / 1e5
-
-
-def unguided_deflection(
-    kind: Kind, free_length: float | None, wound: HelicalSpring | None, outer_diameter: float | None, seats: Seats
-) -> float:
-    """Return the deflection [m] up to which a spring does not buckle; infinite if never, or if that is not known.
-
-    A compression spring whose wire is not known is judged as one of music wire with its outer diameter for the mean
-    one: it buckles no later than that.
-    """
-    if kind != "compression" or free_length is None:
-        return math.inf
-    if wound is not None:
-        return wound.buckling_deflection(free_length, seats)
-    return math.inf if outer_diameter is None else buckling_deflection(free_length, outer_diameter, seats)
 
 
 @dataclass(frozen=True)
@@ -198,21 +168,45 @@ COIL_STEP, COIL_STEP_OF_LARGE, LARGE_COIL = 1e-5, 5e-5, 1e-2  # steps of coil di
 STEPS_PER_TURN = 100.0  # steps of turns: a torsion spring's legs stand within 4 deg of where they should
 
 
-def extension_spring(rate: float, stretch: float, room: float, safety: float = 1.0) -> HelicalSpring | None:
-    """Return the slimmest extension spring of a rate [N/m] that can be stretched so far [m] from at most a length [m].
+def slimmest_spring(
+    spring_type: type[HelicalSpring],  # its kind
+    rate: float,  # [N/m or N m/rad]
+    deflection: float,  # how far it can be stretched or turned [m or rad]
+    room: float,  # length that it may have, relaxed with loops if it is stretched, or wound up [m]
+    safety: float = 1.0,  # against yield
+    pin: float = 0.0,  # diameter of a pin that fits into it, deflected as it is [m]
+) -> HelicalSpring | None:
+    """Return the slimmest spring of a rate that can be deflected so far; None if there is none.
 
-    None if there is none: the body would be longer than the room. Its rate is off by
-    what the turns are rounded by.
+    Its rate is off by what the turns are rounded by.
 
     Examples
     --------
-    >>> spring = extension_spring(690.0, 0.132, 0.136)
+    >>> from cfmkit.stock.springs import ExtensionSpring, HelicalTorsionSpring
+    >>> spring = slimmest_spring(ExtensionSpring, 690.0, 0.132, 0.136)
     >>> round(spring.rate, 1), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), spring.turns
     (690.0, 1.6, 12.7, 71.72)
+    >>> spring = slimmest_spring(HelicalTorsionSpring, 0.05, 1.0, 0.05)
+    >>> round(spring.rate, 4), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), spring.turns
+    (0.05, 0.8, 4.8, 6.59)
+    >>> slimmest_spring(HelicalTorsionSpring, 0.05, 1.0, 0.002) is None
+    True
     """
-    return min(
-        _springs("extension", rate, stretch, room, safety), key=lambda spring: spring.outer_diameter, default=None
-    )
+    springs = _springs(spring_type, rate, deflection, room, safety, pin)
+    return min(springs, key=lambda spring: spring.outer_diameter, default=None)
+
+
+def shortest_spring(
+    spring_type: type[HelicalSpring],  # its kind
+    rate: float,  # [N/m or N m/rad]
+    deflection: float,  # how far it can be stretched or turned [m or rad]
+    widest: float,  # outer diameter that it may have [m]
+    safety: float = 1.0,  # against yield
+    pin: float = 0.0,  # diameter of a pin that fits into it, deflected as it is [m]
+) -> HelicalSpring | None:
+    """Return the shortest spring of a rate that can be deflected so far; None if there is none."""
+    springs = _springs(spring_type, rate, deflection, np.inf, safety, pin, widest)
+    return min(springs, key=lambda spring: spring.body_length, default=None)
 
 
 def as_stated(spring: HelicalSpring) -> dict[str, Any]:
@@ -224,40 +218,8 @@ def as_stated(spring: HelicalSpring) -> dict[str, Any]:
     }
 
 
-def torsion_spring(
-    rate: float, turn: float, room: float, pin: float = 0.0, safety: float = 1.0
-) -> HelicalSpring | None:
-    """Return the slimmest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so long [m].
-
-    None if there is none: the body, which is longest when it is wound up, would be longer, or the inside, which is
-    narrowest then, too narrow for a pin of that diameter [m].
-
-    Examples
-    --------
-    >>> spring = torsion_spring(0.05, 1.0, 0.05)
-    >>> round(spring.rate, 4), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), spring.turns
-    (0.05, 0.8, 4.8, 6.59)
-    >>> torsion_spring(0.05, 1.0, 0.002) is None
-    True
-    """
-    return min(
-        _springs("torsion", rate, turn, room, safety, pin), key=lambda spring: spring.outer_diameter, default=None
-    )
-
-
-def shortest_torsion_spring(
-    rate: float, turn: float, widest: float, pin: float = 0.0, safety: float = 1.0
-) -> HelicalSpring | None:
-    """Return the shortest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so wide [m].
-
-    None if there is none: the coil would be wider, or too narrow for a pin of that diameter [m].
-    """
-    springs = _springs("torsion", rate, turn, np.inf, safety, pin, widest)
-    return min(springs, key=lambda spring: spring.body_length, default=None)
-
-
 def stiffest(
-    kind: Kind,  # of the springs
+    spring_type: type[HelicalSpring],  # kind of the springs
     deflection: FloatArray,  # (n,): how far they are stretched or turned
     # widest, room: float or (n,): largest outer diameter, and length with the loops of one that is stretched [m]
     widest: float | FloatArray,
@@ -268,24 +230,25 @@ def stiffest(
 
     Examples
     --------
-    >>> (rate,) = stiffest("torsion", np.array([1.0]), 5e-3, 30e-3)
-    >>> bool(torsion_spring(0.98 * rate, 1.0, 30e-3).outer_diameter <= 5e-3)
+    >>> from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
+    >>> (rate,) = stiffest(HelicalTorsionSpring, np.array([1.0]), 5e-3, 30e-3)
+    >>> bool(slimmest_spring(HelicalTorsionSpring, 0.98 * rate, 1.0, 30e-3).outer_diameter <= 5e-3)
     True
     """
     deflection, widest, room = (np.asarray(values, dtype=float) for values in (deflection, widest, room))
-    windings = np.array(_windings(kind, safety))
+    windings = np.array(_windings(spring_type, safety))
     slim = windings[:, windings[0] + windings[1] <= widest.max(initial=0.0)]
     wire, coil, one_turn, load = (values[:, None] for values in slim)
     rate = np.minimum(load / np.maximum(deflection, 1e-12), one_turn / MIN_TURNS)
-    long = _length(kind, wire, coil, one_turn / rate, deflection)
+    long = spring_type(wire, coil, one_turn / rate).room_for(deflection)
     return np.asarray(np.where((long <= room) & (coil + wire <= widest), rate, 0.0).max(axis=0, initial=0.0))
 
 
 @lru_cache(maxsize=8)
-def _windings(kind: Kind, safety: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _windings(spring_type: type[HelicalSpring], safety: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return wire and coil of all sizes and indices [m], their rate with one turn and their largest load, (n,) each."""
     indices = np.linspace(MIN_INDEX, MAX_INDEX, N_INDICES)
-    springs: list[Any] = [HelicalSpring(kind, wire, cast("Any", wire * indices), 1.0) for wire in METRIC_WIRE_DIAMETERS]
+    springs: list[Any] = [spring_type(wire, cast("Any", wire * indices), 1.0) for wire in METRIC_WIRE_DIAMETERS]
     rows = [
         (0.0 * spring.coil + spring.wire, spring.coil, spring.rate, largest_load(spring, safety)) for spring in springs
     ]
@@ -293,47 +256,44 @@ def _windings(kind: Kind, safety: float) -> tuple[FloatArray, FloatArray, FloatA
     return wire, coil, rate, load
 
 
-def loaded_length(spring: HelicalSpring) -> float:
-    """Return the length at rest with both loops [m]."""
-    return spring.body_length + 2.0 * (spring.coil - spring.wire)
-
-
-def _length(kind: Kind, wire: Any, coil: Any, turns: Any, deflection: Any) -> Any:
-    """Return the length of a body that winds up, or of one with both loops [m]."""
-    if kind == "torsion":
-        return (turns + 1.0 + deflection / (2.0 * pi)) * wire
-    return (turns + 1.0) * wire + 2.0 * (coil - wire)
-
-
 def _springs(
-    kind: Kind, rate: float, deflection: float, room: float, safety: float, pin: float = 0.0, widest: float = np.inf
+    spring_type: type[HelicalSpring],
+    rate: float,
+    deflection: float,
+    room: float,
+    safety: float,
+    pin: float = 0.0,
+    widest: float = np.inf,
 ) -> Iterator[HelicalSpring]:
     """Yield of each wire on offer the slimmest spring that fits; if only its width is limited, the widest.
 
-    A pin [m] has to fit into a torsion spring that is wound up.
+    A pin [m] has to fit into a spring that is deflected.
     """
     slimmest = np.inf
     for wire in METRIC_WIRE_DIAMETERS:
         if wire * (MIN_INDEX + 1.0) >= min(slimmest, widest):  # no coil of this or of thicker wire is slimmer
             return
-        coil, one_turn, most = _coils_of(kind, wire, safety)
+        coil, one_turn, most = _coils_of(spring_type, wire, safety)
         turns = np.maximum(np.round(one_turn / rate * STEPS_PER_TURN), 1.0) / STEPS_PER_TURN
+        springs: Any = spring_type(wire, cast("Any", coil), cast("Any", turns))
         fits = (turns >= MIN_TURNS) & (one_turn / turns * deflection <= most) & (coil + wire <= widest)
-        fits &= _length(kind, wire, coil, turns, deflection) <= room
-        fits &= PIN_SHARE * (coil * turns / (turns + abs(deflection) / (2.0 * pi)) - wire) >= pin if pin else True
+        fits &= springs.room_for(deflection) <= room
+        fits &= PIN_SHARE * springs.inner_diameter_at(deflection) >= pin if pin else True
         places = np.flatnonzero(fits)
         if len(places):
             place = places[0 if np.isfinite(room) else -1]
-            spring = HelicalSpring(kind, wire, float(coil[place]), float(turns[place]))
+            spring = spring_type(wire, float(coil[place]), float(turns[place]))
             slimmest = spring.outer_diameter if np.isfinite(room) else np.inf
             yield spring
 
 
 @lru_cache(maxsize=512)
-def _coils_of(kind: Kind, wire: float, safety: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _coils_of(
+    spring_type: type[HelicalSpring], wire: float, safety: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the coils of a wire [m], the rate that each has with one turn and the load that it bears, (n,) each."""
     coil = _coil_diameters(wire)
-    spring: Any = HelicalSpring(kind, wire, cast("Any", coil), 1.0)
+    spring: Any = spring_type(wire, cast("Any", coil), 1.0)
     return coil, spring.rate, largest_load(spring, safety)
 
 

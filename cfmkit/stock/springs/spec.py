@@ -6,6 +6,7 @@ import csv
 import re
 from dataclasses import replace
 from difflib import get_close_matches
+from math import inf
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, WrapValidator, model_validator
@@ -16,7 +17,8 @@ from cfmkit.specs.spec import Model, is_made, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
 from cfmkit.specs.units.table import is_unit
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue
-from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.kinds import HELICAL_KINDS, list_kinds
 from cfmkit.stock.springs.offers import GENERIC_SERIES, Offer, generic
 from cfmkit.stock.springs.support_spec import SpringSupport
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireName, WireOutOfRange
@@ -24,11 +26,17 @@ from cfmkit.tables.lab_columns import split_header
 from cfmkit.tables.lab_file import decode_file, lines_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
-    from cfmkit.stock.springs.helical_spring_formulas import Kind
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
+
+    KindName = str
+    Head = tuple[str, str | None] | None  # name and unit of a column of a file; None for one that is not read
+else:
+    KindName = Literal[tuple(HELICAL_KINDS)]
 
 Positive = Field(gt=0)
+LENGTH_RTOL = 0.1  # a stated length may be below that of the turns on each other by so much: makers' tolerance
 RATE_RTOL = 0.1  # a stated rate may be off by so much from that of wire, coil and turns: makers' tolerance
 MAX_TENSION_RATIO = 3.0
 """Largest initial tension over the upper end of what is easily wound: springs that are wound on a bench have more, but
@@ -69,11 +77,10 @@ class WireLimits(Model):
                 object.__setattr__(self, key, getattr(WIRES_BY_NAME[self.material], key))
         return self
 
-    def wound_of(self, kind: Kind, wire: float, coil: float, turns: float) -> HelicalSpring:
+    def wound_of(self, spring_type: type[HelicalSpring], wire: float, coil: float, turns: float) -> HelicalSpring:
         """Return a spring of this wire."""
-        return HelicalSpring(
-            kind, wire, coil, turns, self.shear_modulus or 0.0, self.youngs_modulus or 0.0, self._class
-        )
+        moduli = self.shear_modulus or 0.0, self.youngs_modulus or 0.0
+        return spring_type(wire, coil, turns, *moduli, self._class)
 
     def check_wire(self, wire: float | None, coil: float | None) -> None:
         """Raise `ValueError` for a coil that does not wind, or a wire thinner or thicker than its class is drawn."""
@@ -119,18 +126,15 @@ class SpringWire(WireLimits):
         self.check_wire(self.wire, self.coil)
         return self
 
-    def to_wound(self, kind: Kind) -> HelicalSpring:
-        """Return the wire, loaded as a kind of spring."""
-        return self.wound_of(kind, self.wire, self.coil, self.turns)
-
-    def check_rate(self, kind: Kind, stated: float | None) -> None:
-        """Raise if a stated rate [N/m or N m/rad] is not that of the wire."""
-        if stated is not None and abs(stated / self.to_wound(kind).rate - 1.0) > RATE_RTOL:
-            raise ValueError(_disagree(self.to_wound(kind), stated))
+    def to_wound(self, spring_type: type[HelicalSpring]) -> HelicalSpring:
+        """Return the wire as a kind of spring."""
+        return self.wound_of(spring_type, self.wire, self.coil, self.turns)
 
 
-def _disagree(wound: HelicalSpring, stated: float) -> str:
-    """Return what is wrong with a rate that is not that of wire, coil and turns."""
+def check_rate(wound: HelicalSpring, stated: float) -> None:
+    """Raise `ValueError` for a rate [N/m or N m/rad] that is not that of wire, coil and turns."""
+    if abs(stated / wound.rate - 1.0) <= RATE_RTOL:
+        return
     alike = [
         material.name
         for material in WIRES_BY_NAME.values()
@@ -141,14 +145,17 @@ def _disagree(wound: HelicalSpring, stated: float) -> str:
         <= RATE_RTOL
     ]
     agreement = f" (that of {', '.join(alike)} agrees)" if alike else ""
-    return (
+    raise ValueError(
         f"wire, coil and turns give {wound.rate / stated:.3g} times the rate that is stated: leave one of them out, or "
         f"give the wire's 'material'{agreement} or modulus"
     )
 
 
-def check_initial_tension(wound: HelicalSpring | None, tension: float) -> None:
-    """Raise `ValueError` for an initial tension [N] that cannot be wound into a spring of this wire."""
+def check_initial_tension(spring_type: type[HelicalSpring], wound: HelicalSpring | None, tension: float) -> None:
+    """Raise `ValueError` for an initial tension [N] that a kind of spring, or one of this wire, cannot have."""
+    if tension and not spring_type.has_initial_tension:
+        tight = list_kinds(other for other in HELICAL_KINDS.values() if other.has_initial_tension)
+        raise ValueError(f"'initial_tension' is of {tight} springs; this is of kind {spring_type.kind!r}")
     if wound is None or not tension:
         return
     low, high = (format_short(end, "force") for end in wound.usual_initial_tension)
@@ -172,29 +179,30 @@ InitialTension = Annotated[
 ]
 
 
-def settle_rate(springs: Any, kind: Kind, info: ValidationInfo) -> None:
-    """Check the `stiffness` of springs against their wire `to_wound`, or compute it where none is stated.
+def settle_rate(springs: Any, spring_type: type[HelicalSpring], info: ValidationInfo) -> None:
+    """Check the `stiffness` of springs against their wire `wound`, or compute it where none is stated.
 
     Their initial tension must be one that such a wire is wound with. The rate of a manufactured spring is not checked:
     its tolerance comes on top of what stated values differ by.
     """
-    if springs.wound is not None:
-        check_initial_tension(springs.wound.to_wound(kind), springs.initial_tension)
-    if springs.stiffness is None:
-        if springs.wound is None:
+    wound = None if springs.wound is None else springs.wound.to_wound(spring_type)
+    check_initial_tension(spring_type, wound, springs.initial_tension)
+    if wound is None:
+        if springs.stiffness is None:
             refuse(type(springs).__name__, {("stiffness",): "missing: give it, or 'wound' from which it follows"})
+    elif springs.stiffness is None:
         # past the frozen model, and not counted as set: another wire then has another rate
-        object.__setattr__(springs, "stiffness", springs.wound.to_wound(kind).rate)
-    elif springs.wound is not None and not is_made(info):
+        object.__setattr__(springs, "stiffness", wound.rate)
+    elif not is_made(info):
         for rate in springs.stiffness if isinstance(springs.stiffness, tuple) else (springs.stiffness,):
-            springs.wound.check_rate(kind, rate)
+            check_rate(wound, rate)
 
 
 class CatalogueSpring(WireLimits, SpringSupport):
     """A spring that can be bought."""
 
     name: str = Field(min_length=1, description="part number")
-    kind: Literal["extension", "compression", "torsion"] = Field("extension", description="how it is loaded")
+    kind: KindName = Field(ExtensionSpring.kind, description="how it is loaded")
     stiffness: Annotated[Stiffness, Positive] | None = Field(
         None, description="of one spring; default: from wire, coil and turns"
     )
@@ -228,68 +236,64 @@ class CatalogueSpring(WireLimits, SpringSupport):
     counts: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = Field((2,), description="numbers in parallel to try")
 
     @model_validator(mode="after")
-    def _rate_is_known(self) -> Self:
-        stated = self.rate if self.kind == "torsion" else self.stiffness
-        wrong_key = "'stiffness'" if self.kind == "torsion" else "'rate'"
-        if (self.stiffness if self.kind == "torsion" else self.rate) is not None:
-            raise ValueError(f"a spring of kind {self.kind!r} has no {wrong_key}")
+    def _is_consistent(self) -> Self:
+        rate_key, wound = self.spring_type.rate_key, self.wound
+        for key in {other.rate_key for other in HELICAL_KINDS.values()} - {rate_key}:
+            if getattr(self, key) is not None:
+                raise ValueError(f"a spring of kind {self.kind!r} has no {key!r}")
         stated_sizes = [self.wire, self.coil, self.turns]
         if any(item is not None for item in stated_sizes) and None in stated_sizes:
             raise ValueError("'wire', 'coil' and 'turns' belong together: a rate follows from all three")
         self.check_wire(self.wire, self.coil)
-        if (self.max_stress or self.fatigue) and self.wound is None:
+        if (self.max_stress or self.fatigue) and wound is None:
             raise ValueError(
                 "'max_stress' and 'fatigue' refer to the stress in the wire: give 'wire', 'coil' and 'turns'"
             )
-        if stated is None and self.wound is None:
-            word = "rate" if self.kind == "torsion" else "stiffness"
-            raise ValueError(f"needs {word!r}, or 'wire', 'coil' and 'turns', from which it follows")
-        self._check_sizes()
-        self.check_guide(self.kind, self.wound, self.outer_diameter)
-        body = self.body_length or (self.wound.body_length if self.wound else None)
-        if self.kind == "compression" and body and self.free_length is not None and self.free_length <= body:
-            raise ValueError(
-                "'free_length' of a compression spring must be larger than its 'body_length' with the turns closed"
-            )
-        if stated is not None and self.wound is not None and abs(stated / self.wound.rate - 1.0) > RATE_RTOL:
-            raise ValueError(_disagree(self.wound, stated))
+        stated = getattr(self, rate_key)
+        if stated is None and wound is None:
+            raise ValueError(f"needs {rate_key!r}, or 'wire', 'coil' and 'turns', from which it follows")
+        check_initial_tension(self.spring_type, wound, self.initial_tension)
+        self._check_sizes(wound)
+        self.check_guide(self.spring_type, wound, self.outer_diameter)
+        if stated is not None and wound is not None:
+            check_rate(wound, stated)
         return self
 
-    def _check_sizes(self) -> None:
-        """Raise `ValueError` for sizes that no coil of this wire has."""
-        wound = self.wound
-        if self.initial_tension and self.kind != "extension":
-            raise ValueError(f"'initial_tension' is of extension springs; this is of kind {self.kind!r}")
-        if wound is None:
-            return
-        check_initial_tension(wound, self.initial_tension)
-        outer = self.outer_diameter
-        if outer is not None and abs(outer - wound.outer_diameter) > MIDDLE_OF_WIRE * wound.wire:
+    def _check_sizes(self, wound: HelicalSpring | None) -> None:
+        """Raise `ValueError` for sizes that no spring of this kind has, or no coil of this wire."""
+        outer, free, body = self.outer_diameter, self.free_length, self.body_length
+        if wound is not None and outer is not None and abs(outer - wound.outer_diameter) > MIDDLE_OF_WIRE * wound.wire:
             reported = format_short(wound.outer_diameter, "length")
             raise ValueError(f"'outer_diameter' must be 'coil', the mean diameter, and one wire: {reported}")
-        least = wound.turns * wound.wire
-        if self.body_length is not None and self.body_length < least * (1 - RATE_RTOL):
-            raise ValueError(f"'body_length' is less than the turns on each other: {format_short(least, 'length')}")
-        room = None if self.free_length is None else self.free_length - (self.body_length or least * (1 - RATE_RTOL))
-        if self.kind == "compression" and self.max_elongation and room and self.max_elongation > room * (1 + 1e-9):
+        closed = body or (None if wound is None else wound.body_length)
+        if self.spring_type.deflection_until_closed(free, closed) <= 0.0:
+            raise ValueError(
+                f"'free_length' of a {self.kind} spring must be larger than its 'body_length' with the turns closed"
+            )
+        if wound is None:
+            return
+        stacked = wound.turns * wound.wire
+        least = stacked * (1 - LENGTH_RTOL)
+        for key, length in (("body_length", body), ("free_length", free)):
+            if length is not None and length < least:
+                raise ValueError(f"{key!r} is less than the turns on each other: {format_short(stacked, 'length')}")
+        room = self.spring_type.deflection_until_closed(free, body or least)
+        if self.max_elongation is not None and self.max_elongation > room * (1 + 1e-9):
             raise ValueError(f"'max_elongation' is more than 'free_length' leaves: {format_short(room, 'length')}")
-        if self.kind == "extension" and self.free_length is not None and self.free_length < least * (1 - RATE_RTOL):
-            raise ValueError(f"'free_length' is less than the turns on each other: {format_short(least, 'length')}")
 
     @classmethod
     def from_offer(cls, offer: Offer) -> Self:
         """Return a spring on offer of which wire, coil and turns are known, as a list has it."""
-        wire = wire_of(offer)
-        angular = offer.kind == "torsion"
+        wire, spring_type = wire_of(offer), offer.spring_type
         about = {
             "name": offer.name,
-            "kind": offer.kind,
-            "rate" if angular else "stiffness": offer.rate,
+            "kind": spring_type.kind,
+            spring_type.rate_key: offer.rate,
             "free_length": offer.free_length,
             "body_length": offer.body_length,
             "outer_diameter": offer.outer_diameter,
             "initial_tension": offer.initial_tension,
-            "max_angle" if angular else "max_elongation": offer.largest,
+            spring_type.largest_keys[0]: offer.largest,
             "life": offer.life,
             "counts": offer.counts,
         } | support_of(offer)
@@ -297,33 +301,35 @@ class CatalogueSpring(WireLimits, SpringSupport):
         return cls.model_validate((wire.model_dump(exclude_unset=True) if wire else {}) | stated)
 
     @property
+    def spring_type(self) -> type[HelicalSpring]:
+        """Its kind."""
+        return HELICAL_KINDS[self.kind]
+
+    @property
     def wound(self) -> HelicalSpring | None:
         """Its wire, coil and turns; None if they are not stated."""
         if self.wire is None or self.coil is None or self.turns is None:
             return None
-        return self.wound_of(self.kind, self.wire, self.coil, self.turns)
+        return self.wound_of(self.spring_type, self.wire, self.coil, self.turns)
 
     @property
     def offer(self) -> Offer:
         """The spring as designs look at it."""
-        wound = self.wound
-        stated = self.rate if self.kind == "torsion" else self.stiffness
+        wound, spring_type = self.wound, self.spring_type
+        stated, *ends = (getattr(self, key) for key in (spring_type.rate_key, *spring_type.largest_keys))
         rate = stated if stated is not None else wound.rate if wound is not None else 0.0
-        ends = [self.max_elongation]
-        if self.max_load is not None:
-            ends.append(max(self.max_load - self.initial_tension, 0.0) / rate)
-        if self.kind == "torsion":
-            ends = [self.max_angle, self.max_torque / rate if self.max_torque else None]
+        loads = ends[1:]
         body = self.body_length or (wound.body_length if wound else None)
-        if self.kind == "compression" and self.free_length is not None and body is not None:
-            ends.append(self.free_length - body)  # there the turns touch
         if wound is not None and self.max_stress is not None:
-            ends.append(max(self.max_stress / wound.stress(1.0) - self.initial_tension, 0.0) / rate)
+            loads.append(self.max_stress / wound.stress(1.0))
+        ends = [ends[0], spring_type.deflection_until_closed(self.free_length, body)]
+        ends += [max(load - self.initial_tension, 0.0) / rate for load in loads if load is not None]
+        largest = min(end for end in ends if end is not None)
         return Offer(
             name=self.name,
-            kind=self.kind,
+            spring_type=spring_type,
             rate=rate,
-            largest=min((end for end in ends if end is not None), default=None),
+            largest=largest if largest < inf else None,
             free_length=self.free_length,
             body_length=body,
             initial_tension=self.initial_tension,
@@ -382,8 +388,6 @@ def wire_of(offer: Offer) -> SpringWire | None:
 
 def support_of(offer: Offer) -> dict[str, Any]:
     """Return how a compression spring on offer is held, by key; what is not stated is None."""
-    if offer.kind != "compression":
-        return {}
     seats = None if offer.seats == "fixed-fixed" else offer.seats
     return {"seats": seats, "guide_rod": offer.guide_rod, "guide_tube": offer.guide_tube}
 
@@ -394,56 +398,54 @@ Catalogue = Annotated[tuple[CatalogueSpring, ...] | str, WrapValidator(_resolve_
 
 def offers(
     catalogue: tuple[CatalogueSpring, ...] | str,  # a list, a file's name, or "generic"
-    *kinds: Kind,  # which are wanted
+    *spring_types: type[HelicalSpring],  # kinds that are wanted
 ) -> tuple[Offer, ...]:
     """Return the springs of some kinds on offer.
 
     Raises DataError if the file cannot be read.
     """
     if isinstance(catalogue, DataSource):
-        return tuple(item.offer for item in _from_file(catalogue) if item.kind in kinds)
+        catalogue = tuple(_read_file(catalogue))
     if isinstance(catalogue, str):
-        return tuple(item for kind in kinds for item in generic(kind))
-    return tuple(item.offer for item in catalogue if item.kind in kinds)
+        return tuple(item for spring_type in spring_types for item in generic(spring_type))
+    return tuple(item.offer for item in catalogue if item.spring_type in spring_types)
 
 
 _NUMBER_PATTERN = re.compile(r"[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 _COMMA_PATTERN = re.compile(r"([+-]?[0-9]*),([0-9]+)")
 
 
-def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
-    """Yield the springs of a CSV: columns are the keys of a catalogue's spring, with units: ``stiffness [N/mm]``."""
+def _read_file(source: DataSource) -> list[CatalogueSpring]:
+    """Return the springs of a CSV: columns are the keys of a catalogue's spring, with units: ``stiffness [N/mm]``."""
     lines = _lines(source)
     separator = max(";\t|,", key=lines[0].count) if lines else ","
     rows = csv.reader(lines, delimiter=separator, strict=True)
+    springs: list[CatalogueSpring] = []
     try:
         heads = _heads(next(rows, []), source)
-        springs: list[CatalogueSpring] = []
-        for cells in rows:
-            if not any(cell.strip() for cell in cells):
-                continue
-            if len(cells) != len(heads):
-                raise DataError(f"{source}:{rows.line_num}: has {len(cells)} cells, but the header has {len(heads)}")
-            block = {
-                head[0]: _cell(head[0], cell.strip(), head[1], separator)
-                for head, cell in zip(heads, cells, strict=True)
-                if head and cell.strip()
-            }
-            try:
-                springs.append(CatalogueSpring.model_validate(block))
-                check_names(springs)
-            except ValidationError as error:
-                first = error.errors()[0]
-                place = ".".join(str(part) for part in first["loc"]) or str(block.get("name", ""))
-                reported = "missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
-                raise DataError(f"{source}:{rows.line_num}: {place}: {reported}") from None
-            except ValueError as error:
-                raise DataError(f"{source}:{rows.line_num}: {error}") from None
-    except csv.Error as error:
+        for cells in filter(any, ([cell.strip() for cell in row] for row in rows)):
+            springs.append(_spring_of_row(heads, cells, separator))
+            check_names(springs)
+    except (csv.Error, ValueError) as error:
         raise DataError(f"{source}:{rows.line_num}: {error}") from None
     if not springs:
         raise DataError(f"{source}: lists no spring; a header and one line per spring are needed")
-    yield from springs
+    return springs
+
+
+def _spring_of_row(heads: Sequence[Head], cells: Sequence[str], separator: str) -> CatalogueSpring:
+    """Return the spring of one line of a file; `ValueError` for what is wrong with it."""
+    if len(cells) != len(heads):
+        raise ValueError(f"has {len(cells)} cells, but the header has {len(heads)}")
+    named_cells = ((*head, cell) for head, cell in zip(heads, cells, strict=True) if head and cell)
+    block = {name: _cell(name, cell, unit, separator) for name, unit, cell in named_cells}
+    try:
+        return CatalogueSpring.model_validate(block)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"]) or str(block.get("name", ""))
+        reported = "missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
+        raise ValueError(f"{place}: {reported}") from None
 
 
 def _lines(source: DataSource) -> list[str]:
@@ -455,10 +457,10 @@ def _lines(source: DataSource) -> list[str]:
     return "\n".join(lines_of(text)).lstrip("\n ;,|\t\ufeff").splitlines(keepends=True)
 
 
-def _heads(cells: Sequence[str], source: DataSource) -> list[tuple[str, str | None] | None]:
+def _heads(cells: Sequence[str], source: DataSource) -> list[Head]:
     """Return name and unit of each column; None for a remark, such as a price, which is not read."""
     allowed = [name for name in CatalogueSpring.model_fields if name != "fatigue"]  # a block, which no cell holds
-    columns: list[tuple[str, str | None] | None] = []
+    columns: list[Head] = []
     for cell in cells:
         title, unit = split_header(cell)
         name = title.strip().lower().replace(" ", "_")

@@ -105,10 +105,8 @@ class SpringInUse:
 
     @property
     def loop_stress(self) -> float | None:
-        """Largest bending stress in the loops of an extension spring [Pa]."""
-        if self.wound is None or self.wound.kind != "extension":
-            return None
-        return self.wound.loop_stress(self.largest)
+        """Largest bending stress in the loops at its ends [Pa]; None if it has none."""
+        return None if self.wound is None else self.wound.loop_stress(self.largest)
 
     def life(self) -> float | None:
         """Return the cycles that it lasts; None if nothing is known of it.

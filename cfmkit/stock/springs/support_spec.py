@@ -5,17 +5,19 @@ That is a rod inside of it, or a tube around it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
 from cfmkit.specs.spec import Model
 from cfmkit.specs.units import Length, format_short
 from cfmkit.stock.springs.helical_spring_formulas import Seats
+from cfmkit.stock.springs.kinds import HELICAL_KINDS, list_kinds
 from cfmkit.stock.springs.offers import guide_rod_for
+from cfmkit.stock.springs.stress_and_life import SpringInUse
 
 if TYPE_CHECKING:
-    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring, Kind
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
 
 Positive = Field(gt=0)
@@ -49,12 +51,15 @@ class SpringSupport(Model):
         on_rod = rod is not None and rod >= wound.thinnest_guide_rod * fits
         return on_rod or (tube is not None and tube * fits <= wound.widest_guide_tube)
 
-    def check_guide(self, kind: Kind, wound: HelicalSpring | None, outer: float | None) -> None:
+    def check_guide(self, spring_type: type[HelicalSpring], wound: HelicalSpring | None, outer: float | None) -> None:
         """Raise `ValueError` for a guide that does not fit, or for one of a spring that does not buckle."""
         stated = ["seats"] if self.seats != "fixed-fixed" else []
         stated += [key for key in ("guide_rod", "guide_tube") if getattr(self, key) is not None]
-        if stated and kind != "compression":
-            raise ValueError(f"{stated[0]!r} is for compression springs, which buckle; this is of kind {kind!r}")
+        if stated and not spring_type.needs_guide:
+            buckling = list_kinds(other for other in HELICAL_KINDS.values() if other.needs_guide)
+            raise ValueError(
+                f"{stated[0]!r} is for {buckling} springs, which buckle; this is of kind {spring_type.kind!r}"
+            )
         inside = wound.inner_diameter if wound is not None else outer
         if self.guide_rod is not None and inside is not None and self.guide_rod >= inside:
             inner = format_short(inside, "length")
@@ -63,6 +68,36 @@ class SpringSupport(Model):
         if self.guide_tube is not None and around is not None and self.guide_tube <= around:
             reported = format_short(around, "length")
             raise ValueError(f"'guide_tube' must be wider than the spring, which is {reported} outside")
+
+
+class BuiltInSpring(SpringSupport):
+    """What springs that are built in, of some kind, know of their `wound` wire and of their support."""
+
+    @property
+    def spring_type(self) -> type[HelicalSpring]:
+        """Their kind."""
+        raise NotImplementedError
+
+    @property
+    def coil(self: Any) -> HelicalSpring | None:
+        """Wire, coil and turns of one; None if they are not stated."""
+        return None if self.wound is None else self.wound.to_wound(self.spring_type)
+
+    @property
+    def is_guided(self) -> bool:
+        """True if a rod or a tube keeps it from buckling."""
+        return self.guides(self.coil)
+
+    @property
+    def unguided(self: Any) -> float:
+        """Deflection up to which it does not buckle without a guide [m]; infinite if it never does."""
+        outer = getattr(self, "outer_diameter", None)
+        return float(self.spring_type.unguided_deflection(self.free_length, self.coil, outer, self.seats))
+
+    def put_under(self: Any, least: float, largest: float) -> SpringInUse:
+        """Return one between two loads [N or N m]."""
+        fatigue = None if self.wound is None or self.wound.fatigue is None else self.wound.fatigue.law
+        return SpringInUse(self.coil, least, largest, fatigue, self.life)
 
 
 def guide_words(support: SpringSupport) -> list[str]:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
-    from cfmkit.metrics.metrics_of_rows import CurveRows
+    from cfmkit.metrics.curve_rows import CurveRows
     from cfmkit.results import Result
     from cfmkit.specs.spec import Requirement, Spec
     from cfmkit.studies.point_evaluation import Metric
@@ -394,7 +394,8 @@ def _numbers_in_rows(
                 continue
             numbers = _looked_up(solved.branches, rows, variants)
             if numbers is not None:
-                good = variants.usable & np.isfinite(numbers).all(axis=1)
+                good = solved.complete & np.isfinite(numbers).all(axis=1)
+                good[list(variants.rows().odd)] = False
                 is_reached = _get_to(solved.branches, rows, reached)
                 numbers_by_part |= {
                     int(members[row]): numbers[row] if is_reached[row] else None for row in np.flatnonzero(good)

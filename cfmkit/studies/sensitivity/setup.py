@@ -21,6 +21,7 @@ from cfmkit.studies.parts.uncertain_values import together
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
 from cfmkit.studies.point_evaluation import Study, metrics_of
 from cfmkit.studies.sensitivity.method import method_named
+from cfmkit.studies.variants_in_rows import evaluate_result
 from cfmkit.studies.variations import length_to_vary
 
 if TYPE_CHECKING:
@@ -215,20 +216,19 @@ def _solve_nominal(study: Study) -> Result:
 
 def _with_nominal(study: Study, result: Result) -> tuple[Study, Nominal, tuple[Finding, ...]]:
     """Return the study of those metrics that have a value, and the result without deviations as it sees it."""
-    row = study.row(result)
-    valued = [k for k, value in enumerate(row.values) if value is not None]
+    rows = evaluate_result(study, result)
+    valued = np.flatnonzero(np.isfinite(rows.values[0])).tolist()
     reported = {metric.label: item.reason or "there is none" for metric, item in _valueless(study, result)}
     if not valued:
-        reasons = "; ".join(dict.fromkeys(row.message or reason for reason in reported.values()))
+        reasons = "; ".join(dict.fromkeys(rows.status(0)[1] or reason for reason in reported.values()))
         raise SolutionError(f"none of the metrics has a value for the specification itself: {reasons}")
     without = tuple(
         Finding("no_value", f"{label} has no value for the specification itself ({reason}): left out")
         for label, reason in reported.items()
     )
     outcomes = check(study.spec.part_requirements, result, values_of_family(family(study.spec.family).outputs.values))
-    values = np.array([row.values[k] for k in valued], dtype=np.float64)
     kept = replace(study, metrics=tuple(study.metrics[k] for k in valued))
-    return kept, Nominal(result, outcomes, values), without
+    return kept, Nominal(result, outcomes, rows.values[0, valued]), without
 
 
 def _valueless(study: Study, result: Result) -> Iterator[tuple[Metric, Quantity]]:

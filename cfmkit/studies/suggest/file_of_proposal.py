@@ -223,5 +223,5 @@ def _as_listed(spring: Any) -> Mapping[str, Any]:
     """Return a spring at a pin as a catalogue lists it, in the number that it is built in."""
     wire = {} if spring.wound is None else spring.wound.model_dump(exclude_unset=True)
     known = {"free_length": spring.free_length, "life": spring.life}
-    listed = {"name": spring.name, "kind": spring.kind, "counts": (spring.count,)}
+    listed = {"name": spring.name, "kind": spring.spring_type.kind, "counts": (spring.count,)}
     return wire | listed | {key: value for key, value in known.items() if value is not None}

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from equilibria import equilibria
 
+from cfmkit.elastica import Control
 from cfmkit.elastica.results.path import EquilibriumPath, PathStatus
+from cfmkit.elastica.tracing.trace import DegreeAndPieces, trace_on
 
 
 def beam_stress(path: EquilibriumPath, beam: str, axial: bool = True) -> Any:
@@ -16,9 +17,7 @@ def beam_stress(path: EquilibriumPath, beam: str, axial: bool = True) -> Any:
 
 
 def functional_path(net: Any, drive: Any, degree: int = 18, pieces: int = 1) -> EquilibriumPath:
-    """Return the path of a network at the points of a drive."""
-    at, _ = equilibria(net, drive, degree, pieces)
-    count = len(at.z)
-    numbers, stable = np.arange(count), np.zeros(count, int)
-    branch, accurate = np.array(["primary"] * count), np.ones(count, bool)
-    return EquilibriumPath(net, drive, at, stable, numbers, branch, PathStatus.COMPLETE, "", (), 0.0, accurate)
+    """Return the path of a network with one degree, at the points of a drive."""
+    path = trace_on(net, drive, Control(tolerance=1e-10), DegreeAndPieces(degree, pieces)).path
+    assert path.status is PathStatus.COMPLETE
+    return path.take(path.at_requested)

@@ -15,17 +15,9 @@ from cfmkit.designing.rounded_and_reported_values import find_active_bounds
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.network_from_spec import assemble, known_allowable_stresses, thickest_of
-from cfmkit.families.beam.shaping.multistart import Explored, NetworkScatter, explore, rank, scatter_within_tolerances
+from cfmkit.families.beam.shaping.multistart import Explored, explore, rank, scatter_within_tolerances
 from cfmkit.families.beam.shaping.report import REISSNER_MODEL, Judged, judge_design, notes_of, search_of, starts_table
-from cfmkit.families.beam.shaping.search import (
-    VIOLATION_TOL,
-    ShapeCandidate,
-    StartBudget,
-    polish,
-    satisfy_limits,
-    widen,
-)
-from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
+from cfmkit.families.beam.shaping.search import VIOLATION_TOL, StartBudget, polish, satisfy_limits, widen
 from cfmkit.families.beam.shaping.task_and_variables import (
     BENDING_ONLY,
     STRESS_MARGIN,
@@ -42,17 +34,14 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
+    from cfmkit.families.beam.shaping.search import ShapeCandidate
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.families.run_control import Run
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-def optimise_shape(
-    spec: BeamSpec,  # driven by a displacement
-    wanted: Optimise,  # what is to be reached, what may vary, what must hold
-    run: Run,  # seed, progress, time budget, processes, notes
-) -> Design:
+def optimise_shape(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     """Return a specification with optimised nodes and shapes, or why there is none."""
     if spec.extent < wanted.window[1] * (1 - 1e-12):
         problem = "analysis.travel ends before design.optimise.window: let it reach the end of the window"
@@ -65,10 +54,7 @@ def optimise_shape(
     best = _best(spec, task, result, plan)
     if isinstance(best, Design):
         return replace(best, tables=tables)
-    spread = NetworkScatter(
-        wanted.tolerances.nodes, wanted.tolerances.coefficients, wanted.tolerances.samples, run.seed
-    )
-    drawn = scatter_within_tolerances(Variables(task, best.candidate.order), best.candidate, spread)
+    drawn = scatter_within_tolerances(task, best.candidate, wanted.tolerances, run.seed)
     held = held_by(task, best.candidate)
     return Design(
         best.spec,
@@ -77,7 +63,7 @@ def optimise_shape(
         active_bounds=held,
         warnings=_warnings(task, best, result),
         search=search_of(task, best, drawn, result),
-        notes=notes_of(best.audit, drawn, spread, held),
+        notes=notes_of(best.audit, drawn, wanted.tolerances, held),
         tables=tables,
     )
 
@@ -92,9 +78,8 @@ def with_stretch_and_shear(spec: BeamSpec) -> BeamSpec:
 
 def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
     """Return what is to be shaped; of layers in series one, which moves its share."""
-    mechanism = spec.mechanism
-    layers = mechanism.copies.layers if mechanism.copies else 1
-    if layers > 1 and mechanism.copies:
+    mechanism, layers = spec.mechanism, spec.mechanism.layers
+    if layers > 1:
         spec = with_values(spec, {"mechanism.copies.layers": 1})
     assembly = assemble(spec)
     bends = assemble(spec.replace({"analysis.fidelity": BENDING_ONLY})).network
@@ -110,7 +95,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         copies=float(assembly.parallel) if wanted.contact is None else 1.0,
         contact=wanted.contact,
         window=(wanted.window[0] / layers, wanted.window[1] / layers),
-        coordinates=tuple(_coordinates(wanted)),
+        coordinates=tuple(Coordinate(name, axis, *ends) for name, axis, ends in wanted.list_ranges()),
         shaped=wanted.beams if wanted.beams is not None else tuple(mechanism.beams),
         orders=wanted.orders,
         coefficient_limit=wanted.coefficient_limit,
@@ -131,18 +116,6 @@ def mean_of(curve: TargetCurve, window: tuple[float, float]) -> float:
     """Return the mean of a curve over a window [N]."""
     places = np.linspace(*window, 2001)
     return float(np.trapezoid(curve.evaluate(places), places) / (window[1] - window[0]))
-
-
-def _coordinates(wanted: Optimise) -> list[Coordinate]:
-    box = wanted.limits.envelope
-    coordinates = []
-    for name, node in wanted.free.items():
-        both = node.x is None and node.y is None
-        for axis, stated in enumerate((node.x, node.y)):
-            inside = (box.x, box.y)[axis] if both and box is not None else stated
-            if inside is not None:
-                coordinates.append(Coordinate(name, axis, *inside))
-    return coordinates
 
 
 def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
@@ -167,7 +140,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Ju
     """Return the best design that analysis and audit confirm, or why there is none."""
     candidates = [(candidate, result.audits.get(index)) for index, candidate in rank(task, result.designs)]
     if not candidates:
-        some = [candidate for candidate in result.designs.values() if candidate is not None]
+        some = list(result.shapes.values())
         if not some:
             return _nothing(result, plan)
         if plan.late():
@@ -206,11 +179,8 @@ def _nothing(result: Explored, plan: StartBudget) -> Design:
     if result.lost:
         return Design(None, Status.CRASHED, f"no start was completed: {'; '.join(result.lost)}")
     if result.missing or plan.late():
-        return Design(
-            None,
-            Status.INFEASIBLE,
-            "the time budget ended before any start led to a design: increase it (design.optimise.time_budget)",
-        )
+        said = "the time budget ended before any start led to a design: increase it (design.optimise.time_budget)"
+        return Design(None, Status.INFEASIBLE, said)
     said = (
         "no random network could be followed over the window without losing stability or crossing beams: "
         "widen the envelope (design.optimise.limits.envelope) or the ranges of the free nodes (design.optimise.free), "
@@ -221,19 +191,16 @@ def _nothing(result: Explored, plan: StartBudget) -> Design:
 
 def _report_search(task: Task, design: Judged, result: Explored) -> str:
     """Return what the search did, in one sentence; force and window in it are those of the analysis."""
-    best, window = design.candidate, design.window
-    some = [audit_or_design for audit_or_design in result.designs.values() if audit_or_design is not None]
-    feasible = [audit_or_design for audit_or_design in some if audit_or_design.feasible]
-    unsound = len(feasible) - sum(audit_or_design.sound for audit_or_design in result.audits.values())
+    best, window, counts = design.candidate, design.window, result.count()
+    feasible = counts["starts_within_limits"]
+    unsound = feasible - counts["starts_sound"]
     refuted = f", the audit rejects {unsound} of them" if unsound else ""
-    total = sum(audit_or_design.evaluations for audit_or_design in some)
     reused = f", {result.reused} from the journal" if result.reused else ""
     left = f", {result.missing} not finished in time" if result.missing else ""
     reached = "the analysis has no force at the end of the window"
     if task.shape is not None:
-        reached = (
-            f"force off 'design.target' by at most {percent(design.miss or 0.0)} of its largest value in the window"
-        )
+        off = percent(design.miss or 0.0)
+        reached = f"force off 'design.target' by at most {off} of its largest value in the window"
     elif design.half_band is not None:
         share = 1 - window[0] / window[1]
         whose = "force" if task.contact is None else f"force of {task.contact!r}"
@@ -241,7 +208,7 @@ def _report_search(task: Task, design: Judged, result: Explored) -> str:
     if task.objective == "paper":
         reached = f"F(a)/F(b) - 1 = {best.objective:.3f}"
     return (
-        f"{reached}; {len(feasible)} of {len(result.designs)} starts meet all limits{refuted} ({total} "
+        f"{reached}; {feasible} of {len(result.designs)} starts meet all limits{refuted} ({counts['traces']} "
         f"traces{reused}{left}); the last minimisation {best.ending}"
     )
 
@@ -271,6 +238,7 @@ def _warnings(task: Task, design: Judged, result: Explored) -> tuple[Finding, ..
 
 MAX_NEAR_DESIGNS = 3  # designs that are looked at, the ones that miss the limits least
 AT_BOUND = 1e-4  # a variable so near to its bound, in units of the size and in rad, is held by it
+AT_LIMIT = 2e-3  # a limit that holds by less than this share holds the design
 
 
 @dataclass(frozen=True)
@@ -290,52 +258,42 @@ def find_blocking(task: Task, designs: Iterable[ShapeCandidate], plan: StartBudg
     nearest: dict[str, str] = {}
     for name in missed:
         gives = [_relax_limits(task, candidate, plan, (name,)) for candidate in best]
-        for candidate in gives:
-            if candidate.feasible:
-                return Blocked(missed, {}, candidate)
-        slack = min(
-            (candidate.violation for candidate in gives if set(missed_by(task, candidate)) <= {name}), default=None
-        )
-        if slack is not None:
-            nearest |= NEAREST_LIMITS[name](task, 1.02 * slack)
+        if (met := next((candidate for candidate in gives if candidate.feasible), None)) is not None:
+            return Blocked(missed, {}, met)
+        nearest |= _list_nearest(task, gives, (name,))
     if not nearest:  # none gives way alone: all that are missed together, by the same share
         gives = [_relax_limits(task, candidate, plan, tuple(missed)) for candidate in best]
-        slack = min(
-            (candidate.violation for candidate in gives if set(missed_by(task, candidate)) <= set(missed)), default=None
-        )
-        if slack is not None:
-            nearest = {key: value for name in missed for key, value in NEAREST_LIMITS[name](task, 1.02 * slack).items()}
+        nearest = _list_nearest(task, gives, tuple(missed))
     return Blocked(missed, nearest, None)
+
+
+def _list_nearest(task: Task, gives: list[ShapeCandidate], names: tuple[str, ...]) -> dict[str, str]:
+    """Return what some limits would have to be for the design that misses no others and those least; else nothing."""
+    fits = [candidate.violation for candidate in gives if missed_by(task, candidate).keys() <= {*names}]
+    slack = 1.02 * min(fits, default=np.inf)
+    return {key: value for name in names if fits for key, value in NEAREST_LIMITS[name](task, slack).items()}
 
 
 def _relax_limits(task: Task, candidate: ShapeCandidate, plan: StartBudget, give: tuple[str, ...]) -> ShapeCandidate:
     """Return a design that meets all limits but some, and misses those as little as possible."""
-    rest = [
-        satisfy_limits(
-            task, candidate, task.orders[-1], plan, tuple(set(missed_by(task, candidate)) - set(give)) or give, 0.9
-        )
-    ]
-    return satisfy_limits(task, rest[0], task.orders[-1], plan, give, 0.98)
+    others = tuple(set(missed_by(task, candidate)) - set(give)) or give
+    rest = satisfy_limits(task, candidate, task.orders[-1], plan, others, 0.9)
+    return satisfy_limits(task, rest, task.orders[-1], plan, give, 0.98)
 
 
 def missed_by(task: Task, candidate: ShapeCandidate) -> dict[str, str]:
     """Return the limits that a design misses, each with its worst place and by how much, the worst first."""
-    program = Shaping(Variables(task, candidate.order), candidate.start, Flattest())
-    view = program.view(candidate.x)
-    if view is None:
-        return {}
-    rows = design_limits.list_missed_limits(program.limits(view), VIOLATION_TOL)
+    view = candidate.view(task)
+    rows = [] if view is None else design_limits.list_missed_limits(view.list_limits(), VIOLATION_TOL)
     return {row.name: f"{row.about}: missed by {percent(row.by)}" for row in rows}
 
 
-def held_by(task: Task, candidate: ShapeCandidate, close: float = 2e-3) -> tuple[str, ...]:
+def held_by(task: Task, candidate: ShapeCandidate) -> tuple[str, ...]:
     """Return the limits and bounds that hold a design, by name and place."""
-    variables = Variables(task, candidate.order)
-    program = Shaping(variables, candidate.start, Flattest())
-    view = program.view(candidate.x, sloped=True)
+    variables, view = Variables(task, candidate.order), candidate.view(task)
     at_bound = find_active_bounds(candidate.x, variables.bounds, AT_BOUND)
     held = [f"{name} at its bound" for name, at in zip(variables.names, at_bound, strict=True) if at]
-    return tuple(held) if view is None else (*held, *design_limits.list_active_rows(program.limits(view), close))
+    return (*held, *(design_limits.list_active_rows(view.list_limits(sloped=True), AT_LIMIT) if view else ()))
 
 
 def _stress(task: Task, slack: float) -> dict[str, str]:

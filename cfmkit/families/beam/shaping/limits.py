@@ -7,14 +7,14 @@ between them around the joint, up to the full one; that also asks for an angle b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.objective_and_constraints import LimitRows
+from cfmkit.designing.objective_and_constraints import LimitRows, worst
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.numerics.sampled_extremes import largest, largest_of_three, soft_least
 
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
-    from cfmkit.families.beam.shaping.response import View
+    from cfmkit.families.beam.shaping.response import BeamSamples, PosePlan, Response
+    from cfmkit.families.beam.shaping.task_and_variables import Task
 
 
 SIDE_NAMES = {
@@ -33,6 +34,77 @@ SIDE_NAMES = {
     "x": ("right", "left"),
     "y": ("top", "bottom"),
 }
+
+
+_REFINEMENT_FACTOR = 3  # a whole number, so that the points at which the force is solved are among the finer ones
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A design in the poses of a window that begins at `start` [m]: what goal and limits look at."""
+
+    response: Response
+    poses: PosePlan
+    start: float
+    # derivatives of rows of stress, envelopes and clearance that hold by more than this are left out: no step that can
+    # be trusted makes them miss. The rows themselves are all there
+    slopes_below: float = np.inf
+
+    @property
+    def task(self) -> Task:
+        """Task that the design is of."""
+        return self.response.variables.task
+
+    @cached_property
+    def _limits(self) -> list[PendingRows]:
+        return [rows for make in LIMIT_FUNCTIONS.values() for rows in make(self)]
+
+    def list_limits(self, sloped: bool = False) -> list[LimitRows]:
+        """Return the rows of all limits, with derivatives if these are wanted."""
+        return [limit.compute(sloped) for limit in self._limits]
+
+    @property
+    def violation(self) -> float:
+        """By how much the worst limit is missed."""
+        return worst(self.list_limits())
+
+    @cached_property
+    def window_force(self) -> FloatArray:
+        """Force at many places of the window [N]: the polynomial through its poses.
+
+        Where the force is to follow a curve it is divided by that, so that what is flat follows it.
+        """
+        return self.interpolate(self.response.force[self.poses.window] * self.levelling)
+
+    def interpolate(self, values: FloatArray) -> FloatArray:
+        """Return values at the poses of the window, (j, ...), at many places of it."""
+        return np.asarray(_finer(len(self.poses.window)) @ values)
+
+    @property
+    def levelling(self) -> FloatArray | float:
+        """Factors that make a force level that follows the task's curve, at the poses of the window; 1 without one."""
+        curve, places = self.task.shape, self.poses.at[self.poses.window]
+        return 1.0 if curve is None else 1.0 / curve.evaluate(places * self.task.layers)
+
+    @property
+    def half_band(self) -> float:
+        """(max - min)/(max + min) of the force over the window [1]; infinite where the force is negative."""
+        return half_band(self.window_force)
+
+
+def half_band(force: FloatArray) -> float:
+    """Return (max - min)/(max + min) of a force; infinite where that is negative."""
+    middle = float(force.max() + force.min())
+    return float(np.ptp(force)) / middle if middle > 0 else np.inf
+
+
+@cache
+def _finer(count: int) -> FloatArray:
+    """Return the matrix from values at Chebyshev-Lobatto points to values at three times as many, in order."""
+    from numpy.polynomial import chebyshev
+
+    coarse, fine = (-np.cos(np.linspace(0, np.pi, n)) for n in (count, _REFINEMENT_FACTOR * (count - 1) + 1))
+    return np.asarray(chebyshev.chebvander(fine, count - 1) @ np.linalg.inv(chebyshev.chebvander(coarse, count - 1)))
 
 
 @dataclass(frozen=True)
@@ -45,61 +117,51 @@ class PendingRows:
     slopes: Callable[[], FloatArray]  # returns the derivatives of the rows, (m, k)
     about: Callable[[], list[str]]
 
-
-def rows_of(view: View) -> list[LimitRows]:
-    """Return the rows of all limits, with derivatives if the view has them: the engine computes those once."""
-    pending = view.kept.get("limits")
-    if pending is None:  # else the derivatives are requested where the values were
-        pending = view.kept["limits"] = [rows for make in LIMIT_FUNCTIONS.values() for rows in make(view)]
-    if not view.sloped:
-        return [LimitRows(limit.name, limit.values.ravel(), None, limit.about) for limit in pending]
-    return [
-        LimitRows(limit.name, limit.values.ravel(), limit.slopes().reshape(limit.values.size, -1), limit.about)
-        for limit in pending
-    ]
+    def compute(self, sloped: bool) -> LimitRows:
+        """Return the rows with derivatives, or without."""
+        slopes = self.slopes().reshape(self.values.size, -1) if sloped else None
+        return LimitRows(self.name, self.values.ravel(), slopes, self.about)
 
 
 def stress(view: View) -> list[PendingRows]:
     """Signed extremes of the stress of each beam at every pose but rest, against the allowable stress."""
-    task = view.response.variables.task
-    allowed = task.limits.stress
+    allowed = view.task.limits.stress
     if allowed is None:
         return []
-    most = dict.fromkeys(("left", "right") if task.total_stress else ("stress",), (allowed, allowed))
+    most = dict.fromkeys(("left", "right") if view.task.total_stress else ("stress",), (allowed, allowed))
     return [_extremes(view, "stress", most, slice(1, None), allowed)]
 
 
 def envelope(view: View) -> list[PendingRows]:
     """Extremes of the centre lines before loading."""
-    return _keep_inside(view, "envelope", view.response.variables.task.limits.envelope, slice(0, 1))
+    return _keep_inside(view, "envelope", view.task.limits.envelope, slice(0, 1))
 
 
 def deformed_envelope(view: View) -> list[PendingRows]:
     """Extremes of the centre lines at every pose."""
-    return _keep_inside(view, "deformed_envelope", view.response.variables.task.limits.deformed_envelope, slice(None))
+    return _keep_inside(view, "deformed_envelope", view.task.limits.deformed_envelope, slice(None))
 
 
 def _keep_inside(
     view: View, name: str, box: tuple[float, float, float, float] | None, which: slice
 ) -> list[PendingRows]:
-    size = view.response.variables.task.size
     if box is None:
         return []
-    return [_extremes(view, name, {"x": (box[1], -box[0]), "y": (box[3], -box[2])}, which, size)]
+    return [_extremes(view, name, {"x": (box[1], -box[0]), "y": (box[3], -box[2])}, which, view.task.size)]
 
 
 def _extremes(view: View, name: str, most: dict[str, tuple[float, float]], which: slice, unit: float) -> PendingRows:
     """Return (most - largest value along each beam) / unit at some poses, of some values and of their negatives."""
-    lines = view.response.state.lines
+    samples = view.response.samples
     poses = np.arange(len(view.poses.at))[which]
+    columns = np.stack([view.response.column(what)[which] for what in most])
     top, three, weights = _highest(
-        [line.place for line in lines.values()],
-        [np.stack([getattr(line, what)[which] for what in most]) for line in lines.values()],
+        [beam.place for beam in samples.values()], [columns[..., beam.index] for beam in samples.values()]
     )
     values = (np.array(list(most.values()))[:, None, :, None] - top) / unit  # (what, beam, side, pose)
     is_near = values < view.slopes_below
     share = (weights * np.array([-1.0, 1.0])[:, None, None] / unit)[is_near]
-    rows = np.stack([at.index[three[:, k]] for k, at in enumerate(view.response.rows.values())], axis=1)[is_near]
+    rows = np.stack([beam.index[three[:, k]] for k, beam in enumerate(samples.values())], axis=1)[is_near]
     pose = np.broadcast_to(poses, is_near.shape)[is_near]
     ends = np.cumsum([0, *is_near.reshape(len(most), -1).sum(axis=1).tolist()])
 
@@ -113,14 +175,8 @@ def _extremes(view: View, name: str, most: dict[str, tuple[float, float]], which
         return out
 
     def describe_places() -> list[str]:
-        at = view.poses.at[which]
-        return [
-            f"{beam}, {side}, at {1e3 * pose:.4g} mm"
-            for what in most
-            for beam in lines
-            for side in SIDE_NAMES[what]
-            for pose in at
-        ]
+        names = [f"{beam}, {side}" for what in most for beam in samples for side in SIDE_NAMES[what]]
+        return [f"{name}, at {1e3 * pose:.4g} mm" for name in names for pose in view.poses.at[which]]
 
     return PendingRows(name, values, slopes, describe_places)
 
@@ -137,11 +193,11 @@ def _highest(places: list[FloatArray], values: list[FloatArray]) -> tuple[FloatA
 
 def length_ratio(view: View) -> list[PendingRows]:
     """Length over chord of the beams whose shape varies."""
-    task = view.response.variables.task
-    if task.limits.length_ratio is None:
+    ratio = view.task.limits.length_ratio
+    if ratio is None:
         return []
-    least = 1.0 / task.limits.length_ratio
-    many = {name: line for name, line in view.lengths.items() if name in task.shaped}
+    least = 1.0 / ratio
+    many = {name: line for name, line in view.response.lengths.items() if name in view.task.shaped}
     values = np.array([line.straightness - least for line in many.values()])
     slopes = np.array([line.by_straightness for line in many.values()])
     return [PendingRows("max_length_ratio", values, lambda: slopes, lambda: list(many))]
@@ -149,14 +205,19 @@ def length_ratio(view: View) -> list[PendingRows]:
 
 def slenderness(view: View) -> list[PendingRows]:
     """Length over the largest thickness of every beam."""
-    task = view.response.variables.task
-    if task.limits.slenderness is None:
+    ratio = view.task.limits.slenderness
+    if ratio is None:
         return []
-    many = view.lengths
-    least = np.array([task.limits.slenderness * thickest_of(view.section(name)) for name in many])
+    many = view.response.lengths
+    least = ratio * _thicknesses(view)
     values = np.array([line.length for line in many.values()]) / least - 1.0
     slopes = np.array([line.by_length for line in many.values()]) / least[:, None]
     return [PendingRows("min_slenderness", values, lambda: slopes, lambda: list(many))]
+
+
+def _thicknesses(view: View) -> FloatArray:
+    """Return the largest thickness of every beam (b,) [m]."""
+    return np.array([thickest_of(beam.section) for beam in view.task.network.beams.values()])
 
 
 def radius(view: View) -> list[PendingRows]:
@@ -170,7 +231,7 @@ def radius(view: View) -> list[PendingRows]:
     rows = []
     for row, name in enumerate(variables.task.shaped):
         first = len(variables.task.coordinates) + variables.order * row
-        lengths = view.lengths[name]
+        lengths = view.response.lengths[name]
         turn = powers @ view.response.x[first : first + variables.order]
         for sign in (1.0, -1.0):
             value, _, weights = largest(u, sign * turn)
@@ -185,16 +246,13 @@ def radius(view: View) -> list[PendingRows]:
 
 def clearance(view: View) -> list[PendingRows]:
     """Gap of every pair of beams, and of every beam with itself, before loading and under load."""
-    task = view.response.variables.task
-    if task.limits.clearance is None:
-        return []
-    return [separations(view, pairs(task.network))]
+    return [] if view.task.limits.clearance is None else [separations(view, pairs(view.task.network))]
 
 
 def force(view: View) -> list[PendingRows]:
     """Mean force over the window, against a least value and a target."""
-    limits, weights = view.response.variables.task.limits, view.poses.mean
-    mean = float(weights @ view.response.state.force)
+    limits, weights = view.task.limits, view.poses.mean
+    mean = float(weights @ view.response.force)
     rows: list[tuple[float, float, str]] = []
     if limits.force_min is not None:
         rows.append((mean / limits.force_min - 1.0, 1.0 / limits.force_min, "least mean"))
@@ -255,17 +313,20 @@ def _pair(network: Network, first: str, second: str) -> Pair:
 
 def separations(view: View, couples: list[Pair]) -> PendingRows:
     """Return (gap / required gap - 1) of all pairs at the poses that are shown, (pairs, q)."""
-    shown, limits = view.poses.shown, view.response.variables.task.limits
-    beams, opening = _ThinnedBeams.from_view(view), limits.opening
-    numbers = {name: k for k, name in enumerate(view.lengths)}
+    shown, limits, opening = view.poses.shown, view.task.limits, view.task.limits.opening
+    samples = view.response.samples
+    thin = [_thin_out(beam) for beam in samples.values()]
+    place, row = np.stack([beam.place for beam in thin]), np.stack([beam.index for beam in thin])
+    x, y = (np.stack([view.response.column(axis)[shown][:, chosen] for chosen in row]) for axis in "xy")
+    numbers = {name: k for k, name in enumerate(samples)}
     first, second = np.array([[numbers[name] for name in pair.beams] for pair in couples]).T
-    ways = _Ways.from_beams(view, couples, beams.place[first], beams.place[second])
-    half = np.array([0.5 * thickest_of(view.section(name)) for name in view.lengths])
+    ways = _Ways.from_beams(view, couples, place[first], place[second])
+    half = 0.5 * _thicknesses(view)
     wanted = ((limits.clearance or 0.0) + half[first] + half[second])[:, None, None]
     is_near = opening * ways.length < wanted
     required = np.where(is_near, opening * ways.length, wanted)
     compared = _choose_pairs(couples, ways.length)
-    dx, dy = (line[first][..., :, None] - line[second][..., None, :] for line in (beams.x, beams.y))
+    dx, dy = (line[first][..., :, None] - line[second][..., None, :] for line in (x, y))
     distance = np.sqrt(dx * dx + dy * dy) + 1e-12
     ratio = np.where(compared[:, None], distance / np.where(compared, required, 1.0)[:, None], np.inf)
     soft, weights = soft_least(ratio.reshape(*ratio.shape[:2], -1), BOUND_SHARPNESS)
@@ -279,8 +340,8 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
         for axis, apart in (("x", dx), ("y", dy)):
             along = (apart[at] / distance[at] * pull)[:, None]
             line, second_slopes = (
-                view.response.slopes_at(axis, shown[q], beams.row[side[p], place])
-                for side, place in ((first, i), (second, j))
+                view.response.slopes_at(axis, shown[q], row[side[p], number])
+                for side, number in ((first, i), (second, j))
             )
             by += along * (line - second_slopes)
         out = np.zeros((*soft.shape, len(view.response.x)))
@@ -294,37 +355,10 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
     return PendingRows("clearance", soft - 1.0, slopes, describe_places)
 
 
-@dataclass(frozen=True)
-class _ThinnedBeams:
-    """Beams at 17 of their places: a smooth bound must not depend on how fine the mesh is."""
-
-    place: FloatArray  # (b, 17) fraction of the arc length
-    row: Any  # (b, 17) which of all rows
-    # x, y, (b, q, 17): at the poses that are shown [m]
-    x: FloatArray
-    y: FloatArray
-
-    @classmethod
-    def from_view(cls, view: View) -> _ThinnedBeams:
-        """Return the beams of a response."""
-        lines, shown = view.response.state.lines, view.poses.shown
-        kept = [_even(len(line.place)) for line in lines.values()]
-        x, y = (
-            np.stack([getattr(line, axis)[shown][:, chosen] for line, chosen in zip(lines.values(), kept, strict=True)])
-            for axis in ("x", "y")
-        )
-        at = [
-            (rows.place[chosen], rows.index[chosen])
-            for rows, chosen in zip(view.response.rows.values(), kept, strict=True)
-        ]
-        place, row = (np.stack(column) for column in zip(*at, strict=True))
-        return cls(place, row, x, y)
-
-
-@cache
-def _even(count: int) -> Any:
-    """Return the indices of 17 places of so many, as even as they can be."""
-    return np.unique(np.linspace(0, count - 1, _N_PLACES + 1).round().astype(np.int64))
+def _thin_out(beam: BeamSamples) -> BeamSamples:
+    """Return 17 samples, as even as they can be: a smooth bound must not depend on how fine the mesh is."""
+    chosen = np.unique(np.linspace(0, len(beam.place) - 1, _N_PLACES + 1).round().astype(np.int64))
+    return replace(beam, place=beam.place[chosen], index=beam.index[chosen])
 
 
 def _choose_pairs(couples: list[Pair], distance: FloatArray) -> Any:
@@ -347,7 +381,8 @@ class _Ways:
     @classmethod
     def from_beams(cls, view: View, couples: list[Pair], u: FloatArray, v: FloatArray) -> _Ways:
         """Return the ways of pairs between places (n, r) of their first and second beams."""
-        first, second = ([view.lengths[pair.beams[side]] for pair in couples] for side in (0, 1))
+        lengths = view.response.lengths
+        first, second = ([lengths[pair.beams[side]] for pair in couples] for side in (0, 1))
         first_length, second_length = (
             np.array([line.length for line in lines])[:, None, None] for lines in (first, second)
         )

@@ -22,7 +22,7 @@ from cfmkit.designing.run_many_starts import Done, OneStart, Stage, from_record,
 from cfmkit.elastica import Control, Displacement, PathStatus, trace
 from cfmkit.elastica.tracing.trace_many import trace_many
 from cfmkit.families.beam.network_from_spec import thickest_of
-from cfmkit.families.beam.shaping.limits import pairs
+from cfmkit.families.beam.shaping.limits import half_band, pairs
 from cfmkit.families.beam.shaping.search import (
     VIOLATION_TOL,
     ShapeCandidate,
@@ -33,7 +33,7 @@ from cfmkit.families.beam.shaping.search import (
     searched_far,
     widen,
 )
-from cfmkit.families.beam.shaping.task_and_variables import Variables
+from cfmkit.families.beam.shaping.task_and_variables import Variables, segments_cross
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
     from cfmkit.families.beam.shaping.limits import Pair
+    from cfmkit.families.beam.shaping.spec import Tolerances
     from cfmkit.families.beam.shaping.task_and_variables import Task
     from cfmkit.families.run_control import Run
 
@@ -48,16 +49,6 @@ if TYPE_CHECKING:
 N_AUDIT_POSES = 61
 STRICT_BAND = 0.05  # of the largest force: the strict range is that of `cfmkit analyze`, (max - min) <= 5 % of max
 _JOINT_RTOL = 1e-4  # of the chords: lines that end in a joint meet within the error of the path
-
-
-@dataclass(frozen=True)
-class NetworkScatter:
-    """Standard deviations of node coordinates [m] and shape coefficients [rad], and how many networks are drawn."""
-
-    nodes: float
-    coefficients: float
-    samples: int
-    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -86,11 +77,10 @@ class Drawn:
     lost: int  # those that could not
 
 
-def audit_design(variables: Variables, design: ShapeCandidate) -> Audit:
+def audit_design(task: Task, design: ShapeCandidate) -> Audit:
     """Return the judgement of a design."""
-    task, network = variables.task, variables.build(design.x)
     at = np.linspace(0.0, task.window[1], N_AUDIT_POSES)
-    path = trace(network, Displacement(task.driven, task.direction, at), Control(tolerance=1e-7))
+    path = trace(design.network(task), Displacement(task.driven, task.direction, at), Control(tolerance=1e-7))
     return Audit(
         path.status is PathStatus.COMPLETE,
         bool(path.stable.all()),
@@ -99,32 +89,26 @@ def audit_design(variables: Variables, design: ShapeCandidate) -> Audit:
     )
 
 
-def half_band(at: FloatArray, force: FloatArray, start: float) -> float:
-    """Return (max - min)/(max + min) of a force from `start` on; between poses a cubic."""
+def band_and_range(at: FloatArray, force: FloatArray, start: float) -> tuple[float, float]:
+    """Return (max - min)/(max + min) of a force from `start` on; and the largest share of its travel with 5 % of max.
+
+    That is the share up to its end over which max - min is no more. Between poses the force is a cubic.
+    """
     from scipy.interpolate import CubicSpline
 
-    inside = CubicSpline(at, force)(np.linspace(start, at[-1], 201))
-    return float(np.ptp(inside) / (inside.max() + inside.min()))
-
-
-def strict_share(at: FloatArray, force: FloatArray) -> float:
-    """Return the largest share of the travel up to its end over which (max - min) <= 5 % of max."""
-    from scipy.interpolate import CubicSpline
-
-    fine = np.linspace(0.0, at[-1], 2001)
-    values = CubicSpline(at, force)(fine)[::-1]
+    cubic, fine = CubicSpline(at, force), np.linspace(0.0, at[-1], 2001)
+    values = cubic(fine)[::-1]
     tops, bottoms = np.maximum.accumulate(values), np.minimum.accumulate(values)
     good = tops - bottoms <= STRICT_BAND * tops
     count = len(good) if good.all() else int(good.argmin())
-    return (count - 1) / (len(fine) - 1)
+    return half_band(cubic(np.linspace(start, at[-1], 201))), (count - 1) / (len(fine) - 1)
 
 
-def scatter_within_tolerances(variables: Variables, design: ShapeCandidate, spread: NetworkScatter) -> Drawn:
+def scatter_within_tolerances(task: Task, design: ShapeCandidate, spread: Tolerances, seed: int = 0) -> Drawn:
     """Return what is left of the constant force in networks within the tolerances."""
-    task, rng = variables.task, np.random.default_rng([spread.seed, 1])
-    places = len(task.coordinates)
+    variables, rng = Variables(task, design.order), np.random.default_rng([seed, 1])
     sizes = np.full(variables.count, spread.coefficients)
-    sizes[:places] = spread.nodes / task.size
+    sizes[: len(task.coordinates)] = spread.nodes / task.size
     at = np.linspace(0.0, task.window[1], N_AUDIT_POSES)
     noise = rng.standard_normal((spread.samples, variables.count)) * sizes
     drive = Displacement(task.driven, task.direction, at)
@@ -135,9 +119,8 @@ def scatter_within_tolerances(variables: Variables, design: ShapeCandidate, spre
     else:
         outcomes = trace_many(networks, drive, Control(tolerance=1e-5), partial(_force_at_requested, task))
         forces = [outcome.value for outcome in outcomes if outcome.status == "COMPLETE"]
-    bands = np.array([half_band(at, force, design.start) for force in forces])
-    ranges = np.array([strict_share(at, force) for force in forces])
-    return Drawn(bands, ranges, spread.samples - len(forces))
+    shares = np.array([band_and_range(at, force, design.start) for force in forces]).reshape(-1, 2)
+    return Drawn(shares[:, 0], shares[:, 1], spread.samples - len(forces))
 
 
 def _force_at_requested(task: Task, path: Path) -> FloatArray:
@@ -160,9 +143,7 @@ def lines_cross(line: FloatArray, second_line: FloatArray, joined: bool) -> bool
     """Return True if two polylines (n, 2) cross; pieces that share an end, or touch at a common joint, do not."""
     p, q = line[:, 0] + 1j * line[:, 1], second_line[:, 0] + 1j * second_line[:, 1]
     a, b, c, d = p[:-1, None], p[1:, None], q[None, :-1], q[None, 1:]
-    first = _side(a, b, c) * _side(a, b, d)
-    second = _side(c, d, a) * _side(c, d, b)
-    hit = (first < 0) & (second < 0)
+    hit = segments_cross(a, b, c, d)
     if joined:
         size = abs(p[-1] - p[0]) + abs(q[-1] - q[0])
         gap_of_ends = np.min([abs(u - v) for u in (a, b) for v in (c, d)], axis=0)
@@ -170,16 +151,9 @@ def lines_cross(line: FloatArray, second_line: FloatArray, joined: bool) -> bool
     return bool(hit.any())
 
 
-def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    return np.asarray(np.imag(np.conj(b - a) * (c - a)))
-
-
 def _least_gap(task: Task, path: Path) -> float | None:
     """Return the least distance of surfaces of different beams, away from where they meet [m]."""
-    least = np.inf
-    for pair in pairs(task.network):
-        if not pair.alone:
-            least = min(least, _gap(task, path, pair))
+    least = min((_gap(task, path, pair) for pair in pairs(task.network) if not pair.alone), default=np.inf)
     return float(least) if np.isfinite(least) else None
 
 
@@ -229,33 +203,47 @@ class Explored:
     # number of the start -> the audit of its design, of those that meet all limits
     audits: Mapping[int, Audit] = field(default_factory=dict)
 
+    @property
+    def shapes(self) -> dict[int, ShapeCandidate]:
+        """The designs of the starts that led to one."""
+        return {index: design for index, design in self.designs.items() if design is not None}
+
+    def count(self) -> dict[str, int]:
+        """Return how many starts led to a shape, to one within all limits, to a sound one; and how many traces."""
+        shapes = self.shapes.values()
+        return {
+            "starts": len(shapes),
+            "starts_within_limits": sum(design.feasible for design in shapes),
+            "starts_sound": sum(audit.sound for audit in self.audits.values()),
+            "traces": sum(design.evaluations for design in shapes),
+        }
+
 
 def explore(
-    # task, plan: what is shaped, and how much is tried
     task: Task,
     plan: StartBudget,
-    counts: tuple[int, int],  # (int, int): starts, and how many of the best are widened
+    counts: tuple[int, int],  # starts, and how many of the best are widened
     identity: str,  # of everything that decides the outcome of a start but its number
-    run: Run,  # seed, progress, processes, notes
+    run: Run,
 ) -> Explored:
     """Return what all starts lead to, the best of them widened if that is the objective, as far as the time allows."""
     starts, wide = counts
-    jobs = _Jobs(task, plan, identity, run)
-    begun = jobs.run_stage("starts", partial(search_start, task.started, run.seed, plan=plan), range(starts))
+    jobs, started = _Jobs(task, plan, identity, run), task.started
+    begun = jobs.run_stage("starts", partial(search_start, started, run.seed, plan=plan), range(starts))
     designs, missing = _found_in(begun), starts - len(begun.records)
     if task.objective == "range":
         best = dict(list(rank(task, designs))[:wide])
-        designs |= _found_in(jobs.run_stage("widenings", partial(_widen, task.started, best, plan), best))
-        distant = partial(searched_far, task.started, run.seed, plan=plan)
+        designs |= _found_in(jobs.run_stage("widenings", partial(_go_on, widen, started, best, plan), best))
+        distant = partial(searched_far, started, run.seed, plan=plan)
         far = _found_in(jobs.run_stage("starts over a wider window", distant, range(starts)))
         leaders = dict(sorted(_keep_within_limits(far), key=lambda item: item[1].objective)[:_N_LEADERS])
-        work = partial(_nearer, task.started, leaders, plan)
+        work = partial(_go_on, nearer, started, leaders, plan)
         led = _found_in(jobs.run_stage("widenings of the flattest of these", work, leaders))
         designs |= {index: design for index, design in led.items() if _better(task, design, designs.get(index))}
-    if task.orders != task.started.orders:
+    if task.orders != started.orders:
         widest = dict(list(rank(task, designs))[:_N_REFINED])
-        designs |= _found_in(jobs.run_stage("refinements", partial(_refine, task, widest, plan), widest))
-    audits = {index: audit_design(Variables(task, design.order), design) for index, design in rank(task, designs)}
+        designs |= _found_in(jobs.run_stage("refinements", partial(_go_on, refine, task, widest, plan), widest))
+    audits = {index: audit_design(task, design) for index, design in rank(task, designs)}
     return Explored(designs, begun.reused, missing, tuple(jobs.lost), audits)
 
 
@@ -297,16 +285,15 @@ def _shares(task: Task) -> dict[str, tuple[float, float]]:
     return dict(zip(lasts, pairwise(ends.tolist()), strict=True))
 
 
-def _widen(task: Task, designs: dict[int, ShapeCandidate], plan: StartBudget, index: int) -> ShapeCandidate:
-    return widen(task, designs[index], plan)
-
-
-def _nearer(task: Task, designs: dict[int, ShapeCandidate], plan: StartBudget, index: int) -> ShapeCandidate:
-    return nearer(task, designs[index], plan)
-
-
-def _refine(task: Task, designs: dict[int, ShapeCandidate], plan: StartBudget, index: int) -> ShapeCandidate:
-    return refine(task, designs[index], plan)
+def _go_on(
+    step: Callable[[Task, ShapeCandidate, StartBudget], ShapeCandidate],
+    task: Task,
+    designs: dict[int, ShapeCandidate],
+    plan: StartBudget,
+    index: int,
+) -> ShapeCandidate:
+    """Return what a step makes of the design of a start."""
+    return step(task, designs[index], plan)
 
 
 def _found_in(stage: Done) -> dict[int, ShapeCandidate | None]:

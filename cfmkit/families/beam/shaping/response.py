@@ -7,7 +7,7 @@ leaves the band between two poses: that is seen at many more poses, where a desi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,7 @@ from cfmkit.numerics.quadrature import clenshaw_curtis
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica import Network, Path, Section
+    from cfmkit.elastica import Network, Path
     from cfmkit.elastica.sensitivity import Gradient
     from cfmkit.families.beam.shaping.task_and_variables import Task, Variables
     from cfmkit.numerics.dual_array import DualArray
@@ -83,12 +83,15 @@ def _all_fractions(counts: frozenset[int]) -> FloatArray:
     return distinct(np.concatenate([_fractions(count) for count in counts]))
 
 
-_STRESS_PARTS = {
+_COLUMN_PARTS = {
+    "x": {"x": 1.0},
+    "y": {"y": 1.0},
     "stress": {"bending": 1.0},
     "left": {"axial": 1.0, "bending": 1.0},
     "right": {"axial": 1.0, "bending": -1.0},
 }
-"""Stresses of `BeamAtPoses` as sums."""
+"""What limits look at, as sums of what the engine knows: the centre line; the bending stress on the left side, signed;
+the stress on either side with its axial part, tension positive."""
 
 
 class NoAnswer(Exception):
@@ -96,43 +99,11 @@ class NoAnswer(Exception):
 
 
 @dataclass(frozen=True)
-class BeamAtPoses:
-    """One beam at p poses, at r places along it."""
-
-    place: FloatArray  # (r,) fraction of the arc length
-    # x, y, (p, r): centre line [m]
-    x: FloatArray
-    y: FloatArray
-    stress: FloatArray  # (p, r) bending stress on the left side [Pa]: signed
-    axial: FloatArray | None = None  # (p, r) axial stress, where it counts [Pa]
-
-    @property
-    def left(self) -> FloatArray:
-        """Stress on the left side with the axial part [Pa], tension positive."""
-        assert self.axial is not None
-        return self.axial + self.stress
-
-    @property
-    def right(self) -> FloatArray:
-        """Stress on the right side with the axial part [Pa], tension positive."""
-        assert self.axial is not None
-        return self.axial - self.stress
-
-
-@dataclass(frozen=True)
-class NetworkAtPoses:
-    """The network at p poses: the force that is to be constant (p,) [N], and its beams by name."""
-
-    force: FloatArray
-    lines: dict[str, BeamAtPoses]
-
-
-@dataclass(frozen=True)
-class RowsOfBeam:
+class BeamSamples:
     """Samples of a beam by the engine, at r places."""
 
     place: FloatArray  # (r,) fraction of the arc length
-    index: Any  # (r,) which of all rows they are
+    index: Any  # (r,) which of the samples of all beams they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,44 +131,43 @@ class Response:
         return list(range(len(beams))), _all_fractions(frozenset(map(beams.count, beams)))
 
     @cached_property
-    def rows(self) -> dict[str, RowsOfBeam]:
+    def samples(self) -> dict[str, BeamSamples]:
         """Samples of each beam; the ends of elements occur twice among its states, and once here."""
         (_, fractions), beams = self._elements, self.path.mesh.elements.beam
-        rows = {}
+        samples = {}
         for name in self.path.network.beams:
             numbers = [k for k, beam in enumerate(beams) if beam == name]
             among = np.searchsorted(fractions, _fractions(len(numbers)))
             index = (np.array(numbers)[:, None] * len(fractions) + among).ravel()
-            place = self.states.place[index]
+            place = self._states.place[index]
             once = np.append(True, np.diff(place) > 0)
-            rows[name] = RowsOfBeam(place[once], index[once])
-        return rows
+            samples[name] = BeamSamples(place[once], index[once])
+        return samples
 
     @cached_property
-    def states(self) -> beam_states.BeamStates:
+    def _states(self) -> beam_states.BeamStates:
         """States at the poses, at the fractions of all elements, one after the other."""
         path = self.path.take(self.keep)
         return beam_states.states_of_elements(path.network, path.at, *self._elements)
 
     @cached_property
-    def state(self) -> NetworkAtPoses:
-        """Force and beams."""
-        elements, fractions = self._elements
-        beams = self.path.network.beams
-        width = np.repeat([beams[self.path.mesh.elements.beam[k]].section.width for k in elements], len(fractions))
-        states = self.states
-        bending, axial = beam_states.bending_and_axial_stress(width, states)
-        lines = {
-            name: BeamAtPoses(
-                at.place,
-                states.x[:, at.index],
-                states.y[:, at.index],
-                bending[:, at.index],
-                axial[:, at.index] if self.variables.task.total_stress else None,
-            )
-            for name, at in self.rows.items()
-        }
-        return NetworkAtPoses(self.variables.task.force(self.path)[self.keep], lines)
+    def force(self) -> FloatArray:
+        """The force that is to be constant, (p,) [N]."""
+        force: FloatArray = self.variables.task.force(self.path)[self.keep]
+        return force
+
+    @cached_property
+    def _columns(self) -> dict[str, FloatArray]:
+        """Coordinates [m] and stresses [Pa] at all samples, (p, r)."""
+        (_, fractions), beams = self._elements, self.path.network.beams
+        width = np.repeat([beams[name].section.width for name in self.path.mesh.elements.beam], len(fractions))
+        bending, axial = beam_states.bending_and_axial_stress(width, self._states)
+        return {"x": self._states.x, "y": self._states.y, "bending": bending, "axial": axial}
+
+    def column(self, what: str) -> FloatArray:
+        """Return what limits look at, a key of `_COLUMN_PARTS`, at all samples, (p, r) [m or Pa]."""
+        parts = [factor * self._columns[name] for name, factor in _COLUMN_PARTS[what].items()]
+        return np.asarray(sum(parts[1:], parts[0]))
 
     @cached_property
     def _gradient(self) -> Gradient:
@@ -218,7 +188,7 @@ class Response:
 
     @cached_property
     def _dual(self) -> dict[str, DualArray]:
-        """Coordinates and stresses at all rows of the sampling with their derivatives, (p, r).
+        """The same as `_columns` with derivatives.
 
         Raises NoAnswer where the engine has none.
         """
@@ -227,12 +197,12 @@ class Response:
         return {"x": states.x, "y": states.y, "bending": bending, "axial": axial}
 
     def slopes_at(self, what: str, pose: Any, sample: Any) -> FloatArray:
-        """Return derivatives (..., k) by the variables of a column of `BeamAtPoses`; samples are `RowsOfBeam.index`."""
+        """Return derivatives (..., k) by the variables of a `column` at poses and samples."""
         shape = np.broadcast_shapes(np.shape(pose), np.shape(sample))
         if 0 in shape:
             return np.empty((*shape, len(self.x)))
-        parts = _STRESS_PARTS.get(what, {what: 1.0})
-        slopes = [factor * self._dual[name].all_slopes[:, pose, sample] for name, factor in parts.items()]
+        parts = _COLUMN_PARTS[what].items()
+        slopes = [factor * self._dual[name].all_slopes[:, pose, sample] for name, factor in parts]
         return np.asarray(np.moveaxis(sum(slopes[1:], slopes[0]), 0, -1))
 
 
@@ -253,30 +223,6 @@ def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response 
     return Response(variables, x.copy(), path)
 
 
-@dataclass(frozen=True, eq=False)
-class View:
-    """Input of the limits: the response at the poses of a window from `start`, with derivatives or without.
-
-    Derivatives are those of rows below `slopes_below`. kept: what was computed for either.
-    """
-
-    response: Response
-    poses: PosePlan
-    start: float
-    sloped: bool = False
-    slopes_below: float = np.inf
-    kept: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def lengths(self) -> dict[str, Length]:
-        """Lengths of all beams."""
-        return self.response.lengths
-
-    def section(self, beam: str) -> Section:
-        """Return the section of a beam."""
-        return self.response.variables.task.network.beams[beam].section
-
-
 MANY_POSES = 241  # from rest to the end of the window: of a travel of 13.6 mm one every 0.06 mm
 _PLACES_PER_POSE = 8  # places of the interpolated force from pose to pose
 _CLOSE_CONTROL = Control(tolerance=1e-7, branch="stop")
@@ -284,15 +230,13 @@ _CLOSE_CONTROL = Control(tolerance=1e-7, branch="stop")
 
 @dataclass(frozen=True)
 class CloseView:
-    """Force of the mechanism [N] and largest stress [Pa] at even poses from rest to the end of the window [m].
-
-    curve, layers: force [N] that is to be followed, by the displacement [m] of so many layers. The force is divided by
-    it, as it is in the search.
-    """
+    """Force of the mechanism [N] and largest stress [Pa] at even poses from rest to the end of the window [m]."""
 
     at: FloatArray
     force: FloatArray
     stress: FloatArray
+    # curve, layers: force [N] that is to be followed, by the displacement [m] of so many layers; the force is divided
+    # by it, as it is in the search
     curve: TargetCurve | None = None
     layers: int = 1
 
@@ -326,7 +270,7 @@ class CloseView:
         return float(self._between[0][min(kept[-1] + 1, len(self.bands) - 1) if len(kept) else 0])
 
 
-def looked_at(task: Task, network: Network) -> CloseView | None:
+def view_closely(task: Task, network: Network) -> CloseView | None:
     """Return a network at many poses; None if it does not reach the end, or loses stability on the way."""
     at = np.linspace(0.0, task.window[1], MANY_POSES)
     try:

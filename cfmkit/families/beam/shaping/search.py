@@ -18,12 +18,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.objective_and_constraints import worst
-from cfmkit.designing.rounded_and_reported_values import round_within_bounds as rounded_within
+from cfmkit.designing.rounded_and_reported_values import round_within_bounds
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families.beam.shaping.limits import LIMIT_FUNCTIONS
-from cfmkit.families.beam.shaping.response import looked_at
-from cfmkit.families.beam.shaping.sqp_program import BAND_WEIGHT, Flattest, ForceRatio, Shaping, Widest, window_force
+from cfmkit.families.beam.shaping.response import view_closely
+from cfmkit.families.beam.shaping.sqp_program import BAND_WEIGHT, Flattest, ForceRatio, Shaping, Widest
 from cfmkit.families.beam.shaping.task_and_variables import Variables, candidates
 from cfmkit.numerics.sqp import Effort, Optimum, minimize
 
@@ -31,6 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Network
+    from cfmkit.families.beam.shaping.limits import View
     from cfmkit.families.beam.shaping.response import CloseView
     from cfmkit.families.beam.shaping.task_and_variables import Task
 
@@ -50,9 +51,7 @@ _MAX_BAND_RATIO = 3.0  # times that band: so far from it, what bends only is not
 _FAR_START = 0.5  # of the start of the requested window: where the window begins that starts are compared over
 _N_WINDOW_POSES = 9  # poses in that window
 _MAX_ROUNDS = 6  # towards the limits
-_MAX_VIOLATION = (
-    0.1  # of a limit: what bends only and misses one by so much is not taken on where beams stretch and shear
-)
+_MAX_VIOLATION = 0.1  # of a limit: what bends only and misses one by so much is not taken on in the task's model
 _SPRING_HALF_BAND = 0.2  # one with this is a spring, and not looked at further
 _FINER_POSE_COUNTS = (33, 65)  # poses in the window where the first 17 do not show what the force does
 _BAND_RATIO_TOL = 1.01  # a half band at many poses that is within this and the next of that at few
@@ -64,15 +63,11 @@ _BAND_WEIGHT = 20.0  # what a half band beyond that counts against the violation
 class StartBudget:
     """Effort at one start."""
 
-    # drawn, tries: random networks that are looked at, and how many of the best are made to meet the limits until one
-    # does
-    drawn: int = 80
-    tries: int = 4
-    # meeting, flattening, widening: steps of one round towards the limits, of one flattening, and of the widening of
-    # the window
-    meeting: int = 12
-    flattening: int = 40
-    widening: int = 50
+    drawn: int = 80  # random networks that are looked at
+    tries: int = 4  # how many of the best are made to meet the limits until one does
+    meeting: int = 12  # steps of one round towards the limits
+    flattening: int = 40  # steps of one flattening
+    widening: int = 50  # steps of one widening of the window
     clock: Clock = field(default_factory=Clock)  # whether the time is up
 
     def late(self) -> bool:
@@ -103,15 +98,20 @@ class ShapeCandidate:
         """Whether all limits hold."""
         return self.violation <= VIOLATION_TOL
 
+    def network(self, task: Task) -> Network:
+        """Return the network that it is."""
+        return Variables(task, self.order).build(self.x)
 
-def search_start(
-    task: Task,  # what is shaped
-    # seed, index: of the run and of the start: the same pair gives the same answer
-    seed: int,
-    index: int,
-    plan: StartBudget,  # how much is tried
-) -> ShapeCandidate | None:
-    """Return what a start leads to; None if no random network could be followed over the window."""
+    def view(self, task: Task) -> View | None:
+        """Return it in the poses of its window; None if it cannot be followed."""
+        return Shaping(Variables(task, self.order), self.start, Flattest()).view(self.x)
+
+
+def search_start(task: Task, seed: int, index: int, plan: StartBudget) -> ShapeCandidate | None:
+    """Return what a start leads to; None if no random network could be followed over the window.
+
+    The same seed of the run and index of the start give the same answer.
+    """
     first, rng = task.first, np.random.default_rng([seed, index])
     begun = _begin_network(first, rng, plan)
     if begun is None and first is not task:  # straight beams that cannot stretch may not be able to move at all
@@ -122,9 +122,8 @@ def search_start(
         return polish(task, begun, plan)
     enough = _BAND_SHARE * task.half_band if task.objective == "range" else -np.inf
     design = evaluate_in_model(task, flatten(first, begun, plan, enough))
-    if design.violation > _MAX_VIOLATION or (
-        task.objective == "range" and design.objective > _MAX_BAND_RATIO * task.half_band
-    ):
+    is_far_off = task.objective == "range" and design.objective > _MAX_BAND_RATIO * task.half_band
+    if design.violation > _MAX_VIOLATION or is_far_off:
         return design
     return polish(task, design if design.feasible else satisfy_limits(task, design, design.order, plan), plan)
 
@@ -174,13 +173,11 @@ def _begin_network(task: Task, rng: np.random.Generator, plan: StartBudget) -> S
 
 def evaluate_in_model(task: Task, design: ShapeCandidate) -> ShapeCandidate:
     """Return a design that was found in another model with objective and limits as they are in that of the task."""
-    program = Shaping(Variables(task, design.order), design.start, Flattest())
-    view = program.view(design.x)
+    view = design.view(task)
     if view is None:
         return replace(design, objective=np.inf, violation=np.inf)
-    objective = design.objective if task.objective == "paper" else _half_band(window_force(view))
-    violation = worst_of(program, design.x)
-    return replace(design, objective=objective, violation=violation, evaluations=design.evaluations + 1)
+    objective = design.objective if task.objective == "paper" else view.half_band
+    return replace(design, objective=objective, violation=view.violation, evaluations=design.evaluations + 1)
 
 
 def polish(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandidate:
@@ -201,20 +198,17 @@ def flatten(task: Task, design: ShapeCandidate, plan: StartBudget, enough: float
 
 
 def verify(
-    # task, design, plan: what was searched for, and what came out; where that misses a limit it is returned as it is
-    task: Task,
-    design: ShapeCandidate,
-    plan: StartBudget,
-    again: Callable[
-        [Task, ShapeCandidate], ShapeCandidate
-    ],  # what searches on, from a task with more poses and a design
+    task: Task, design: ShapeCandidate, plan: StartBudget, again: Callable[[Task, ShapeCandidate], ShapeCandidate]
 ) -> ShapeCandidate:
-    """Return a design with objective, window and limits as they are at many poses."""
+    """Return a design with objective, window and limits as they are at many poses; one that misses a limit as it is.
+
+    `again` searches on, from a task with more poses and a design.
+    """
     if not design.feasible:
         return design
     for points in (*(more for more in _FINER_POSE_COUNTS if more > task.points), None):
         design = round_design(task, design)
-        view = looked_at(task, Variables(task, design.order).build(design.x))
+        view = view_closely(task, design.network(task))
         design = replace(design, evaluations=design.evaluations + 1)
         if points is None or plan.late() or _shows_all(task, design, view):
             break
@@ -249,8 +243,8 @@ def _as_seen(task: Task, design: ShapeCandidate, view: CloseView | None) -> Shap
         wider = design.start < task.window[0]  # one that was not widened yet is left as flat as it is
         starts = [widest, design.start] if wider and widest < design.start else [max(widest, design.start)]
     for start in starts:  # the mean force is over another window
-        program = Shaping(Variables(task, design.order), start, Flattest())
-        violation = design.violation if start == design.start else max(design.violation, worst_of(program, design.x))
+        moved = None if start == design.start else evaluate_in_model(task, replace(design, start=start))
+        violation = design.violation if moved is None else max(design.violation, moved.violation)
         if violation <= VIOLATION_TOL:
             break
     return replace(design, start=start, objective=view.half_band(start), violation=violation)
@@ -265,10 +259,9 @@ def _overstress(task: Task, view: CloseView) -> float:
 def round_design(task: Task, design: ShapeCandidate) -> ShapeCandidate:
     """Return a design with coordinates and coefficients that print short."""
     places, bounds = len(task.coordinates), Variables(task, design.order).bounds
-    coordinates = rounded_within(design.x[:places], bounds[:places], COORDINATE_DECIMALS, task.size)
-    return replace(
-        design, x=np.append(coordinates, rounded_within(design.x[places:], bounds[places:], COEFFICIENT_DECIMALS))
-    )
+    coordinates = round_within_bounds(design.x[:places], bounds[:places], COORDINATE_DECIMALS, task.size)
+    coefficients = round_within_bounds(design.x[places:], bounds[places:], COEFFICIENT_DECIMALS)
+    return replace(design, x=np.append(coordinates, coefficients))
 
 
 def draw_networks(task: Task, rng: np.random.Generator, plan: StartBudget) -> list[ShapeCandidate]:
@@ -285,18 +278,16 @@ def draw_networks(task: Task, rng: np.random.Generator, plan: StartBudget) -> li
                 break
             view = program.view(x)
             if view is not None:
-                band = _half_band(window_force(view))
-                excess = worst_of(program, x) if band < _SPRING_HALF_BAND else np.inf
-                networks.append(ShapeCandidate(x, order, task.window[0], band, excess, "", 1))
+                excess = view.violation if view.half_band < _SPRING_HALF_BAND else np.inf
+                networks.append(ShapeCandidate(x, order, task.window[0], view.half_band, excess, "", 1))
         if len(networks) >= plan.tries:
             break
-    return sorted(
-        networks,
-        key=lambda network: (
-            network.violation + _BAND_WEIGHT * max(0.0, network.objective - _START_HALF_BAND),
-            network.objective,
-        ),
-    )
+
+    def rank(network: ShapeCandidate) -> tuple[float, float]:
+        excess = _BAND_WEIGHT * max(0.0, network.objective - _START_HALF_BAND)
+        return network.violation + excess, network.objective
+
+    return sorted(networks, key=rank)
 
 
 def _coarse(task: Task) -> int:
@@ -350,34 +341,14 @@ def _minimise_objective(
 
 def found_of(program: Shaping, optimum: Optimum, before: int = 0) -> ShapeCandidate:
     """Return an optimum as a design; its objective is measured anew, without the help of the goal's own variables."""
-    x, goal = optimum.z[: program.variables.count], program.goal
-    start = goal.window_start(optimum.z[program.variables.count :][: len(goal.bounds)], program.start)
-    objective = optimum.objective
+    variables, goal = program.variables, program.goal
+    x, values = np.split(optimum.z, [variables.count])
+    start = goal.window_start(values, program.start)
     view = program.view(x, start)
-    if not isinstance(goal, ForceRatio) and view is not None:
-        objective = _half_band(window_force(view))
-    return ShapeCandidate(
-        x,
-        program.variables.order,
-        start,
-        objective,
-        worst_of(program, x, start),
-        optimum.ending.value,
-        before + optimum.evaluations,
-    )
-
-
-def _half_band(force: FloatArray) -> float:
-    middle = float(force.max() + force.min())
-    return float(np.ptp(force)) / middle if middle > 0 else np.inf
-
-
-def worst_of(program: Shaping, x: FloatArray, start: float | None = None) -> float:
-    """Return by how much the worst limit is missed."""
-    view = program.view(x, start)
-    if view is None:
-        return np.inf
-    return worst(program.limits(view))
+    violation = np.inf if view is None else view.violation
+    objective = optimum.objective if isinstance(goal, ForceRatio) or view is None else view.half_band
+    ending, evaluations = optimum.ending.value, before + optimum.evaluations
+    return ShapeCandidate(x, variables.order, start, objective, violation, ending, evaluations)
 
 
 def widen(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandidate:
@@ -397,16 +368,9 @@ def widen(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandida
 
     wide = verify(task, _widest(task, good, plan), plan, again)
     # what more poses refute keeps the band over a narrower window, which may be wider than what the repair came to
-    narrower = (
-        _as_seen(task, candidate, looked_at(task, Variables(task, candidate.order).build(candidate.x)))
-        for candidate in refuted
-    )
-    kept = [
-        candidate
-        for candidate in (good, *narrower, wide)
-        if candidate.feasible and candidate.objective <= task.half_band
-    ]
-    widest = min(reversed(kept), key=lambda candidate: candidate.start)
+    narrower = (_as_seen(task, shape, view_closely(task, shape.network(task))) for shape in refuted)
+    kept = [shape for shape in (good, *narrower, wide) if shape.feasible and shape.objective <= task.half_band]
+    widest = min(reversed(kept), key=lambda shape: shape.start)
     return replace(widest, evaluations=wide.evaluations + len(refuted))
 
 

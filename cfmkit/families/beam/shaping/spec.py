@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.families.beam.contact_spec import RotationStop, sides_of
+from cfmkit.families.beam.contact_spec import Fault, RotationStop, list_names, sides_of
 from cfmkit.specs.spec import Model, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Time
 
@@ -133,25 +133,32 @@ class Optimise(Model):
             refuse("Optimise", {("compare",): "must be [a, b] with a > b > 0"})
         return self
 
+    def list_ranges(self) -> Iterator[tuple[str, int, Range]]:
+        """Yield each coordinate that may vary: its node, 0 for x and 1 for y, and its range [m]."""
+        box = self.limits.envelope
+        for name, node in self.free.items():
+            inside = (box.x, box.y) if node.x is None and node.y is None and box is not None else (node.x, node.y)
+            yield from ((name, axis, ends) for axis, ends in enumerate(inside) if ends is not None)
 
-def optimise_faults(wanted: Optimise, mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str]]:
+
+def optimise_faults(wanted: Optimise, mechanism: Mechanism) -> Iterator[Fault]:
     """Yield what keeps the block from making sense with its mechanism, each with its place below the block."""
     if not mechanism.drive.is_displacement:
         yield (), f"needs a drive of kind 'displacement', not {mechanism.drive.kind!r}"
     for name, node in wanted.free.items():
         if name not in mechanism.nodes:
-            yield ("free", name), f"there is no node {name!r}; nodes are {', '.join(mechanism.nodes)}"
+            yield ("free", name), f"there is no node {name!r}; nodes are {list_names(mechanism.nodes)}"
         elif node.x is None and node.y is None and wanted.limits.envelope is None:
             yield ("free", name), "no range is given: give 'x', 'y' or limits.envelope"
     for index, name in enumerate(wanted.beams or ()):
         if name not in mechanism.beams:
-            yield ("beams", index), f"there is no beam {name!r}; beams are {', '.join(mechanism.beams)}"
+            yield ("beams", index), f"there is no beam {name!r}; beams are {list_names(mechanism.beams)}"
     yield from _contact_faults(wanted, mechanism)
     if not wanted.free and (wanted.orders[-1] == 0 or wanted.beams == ()):
         yield (), "leaves nothing to vary: name free nodes, or an order of the shapes above 0"
 
 
-def _contact_faults(wanted: Optimise, mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str]]:
+def _contact_faults(wanted: Optimise, mechanism: Mechanism) -> Iterator[Fault]:
     """Yield what is wrong with the contact whose force is to be constant, and with obstacles of a search."""
     names = [*mechanism.stops, *mechanism.obstacles]
     if wanted.contact is not None and wanted.contact not in names:

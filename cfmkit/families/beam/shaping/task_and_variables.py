@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import combinations
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from cfmkit.elastica import Network, Polynomial
 from cfmkit.elastica.model.beam import fit
+from cfmkit.elastica.model.beam_fits import beam_end_at
 from cfmkit.elastica.model.contact import NodeOnObstacle
 from cfmkit.families.beam.contacts import named_force, numbers_of, sense_of
 from cfmkit.families.beam.network_from_spec import thickest_of
@@ -51,18 +51,16 @@ class Coordinate:
     high: float
 
     @property
-    def name(self) -> str:
-        """As reports call it: ``n3.x``."""
-        return f"{self.node}.{'xy'[self.axis]}"
+    def key(self) -> str:
+        """Its key in a node of a network: x or y."""
+        return "xy"[self.axis]
 
 
 @dataclass(frozen=True)
 class TaskLimits:
     """Limits that must hold; None: not asked."""
 
-    stress: float | None = (
-        None  # largest stress at every pose [Pa]: by the margin `STRESS_MARGIN` below the allowable one
-    )
+    stress: float | None = None  # largest stress at every pose [Pa]: by `STRESS_MARGIN` below the allowable one
     envelope: tuple[float, float, float, float] | None = None  # where the centre lines must lie before loading [m]
     deformed_envelope: tuple[float, float, float, float] | None = None  # the same at every pose
     length_ratio: float | None = 1.5  # largest length over distance of the ends [1]
@@ -144,12 +142,10 @@ class Task:
 
         It does not depend on where the free nodes are: a design that is designed again comes out the same.
         """
-        free = {
-            (coordinate.node, coordinate.axis): (coordinate.low, coordinate.high) for coordinate in self.coordinates
-        }
+        free = {(place.node, place.key): (place.low, place.high) for place in self.coordinates}
         spans = []
-        for axis in (0, 1):
-            places = [free.get((name, axis), ((node.x, node.y)[axis],)) for name, node in self.network.nodes.items()]
+        for key in "xy":
+            places = [free.get((name, key), (getattr(node, key),)) for name, node in self.network.nodes.items()]
             spans.append(np.ptp([value for some in places for value in some]))
         return float(max(spans))
 
@@ -172,51 +168,47 @@ class Variables:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """As reports call them."""
-        places = [coordinate.name for coordinate in self.task.coordinates]
+        places = [f"{place.node}.{place.key}" for place in self.task.coordinates]
         return (*places, *(f"{beam}.c{k}" for beam in self.task.shaped for k in range(1, self.order + 1)))
 
     @cached_property
     def bounds(self) -> FloatArray:
         """Lowest and highest values, (k, 2)."""
         size, limit = self.task.size, self.task.coefficient_limit
-        places = [(coordinate.low / size, coordinate.high / size) for coordinate in self.task.coordinates]
+        places = [(place.low / size, place.high / size) for place in self.task.coordinates]
         rest = self.count - len(places)
         return np.array([*places, *([(-limit, limit)] * rest)]).reshape(-1, 2)
 
+    def split(self, x: Any) -> tuple[Any, Any]:
+        """Return the coordinates of a vector of variables, and its coefficients (shaped beams, order)."""
+        places = len(self.task.coordinates)
+        return x[:places], x[places:].reshape(len(self.task.shaped), self.order)
+
     def build(self, x: Any) -> Network:
         """Return the network of a vector of variables, which may be complex."""
-        network, places = self.task.network, len(self.task.coordinates)
-        nodes = dict(network.nodes)
-        moved: dict[str, dict[str, Any]] = {}
-        for value, coordinate in zip(x[:places], self.task.coordinates, strict=True):
-            moved.setdefault(coordinate.node, {})["xy"[coordinate.axis]] = value * self.task.size
-        nodes |= {name: replace(nodes[name], **at) for name, at in moved.items()}
-        beams = dict(network.beams)
-        for beam, row in zip(self.task.shaped, x[places:].reshape(len(self.task.shaped), self.order), strict=True):
+        places, rows = self.split(x)
+        nodes, beams = dict(self.task.network.nodes), dict(self.task.network.beams)
+        for value, place in zip(places, self.task.coordinates, strict=True):
+            nodes[place.node] = replace(nodes[place.node], **{place.key: value * self.task.size})
+        for beam, row in zip(self.task.shaped, rows, strict=True):
             beams[beam] = replace(beams[beam], shape=Polynomial((0.0, *row)), closure="rotscale")
-        return replace(network, nodes=nodes, beams=beams)
+        return replace(self.task.network, nodes=nodes, beams=beams)
 
     def read(self) -> FloatArray:
         """Return the variables of the task's own network; terms above the order are dropped."""
         nodes, beams = self.task.network.nodes, self.task.network.beams
-        places = [
-            (nodes[coordinate.node].x, nodes[coordinate.node].y)[coordinate.axis] / self.task.size
-            for coordinate in self.task.coordinates
-        ]
-        rows = [self._coefficients(beams[beam].shape) for beam in self.task.shaped]
+        places = [getattr(nodes[place.node], place.key) / self.task.size for place in self.task.coordinates]
+        shapes = [beams[beam].shape for beam in self.task.shaped]
+        coefficients = [shape.coefficients[1:] if isinstance(shape, Polynomial) else () for shape in shapes]
+        rows = [((*row, *[0.0] * self.order)[: self.order]) for row in coefficients]
         return np.array([*places, *(value for row in rows for value in row)], dtype=float)
-
-    def _coefficients(self, shape: Any) -> list[float]:
-        coefficients = list(shape.coefficients[1:]) if isinstance(shape, Polynomial) else []
-        return (coefficients + [0.0] * self.order)[: self.order]
 
     def change_order(self, x: FloatArray, order: int) -> tuple[Variables, FloatArray]:
         """Return the variables of another order and the same shapes in them, terms above the order dropped."""
-        places = len(self.task.coordinates)
-        rows = x[places:].reshape(len(self.task.shaped), self.order)[:, :order]
-        wider = np.zeros((len(self.task.shaped), order))
-        wider[:, : rows.shape[1]] = rows
-        return Variables(self.task, order), np.concatenate([x[:places], wider.ravel()])
+        places, rows = self.split(x)
+        wider = np.zeros((len(rows), order))
+        wider[:, : self.order] = rows[:, :order]
+        return Variables(self.task, order), np.concatenate([places, wider.ravel()])
 
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -245,7 +237,7 @@ def _measure_polynomials(variables: Variables, x: FloatArray, network: Network) 
     names, order = variables.task.shaped, variables.order
     first = len(variables.task.coordinates)
     powers = _GAUSS_NODES[:, None] ** np.arange(1, order + 1)
-    turn = np.exp(1j * (x[first:].reshape(len(names), order) @ powers.T)) * _GAUSS_WEIGHTS
+    turn = np.exp(1j * (variables.split(x)[1] @ powers.T)) * _GAUSS_WEIGHTS
     chi, by_chi = turn.sum(axis=1), 1j * (turn @ powers)
     ratio = abs(chi)
     by_ratio = np.zeros((len(names), variables.count))
@@ -274,20 +266,23 @@ def _measure_beam(variables: Variables, network: Network, name: str) -> Length:
     return Length(length, chord / length, by_length, by_chord / length - chord / length**2 * by_length)
 
 
+def _ends(network: Network) -> FloatArray:
+    """Return where the beams of a network begin and end, complex (beams, 2) [m]."""
+    return np.array([[complex(*beam_end_at(network, name, side)) for side in (0, 1)] for name in network.beams])
+
+
 def _reach(network: Network, name: str) -> complex:
     """Return the vector between the ends of a beam [m]."""
-    beam = network.beams[name]
-    start, end = network.nodes[beam.start], network.nodes[beam.end]
-    return complex(end.x - start.x, end.y - start.y) + complex(*beam.end_offset) - complex(*beam.start_offset)
+    start, end = (complex(*beam_end_at(network, name, side)) for side in (0, 1))
+    return end - start
 
 
 def _differentiate_reach(variables: Variables, name: str) -> FloatArray:
     """Return the derivatives of that vector by the variables, complex (k,)."""
     beam = variables.task.network.beams[name]
     out = np.zeros(variables.count, dtype=complex)
-    for k, coordinate in enumerate(variables.task.coordinates):
-        sense = (coordinate.node == beam.end) - (coordinate.node == beam.start)
-        out[k] = sense * variables.task.size * (1j if coordinate.axis else 1.0)
+    for k, place in enumerate(variables.task.coordinates):
+        out[k] = ((place.node == beam.end) - (place.node == beam.start)) * variables.task.size * 1j**place.axis
     return out
 
 
@@ -308,19 +303,14 @@ def candidates(variables: Variables, rng: np.random.Generator) -> Iterator[Float
 
 def sound(variables: Variables, x: FloatArray) -> bool:
     """Return True if the chords of the beams do not cross and are long enough."""
-    network = variables.build(x)
-    chords = {name: _chord(network, name) for name in network.beams}
-    least = _least_chord(variables, network)
-    if any(abs(b - a) < least for a, b in chords.values()):
-        return False
-    return not any(_cross(*chords[first], *chords[second]) for first, second in combinations(chords, 2))
-
-
-def _least_chord(variables: Variables, network: Network) -> float:
-    slenderness = variables.task.limits.slenderness
+    network, slenderness = variables.build(x), variables.task.limits.slenderness
+    ends = _ends(network)
+    reach = np.abs(ends[:, 1] - ends[:, 0])
+    least = _LEAST_CHORD * reach.mean()
     if slenderness is not None:
-        return slenderness * max(thickest_of(beam.section) for beam in network.beams.values())
-    return _LEAST_CHORD * float(np.mean([abs(b - a) for a, b in (_chord(network, name) for name in network.beams)]))
+        least = slenderness * max(thickest_of(beam.section) for beam in network.beams.values())
+    first, second = np.triu_indices(len(ends), 1)
+    return bool((reach >= least).all() and not segments_cross(*ends[first].T, *ends[second].T).any())
 
 
 _MIN_LENGTH_SHARE = 1e-6  # of the mean distance of joined nodes: shorter beams are none, and their slopes have no value
@@ -328,8 +318,8 @@ _MIN_LENGTH_SHARE = 1e-6  # of the mean distance of joined nodes: shorter beams 
 
 def has_vanished_beam(network: Network) -> bool:
     """Return True if the nodes of a beam coincide but for rounding, as two that are pushed into one corner do."""
-    chords = [abs(end - start) for start, end in (_chord(network, name) for name in network.beams)]
-    return min(chords) <= _MIN_LENGTH_SHARE * float(np.mean(chords))
+    reach = np.abs(np.diff(_ends(network)))
+    return bool(reach.min() <= _MIN_LENGTH_SHARE * reach.mean())
 
 
 def has_pad_inside(network: Network) -> bool:
@@ -341,18 +331,11 @@ def has_pad_inside(network: Network) -> bool:
     )
 
 
-def _chord(network: Network, name: str) -> tuple[complex, complex]:
-    beam = network.beams[name]
-    start, end = network.nodes[beam.start], network.nodes[beam.end]
-    return complex(start.x, start.y) + complex(*beam.start_offset), complex(end.x, end.y) + complex(*beam.end_offset)
+def segments_cross(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Any:
+    """Return which segments a-b and c-d cross, complex places of any shapes; sharing an end is no crossing."""
 
+    def side(start: FloatArray, end: FloatArray, place: FloatArray) -> Any:
+        along, to = end - start, place - start
+        return along.real * to.imag - along.imag * to.real
 
-def _cross(a: complex, b: complex, c: complex, d: complex) -> bool:
-    """Return True if the segments a-b and c-d cross; sharing an end is no crossing."""
-    if {a, b} & {c, d}:
-        return False
-    return _side(a, b, c) * _side(a, b, d) < 0 and _side(c, d, a) * _side(c, d, b) < 0
-
-
-def _side(a: complex, b: complex, c: complex) -> float:
-    return float(((b - a).conjugate() * (c - a)).imag)
+    return (side(a, b, c) * side(a, b, d) < 0) & (side(c, d, a) * side(c, d, b) < 0)

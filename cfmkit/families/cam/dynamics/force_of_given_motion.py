@@ -134,10 +134,7 @@ def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
 def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
     """Return the spec with the defaults of the analysis made explicit."""
     resolved, masses = parts.right.spec, spec.mechanism.masses
-    method = "inverse" if stated_motion(spec).closed else "multibody"
-    dynamics = stated_motion(spec).model_copy(update={"method": method})
-    written_out = {"fidelity": "dynamic", "gravity": spec.gravity, "dynamics": dynamics}
-    analysis = spec.analysis.model_copy(update=written_out)
+    analysis = spec.analysis.model_copy(update={"fidelity": "dynamic", "gravity": spec.gravity})
     changes: dict[str, object] = {"analysis": analysis}
     if masses is not None:
         side = parts.machine.right.parts
@@ -212,17 +209,16 @@ def multibody_history(
     """
     model = NineCoordinates(machine)
     trajectory = model.run(motion, points, scheme, first)
-    right, left = reactions(model, trajectory)
-    center = np.array([right.center, left.center])
+    center, contact, traction, roller_pin, slider_pin, spin = reactions(model, trajectory)
     return History(
         times=trajectory.times,
         moment=motion.evaluate(trajectory.times),
         force=trajectory.force,
-        contact=np.array([right.contact, left.contact]),
-        traction=np.array([right.traction, left.traction]),
-        spin=np.array([right.spin, left.spin]),
-        brace=np.abs([right.roller_pin, left.roller_pin]),
-        pin=np.abs([right.slider_pin, left.slider_pin]),
+        contact=contact,
+        traction=traction,
+        spin=spin,
+        brace=np.abs(roller_pin),
+        pin=np.abs(slider_pin),
         elongation=machine.springs.elongation(np.abs(center[0] + center[1].conj())),
         center=center,
         on_corner=np.zeros(len(trajectory.times), dtype=bool),
@@ -242,13 +238,10 @@ class MotionEnding:
     finding: Finding
 
 
-def ending(
-    parts: Build,  # the mechanism and its motion
-    times: FloatArray,  # (n,): at which it is looked at [s]
-    origin: float,  # what is added to slider positions to give displacements [m]
-) -> MotionEnding | None:
+def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | None:
     """Return where a motion becomes impossible; None if it never does.
 
+    It is looked at at times (n,) [s]; `origin` added to a slider position gives the displacement [m].
     Raises CannotBuild if the first pose is impossible already.
     """
     machine, motion = parts.machine, parts.motion
@@ -282,7 +275,7 @@ def _margins(machine: Machine, moment: tuple[FloatArray, FloatArray, FloatArray]
     """Return what must not be negative, by the name of the finding that says so, (n,) each."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         response = respond(machine, moment)  # type: ignore[arg-type]
-    radius, center = machine.constants.radius, response.at.center
+    radius, center = machine.parts.roller_radius, response.at.center
     touching = (center + 1j * radius * response.at.tangent).real
     return {
         "flanks_collide": touching.min(axis=0),

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Constants, Machine, Stance
+    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Machine, SideParts, Stance
 
     ComplexArray = NDArray[np.complex128]
 
@@ -96,7 +96,7 @@ class MotionResponse:
     @cached_property
     def spin(self) -> FloatArray:
         """Speed at which each roller turns, positive on the way up, (2, n) [rad/s]."""
-        spin: FloatArray = self.at.way * self.moment.speed / self.machine.constants.radius
+        spin: FloatArray = self.at.way * self.moment.speed / self.machine.parts.roller_radius
         return spin
 
     @cached_property
@@ -121,8 +121,8 @@ class MotionResponse:
     @cached_property
     def mass(self) -> FloatArray:
         """Mass that moved with the slider would have the same kinetic energy, (n,) [kg]."""
-        parts, at = self.machine.constants, self.at
-        roller = (parts.roller_mass + parts.roller_inertia / parts.radius**2) * at.way**2
+        parts, at = self.machine.parts, self.at
+        roller = (parts.roller_mass + parts.roller_inertia / parts.roller_radius**2) * at.way**2
         brace = parts.brace_mass * np.abs(at.first + 1j) ** 2 / 4.0 + parts.brace_inertia * at.swing**2
         total: FloatArray = self.machine.slider_mass + (roller + brace).sum(axis=0)
         return total
@@ -130,7 +130,7 @@ class MotionResponse:
     @cached_property
     def energy(self) -> FloatArray:
         """Kinetic and potential energy, (n,) [J]."""
-        parts, machine, position = self.machine.constants, self.machine, self.moment.position
+        parts, machine, position = self.machine.parts, self.machine, self.moment.position
         center = self.at.center.imag
         lifted = parts.roller_mass * center + parts.brace_mass * (center + position) / 2.0
         height = machine.slider_mass * position + lifted.sum(axis=0)
@@ -142,15 +142,13 @@ class MotionResponse:
         return total
 
 
-def respond(
-    machine: Machine,  # the mechanism
-    # position, speed and acceleration of the slider; positions within ``machine.span``, and speeds of one sign: rolling
-    # resistance acts against the motion, also where it begins and ends
-    moment: Moment,
-) -> MotionResponse:
-    """Return the forces of a motion."""
-    parts, stances = machine.constants, machine.stances(moment.position)
-    at = kinematics(stances, moment.position, parts.length)
+def respond(machine: Machine, moment: Moment) -> MotionResponse:
+    """Return the forces of a motion of the slider, at positions within ``machine.span``.
+
+    Speeds are of one sign: rolling resistance acts against the motion, also where it begins and ends.
+    """
+    parts, stances = machine.parts, machine.stances(moment.position)
+    at = kinematics(stances, moment.position, parts.brace_length)
     loads = _loads(machine, parts, at, moment)
     free = loads.springs - parts.roller_mass * loads.roller - loads.rolling * at.tangent
     middle = parts.brace_mass * loads.middle
@@ -197,7 +195,7 @@ def kinematics(stances: tuple[Stance, Stance], position: FloatArray, length: Flo
     return Kinematics(center, tangent, brace, lever, ratio, bend, first, second, swing, sway)
 
 
-def _loads(machine: Machine, parts: Constants, at: Kinematics, moment: Moment) -> MovingLoads:
+def _loads(machine: Machine, parts: SideParts, at: Kinematics, moment: Moment) -> MovingLoads:
     push, square = moment.acceleration, moment.speed * moment.speed
     lift: Any = 1j * machine.gravity
     if machine.sideways:  # to the right is outwards on the right, inwards on the left
@@ -210,7 +208,7 @@ def _loads(machine: Machine, parts: Constants, at: Kinematics, moment: Moment) -
         roller=roller,
         middle=middle,
         turning=at.swing * push + at.sway * square,
-        rolling=parts.roller_inertia / parts.radius**2 * along,
+        rolling=parts.roller_inertia / parts.roller_radius**2 * along,
         springs=np.array([pull, pull.conj()]),  # the left roller sees the opposite force in a mirror
     )
 

@@ -26,13 +26,12 @@ Everything works for one vector of coordinates and for many, (..., 9).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cfmkit.families.cam.dynamics.axis_springs import AxisGap
-from cfmkit.families.cam.dynamics.flank_by_height import FlankLine
 from cfmkit.families.cam.dynamics.roller_curves_and_motion import Flank
 
 if TYPE_CHECKING:
@@ -41,14 +40,74 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.flank_by_height import FlankPoint
-    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, Side, SideParts
+    from cfmkit.families.cam.dynamics.roller_curves_and_motion import CurvePoints, Cycloid, Machine, Side
+    from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw
 
     ComplexArray = NDArray[np.complex128]
 
 
+N_KNOTS = 65
+NEWTON_STEPS = 30  # turned flanks of the tests take five from the estimates by 65 knots
 N_COORDINATES = 9
 HOLONOMIC_ROWS, ROLLING_ROWS, DRIVE_ROW = slice(0, 6), slice(6, 8), 8
+
+
+def _slope_second_derivative(law: SlopeLaw, x: Real) -> Real:
+    """Return d3y/dx3 of the roller path [1/m^2]."""
+    rise, bow = law.rise_and_bow(x)
+    turn = 1.0 - law.friction * law.frictionless(x)
+    second: Real = (1.0 + law.friction**2) * (bow + 2.0 * law.friction * rise * rise / turn) / (turn * turn)
+    return second
+
+
+class FlankPoint(NamedTuple):
+    """A point of the flank, or arrays of points: path coordinate and x [m], dx/dy and its derivatives by y."""
+
+    parameter: Any
+    x: Any
+    first: Any
+    second: Any
+    third: Any
+
+
+@dataclass(frozen=True)
+class FlankLine:
+    """The flank of a side as the paper needs it: its x as a function of its height y, with three derivatives.
+
+    With tau the angle of the tangent from the x-axis, k the flank's curvature and k_s its derivative along the flank
+    dx/dy = cot tau, d2x/dy2 = -k / sin^3 tau, d3x/dy3 = -k_s / sin^4 tau + 3 k^2 cos tau / sin^5 tau. Only the point
+    that belongs to y needs Newton's method. The corner of an undercut cam cannot be described so.
+    """
+
+    side: Side
+    flank: Flank  # at the flank's distance from the roller path, before it is turned with its side
+
+    def evaluate(self, u: Any) -> CurvePoints:
+        """Return the points of the flank for path coordinates u [m]."""
+        return self.side.rotate(self.flank.evaluate(u))
+
+    def estimate(self, y: float) -> float:
+        """Return a rough path coordinate of the point at height y [m]."""
+        u = np.linspace(*self.flank.ends, N_KNOTS)
+        return float(np.interp(y, self.evaluate(u).point.imag, u))
+
+    def locate(self, y: Real, guess: Real) -> FlankPoint:
+        """Return the points of the flank at heights y [m], starting the search at path coordinates `guess` [m]."""
+        law: SlopeLaw = self.flank.profile.path.law
+        u: Any = guess
+        for _ in range(NEWTON_STEPS):
+            at = self.evaluate(u)
+            step = (at.point.imag - y) / (at.pace * at.tangent.imag)
+            u = u - step
+            if np.max(np.abs(step)) <= 1e-16 + 4e-16 * law.brace_length:
+                break
+        at, (slope, bend) = self.evaluate(u), law.slopes(u)
+        square = 1.0 + slope * slope
+        change = (_slope_second_derivative(law, u) - 3.0 * slope * bend * bend / square) / (square * square)
+        change = change / (1.0 + self.flank.shift * bend / (square * square**0.5)) ** 3
+        cosine, sine, curvature = at.tangent.real, at.tangent.imag, at.curvature
+        third = (3.0 * curvature * curvature * cosine / sine - change) / sine**4
+        return FlankPoint(u, at.point.real, cosine / sine, -curvature / sine**3, third)
 
 
 class Posture(NamedTuple):
@@ -338,8 +397,7 @@ def _chain(side: Side, hand: float) -> SideChain:
     flank = side.pieces[-1]
     if not isinstance(flank, Flank):
         raise TypeError("the last piece of a roller's curve must run along the flank")
-    distance = flank.shift - side.parts.roller_radius
-    line = FlankLine(flank.profile.path, distance, side.angle, side.height, flank.ends)
+    line = FlankLine(side, replace(flank, shift=flank.shift - side.parts.roller_radius))
     return SideChain(hand, side.parts.brace_length, side.parts.roller_radius, line)
 
 
@@ -353,60 +411,30 @@ def _solve(matrices: FloatArray, right: FloatArray) -> FloatArray:
     return np.asarray(solution, dtype=np.float64)
 
 
-class Reactions(NamedTuple):
-    """Of one side, each (n,), x outwards.
+def reactions(model: NineCoordinates, trajectory: Trajectory) -> tuple[NDArray[Any], ...]:
+    """Return the forces of both sides (right, left), each (2, n), x outwards.
 
     `center` of the roller [m], normal `contact` force and `traction` along the way up [N], force on the
     brace at the roller and at the slider [N], `spin` of the roller, positive on the way up [rad/s].
     """
-
-    center: ComplexArray
-    contact: FloatArray
-    traction: FloatArray
-    roller_pin: ComplexArray
-    slider_pin: ComplexArray
-    spin: FloatArray
-
-
-def reactions(model: NineCoordinates, trajectory: Trajectory) -> tuple[Reactions, Reactions]:
-    """Return the reactions on the right and on the left."""
     pull = model.spring_force(trajectory.coordinates, trajectory.velocities)
-    return _side(model, trajectory, 0, pull), _side(model, trajectory, 1, pull.conj())
+    sides = (_react(model, trajectory, index, springs) for index, springs in enumerate((pull, pull.conj())))
+    return tuple(np.array(pair) for pair in zip(*sides, strict=True))
 
 
-def _side(model: NineCoordinates, trajectory: Trajectory, index: int, springs: ComplexArray) -> Reactions:
+def _react(model: NineCoordinates, trajectory: Trajectory, index: int, springs: ComplexArray) -> tuple[Any, ...]:
     chain, posture, parts = model.chains[index], trajectory.postures[index], model.sides[index].parts
-    push = _contact_force(chain, posture, trajectory.multipliers)
-    tangent = (posture.flank.first + 1j) / np.sqrt(1.0 + posture.flank.first**2)
-    arm, bent = _brace(chain, parts, trajectory)
-    lift = 1j * (trajectory.accelerations[:, 0] + model.machine.gravity)
-    roller_pin = push + springs - parts.roller_mass * (bent + lift)
-    return Reactions(
-        center=1j * trajectory.coordinates[:, 0] + arm,
-        contact=(push * (-1j * tangent).conj()).real,
-        traction=(push * tangent.conj()).real,
-        roller_pin=roller_pin,
-        slider_pin=parts.brace_mass * (0.5 * bent + lift) - roller_pin,
-        spin=chain.hand * trajectory.velocities[:, chain.columns.start + 1],
-    )
-
-
-def _contact_force(chain: SideChain, posture: Posture, multipliers: FloatArray) -> ComplexArray:
-    """Return the force of the cam on the roller [N]."""
     i, j, _, roll = chain.rows
-    force = -(multipliers[:, i] + 1j * multipliers[:, j])
-    force = force - multipliers[:, roll] * (chain.hand * posture.flank.first + 1j)
-    return _as_on_the_right(chain, force)
-
-
-def _brace(chain: SideChain, parts: SideParts, trajectory: Trajectory) -> tuple[ComplexArray, ComplexArray]:
-    """Return the brace from slider to roller [m] and its second time derivative [m/s^2]."""
-    column = chain.columns.start
+    multipliers, column, steep = trajectory.multipliers, chain.columns.start, chain.hand * posture.flank.first
+    push = -(multipliers[:, i] + 1j * multipliers[:, j]) - multipliers[:, roll] * (steep + 1j)  # of the cam
     angle, rate = trajectory.coordinates[:, column], trajectory.velocities[:, column]
     arm = parts.brace_length * np.exp(1j * angle)
     bent = arm * (1j * trajectory.accelerations[:, column] - rate * rate)
-    return _as_on_the_right(chain, arm), _as_on_the_right(chain, bent)
-
-
-def _as_on_the_right(chain: SideChain, vector: ComplexArray) -> ComplexArray:
-    return vector if chain.hand > 0 else -vector.conj()
+    if chain.hand < 0:  # as seen in a mirror
+        push, arm, bent = (-vector.conj() for vector in (push, arm, bent))
+    tangent = (posture.flank.first + 1j) / np.sqrt(1.0 + posture.flank.first**2)
+    lift = 1j * (trajectory.accelerations[:, 0] + model.machine.gravity)
+    roller_pin = push + springs - parts.roller_mass * (bent + lift)
+    slider_pin = parts.brace_mass * (0.5 * bent + lift) - roller_pin
+    center, spin = 1j * trajectory.coordinates[:, 0] + arm, chain.hand * trajectory.velocities[:, column + 1]
+    return center, (push * (-1j * tangent).conj()).real, (push * tangent.conj()).real, roller_pin, slider_pin, spin

@@ -20,9 +20,9 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -40,15 +40,16 @@ if TYPE_CHECKING:
     ComplexArray = NDArray[np.complex128]
 
 
-class Constants(NamedTuple):
-    """Parts of both sides, each (2, 1), so that they multiply a row each."""
+@dataclass(frozen=True)
+class SideParts:
+    """Dimensions and masses of a side, or of both as columns (2, 1), SI units; braces balance at mid-length."""
 
-    length: FloatArray
-    brace_mass: FloatArray
-    brace_inertia: FloatArray
-    radius: FloatArray
-    roller_mass: FloatArray
-    roller_inertia: FloatArray
+    brace_length: Any
+    brace_mass: Any
+    brace_inertia: Any
+    roller_radius: Any
+    roller_mass: Any
+    roller_inertia: Any
 
 
 @dataclass(frozen=True)
@@ -65,11 +66,10 @@ class Machine:
     sideways: float = 0.0  # acceleration across the slider's travel, to the right, with which weight acts [m/s^2]
 
     @cached_property
-    def constants(self) -> Constants:
-        """The parts of both sides as columns."""
-        sides = self.right.parts, self.left.parts
-        names = ("brace_length", "brace_mass", "brace_inertia", "roller_radius", "roller_mass", "roller_inertia")
-        return Constants(*np.array([[[getattr(parts, name)] for parts in sides] for name in names]))
+    def parts(self) -> SideParts:
+        """The parts of both sides as columns (2, 1), so that they multiply a row each."""
+        columns = np.array([astuple(self.right.parts), astuple(self.left.parts)]).T[..., None]
+        return SideParts(*columns)
 
     @property
     def span(self) -> tuple[float, float]:
@@ -139,24 +139,6 @@ class CurvePoints(NamedTuple):
     pace: FloatArray
 
 
-class CurvePiece(Protocol):
-    """A smooth piece of a curve between two values of its parameter."""
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """First and last value of the parameter."""
-        ...
-
-    @property
-    def on_corner(self) -> bool:
-        """Whether the roller pivots on the cam's corner."""
-        ...
-
-    def evaluate(self, parameter: FloatArray) -> CurvePoints:
-        """Return the points for values of the parameter."""
-        ...
-
-
 @dataclass(frozen=True)
 class Flank:
     """The line at a distance `shift` [m] outwards from the roller path; its parameter is the path coordinate."""
@@ -195,6 +177,10 @@ class CornerArc:
         return CurvePoints(self.corner + self.radius * toward, 1j * toward, 1.0 / size, size)
 
 
+CurvePiece = Flank | CornerArc
+"""A smooth piece of a curve between two values of its parameter."""
+
+
 def pieces_of(track: Track) -> tuple[CurvePiece, ...]:
     """Return the curve of the roller's centre on a cam, from the start of the track to the cam's end."""
     profile = track.profile
@@ -211,18 +197,6 @@ N_KNOTS = 129
 GUIDE_KNOTS = 2049
 NEWTON_STEPS = 5
 """Estimates by 2049 knots need two at most in the tests; a bracketed search takes over where five are not enough."""
-
-
-@dataclass(frozen=True)
-class SideParts:
-    """Dimensions and masses of one side: SI units; the brace's centre of mass is at mid-length."""
-
-    brace_length: float
-    brace_mass: float
-    brace_inertia: float
-    roller_radius: float
-    roller_mass: float
-    roller_inertia: float
 
 
 class Stance(NamedTuple):
@@ -278,7 +252,7 @@ class Side:
     def _drop(self, places: CurvePoints) -> FloatArray:
         """Return how far the rollers' axes are below the slider [m]."""
         x, length = places.point.real, self.parts.brace_length
-        return np.sqrt((length - x) * (length + x))
+        return np.asarray(np.sqrt((length - x) * (length + x)))
 
     def rate(self, places: CurvePoints) -> FloatArray:
         """Return the derivative of the slider's position by the parameter."""

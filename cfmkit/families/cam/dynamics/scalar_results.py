@@ -75,9 +75,10 @@ def contact_pressure(moved: MotionSolution) -> FloatArray:
     machine = moved.build.machine
     low, high = machine.span
     stances = machine.stances(np.clip(history.moment.position, low, high))
-    radius, bend = machine.constants.radius, np.array([stance.curvature for stance in stances])
+    radius, bend = machine.parts.roller_radius, np.array([stance.curvature for stance in stances])
     with np.errstate(divide="ignore", invalid="ignore"):
-        pressed = pressure(history.contact, 1.0 / (radius * (1.0 - bend * radius)), contact).max(axis=0)
+        curvature = 1.0 / (radius * (1.0 - bend * radius))
+        pressed = pressure(history.contact, curvature, contact.material, contact.width).max(axis=0)
     return np.where(history.on_corner, np.nan, pressed)
 
 

@@ -5,7 +5,7 @@ from cfmkit.lazy_names import lazy_names
 __getattr__, __all__ = lazy_names(
     __name__,
     {
-        "designed_and_built_flanks": "DesignFlank",
+        "flank_from_roller_path": "DesignFlank",
         "slope_law": "SlopeLaw",
     },
 )

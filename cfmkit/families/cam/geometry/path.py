@@ -14,6 +14,7 @@ the springs are stretched by at the start.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -25,6 +26,8 @@ from cfmkit.numerics.quadrature import RunningIntegral
 from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 
@@ -34,35 +37,24 @@ CAMS_KEPT = 8  # cams that are remembered: whoever builds other parts around one
 
 
 class RollerPath:
-    """The roller-centre path y(x) from (x0, 0), by the closed form, a quadrature or the paper's ODE.
+    """The roller-centre path y(x) from (x0, 0) up to an x of `end` [m], by the closed form, a quadrature or the ODE.
 
-    Parameters
-    ----------
-    law : SlopeLaw
-        The slope.
-    end : float
-        The largest x that will be needed [m].
-    method : {"quadrature", "ode"}
-        "quadrature" (default) integrates the slope over x by Gauss-Legendre panels;
-        "ode" integrates [SS, eq. 2] over y with scipy's DOP853.
+    "quadrature" integrates the slope over x by Gauss-Legendre panels where there is no closed form; "ode" integrates
+    [SS, eq. 2] over y with scipy's DOP853.
     """
 
     def __init__(self, law: SlopeLaw, end: float, method: Method = "quadrature") -> None:
         """Integrate the slope once."""
         self.law, self.end, self.method = law, end, method
-        self._height: _ClosedHeight | _QuadratureHeight | _OdeHeight | _CurveHeight
+        self.height: Callable[[Any], Any]  # y(x) [m] for x between x0 and `end` [m]
         if method == "ode":
-            self._height = _OdeHeight(law, end)
+            self.height = _OdeHeight(law, end)
         elif isinstance(law, CurveSlopeLaw):
-            self._height = _CurveHeight(law)
+            self.height = partial(_height_for_curve, law)
         elif law.friction:
-            self._height = _QuadratureHeight(law, end)
+            self.height = _QuadratureHeight(law, end)
         else:
-            self._height = _ClosedHeight(law)
-
-    def height(self, x: Real) -> Real:
-        """Return y(x) [m] for an array x between x0 and `end` [m]."""
-        return self._height(x)
+            self.height = partial(_closed_height, law)
 
     def travel(self, x: Real) -> Real:
         """Return the slider's travel with the profile's own brace, y + sqrt(l^2 - x^2) less its start [m]."""
@@ -70,29 +62,16 @@ class RollerPath:
         return self.height(x) + drop(x, law.rest_half_width, law.brace_length)
 
 
-class _ClosedHeight:
-    """Height without friction: y = c ((D^2 - d0^2)/2A + sqrt(l^2 - x0^2) - sqrt(l^2 - x^2))."""
-
-    def __init__(self, law: SlopeLaw) -> None:
-        self.law = law
-
-    def __call__(self, x: Real) -> Real:
-        law = self.law
-        out = x - law.rest_half_width
-        stretch = out * (out + 2.0 * law.preload) / (2.0 * law.force_constant)
-        return law.slope_factor * (stretch - drop(x, law.rest_half_width, law.brace_length))
+def _closed_height(law: SlopeLaw, x: Real) -> Real:
+    """Return the height without friction: y = c ((D^2 - d0^2)/2A + sqrt(l^2 - x0^2) - sqrt(l^2 - x^2))."""
+    out = x - law.rest_half_width
+    stretch = out * (out + 2.0 * law.preload) / (2.0 * law.force_constant)
+    return law.slope_factor * (stretch - drop(x, law.rest_half_width, law.brace_length))
 
 
-class _CurveHeight:
-    """Height of a path whose force follows a curve: the travel less what the braces lower the slider by."""
-
-    def __init__(self, law: CurveSlopeLaw) -> None:
-        self.law = law
-
-    def __call__(self, x: Real) -> Real:
-        law = self.law
-        height: Any = law.travel(x) - drop(x, law.rest_half_width, law.brace_length)
-        return height
+def _height_for_curve(law: CurveSlopeLaw, x: Real) -> Any:
+    """Return the height of a path whose force follows a curve: the travel less what the braces lower the slider by."""
+    return law.travel(x) - drop(x, law.rest_half_width, law.brace_length)
 
 
 class _QuadratureHeight:
@@ -159,18 +138,13 @@ class _OdeHeight:
         return y
 
 
-def ideal_position(law: SlopeLaw, travel: Real) -> Real:
-    """Return x after a slider travel [m]: exact without friction and weight, else near it."""
-    return law.position(travel)
-
-
 def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[RollerPath, float]:
     """Return the path up to a slider travel with the profile's own brace [m], and the x at its end.
 
     The path reaches at least that end. If the geometry cannot give the travel (the brace turns horizontal, the path
     vertical, or the slider stops rising first), the end is short of it: compare ``path.travel(end)``.
     """
-    x0, ideal = law.rest_half_width, ideal_position(law, travel)
+    x0, ideal = law.rest_half_width, law.position(travel)
     if law.is_ideal:
         end = np.minimum(ideal, _farthest(law))
         return RollerPath(law, end, method), end

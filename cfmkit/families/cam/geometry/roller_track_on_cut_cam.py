@@ -19,7 +19,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
-from cfmkit.families.cam.geometry.path import RollerPath, ideal_position
+from cfmkit.families.cam.geometry.path import RollerPath
 from cfmkit.families.cam.geometry.slope_law import Real, brace_tangent
 from cfmkit.families.rows import agree, fails, is_column, root_between, rows_of
 from cfmkit.numerics.roots import bracketed_root, invert_increasing
@@ -65,6 +65,12 @@ class TrackStates(ShortRepr):
     def bend(self) -> FloatArray:
         """d2y/dx2 of the centre's track, (n,) [1/m]; it is wanted at dead points alone."""
         return self.compute_bend()
+
+    @cached_property
+    def pressure_angle(self) -> FloatArray:
+        """Angle between a brace's pull and its roller's motion [rad]; at 90 deg the slider moves nothing."""
+        angle: FloatArray = np.arctan2(1.0 + self.slope * self.tangent, self.slope - self.tangent)
+        return angle
 
     def __reduce__(self) -> tuple[Any, ...]:
         # what computes the last array may not be pickled
@@ -125,24 +131,11 @@ def pivot_angle(slider: FloatArray, pivot: Pivot) -> FloatArray:
 
 
 class Track:
-    """The track of a roller's centre on a given cam.
+    """The track of a roller's centre on a given cam, with the roller and the brace built in [m].
 
-    Parameters
-    ----------
-    profile : CamProfile
-        The cam as cut.
-    roller_radius : float
-        Of the roller that runs on it [m].
-    brace_length : float
-        Of the brace built in [m].
-    offset : float
-        Material left on the flank beyond the profile, >= 0 [m]; it rounds a corner. Missing
-        material is not an offset: it is the cam cut for a larger roller (`flank_from_roller_path.cut`).
-
-    Raises
-    ------
-    NoTrack
-        If the roller cannot run on the cam.
+    Material left on the flank beyond the profile, an `offset` >= 0 [m], rounds a corner. Missing material is not an
+    offset: it is the cam cut for a larger roller (`flank_from_roller_path.cut_cam`). Raises NoTrack if the roller
+    cannot run on the cam.
     """
 
     def __init__(self, profile: CamProfile, roller_radius: float, brace_length: float, offset: float = 0.0) -> None:
@@ -272,7 +265,7 @@ class Track:
 
     def _flank_bend(self, u: FloatArray) -> FloatArray:
         law = self.profile.path.law
-        bend: FloatArray = law.slope_derivative(u)
+        bend: FloatArray = law.slopes(u)[1]
         return bend / (1.0 + self.shift / law.curvature_radius(u)) if self._is_shifted else bend
 
     def _corner_states(self, slider: FloatArray, rows: Any = None) -> TrackStates:
@@ -347,10 +340,10 @@ class Track:
         low, high = self.flank_range
         if self._is_ideal:
             travel = np.maximum(slider - self._slider(law.rest_half_width, 0.0), 0.0)
-            return np.minimum(np.maximum(ideal_position(law, travel), low), high)
+            return np.minimum(np.maximum(law.position(travel), low), high)
         zero, places, excess = self._guide
         root = np.sqrt(np.maximum(slider - zero, 0.0))
-        guess = ideal_position(law, root * root) + self._interpolate(root, places, excess)
+        guess = law.position(root * root) + self._interpolate(root, places, excess)
         return invert_increasing(self._evaluate_flank, slider, self.flank_range, guess)
 
     @staticmethod
@@ -368,7 +361,7 @@ class Track:
         slider = self._evaluate_flank(knots)[0]
         zero = np.minimum(self.start, slider[..., :1])
         root = np.sqrt(np.maximum(slider - zero, 0.0))
-        return zero, root, knots - ideal_position(self.profile.path.law, root * root)
+        return zero, root, knots - self.profile.path.law.position(root * root)
 
 
 def track_of(profile: CamProfile, roller_radius: Any, brace_length: Any, offset: Any = 0.0) -> Track:

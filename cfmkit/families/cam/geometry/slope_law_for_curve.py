@@ -191,16 +191,11 @@ class CurveSlopeLaw(SlopeLaw):
         slope: Any = self._slope_and_rise(x)[0]
         return slope
 
-    def slopes(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def slopes(self, x: Real) -> tuple[Any, Any]:
         """Return dy/dx and d2y/dx2 [1/m] of the path."""
-        p, rise = self._slope_and_rise(x)
+        p, rise = self._slope_and_rise(np.asarray(x))
         turn = 1.0 - self.friction * p
         return (p + self.friction) / turn, rise * (1.0 + self.friction**2) / (turn * turn)
-
-    def slope_derivative(self, x: Real) -> Real:
-        """Return d2y/dx2 of the path [1/m]."""
-        derivative: Any = self.slopes(np.asarray(x))[1]
-        return derivative
 
     def curvature_radius(self, x: Real) -> Real:
         """Return the radius of curvature of the path [m], negative where it is hollow: no roller undercuts there."""

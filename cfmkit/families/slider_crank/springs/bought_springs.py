@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from cfmkit.families.slider_crank.springs.largest_turns_and_forces import Motion
 from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
+from cfmkit.stock.springs.kinds import AXIAL_KINDS, TURNED_KINDS
 from cfmkit.stock.springs.offers import PIN_SHARE, Miss, Offer, guide_rod_for, nearest
 from cfmkit.stock.springs.spec import offers, support_of, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse, orient_to_larger
@@ -68,11 +69,11 @@ class SpringOption:
 
     @property
     def written(self) -> Bought:
-        """The same as a specification has it, with a rod where a compression spring would buckle."""
+        """The same as a specification has it, with a rod where it would buckle."""
         offer = self.offer
         about = {"wound": wire_of(offer), "life": offer.life}
-        if offer.kind == "compression":
-            about |= {"loaded": offer.kind, "free_length": offer.free_length} | support_of(offer)
+        if offer.spring_type.needs_guide:
+            about |= {"loaded": offer.spring_type.kind, "free_length": offer.free_length} | support_of(offer)
             if offer.guide_tube is None and offer.wound is not None:
                 needed = self.deflection > offer.unguided
                 guides = offer.guide_rod is not None and offer.guide_rod >= offer.wound.thinnest_guide_rod
@@ -185,12 +186,13 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
     for joint, name in enumerate(JOINT_NAMES):
         if name not in wanted.springs:
             continue
-        kinds = ("torsion",) if joint < 3 else ("extension", "compression")
+        spring_types = (AXIAL_KINDS if name == "slider" else TURNED_KINDS).values()
         cap = getattr(wanted.max_rates, name, None) if wanted.max_rates else None
-        for offer in offers(wanted.catalogue or (), *kinds):
+        for offer in offers(wanted.catalogue or (), *spring_types):
             label = f"{offer.name} at the {name.replace('_', ' ')}"
             ends = orient_to_larger(float(high[joint]), float(low[joint]))
-            reason = _why_not(offer, ends, wanted) or _binds(offer, max(map(abs, ends)), task.spec.mechanism.pins)
+            pins = task.spec.mechanism.pins if name != "slider" else None
+            reason = _why_not(offer, ends, wanted) or _binds(offer, max(map(abs, ends)), pins)
             if reason is not None:
                 refused.append(Miss(label, *reason))
                 continue
@@ -209,24 +211,24 @@ def _why_not(offer: Offer, ends: tuple[float, float], wanted: CrankDesign) -> tu
     `ends`: how far its joint is moved from the unloaded position at least and at most, over the travel [rad or m].
     """
     moved = ends[1]
-    kind: Literal["angle", "length"] = "angle" if offer.kind == "torsion" else "length"
+    dimension = offer.spring_type.dimension
     if offer.initial_tension:
         return 1.0, "its initial tension would load it in the unloaded position"
     room = wanted.spring_room
-    if kind == "length" and room is not None and offer.free_length is not None and offer.free_length > room:
-        reported = f"too long, {format_short(offer.free_length, kind)} relaxed"
-        return offer.free_length / room - 1.0, f"{reported} ('design.spring_room' {format_short(room, kind)})"
+    if dimension == "length" and room is not None and offer.free_length is not None and offer.free_length > room:
+        reported = f"too long, {format_short(offer.free_length, dimension)} relaxed"
+        return offer.free_length / room - 1.0, f"{reported} ('design.spring_room' {format_short(room, dimension)})"
     if offer.largest is not None and offer.largest < moved * (1 - 1e-9):
-        allowed, needed = format_short(offer.largest, kind), format_short(moved, kind)
+        allowed, needed = (format_short(size, dimension) for size in (offer.largest, moved))
         return moved / offer.largest - 1.0, f"deflected by {needed}, it allows {allowed}"
     return SpringInUse.from_offer(offer, *ends).why_too_weak(wanted.spring_life, wanted.spring_safety)
 
 
 def _binds(offer: Offer, turned: float, pins: Pins | None) -> tuple[float, str] | None:
-    """Return by what share a torsion spring that is turned so far [rad] is too narrow for its pin; None if it fits."""
-    if offer.kind != "torsion" or offer.wound is None or pins is None:
+    """Return by what share a spring that is turned so far [rad] is too narrow for its pin; None if it fits."""
+    if offer.wound is None or pins is None:
         return None
-    inside, needed = offer.wound.inner_diameter_wound_up(turned), pins.diameter / PIN_SHARE
+    inside, needed = offer.wound.inner_diameter_at(turned), pins.diameter / PIN_SHARE
     if inside >= needed:
         return None
     reported, pin = format_short(max(inside, 0.0), "length"), format_short(pins.diameter, "length")

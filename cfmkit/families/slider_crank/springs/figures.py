@@ -37,7 +37,6 @@ from cfmkit.plots.style import (
     new_figure,
 )
 from cfmkit.specs.units import format_short, to_border
-from cfmkit.stock.springs.offers import loaded_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -136,7 +135,7 @@ def scene(result: Result) -> PanelView:
     if springs.pulled_outwards(*(float(end[3, 0]) for end in solution.extremes.turns)):
         # it lies beside the coupler, as long as its wire is wound
         rest = float(solution.assembly.units(np.array([solution.assembly.start])).position[0])
-        wall = rest - link.branch * max(loaded_length(coil) for coil in springs.coils_at("slider"))
+        wall = rest - link.branch * max(coil.free_length_for(0.0) for coil in springs.coils_at("slider"))
     ends = [
         float(x.min()),
         float(x.max()),

@@ -24,7 +24,7 @@ from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.support_spec import guide_cure, guide_needed
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -225,43 +225,50 @@ def _stretched_outside(solution: Solution) -> Sentence:
 # --- limits of springs ----------------------------------------------------------------------------------------------
 
 
-def _fault_of_bought_spring(
-    spec: SliderCrankSpec,  # with bought springs
-    number: int,  # which of them
-    moved: float,  # size of the largest turn of its joint, of the slider its travel [rad or m]
-) -> tuple[Any, ...] | None:
-    """Return what is wrong with a bought spring over a motion, and settings that cure it; None if nothing is."""
-    spring, pins = spec.mechanism.springs.bought[number], spec.mechanism.pins
-    coil, key = spring.coil, f"mechanism.springs.bought.{number}"
-    if spring.kind == "compression":
-        if spring.is_guided or not moved > spring.unguided * (1 + 1e-9):
-            return None
-        return (
-            f"{spring.name} buckles when it is deflected by {mm(spring.unguided)} (ends {spring.seats}), and "
-            f"is deflected by {mm(moved)}; {guide_needed(spring, coil, key)}",
-            *guide_cure(coil, key),
-        )
-    if spring.kind != "torsion" or coil is None or pins is None or not np.isfinite(moved):
+def _buckling(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | None:
+    """Return how a bought spring buckles that is deflected so far, and what guides it; None if it does not."""
+    spring, key = spec.mechanism.springs.bought[number], f"mechanism.springs.bought.{number}"
+    if spring.is_guided or not moved > spring.unguided * (1 + 1e-9):
         return None
-    inside = coil.inner_diameter_wound_up(moved)
+    return (
+        f"{spring.name} buckles when it is deflected by {mm(spring.unguided)} (ends {spring.seats}), and "
+        f"is deflected by {mm(moved)}; {guide_needed(spring, spring.coil, key)}",
+        *guide_cure(spring.coil, key),
+    )
+
+
+def _binding(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | None:
+    """Return how a bought spring that is wound up so far [rad] binds on its pin; None if it does not."""
+    spring, pins = spec.mechanism.springs.bought[number], spec.mechanism.pins
+    if spring.coil is None or pins is None or not np.isfinite(moved):
+        return None
+    inside = spring.coil.inner_diameter_at(moved)
     if inside >= pins.diameter:
         return None
     return (
-        f"{spring.name} at the {spring.at.replace('_', ' ')} is {mm(coil.inner_diameter)} wide inside, "
+        f"{spring.name} at the {spring.at.replace('_', ' ')} is {mm(spring.coil.inner_diameter)} wide inside, "
         f"wound up by {deg(moved)} {mm(max(inside, 0.0))}: it binds on its pin of {mm(pins.diameter)}; use "
         "a wider spring, or a thinner pin ('mechanism.pins.diameter')",
     )
 
 
-def _fails(number: int, spring: Bought) -> Rule:
-    """Return the rule on what a bought spring cannot do."""
+def _rules_on(number: int, spring: Bought) -> Iterator[Rule]:
+    """Yield the rules on what the bought spring of a number cannot do."""
+    if spring.spring_type.needs_guide:
+        yield _fails("spring_buckles", _buckling, number, spring)
+    if spring.at != "slider":
+        yield _fails("spring_binds_on_pin", _binding, number, spring)
+
+
+def _fails(name: str, describe_fault: Callable[..., Sentence | None], number: int, spring: Bought) -> Rule:
+    """Return the rule on one fault of a bought spring."""
 
     def fault(solution: Solution, row: int) -> Sentence | None:
         turns = np.broadcast_to(solution.extremes.largest_turns, (4, len(solution)))
-        return _fault_of_bought_spring(solution.specs[row], number, float(turns[JOINT_NAMES.index(spring.at), row]))
+        return describe_fault(solution.specs[row], number, float(turns[JOINT_NAMES.index(spring.at), row]))
 
     return FindingRule(
-        "spring_buckles" if spring.kind == "compression" else "spring_binds_on_pin",
+        name,
         lambda solution: np.array([fault(solution, row) is not None for row in range(len(solution))]),
         lambda solution: fault(solution, 0) or (),
     )
@@ -383,6 +390,6 @@ def rules_of(solution: Solution) -> tuple[Rule, ...]:
     springs = solution.spec.mechanism.springs.bought
     return (
         *FINDING_RULES,
-        *(_fails(*number_and_spring) for number_and_spring in enumerate(springs)),
+        *(rule for number, spring in enumerate(springs) for rule in _rules_on(number, spring)),
         *(_overturns(joint) for joint in range(4)),
     )

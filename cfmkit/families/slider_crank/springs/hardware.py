@@ -355,7 +355,7 @@ def _tallest_spring(spec: SliderCrankSpec, solution: Solution) -> float:
     for entry in spec.mechanism.springs.bought:
         if entry.at in heights and entry.coil is not None:
             turn = float(turns[JOINT_NAMES.index(entry.at)])
-            heights[entry.at] += entry.count * entry.coil.body_length_wound_up(turn)
+            heights[entry.at] += entry.count * entry.coil.room_for(turn)
     return max(heights.values())
 
 

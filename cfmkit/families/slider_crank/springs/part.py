@@ -87,7 +87,7 @@ def height_of(name: str, coil: HelicalSpring, turn: float) -> float:
 
     There it is longest when it is wound up by `turn` [rad].
     """
-    return coil.outer_diameter if name == "slider" else coil.body_length_wound_up(turn)
+    return coil.outer_diameter if name == "slider" else coil.room_for(turn)
 
 
 def _sizes(springs: Springs) -> str:

@@ -91,10 +91,8 @@ def _list_springs_in_use(solution: Solution, number: int) -> list[SpringInUse]:
         high, low = (float(np.broadcast_to(ends[joint], len(solution))[number]) for ends in solution.extremes.turns)
         least, largest = orient_to_larger(high, low)
         # springs of a joint turn alike: each bears its wire's share of the rate, which may be stated
-        wound = None if spring.wound is None else spring.wound.to_wound(spring.kind)
-        rate_of_each = wound.rate * springs.stated_over_wires(spring.at) if wound is not None else 0.0
-        fatigue = None if spring.wound is None or spring.wound.fatigue is None else spring.wound.fatigue.law
-        in_use.append(SpringInUse(wound, rate_of_each * least, rate_of_each * largest, fatigue, spring.life))
+        rate = 0.0 if spring.coil is None else spring.coil.rate * springs.stated_over_wires(spring.at)
+        in_use.append(spring.put_under(rate * least, rate * largest))
     return in_use
 
 

@@ -34,7 +34,7 @@ from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.sprung_linkage import reactions, reference_motion, window_of
 from cfmkit.metrics.continuous_means_and_extremes import extremes
-from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples
+from cfmkit.metrics.curve_rows import CurveRows, RowSamples
 from cfmkit.numerics.roots import last_places
 from cfmkit.numerics.sampled_extremes import Monotone, monotone
 from cfmkit.results import ROUND_OFF

@@ -9,13 +9,19 @@ from pydantic import Field, ValidationInfo, model_validator
 from cfmkit.specs.spec import DesignBlock, Model, PositiveForce, PositiveLength, is_made, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, Torque
-from cfmkit.stock.springs.offers import unguided_deflection
+from cfmkit.stock.springs.extension_springs import ExtensionSpring
+from cfmkit.stock.springs.kinds import AXIAL_KINDS
 from cfmkit.stock.springs.spec import RATE_RTOL, Catalogue, Life, SpringSafety, SpringWire
-from cfmkit.stock.springs.support_spec import SpringSupport
+from cfmkit.stock.springs.support_spec import BuiltInSpring
+from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
-    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring, Kind
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
+
+    AxialKind = str
+else:
+    AxialKind = Literal[tuple(AXIAL_KINDS)]
 
 PositiveAngle = Annotated[Angle, Field(gt=0)]
 TorsionRate = Annotated[RotationalStiffness, Field(ge=0)]
@@ -25,15 +31,13 @@ ExtensionRate = Annotated[Stiffness, Field(ge=0)]
 JointName = Literal["pivot", "crank_pin", "slider_pin", "slider"]
 
 
-class Bought(SpringSupport):
+class Bought(BuiltInSpring):
     """A spring of one leg that is bought."""
 
     at: JointName = Field(description="the joint that it acts at")
     name: str = Field(min_length=1, description="part number")
     count: int = Field(1, ge=1, le=1000, description="how many in parallel in one leg")
-    loaded: Literal["extension", "compression"] | None = Field(
-        None, description="how a spring at the slider is loaded; default: extension"
-    )
+    loaded: AxialKind | None = Field(None, description="how a spring at the slider is loaded; default: extension")
     free_length: PositiveLength | None = Field(None, description="relaxed, of one that is compressed: it may buckle")
     wound: SpringWire | None = Field(
         None,
@@ -46,28 +50,13 @@ class Bought(SpringSupport):
     def _is_held(self) -> Self:
         if self.loaded is not None and self.at != "slider":
             raise ValueError("'loaded' is for the spring at the slider; those at pins are torsion springs")
-        self.check_guide(self.kind, self.coil, None)
+        self.check_guide(self.spring_type, self.coil, None)
         return self
 
     @property
-    def kind(self) -> Kind:
-        """Kind of its load."""
-        return self.loaded or "extension" if self.at == "slider" else "torsion"
-
-    @property
-    def coil(self) -> HelicalSpring | None:
-        """Its wire, coil and turns; None if they are not stated."""
-        return None if self.wound is None else self.wound.to_wound(self.kind)
-
-    @property
-    def is_guided(self) -> bool:
-        """True if a rod or a tube keeps it from buckling."""
-        return self.guides(self.coil)
-
-    @property
-    def unguided(self) -> float:
-        """Deflection up to which it does not buckle without a guide [m]; infinite if it never does."""
-        return unguided_deflection(self.kind, self.free_length, self.coil, None, self.seats)
+    def spring_type(self) -> type[HelicalSpring]:
+        """Its kind."""
+        return AXIAL_KINDS[self.loaded or ExtensionSpring.kind] if self.at == "slider" else HelicalTorsionSpring
 
     @property
     def rate(self) -> float | None:

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.contact.carried_states import carry
-from cfmkit.elastica.contact.equations import NO_FRICTION, with_closed
-from cfmkit.elastica.contact.line_tangent import raise_pad
-from cfmkit.elastica.contact.side_conditions import SideConditions
+from cfmkit.elastica.contact.conditions import FORCE_ROUNDING, Conditions
+from cfmkit.elastica.contact.equations import with_closed
 from cfmkit.elastica.contact.side_gaps import LoadStage
-from cfmkit.elastica.contact.terms import gaps, measure, rub_values, slip_way
+from cfmkit.elastica.contact.terms import measure, slip_way
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam, NodeOnObstacle, describe
+from cfmkit.elastica.model.contact import BeamOnBeam, FrictionState, NodeOnBeam, NodeOnObstacle, describe
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
+from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -29,13 +29,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.model.contact import FrictionState
     from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathEvent, Walk
-    from cfmkit.numerics.continuation.problem import PathEquilibrium
 
-GAP_ROUNDING, FORCE_ROUNDING = 1e-11, 1e-10
-"""Gap, in mean beam lengths, and force, as a share of the largest and of one, that may be negative by rounding."""
-SLIP_ROUNDING = 1e-13  # way of slip in one sample, in mean beam lengths, by which it may go back by rounding
 FEWEST_SAMPLES = 16  # of a step between whose ends a gap may close and open again
 SAMPLES_PER_RADIUS = 6.0  # of the smallest radius that a pad may pass
 MAX_SLOPE_STEPS = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
@@ -50,7 +45,6 @@ class PieceOfPath:
     closed: frozenset[int]
     options: Options
     friction: Mapping[int, FrictionState] = field(default_factory=dict)  # of closed contacts that rub
-    siblings: dict[frozenset[int], PieceOfPath] = field(default_factory=dict)  # of the same arrays, by what is closed
     seen_between: dict[tuple[float, float], FloatArray] = field(init=False, default_factory=dict)  # values by drives
 
     @cached_property
@@ -61,9 +55,9 @@ class PieceOfPath:
         return WatchedProblem(mesh, self.whole.ramp, self.whole.next_correction, piece=self)
 
     @cached_property
-    def sides(self) -> SideConditions:
-        """Conditions on the sides of beams."""
-        return SideConditions(self.whole.mesh, self.closed)
+    def conditions(self) -> Conditions:
+        """Conditions, none of which may become negative on this piece."""
+        return Conditions(self.whole.mesh, self.closed, self.friction)
 
     @property
     def flanks(self) -> tuple[FlankPlace, ...]:
@@ -90,8 +84,7 @@ class PieceOfPath:
             item: Any = network.contacts[flank.number]
             return beams.index(item.beam), flank.parameter
 
-        order = sorted(flanks, key=place)
-        mesh = self.whole.remesh(tuple(order))
+        mesh = self.whole.remesh(tuple(sorted(flanks, key=place)))
         sides = [k for k, contact in enumerate(mesh.contacts) if contact.slide >= 0]
         nodes = [k for k in closed if self.whole.mesh.contacts[k].slide < 0]
         return PieceOfPath(replace(self.whole, mesh=mesh), frozenset([*nodes, *sides]), self.options)
@@ -118,32 +111,34 @@ class PieceOfPath:
     def with_closed(self, closed: frozenset[int]) -> PieceOfPath:
         """Return the problem with another set of closed contacts; what friction does at a new one is left open."""
         friction = {number: state for number, state in self.friction.items() if number in closed}
-        if friction:
-            return PieceOfPath(self.whole, closed, self.options, friction, self.siblings)
-        if not self.friction:
-            self.siblings.setdefault(self.closed, self)
-        if closed not in self.siblings:
-            self.siblings[closed] = PieceOfPath(self.whole, closed, self.options, siblings=self.siblings)
-        return self.siblings[closed]
+        return PieceOfPath(self.whole, closed, self.options, friction)
 
-    def say(self, number: int) -> str:
-        """Return what the contact of a row of `values` is called."""
-        count = len(self.whole.mesh.contacts)
-        if number >= count + len(self.sides.all):
-            number = self.rubbing[number - count - len(self.sides.all)]
-        return describe(
-            self.whole.mesh.contacts[number].item if number < count else self.sides.all[number - count].item
-        )
+    def say(self, row: int) -> str:
+        """Return what the contact of a row of `values` is called: of a contact its number is its row."""
+        return describe(self.conditions.all[row].item)
 
     def say_all(self, number: int) -> str:
         """Return what a contact and those that are closed with it are called, where they block the drive together."""
         others = [self.say(index) for index in sorted(self.closed - {number})]
         return " with ".join([self.say(number), *others[:2]])
 
+    @property
+    def rubbing(self) -> list[int]:
+        """Closed contacts with friction."""
+        return [k for k in sorted(self.closed) if self.whole.mesh.contacts[k].rub >= 0]
+
     def say_rubbing(self) -> str:
         """Return what the closed contacts with friction are called."""
-        contacts = self.whole.mesh.contacts
-        return ", ".join(describe(contacts[k].item) for k in sorted(self.closed) if contacts[k].rub >= 0)
+        return ", ".join(map(self.say, self.rubbing))
+
+    def stick_at(self, at: PathEquilibrium, number: int) -> FrictionState:
+        """Return the state of friction of a contact that begins to stick at an equilibrium."""
+        way = slip_way(self.whole.mesh, self.whole.mesh.contacts[number], self.whole.values(at.x, at.drive))
+        return FrictionState(0.0, float(way.value))
+
+    def stick_all(self, at: PathEquilibrium) -> PieceOfPath:
+        """Return the piece in which all closed contacts with friction stick from an equilibrium on."""
+        return replace(self, friction={k: self.stick_at(at, k) for k in self.rubbing})
 
     # -- unknowns ------------------------------------------------------------------------------------------------------
     @cached_property
@@ -183,9 +178,23 @@ class PieceOfPath:
     def grow_event(self, event: PathEvent) -> PathEvent:
         """Return an event whose equilibria have the forces of all contacts."""
         within = None if event.within is None else (self.grow(event.within[0]), self.grow(event.within[1]))
-        start = None if event.near is None else self.grow(event.near)
+        near = None if event.near is None else self.grow(event.near)
         modes = None if event.modes is None else self.expand(event.modes)
-        return replace(event, near=start, modes=modes, within=within)
+        return replace(event, near=near, modes=modes, within=within)
+
+    def solve_near(self, at: PathEquilibrium) -> PathEquilibrium | None:
+        """Return the equilibrium of this piece at the drive of one near it; both have the unknowns of all contacts."""
+        near = self.shrink(at)
+        found = self.own.solve(near.x, near.drive)
+        return None if found is None else self.grow(found)
+
+    def solve_at_level(self, begin: PathEquilibrium, row: dict[int, float], level: float) -> PathEquilibrium | None:
+        """Return the equilibrium at which a combination of its own unknowns has a value, near one of all unknowns."""
+        near = self.shrink(begin)
+        border = np.zeros(len(near.x) + 1)
+        border[list(row)] = list(row.values())
+        state = self.own.equations.solve(near.x, near.drive, border, level)
+        return state if state is not None and np.isfinite(state.rate).all() else None
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
         """Return True if forces are as large as where a structure locks, between two points that nearly coincide."""
@@ -195,37 +204,11 @@ class PieceOfPath:
 
     # -- gaps and forces -----------------------------------------------------------------------------------------------
     def values(self, x: FloatArray, drives: FloatArray) -> FloatArray:
-        """Return the forces of closed and the gaps of open contacts in states (n, free), (contacts, n).
-
-        Behind them come the values of the conditions on sides of beams.
-        """
+        """Return the values of all conditions in states (n, free), (rows, n)."""
         mesh, way = self.whole.mesh, drives[:, None]
         z = np.asarray(way * mesh.base if self.whole.ramp else mesh.base + way * mesh.rate)
         z[:, mesh.free] = x
-        count = len(mesh.contacts) + len(self.sides.all)
-        spread_values = np.empty((count + len(self.rubbing), len(z)))
-        measured = self.whole.equations.measure_nodes(z)
-        for number, contact in enumerate(mesh.contacts):
-            if number in self.closed:
-                spread_values[number] = z[:, contact.unknown]
-            else:
-                spread_values[number] = gaps(mesh, contact, z) if measured is None else measured[number]
-                spread_values[number] += raise_pad(mesh, contact, z)
-        spread_values[len(mesh.contacts) : count] = self.sides.values(z, LoadStage.from_problem(self.whole, drives))
-        for row, number in enumerate(self.rubbing, count):
-            spread_values[row] = rub_values(mesh, mesh.contacts[number], self.friction[number], z)
-        return spread_values
-
-    @cached_property
-    def rubbing(self) -> tuple[int, ...]:
-        """Closed contacts with friction."""
-        return tuple(number for number, state in sorted(self.friction.items()) if state.sense != NO_FRICTION.sense)
-
-    @cached_property
-    def slipping_rows(self) -> dict[int, int]:
-        """Rows of `values` that are ways of slip, which must grow, with their contacts."""
-        first = len(self.whole.mesh.contacts) + len(self.sides.all)
-        return {first + k: number for k, number in enumerate(self.rubbing) if self.friction[number].sense}
+        return self.conditions.values(z, LoadStage.from_problem(self.whole, drives))
 
     def slip_rate(self, at: PathEquilibrium, number: int) -> float:
         """Return how far a contact slips in its sense by the drive, at an equilibrium."""
@@ -241,35 +224,20 @@ class PieceOfPath:
         moved[mesh.free] = at.rate
         return moved
 
-    def row_value(self, at: PathEquilibrium, number: int, travel: float = 1.0) -> float:
+    def row_value(self, at: PathEquilibrium, row: int, travel: float = 1.0) -> float:
         """Return one row of `values` at an equilibrium: of a way of slip how much it grows in the sense of travel."""
-        mesh, drives = self.whole.mesh, np.array([at.drive])
-        z = self.whole.values(at.x, at.drive)[None]
-        if number in self.slipping_rows:
-            return travel * self.slip_rate(at, self.slipping_rows[number])
-        first = len(mesh.contacts) + len(self.sides.all)
-        if number >= first:
-            rubs = self.rubbing[number - first]
-            return float(rub_values(mesh, mesh.contacts[rubs], self.friction[rubs], z)[0])
-        if number >= len(mesh.contacts):
-            condition = self.sides.all[number - len(mesh.contacts)]
-            return float(self.sides.value(condition, z, LoadStage.from_problem(self.whole, drives))[0])
-        contact = mesh.contacts[number]
-        open_gap = gaps(mesh, contact, z) + raise_pad(mesh, contact, z)
-        return float(z[0, contact.unknown] if number in self.closed else open_gap[0])
+        condition = self.conditions.all[row]
+        if condition.kind == "slip":
+            return travel * self.slip_rate(at, condition.number)
+        stage = LoadStage.from_problem(self.whole, np.array([at.drive]))
+        return float(self.conditions.value(condition, self.whole.values(at.x, at.drive)[None], stage)[0])
 
-    def roundings(self, values: FloatArray) -> FloatArray:
-        """Return by how much a force or a gap (contacts, ..., shares) may be negative, (contacts, ...)."""
-        closed = list(self.closed)
-        largest = np.abs(values[closed]).max(axis=(0, -1), initial=1.0)
-        shape = -1, *(1,) * (values.ndim - 2)
-        spread_values = np.full(values.shape[:-1], GAP_ROUNDING)
-        spread_values[closed] = FORCE_ROUNDING * largest
-        count = len(self.whole.mesh.contacts)
-        spread_values[count : count + len(self.sides.all)] = self.sides.roundings.reshape(shape)
-        for row in range(count + len(self.sides.all), len(values)):
-            spread_values[row] = SLIP_ROUNDING if row in self.slipping_rows else FORCE_ROUNDING * largest
-        return spread_values
+    def violates(self, at: PathEquilibrium, roundings: FloatArray, travel: float) -> bool:
+        """Return True if some condition is violated at an equilibrium, in the sense of travel."""
+        values = self.values(at.x[None], np.array([at.drive]))[:, 0]
+        for row in self.conditions.rows_of("slip"):
+            values[row] = self.row_value(at, row, 1.0 if travel >= 0 else -1.0)
+        return not (values >= -roundings).all()
 
     def roundings_of_force(self, at: PathEquilibrium) -> float:
         """Return which force of a contact is rounding at an equilibrium."""
@@ -278,40 +246,14 @@ class PieceOfPath:
 
     def are_quiet(self, states: Sequence[PathEquilibrium]) -> Any:
         """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together."""
-        whole, kept, n_samples = self.whole, self.own_mask, FEWEST_SAMPLES + 1
         x, rate = (self.expand(np.array(rows).T).T for rows in zip(*((at.x, at.rate) for at in states), strict=True))
-        drive = np.array([at.drive for at in states])
-        width, chord = np.diff(drive)[:, None], np.diff(x, axis=0)
-        moved = np.abs(chord[:, whole.motions]).max(axis=1)
-        slope = np.abs(rate[:, whole.motions]).max(axis=1)
-        dense = SAMPLES_PER_RADIUS * moved * whole.mesh.scales.length <= FEWEST_SAMPLES * self.smallest_radius
-        smooth = np.maximum(slope[:-1], slope[1:]) * np.abs(width[:, 0]) <= MAX_SLOPE_STEPS * moved
-        s, some = np.linspace(0.0, 1.0, n_samples)[:, None, None], self.seen_unknowns
-        between = np.zeros((n_samples, *chord.shape))
-        between[..., some] = x[:-1, some] + s * s * (3 - 2 * s) * chord[:, some]
-        between[..., some] += width * (s * (1 - s) ** 2 * rate[:-1, some] + s * s * (s - 1) * rate[1:, some])
-        drives = drive[:-1] + s[:, :, 0] * width[:, 0]
-        values = self.values(between.reshape(-1, len(kept)), drives.ravel())
-        values = values.reshape(len(values), n_samples, -1).swapaxes(1, 2)
-        for row, number in self.slipping_rows.items():
-            grown = np.array([self.slip_rate(self.grow(at), number) for at in states[1:]]) * width[:, 0]
-            values[row] = np.diff(values[row], axis=-1, prepend=values[row, :, :1])
-            values[row, :, -1] = np.minimum(values[row, :, -1], grown)
-        calm: Any = (values[..., 1:] >= -self.roundings(values)[..., None]).all(axis=(0, 2))
-        suspect = int(calm.argmin())
-        if not calm[suspect] and dense[suspect] and smooth[suspect] and not self.slipping_rows:
-            self.seen_between[float(drive[suspect]), float(drive[suspect + 1])] = values[:, suspect]
-        return calm & dense & smooth
-
-    @cached_property
-    def seen_unknowns(self) -> Any:
-        """Free unknowns of the whole that `values` depends on: all if sides may touch, else those of nodes that do."""
-        mesh = self.whole.mesh
-        if self.sides.all:
-            return slice(None)
-        unknowns = [*mesh.attachments.unknowns[[contact.place for contact in mesh.contacts]].ravel().tolist()]
-        unknowns += [unknown for contact in mesh.contacts for unknown in contact.own_unknowns]
-        return np.flatnonzero(np.isin(mesh.free, unknowns))
+        steps = StepsOfPiece(self, x, np.array([at.drive for at in states]), rate)
+        values = steps.values(np.linspace(0.0, 1.0, FEWEST_SAMPLES + 1))
+        calm: Any = (values[..., 1:] >= -self.conditions.roundings(values)[..., None]).all(axis=(0, 2))
+        dense, suspect = steps.wanted_samples <= FEWEST_SAMPLES, int(calm.argmin())
+        if not calm[suspect] and dense[suspect] and steps.are_smooth[suspect] and not self.conditions.rows_of("slip"):
+            self.seen_between[states[suspect].drive, states[suspect + 1].drive] = values[:, suspect]
+        return calm & dense & steps.are_smooth
 
     @cached_property
     def smallest_radius(self) -> float:
@@ -345,6 +287,51 @@ class PieceOfPath:
 
 
 @dataclass(frozen=True, eq=False)
+class StepsOfPiece:
+    """m steps between m + 1 points of a piece: cubics through their ends, or chords where slopes are steep."""
+
+    piece: PieceOfPath
+    x: FloatArray  # (m + 1, free) of the whole
+    drive: FloatArray  # (m + 1,)
+    rate: FloatArray  # (m + 1, free)
+
+    @cached_property
+    def moved(self) -> FloatArray:
+        """Largest motion of each step, (m,)."""
+        return np.asarray(np.abs(np.diff(self.x, axis=0)[:, self.piece.whole.motions]).max(axis=1))
+
+    @cached_property
+    def are_smooth(self) -> Any:
+        """True for steps that cubics describe, (m,)."""
+        slope, width = np.abs(self.rate[:, self.piece.whole.motions]).max(axis=1), np.abs(np.diff(self.drive))
+        return (width > 0) & (np.maximum(slope[:-1], slope[1:]) * width <= MAX_SLOPE_STEPS * self.moved)
+
+    @property
+    def wanted_samples(self) -> FloatArray:
+        """Places of each step at which gaps and forces are looked at so densely that no obstacle is passed, (m,)."""
+        length = self.piece.whole.mesh.scales.length
+        return SAMPLES_PER_RADIUS * self.moved * length / self.piece.smallest_radius
+
+    def values(self, shares: FloatArray) -> FloatArray:
+        """Return the values of all conditions at shares of each step, from 0 to 1, (rows, m, shares)."""
+        piece, x, rate, width = self.piece, self.x, self.rate, np.diff(self.drive)[:, None]
+        s, smooth = shares[:, None, None], self.are_smooth[:, None]
+        between = x[:-1] + np.where(smooth, s * s * (3 - 2 * s), s) * np.diff(x, axis=0)
+        between += smooth * width * (s * (1 - s) ** 2 * rate[:-1] + s * s * (s - 1) * rate[1:])
+        drives = self.drive[:-1] + s[:, :, 0] * width[:, 0]
+        between[-1], drives[-1] = x[1:], self.drive[1:]
+        values = piece.values(between.reshape(-1, between.shape[-1]), drives.ravel())
+        values = values.reshape(len(values), len(shares), -1).swapaxes(1, 2)
+        for row in piece.conditions.rows_of("slip"):
+            number = piece.conditions.all[row].number
+            ends = (PathEquilibrium(*end, 0) for end in zip(self.x[1:], self.drive[1:], self.rate[1:], strict=True))
+            grown = np.array([piece.slip_rate(end, number) for end in ends]) * width[:, 0]
+            values[row] = np.diff(values[row], axis=-1, prepend=values[row, :, :1])
+            values[row, :, -1] = np.minimum(values[row, :, -1], grown)
+        return values
+
+
+@dataclass(frozen=True, eq=False)
 class WatchedProblem(NetworkProblem):
     """The problem of a piece; it knows between which states of a march no contact changes."""
 
@@ -355,7 +342,7 @@ class WatchedProblem(NetworkProblem):
         marched = super().march(walk)
         if len(marched.drive) and self.piece is not None:
             states = [walk.here, *marched.states]
-            together = SIDES_TOGETHER if self.piece.sides.all else NODES_TOGETHER
+            together = SIDES_TOGETHER if self.piece.conditions.rows_of("touch") else NODES_TOGETHER
             for first in range(0, len(states) - 1, together):
                 some = states[first : first + together + 1]
                 quiet = self.piece.are_quiet(some).tolist()
