@@ -31,7 +31,7 @@ from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.springs.part import N_SHEETS, height_of
 from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemble
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
@@ -408,10 +408,10 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
 
 
 def _no_spring(name: str, turn: tuple[float, float], coil: HelicalSpring | None) -> str:
-    dimension, motion = ("stiffness", "length") if name == "slider" else ("rotational_stiffness", "angle")
-    reported = f"{format_short(turn[0], dimension, 3)} over {format_short(turn[1], motion, 3)}"
+    joint = JOINTS[name]
+    reported = f"{format_short(turn[0], joint.rate, 3)} over {format_short(turn[1], joint.motion, 3)}"
     wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
-    return f"no spring of steel wire fits at the {name.replace('_', ' ')}: {reported}{wide}"
+    return f"no spring of steel wire fits at the {joint.words}: {reported}{wide}"
 
 
 def pushed_linkage(request: Request, lengths: Proportions, crank: float, first: float) -> Candidate | float:

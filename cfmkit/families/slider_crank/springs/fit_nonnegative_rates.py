@@ -189,7 +189,8 @@ def _solve_programme(
         for (low, top), scale in zip(goal.bounds, scales, strict=True)
     ]
     bounds += [(0.0, worst), *[(0.0, None)] * rest.shape[1]]
-    others, equal = np.zeros(len(cost) - count), {}
+    others = np.zeros(len(cost) - count)
+    equal: dict[str, Any] = {}
     if goal.held is not None:
         row, held = _normalise_row(goal.held[0] / scales, goal.held[1])
         equal = {"A_eq": np.append(row, others)[None], "b_eq": [held]}
