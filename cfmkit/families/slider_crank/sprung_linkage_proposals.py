@@ -31,7 +31,7 @@ from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.springs.part import N_SHEETS, height_of
 from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemble
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
@@ -314,14 +314,14 @@ def with_links(spec: SliderCrankSpec, request: Request, block: MaterialBlock) ->
     return spec.replace(changes)
 
 
-def _over_motion(spec: SliderCrankSpec) -> tuple[Assembly, float, float]:
+def _assemble_with_motion(spec: SliderCrankSpec) -> tuple[Assembly, float, float]:
     """Return a linkage with its springs, and the ends of the motion of its analysis [rad or m]."""
     return assemble(spec), *(spec.analysis.travel or spec.analysis.angle or (0.0, 0.0))
 
 
 def _loads(spec: SliderCrankSpec) -> LinkLoads:
     """Return what acts on the links over the motion of the analysis."""
-    assembly, low, high = _over_motion(spec)
+    assembly, low, high = _assemble_with_motion(spec)
     return link_loads(assembly, grid_over(assembly.drive, low, high), spec.mechanism.sets)
 
 
@@ -336,7 +336,7 @@ def _least_sheet(spec: SliderCrankSpec, request: Request, block: MaterialBlock) 
 
 def _turns_of(spec: SliderCrankSpec) -> dict[str, float]:
     """Return how far each torsion spring that is bought turns from where it is relaxed [rad]."""
-    turns = MotionExtremes(*_over_motion(spec)).largest_turns[:3, 0].tolist()
+    turns = MotionExtremes(*_assemble_with_motion(spec)).largest_turns[:3, 0].tolist()
     bought = {spring.at for spring in spec.mechanism.springs.bought}
     return {name: turn for name, turn in zip(JOINT_NAMES[:3], turns, strict=True) if name in bought}
 
@@ -408,7 +408,7 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
 
 
 def _no_spring(name: str, turn: tuple[float, float], coil: HelicalSpring | None) -> str:
-    joint = JOINTS[name]
+    joint = JOINTS_BY_NAME[name]
     reported = f"{format_short(turn[0], joint.rate, 3)} over {format_short(turn[1], joint.motion, 3)}"
     wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
     return f"no spring of steel wire fits at the {joint.words}: {reported}{wide}"

@@ -47,8 +47,8 @@ class Joint:
 
 
 _ALL_JOINTS = Joint("pivot"), Joint("crank_pin"), Joint("slider_pin"), Joint("slider", "length", "stiffness")
-JOINTS = {joint.name: joint for joint in _ALL_JOINTS}
-JOINT_NAMES = tuple(JOINTS)
+JOINTS_BY_NAME = {joint.name: joint for joint in _ALL_JOINTS}
+JOINT_NAMES = tuple(JOINTS_BY_NAME)
 """Where the springs are: A, B, C, and the slider; rows of every (4, n) array here."""
 
 

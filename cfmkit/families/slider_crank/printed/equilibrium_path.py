@@ -97,7 +97,7 @@ class Chain(ShortRepr):
 
     @property
     def kink(self) -> float:
-        """How far the crank pin lies off the line from pivot to slider pin [m]; positive: to its left."""
+        """Distance of the crank pin from the line from pivot to slider pin [m]; positive: to its left."""
         return kink(self.pins)
 
     @property

@@ -41,7 +41,7 @@ from cfmkit.families.slider_crank.springs.rate_fit_task import FREE_LENGTH_KEYS,
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest, widest_of_all
 from cfmkit.families.slider_crank.springs.solution import BAND_EDGE_FACTOR
 from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN, default_motion
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.numerics.box_search import BoxAxis, Lowest, lowest
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, format_short
@@ -387,8 +387,8 @@ def _find_rate_ranges(solved: Solved) -> str:
     reported = []
     for k, name in enumerate(JOINT_NAMES):
         if name in solved.task.wanted.springs and wide[k] and math.isfinite(span[k, 1]):
-            low, high = (format_short(float(end), JOINTS[name].rate) for end in span[k])
-            reported.append(f"{JOINTS[name].words} {low} to {high}")
+            low, high = (format_short(float(end), JOINTS_BY_NAME[name].rate) for end in span[k])
+            reported.append(f"{JOINTS_BY_NAME[name].words} {low} to {high}")
     return ", ".join(reported) if len(reported) > 1 else ""
 
 

@@ -12,7 +12,7 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.model import analyze
 from cfmkit.families.slider_crank.springs.rate_fit_task import FREE_LENGTH_KEYS
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ def describe_springs(solved: Solved) -> tuple[Finding, ...]:
         return ()  # which joint gets none is the choice of the catalogue's springs
     warnings, wanted = [], solved.task.wanted
     rates = zip(JOINT_NAMES, solved.rates, strict=True)
-    gone = [JOINTS[name].words for name, rate in rates if rate == 0.0 and name in wanted.springs]
+    gone = [JOINTS_BY_NAME[name].words for name, rate in rates if rate == 0.0 and name in wanted.springs]
     if gone:
         text = f"the best rate at {' and '.join(gone)} is zero: no spring is needed there"
         warnings.append(finding("spring_dropped", text))
