@@ -26,6 +26,7 @@ from slider_crank import CONFIGS, config
 
 import cfmkit
 from cfmkit import Run, api
+from cfmkit.errors import GeometryError
 from cfmkit.families import family
 from cfmkit.families.slider_crank.printed import equilibrium_path, strip_thickness_search
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
@@ -35,6 +36,7 @@ from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
     Flexure,
     spread,
 )
+from cfmkit.families.slider_crank.printed.part import Leg
 from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 from cfmkit.results import Status
@@ -609,6 +611,16 @@ def _ray(at: complex, way: complex, start: complex, end: complex) -> float | Non
     share = -off.imag / edge.imag
     reach = off.real + share * edge.real
     return reach if 0 <= share <= 1 and reach > 0 else None
+
+
+@pytest.mark.parametrize(
+    ("name", "change"), [("lumped", "flexures.pivot.thickness=0.5 mm"), ("strip", "beam.offset=0.5 mm")]
+)
+def test_a_leg_that_is_not_drawn_as_specified_is_refused(name: str, change: str, monkeypatch: Any) -> None:
+    drawn, other = Leg.contours.fget, config(name, f"mechanism.{change}")  # type: ignore[attr-defined]
+    monkeypatch.setattr(Leg, "contours", property(lambda _: drawn(Leg.from_spec(other, as_printed=True))))
+    with pytest.raises(GeometryError, match="thick in the outline"):
+        api.drawing(config(name))
 
 
 @pytest.mark.parametrize(("change", "allowed"), [("0.0099 mm", False), ("0.0101 mm", True), ("1e-9 mm", False)])

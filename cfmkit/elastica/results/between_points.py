@@ -109,6 +109,7 @@ AT_POINT = 1e-10  # share of the drive's range within which a bifurcation is at 
 NEXT_TO_POINT = 1e-7
 """The same for a point of the path that goes through. So near, Newton's method leaves more of the critical mode than
 the path moves: no polynomial may run through both. On the branch that parts it moves with the root of the distance."""
+SHARE_OF_STEP = 1e-3  # such a bifurcation is also nearer to the point than this share of the step to the one before
 PLACE_RTOL = 1e-12  # share of the drive's range within which a place is that of a point
 
 
@@ -441,13 +442,20 @@ class BetweenPoints(ShortRepr):
             below, above = ranks[0] > ranks[1], ranks[1] > ranks[0]  # a branch that parts is named after the other
             # a point beyond the bifurcation is still on its branch where the mode is less than rounding
             sides = (right - 1, inner_events[0] - before, below), (right, behind - inner_events[0], above)
-            limits = {True: AT_POINT * width, False: near}
-            at = next((point for point, distance, parts in sides if distance <= limits[parts]), None)
+            limits = [AT_POINT * width if parts else self._nearness(point, width) for point, _, parts in sides]
+            at = next((side[0] for side, limit in zip(sides, limits, strict=True) if side[1] <= limit), None)
             place = float(inner_events[0] if at is None else drive[at])
             y = self._corner(place, right if below else right - 1) if at is None else np.asarray(self.own_unknowns[at])
             if y is not None:
                 corners[int(stretches[right])] = Corner(place, y, below, above)
         return corners
+
+    def _nearness(self, point: int, width: float) -> float:
+        """Return how near to a point of the path that goes through a bifurcation counts as at it, dimensionless."""
+        neighbours = np.flatnonzero(self._stretch == self._stretch[point])
+        steps = np.abs(self.own_drive[neighbours] - self.own_drive[point])
+        step = float(steps[steps > 0].min(initial=np.inf)) if len(neighbours) > 1 else 0.0
+        return max(AT_POINT * width, min(NEXT_TO_POINT * width, SHARE_OF_STEP * step))
 
     def _corner(self, place: float, point: int) -> FloatArray | None:
         """Return the equilibrium at a bifurcation from the stretch that a point next to it is on, which goes through.

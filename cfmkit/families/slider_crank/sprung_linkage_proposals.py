@@ -31,7 +31,7 @@ from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.springs.part import N_SHEETS, height_of
 from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemble
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
@@ -147,23 +147,20 @@ def _offer_turned(request: Request, share: float, linkage: tuple[float, float, f
     most = largest_effort(_turning(request, link, low))
     if most < MIN_TORQUE_SHARE * request.low:
         return most
-    data = {
-        "family": "slider-crank",
-        "name": "suggested",
-        "mechanism": {
-            "crank_length": link.crank, "coupler_length": link.coupler, "offset": link.offset,
-            "unloaded_angle": low, "springs": {},
-        },
-        "analysis": {"angle": (low, within[1]), "points": 961},
-    }  # fmt: skip
-    spec = SliderCrankSpec.model_validate(data)
+    mechanism = {"crank_length": link.crank, "coupler_length": link.coupler, "offset": link.offset}
     return Candidate(
         "springs at pins",
-        spec,
+        _unsprung(mechanism | {"unloaded_angle": low}, {"angle": (low, within[1]), "points": 961}),
         finish=finish,
         promise=-min(most / request.target, MAX_TORQUE_RATIO),
         springs="custom",
     )
+
+
+def _unsprung(mechanism: dict[str, Any], analysis: dict[str, Any]) -> SliderCrankSpec:
+    """Return a linkage that is to be given springs."""
+    data = {"family": "slider-crank", "name": "suggested", "mechanism": mechanism, "analysis": analysis}
+    return SliderCrankSpec.model_validate(data)
 
 
 def _angle_range(request: Request, unloaded: float) -> tuple[float, float]:
@@ -272,7 +269,7 @@ def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
 
 def _with_springs(spec: SliderCrankSpec, request: Request, sheet: float) -> SliderCrankSpec:
     """Return a linkage with the springs that hold the torque or the force best, wound beside links of a sheet [m]."""
-    held = _torque_held(spec, request, sheet) if request.kind == "torque" else _force_held(spec, request, sheet)
+    held = _find_springs(spec, request, sheet)
     if held is None or held.deviation > MAX_DEVIATION_SHARE:
         off = "" if held is None else f" nearer than {percent(held.deviation)}"
         raise SolutionError(f"no springs of steel wire that fit at the pins hold this {request.kind}{off}")
@@ -316,10 +313,14 @@ def with_links(spec: SliderCrankSpec, request: Request, block: MaterialBlock) ->
     return spec.replace(changes)
 
 
+def _assemble_with_motion(spec: SliderCrankSpec) -> tuple[Assembly, float, float]:
+    """Return a linkage with its springs, and the ends of the motion of its analysis [rad or m]."""
+    return assemble(spec), *(spec.analysis.travel or spec.analysis.angle or (0.0, 0.0))
+
+
 def _loads(spec: SliderCrankSpec) -> LinkLoads:
     """Return what acts on the links over the motion of the analysis."""
-    assembly = assemble(spec)
-    low, high = spec.analysis.travel or spec.analysis.angle or (0.0, 0.0)
+    assembly, low, high = _assemble_with_motion(spec)
     return link_loads(assembly, grid_over(assembly.drive, low, high), spec.mechanism.sets)
 
 
@@ -327,20 +328,16 @@ def _least_sheet(spec: SliderCrankSpec, request: Request, block: MaterialBlock) 
     """Return how thick links of a material have to be at least, if they are as wide as they may be [m]."""
     material = MaterialSpec.model_validate(dict(block))
     allowable = material.allowable(1.0)
-    return (
-        math.inf
-        if allowable is None
-        else least_sheet(_loads(spec), material.modulus, request.strength_used * allowable)
-    )
+    if allowable is None:
+        return math.inf
+    return least_sheet(_loads(spec), material.modulus, request.strength_used * allowable)
 
 
 def _turns_of(spec: SliderCrankSpec) -> dict[str, float]:
     """Return how far each torsion spring that is bought turns from where it is relaxed [rad]."""
-    assembly = assemble(spec)
-    low, high = spec.analysis.travel or spec.analysis.angle or (0.0, 0.0)
-    turns = MotionExtremes(assembly, low, high).largest_turns[:, 0]
+    turns = MotionExtremes(*_assemble_with_motion(spec)).largest_turns[:3, 0].tolist()
     bought = {spring.at for spring in spec.mechanism.springs.bought}
-    return {name: float(turn) for name, turn in zip(JOINT_NAMES[:3], turns, strict=False) if name in bought}
+    return {name: turn for name, turn in zip(JOINT_NAMES[:3], turns, strict=True) if name in bought}
 
 
 def _hole_of_coil(spec: SliderCrankSpec, name: str, turn: float) -> float:
@@ -351,20 +348,18 @@ def _hole_of_coil(spec: SliderCrankSpec, name: str, turn: float) -> float:
     )
 
 
-def _torque_held(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEffort | None:
-    unloaded = float(spec.mechanism.unloaded_angle or 0.0)
-    turning = _turning(request, linkage_of(spec.mechanism), unloaded, sheet)
-    return flattest_springs(turning, request.target, FLAT_DEVIATION_SHARE * request.ripple)
-
-
-def _force_held(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEffort | None:
-    """Return the springs of the first motion that are flat enough, else the flattest of all; none is left out."""
+def _find_springs(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEffort | None:
+    """Return the flattest springs; for a force those of the first motion that are flat enough, and none is left out."""
+    flat = FLAT_DEVIATION_SHARE * request.ripple
+    if request.kind == "torque":
+        turning = _turning(request, linkage_of(spec.mechanism), float(spec.mechanism.unloaded_angle or 0.0), sheet)
+        return flattest_springs(turning, request.target, flat)
     best: HeldEffort | None = None
     for motion in _pushing(spec, request, sheet):
         held = flattest_springs(motion, request.target, 0.0)
         if held is not None and (best is None or held.deviation < best.deviation):
             best = held
-        if best is not None and best.deviation <= FLAT_DEVIATION_SHARE * request.ripple:
+        if best is not None and best.deviation <= flat:
             break
     return best
 
@@ -412,10 +407,10 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
 
 
 def _no_spring(name: str, turn: tuple[float, float], coil: HelicalSpring | None) -> str:
-    dimension, motion = ("stiffness", "length") if name == "slider" else ("rotational_stiffness", "angle")
-    reported = f"{format_short(turn[0], dimension, 3)} over {format_short(turn[1], motion, 3)}"
+    joint = JOINTS_BY_NAME[name]
+    reported = f"{format_short(turn[0], joint.rate, 3)} over {format_short(turn[1], joint.motion, 3)}"
     wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
-    return f"no spring of steel wire fits at the {name.replace('_', ' ')}: {reported}{wide}"
+    return f"no spring of steel wire fits at the {joint.words}: {reported}{wide}"
 
 
 def pushed_linkage(request: Request, lengths: Proportions, crank: float, first: float) -> Candidate | float:
@@ -423,16 +418,12 @@ def pushed_linkage(request: Request, lengths: Proportions, crank: float, first: 
 
     Or the largest force that springs can hold, where that is less than what is required [N].
     """
-    data = {
-        "family": "slider-crank",
-        "name": "suggested",
-        "mechanism": {
-            "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
-            "unloaded_offset": 4e-4, "springs": {},
-        },
-        "analysis": pushed_analysis((first, lengths.reach * crank)),
-    }  # fmt: skip
-    spec = SliderCrankSpec.model_validate(data)
+    mechanism = {
+        "crank_length": crank,
+        "stretched_position": lengths.stretched * crank,
+        "offset": lengths.offset * crank,
+    }
+    spec = _unsprung(mechanism | {"unloaded_offset": 4e-4}, pushed_analysis((first, lengths.reach * crank)))
     most = 0.0
     for motion in _pushing(spec, request):
         most = max(most, largest_effort(motion))

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -31,7 +31,24 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.linkage import Linkage
 
-JOINT_NAMES = ("pivot", "crank_pin", "slider_pin", "slider")
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint that may have a spring, with the dimensions of its motion and of the spring's rate."""
+
+    name: str  # in a specification
+    motion: Literal["angle", "length"] = "angle"
+    rate: Literal["rotational_stiffness", "stiffness"] = "rotational_stiffness"
+
+    @property
+    def words(self) -> str:
+        """Name in a sentence."""
+        return self.name.replace("_", " ")
+
+
+_ALL_JOINTS = Joint("pivot"), Joint("crank_pin"), Joint("slider_pin"), Joint("slider", "length", "stiffness")
+JOINTS_BY_NAME = {joint.name: joint for joint in _ALL_JOINTS}
+JOINT_NAMES = tuple(JOINTS_BY_NAME)
 """Where the springs are: A, B, C, and the slider; rows of every (4, n) array here."""
 
 

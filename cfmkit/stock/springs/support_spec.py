@@ -71,7 +71,7 @@ class SpringSupport(Model):
 
 
 class BuiltInSpring(SpringSupport):
-    """What springs that are built in, of some kind, know of their `wound` wire and of their support."""
+    """Wire and support of springs that are built in, of any kind."""
 
     @property
     def spring_type(self) -> type[HelicalSpring]:

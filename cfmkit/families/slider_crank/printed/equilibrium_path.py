@@ -96,10 +96,14 @@ class Chain(ShortRepr):
     knee: Callable[[Path, int], FloatArray]  # from a path and a point of it to where the crank pin is [m]
 
     @property
+    def kink(self) -> float:
+        """Distance of the crank pin from the line from pivot to slider pin [m]; positive: to its left."""
+        return kink(self.pins)
+
+    @property
     def side(self) -> int:
         """To which side the chain is kinked, +1 or -1; 0 where it is straight."""
-        off = kink(self.pins)
-        return int(np.sign(off)) if abs(off) > STRAIGHT_OFFSET * self.length else 0
+        return int(np.sign(self.kink)) if abs(self.kink) > STRAIGHT_OFFSET * self.length else 0
 
     @property
     def length(self) -> float:
@@ -138,7 +142,7 @@ class Chain(ShortRepr):
             )
         drive = Displacement(SLIDER_NODE, self.direction, travel)
         wanted = side or self.side or 1
-        clear = abs(kink(self.pins)) > DECISIVE_OFFSET * self.length
+        clear = abs(self.kink) > DECISIVE_OFFSET * self.length
         if wanted == self.side and clear:
             path = _trace(self.build(self.points), drive, tolerance)
             if path.status is PathStatus.COMPLETE:
@@ -188,7 +192,7 @@ class Chain(ShortRepr):
         if ending is PressingEnd.COMPLETE and not stable.all():
             first = path.drive[path.at_requested][~stable][0]
             ending, message = PressingEnd.UNSTABLE, f"unstable from {first * 1e3:.4g} mm on"
-        chain_like = abs(kink(self.pins)) <= FRAME_OFFSET * self.length
+        chain_like = abs(self.kink) <= FRAME_OFFSET * self.length
         if ending is PressingEnd.COMPLETE and side != wanted and (chain_like or wanted != self.side):
             return self._cut_before_crossing(path, sides, wanted)
         return Pressed(path, ending, message, side)
@@ -202,7 +206,7 @@ class Chain(ShortRepr):
         along = np.array([np.cos(self.direction), np.sin(self.direction)])
         last = path.at_requested.tolist()
         pins = np.array([self.knee(path, at) for at in last])
-        moved = np.array([kink(np.array([self.pins[0], pin, self.pins[2]])) for pin in pins]) - kink(self.pins)
+        moved = np.array([kink(np.array([self.pins[0], pin, self.pins[2]])) for pin in pins]) - self.kink
         ends = self.pins[2] + np.outer(path.drive[path.at_requested], along)
         off = np.array([kink(np.array([self.pins[0], *pose])) for pose in zip(pins, ends, strict=True)])
         sides: FloatArray = np.where((np.sign(moved) == wanted) | (np.sign(off) == wanted), wanted, np.sign(moved))

@@ -9,7 +9,6 @@ import numpy as np
 from cfmkit.elastica import hindered_curling
 from cfmkit.families.findings import format_at_most, mm, mpa, newton, stiffer, too_soft
 from cfmkit.families.rows import FindingRule
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.printed.scalar_results import stress_stroke
 
 if TYPE_CHECKING:
@@ -67,7 +66,7 @@ def _is_straight(solution: Solution) -> bool:
 
 
 def _offset(solution: Solution) -> float:
-    return abs(kink(solution.chain.pins))
+    return abs(solution.chain.kink)
 
 
 def _made_sizes(solution: Solution) -> tuple[float, float]:

@@ -38,7 +38,7 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import linkage_of
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import chain_of, elasticity
 from cfmkit.families.slider_crank.printed.findings import left_out_friction
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, kink
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS
 from cfmkit.families.slider_crank.printed.model import as_run
 from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS
@@ -220,7 +220,7 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; those that a solid does not know have no value."""
     limit = elasticity(solution.spec.mechanism).allowable_stress
     values: dict[str, float | None] = {
-        "kink": kink(solution.chain.pins),
+        "kink": solution.chain.kink,
         "run_in_95": first_at(solution.travel, solution.force, 0.95 * solution.level),
         "run_in_98": first_at(solution.travel, solution.force, 0.98 * solution.level),
         "allowable_stress": limit,

@@ -9,7 +9,6 @@ import numpy as np
 
 from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
 from cfmkit.families.rows import ScalarQuantity, or_nan
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.springs.scalar_results import SCALAR_DEFINITIONS as OF_SPRINGS
 
 if TYPE_CHECKING:
@@ -53,7 +52,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "kink": ScalarQuantity(
         "length",
         "offset of the crank pin from the line between pivot and slider pin, unloaded; left is positive",
-        lambda solution: kink(solution.chain.pins),
+        lambda solution: solution.chain.kink,
     ),
     "run_in_95": _run_in(0.95),
     "run_in_98": _run_in(0.98),

@@ -21,7 +21,7 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import minimax, ranges
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.spec import Bought
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.kinds import AXIAL_KINDS, TURNED_KINDS
 from cfmkit.stock.springs.offers import PIN_SHARE, Miss, Offer, guide_rod_for, nearest
@@ -62,7 +62,7 @@ def best_sets(goal: RateGoal, offered: Sequence[FloatArray], count: int = 1) -> 
 class SpringOption:
     """A spring for a joint, in a number."""
 
-    joint: int  # which, an index of `JOINTS`
+    joint: int  # which, an index of `JOINT_NAMES`
     offer: Offer  # the spring
     count: int  # how many in parallel, in one leg
     deflection: float = 0.0  # largest one over the travel [rad or m]
@@ -88,7 +88,7 @@ class SpringOption:
     @property
     def label(self) -> str:
         """Number, name and joint."""
-        return f"{self.count} x {self.offer.name} at the {JOINT_NAMES[self.joint].replace('_', ' ')}"
+        return f"{self.count} x {self.offer.name} at the {JOINTS_BY_NAME[JOINT_NAMES[self.joint]].words}"
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
         spring_types = (AXIAL_KINDS if name == "slider" else TURNED_KINDS).values()
         cap = getattr(wanted.max_rates, name, None) if wanted.max_rates else None
         for offer in offers(wanted.catalogue or (), *spring_types):
-            label = f"{offer.name} at the {name.replace('_', ' ')}"
+            label = f"{offer.name} at the {JOINTS_BY_NAME[name].words}"
             ends = orient_to_larger(float(high[joint]), float(low[joint]))
             pins = task.spec.mechanism.pins if name != "slider" else None
             reason = _why_not(offer, ends, wanted) or _binds(offer, max(map(abs, ends)), pins)

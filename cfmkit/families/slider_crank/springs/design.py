@@ -41,7 +41,7 @@ from cfmkit.families.slider_crank.springs.rate_fit_task import FREE_LENGTH_KEYS,
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest, widest_of_all
 from cfmkit.families.slider_crank.springs.solution import BAND_EDGE_FACTOR
 from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN, default_motion
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.numerics.box_search import BoxAxis, Lowest, lowest
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, format_short
@@ -189,14 +189,12 @@ def _height(spec: SliderCrankSpec, lengths: dict[str, float], best: float) -> fl
     if wanted.window[0] < first - 1e-9 or wanted.window[1] > last + 1e-9:
         return math.inf
     try:
-        goal = task.goal(wanted.window)
+        fitted = _fit_rates(task, wanted.window)
     except Infeasible:
-        goal = None
-    if goal is None:
+        fitted = None
+    if fitted is None:
         return math.inf
-    rates = _best_rates(goal, wanted)
-    if rates is None:
-        return math.inf
+    goal, rates = fitted
     deviation = goal.rms(rates) if wanted.objective == "least-squares" else goal.deviation(rates)
     if wanted.catalogue and deviation < best:
         return least_deviation(task, goal, wanted.window)
@@ -346,15 +344,16 @@ def even_best(spec: SliderCrankSpec, names: tuple[str, ...], search: Lowest) -> 
         return task_of(with_lengths(spec, dict(zip(names, place, strict=True))))
 
     if tolerance is not None:
-        good = [place for place in good if _deviation(task(place), window) <= tolerance * (1.0 - TOLERANCE_RESERVE)]
+        fits, most = [_fit_rates(task(place), window) for place in good], tolerance * (1.0 - TOLERANCE_RESERVE)
+        good = [place for place, fit in zip(good, fits, strict=True) if fit and fit[0].deviation(fit[1]) <= most]
     return min([search.place, *good], key=lambda place: task(place).rotation(window))
 
 
-def _deviation(task: SpringTask, window: tuple[float, float]) -> float:
-    """Return the largest deviation of the best springs over a window, by the objective of the design."""
+def _fit_rates(task: SpringTask, window: tuple[float, float]) -> tuple[RateGoal, FloatArray] | None:
+    """Return the goal over a window, and the best rates by the objective of the design; None if there are none."""
     goal = task.goal(window)
     rates = None if goal is None else _best_rates(goal, task.wanted)
-    return math.inf if goal is None or rates is None else goal.deviation(rates)
+    return None if goal is None or rates is None else (goal, rates)
 
 
 def _best_rates(goal: RateGoal, wanted: CrankDesign) -> FloatArray | None:
@@ -388,9 +387,8 @@ def _find_rate_ranges(solved: Solved) -> str:
     reported = []
     for k, name in enumerate(JOINT_NAMES):
         if name in solved.task.wanted.springs and wide[k] and math.isfinite(span[k, 1]):
-            dimension = "stiffness" if name == "slider" else "rotational_stiffness"
-            low, high = (format_short(float(end), dimension) for end in span[k])
-            reported.append(f"{name.replace('_', ' ')} {low} to {high}")
+            low, high = (format_short(float(end), JOINTS_BY_NAME[name].rate) for end in span[k])
+            reported.append(f"{JOINTS_BY_NAME[name].words} {low} to {high}")
     return ", ".join(reported) if len(reported) > 1 else ""
 
 

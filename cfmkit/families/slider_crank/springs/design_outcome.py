@@ -12,7 +12,7 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.model import analyze
 from cfmkit.families.slider_crank.springs.rate_fit_task import FREE_LENGTH_KEYS
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -62,13 +62,15 @@ def audit(solved: Solved, spec: SliderCrankSpec) -> Solved:
         if branch == "mean":  # no way of the curve is the mean of both
             return solved
         branch = f"[{branch}]"
-    (largest,), (rms,) = (
-        measure_metrics(result, solved.judged, f"{names[0]}{branch}"),
-        measure_metrics(result, solved.window, f"{names[1]}{branch}"),
-    )
+    (largest,) = measure_metrics(result, solved.judged, f"{names[0]}{branch}")
+    (rms,) = measure_metrics(result, solved.window, f"{names[1]}{branch}")
     if largest is None or rms is None:
         return solved
     return replace(solved, deviation=largest, rms=rms / target, exact=True)
+
+
+def _no_targets(text: str) -> Finding:
+    return finding("infeasible_targets", text)
 
 
 def check_reach(task: SpringTask, window: tuple[float, float]) -> None:
@@ -78,87 +80,77 @@ def check_reach(task: SpringTask, window: tuple[float, float]) -> None:
     if window[0] >= first - slack and window[1] <= last + slack:
         return
     ends = [format_short(end, task.assembly.dimension) for end in (*window, first, last)]
-    text = (
+    raise finding.infeasible(
+        "infeasible_targets",
         f"the window {ends[0]} to {ends[1]} is not reached: linkage and limits of the joints allow {ends[2]} to "
-        f"{ends[3]}; change 'design.{task.assembly.motion_name}', the lengths, or 'mechanism.limits'"
+        f"{ends[3]}; change 'design.{task.assembly.motion_name}', the lengths, or 'mechanism.limits'",
     )
-    raise finding.infeasible("infeasible_targets", text)
 
 
 def cannot_hold(task: SpringTask) -> Finding:
     """Return why a slope in the stretched position, or a trim, cannot be had."""
     wanted = task.wanted
     if wanted.angle_travel is not None and not wanted.hold_stiffness:
-        text = (
+        return _no_targets(
             f"no springs give an adjustment of {format_short(wanted.adjustment or 0.0, 'force')} when the unloaded "
             f"angle is turned by {format_short(wanted.angle_travel, 'angle')}, within 'design.max_rates'; reduce "
             "'design.adjustment', or increase 'design.angle_travel'"
         )
-        return finding("infeasible_targets", text)
-    text = (
-        "no springs with rates of zero or more have 'design.stiffness' in the stretched position within "
-        "'design.max_rates'"
-    )
+    text = "no springs with rates of zero or more have 'design.stiffness' in the stretched position within "
+    text += "'design.max_rates'"
     if task.assembly.stretched == task.assembly.start:
         text += ": the springs are relaxed there, and only positive slopes exist"
-    elif task.goal((task.assembly.start, task.assembly.stretched)) is not None and "slider" not in task.wanted.springs:
+    elif task.goal((task.assembly.start, task.assembly.stretched)) is not None and "slider" not in wanted.springs:
         text += ": torsion springs alone have positive slopes; use the spring at the slider"
     return finding("no_zero_stiffness", text)
 
 
 def nowhere(task: SpringTask) -> Finding:
     """Return why no window keeps the tolerance, or why no springs are better than none in the window."""
-    window = task.wanted.window
+    window, drive = task.wanted.window, task.assembly.drive
     goal = task.goal(window) if window is not None else None
     if task.wanted.curve is not None:
-        text = "no springs come closer to 'design.target' than having none at all"
-        return finding("infeasible_targets", f"{text}; change it, its window, or 'design.springs'")
-    if goal is not None and task.assembly.drive == "torque" and (goal.matrix[:, :3] <= 0.0).all():
-        reversed_torque = format_short(-task.wanted.size, "torque")
-        text = f"in the window torsion springs turn the crank the other way; request 'design.torque: {reversed_torque}'"
-        return finding("infeasible_targets", text)
-    if "slider" not in task.wanted.springs and task.assembly.drive == "torque":
-        text = "torsion springs alone give no constant torque next to the stretched position; "
-        text += "use the slider's, too, in 'design.springs'"
-        return finding("no_zero_stiffness", text)
+        return _no_targets(
+            "no springs come closer to 'design.target' than having none at all; change it, its window, or "
+            "'design.springs'"
+        )
+    if goal is not None and drive == "torque" and (goal.matrix[:, :3] <= 0.0).all():
+        text = "in the window torsion springs turn the crank the other way; request 'design.torque: "
+        return _no_targets(f"{text}{format_short(-task.wanted.size, 'torque')}'")
+    if "slider" not in task.wanted.springs and drive == "torque":
+        text = "torsion springs alone give no constant torque next to the stretched position"
+        return finding("no_zero_stiffness", f"{text}; use the slider's, too, in 'design.springs'")
     if window is not None:
-        text = f"in the window no springs come closer to a constant {task.assembly.drive} than having none at all"
-        return finding("infeasible_targets", f"{text}; change 'design.{task.assembly.motion_name}' or 'design.springs'")
-    return finding(
-        "infeasible_targets", "no window keeps 'design.tolerance'; allow more, or change the lengths in 'mechanism'"
-    )
+        text = f"in the window no springs come closer to a constant {drive} than having none at all"
+        return _no_targets(f"{text}; change 'design.{task.assembly.motion_name}' or 'design.springs'")
+    return _no_targets("no window keeps 'design.tolerance'; allow more, or change the lengths in 'mechanism'")
 
 
 def hopeless(task: SpringTask, deviation: float) -> Finding:
     """Return that even the best springs have nothing of a constant effort, and why."""
-    text = f"even the best springs are off by {percent(deviation)}: that is no constant {task.assembly.drive}"
+    assembly, text = task.assembly, f"even the best springs are off by {percent(deviation)}"
     if task.wanted.curve is not None:
-        text = f"even the best springs are off by {percent(deviation)} of the largest of 'design.target'"
-        return finding("infeasible_targets", f"{text}; change it, its window, or the lengths in 'mechanism'")
-    ahead = (task.assembly.stretched - task.assembly.start) * task.wanted.size
-    if task.assembly.drive == "torque" and ahead <= 0.0:
+        cure = "change it, its window, or the lengths in 'mechanism'"
+        return _no_targets(f"{text} of the largest of 'design.target'; {cure}")
+    text += f": that is no constant {assembly.drive}"
+    if assembly.drive == "torque" and (assembly.stretched - assembly.start) * task.wanted.size <= 0.0:
         text += "; the stretched position does not lie ahead of the unloaded one, and the torque only rises there; "
         text += "change 'mechanism.unloaded_angle' (or 'unloaded_offset'), or the sign of 'design.torque'"
         return finding("no_zero_stiffness", text)
-    return finding(
-        "infeasible_targets",
-        f"{text}; narrow 'design.{task.assembly.motion_name}', or change the lengths in 'mechanism'",
-    )
+    return _no_targets(f"{text}; narrow 'design.{assembly.motion_name}', or change the lengths in 'mechanism'")
 
 
 def too_far(task: SpringTask, deviation: float) -> tuple[Finding, dict[str, str]]:
     """Return that a window is too wide for its tolerance, and what would be feasible."""
-    wanted = task.wanted
+    tolerance, name = task.wanted.tolerance or 0.0, f"design.{task.assembly.motion_name}"
     nearest = {"design.tolerance": f"{100 * deviation:.4g} %"}
-    allowed = f"'design.tolerance' allows {percent(wanted.tolerance or 0)}"
-    text = f"the best springs are off by {percent(deviation)}, and {allowed}"
-    text += f"; allow more, or narrow 'design.{task.assembly.motion_name}'"
-    widest_window = widest(task, wanted.tolerance or 0.0)
-    if widest_window is not None:
+    text = f"the best springs are off by {percent(deviation)}, and 'design.tolerance' allows {percent(tolerance)}"
+    text += f"; allow more, or narrow '{name}'"
+    if (widest_window := widest(task, tolerance)) is not None:
         low, high = (format_short(end, task.assembly.dimension) for end in (widest_window.low, widest_window.high))
-        nearest[f"design.{task.assembly.motion_name}"] = f"[{low}, {high}]"
+        nearest[name] = f"[{low}, {high}]"
         text += f": a window that keeps it is {low} to {high}"
-    return finding("infeasible_targets", text), nearest
+    return _no_targets(text), nearest
 
 
 def active_bounds(solved: Solved, wanted: CrankDesign) -> tuple[str, ...]:
@@ -177,22 +169,18 @@ def active_bounds(solved: Solved, wanted: CrankDesign) -> tuple[str, ...]:
 
 def describe_springs(solved: Solved) -> tuple[Finding, ...]:
     """Return what to say about springs that are not needed, and about those that would like to be stiffer."""
-    warnings, wanted = [], solved.task.wanted
     if solved.bought:
         return ()  # which joint gets none is the choice of the catalogue's springs
-    gone = [
-        name for name, rate in zip(JOINT_NAMES, solved.rates, strict=True) if rate == 0.0 and name in wanted.springs
-    ]
+    warnings, wanted = [], solved.task.wanted
+    rates = zip(JOINT_NAMES, solved.rates, strict=True)
+    gone = [JOINTS_BY_NAME[name].words for name, rate in rates if rate == 0.0 and name in wanted.springs]
     if gone:
-        names = " and ".join(name.replace("_", " ") for name in gone)
-        warnings.append(finding("spring_dropped", f"the best rate at {names} is zero: no spring is needed there"))
+        text = f"the best rate at {' and '.join(gone)} is zero: no spring is needed there"
+        warnings.append(finding("spring_dropped", text))
     at_cap = [path for path in active_bounds(solved, wanted) if "max_rates" in path]
     if at_cap:
-        warnings.append(
-            finding(
-                "spring_at_bound", f"{' and '.join(at_cap)} limits the design: a larger value would give a better one"
-            )
-        )
+        text = f"{' and '.join(at_cap)} limits the design: a larger value would give a better one"
+        warnings.append(finding("spring_at_bound", text))
     return tuple(warnings)
 
 
@@ -228,16 +216,9 @@ def search_of(solved: Solved) -> dict[str, Searched]:
     """
     if solved.exact:
         return {}
+    places = f"deviation from the target, relative to it, at the {solved.places} places searched"
     about: dict[str, tuple[float | None, str, str]] = {
-        "largest_miss": (
-            solved.deviation,
-            "ratio",
-            f"largest deviation from the target, relative to it, at the {solved.places} places searched",
-        ),
-        "mean_square_miss": (
-            solved.rms,
-            "ratio",
-            f"root mean square deviation from the target, relative to it, at the {solved.places} places searched",
-        ),
+        "largest_miss": (solved.deviation, "ratio", f"largest {places}"),
+        "mean_square_miss": (solved.rms, "ratio", f"root mean square {places}"),
     }
     return search_values(about, "prb", solved.window, solved.task.assembly.dimension)

@@ -14,7 +14,7 @@ from cfmkit.families.slider_crank.springs.hardware import hardware
 from cfmkit.families.slider_crank.springs.hardware import joints as joints_at
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.part import bodies
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.plots import parts
 from cfmkit.plots.assembly import assembly_figure
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
@@ -236,7 +236,7 @@ def energy(result: Result) -> Figure:
     series = [Series(solution.energy[0], "all springs", TEXT_INK, prefer=0.75)]
     if (rates > 0.0).sum() > 1:
         series += [
-            Series(shares[k], name.replace("_", " "), SPRING_COLOURS[k], dashed=True, prefer=0.9 - 0.1 * k)
+            Series(shares[k], JOINTS_BY_NAME[name].words, SPRING_COLOURS[k], dashed=True, prefer=0.9 - 0.1 * k)
             for k, name in enumerate(JOINT_NAMES)
             if rates[k] > 0.0
         ]
@@ -264,7 +264,10 @@ def springs(result: Result) -> Figure:
     joints = [k for k in range(4) if solution.assembly.rates[k] > 0.0]
     series = [
         Series(
-            solution.spring_efforts[k, 0], JOINT_NAMES[k].replace("_", " "), SPRING_COLOURS[k], prefer=0.9 - 0.12 * n
+            solution.spring_efforts[k, 0],
+            JOINTS_BY_NAME[JOINT_NAMES[k]].words,
+            SPRING_COLOURS[k],
+            prefer=0.9 - 0.12 * n,
         )
         for n, k in enumerate(joints)
     ]
@@ -284,7 +287,8 @@ def joints(result: Result) -> Figure:
     solution: Solution = result.state
     turn, over = solution.unit_spring_curves.turn[:, 0], motion_scale(solution)
     series = [
-        Series(turn[k], JOINT_NAMES[k].replace("_", " "), SPRING_COLOURS[k], prefer=0.85 - 0.15 * k) for k in range(3)
+        Series(turn[k], JOINTS_BY_NAME[JOINT_NAMES[k]].words, SPRING_COLOURS[k], prefer=0.85 - 0.15 * k)
+        for k in range(3)
     ]
     limits = [limit for name in JOINT_NAMES[:3] for limit in limits_on(result, f"{name}_rotation_max")]
     coupler, guide = (force[0] for force in solution.reactions)

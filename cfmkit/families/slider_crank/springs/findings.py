@@ -19,7 +19,7 @@ from cfmkit.families.slider_crank.springs.bistability_class import (
     TRISTABLE_CLASS,
 )
 from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.support_spec import guide_cure, guide_needed
 
@@ -97,7 +97,7 @@ def _winds_up(solution: Solution) -> Any:
 
 def _winding(solution: Solution) -> Sentence:
     rates = solution.assemblies[0].rates
-    wound = [name.replace("_", " ") for name, rate in zip(JOINT_NAMES[:2], rates, strict=False) if rate > 0.0]
+    wound = [JOINTS_BY_NAME[name].words for name, rate in zip(JOINT_NAMES[:2], rates, strict=False) if rate > 0.0]
     return (
         f"over a full turn the spring at the {' and at the '.join(wound)} is wound up: the torque differs in the next "
         "turn; only springs at slider and slider pin repeat",
@@ -246,7 +246,7 @@ def _binding(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | Non
     if inside >= pins.diameter:
         return None
     return (
-        f"{spring.name} at the {spring.at.replace('_', ' ')} is {mm(spring.coil.inner_diameter)} wide inside, "
+        f"{spring.name} at the {JOINTS_BY_NAME[spring.at].words} is {mm(spring.coil.inner_diameter)} wide inside, "
         f"wound up by {deg(moved)} {mm(max(inside, 0.0))}: it binds on its pin of {mm(pins.diameter)}; use "
         "a wider spring, or a thinner pin ('mechanism.pins.diameter')",
     )
@@ -285,10 +285,10 @@ def _overturns(joint: int) -> Rule:
         return solution.extremes.largest_turns[joint] > limits * ON_LIMIT
 
     def sentence(solution: Solution) -> Sentence:
-        dimension, limit = "length" if name == "slider" else "angle", getattr(solution.spec.mechanism.limits, name)
-        reported = format_short(float(solution.extremes.largest_turns[joint, 0]), dimension)
-        what = "slider's spring" if name == "slider" else f"spring at the {name.replace('_', ' ')}"
-        return (f"the {what} is deflected by {reported}; its limit is {format_short(limit, dimension)}",)
+        motion, limit = JOINTS_BY_NAME[name].motion, getattr(solution.spec.mechanism.limits, name)
+        reported = format_short(float(solution.extremes.largest_turns[joint, 0]), motion)
+        what = "slider's spring" if motion == "length" else f"spring at the {JOINTS_BY_NAME[name].words}"
+        return (f"the {what} is deflected by {reported}; its limit is {format_short(limit, motion)}",)
 
     return FindingRule("joint_overrotated", holds, sentence)
 

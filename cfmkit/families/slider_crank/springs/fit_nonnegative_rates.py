@@ -149,8 +149,9 @@ def _minimax(goal: RateGoal) -> tuple[FloatArray, float] | None:
 def _smallest_deviation(goal: RateGoal) -> tuple[FloatArray, float] | None:
     cost = np.zeros(goal.matrix.shape[1] + 1)
     cost[-1] = 1.0
-    solved = _solve_programme(goal, cost, None)
-    return None if solved is None else (solved[:-1] / goal.scales(), float(solved[-1]))
+    scales = goal.scales()
+    solved = _solve_programme(goal, cost, None, scales)
+    return None if solved is None else (solved[:-1] / scales, float(solved[-1]))
 
 
 def _enlarge_goal(goal: RateGoal, rates: FloatArray, unit: float) -> RateGoal:
@@ -171,31 +172,34 @@ def _enlarge_goal(goal: RateGoal, rates: FloatArray, unit: float) -> RateGoal:
 
 def _solve_programme(
     goal: RateGoal,  # m springs
-    cost: FloatArray,  # (m + 1,): of scaled rates and of the deviation
+    cost: FloatArray,  # (m + 1 + k,): of scaled rates, of the deviation, and of k unknowns more, none negative
     worst: float | None,  # largest deviation allowed
+    scales: FloatArray,  # (m,): of the rates
+    more: Sequence[FloatArray] = (),  # (m + 1 + k,) each: rows whose products with the unknowns must not be positive
 ) -> FloatArray | None:
-    """Return scaled rates, then the deviation, that minimise a cost; None if there are none."""
+    """Return scaled rates, then the deviation and what is more, that minimise a cost; None if there are none."""
     from scipy.optimize import linprog
 
-    scales = goal.scales()
-    matrix = goal.matrix / scales
-    ones = np.ones((len(goal.wanted), 1))
-    rows = np.vstack([np.hstack([matrix, -ones]), np.hstack([-matrix, -ones])])
+    count, matrix = len(goal.upper), goal.matrix / scales
+    ones, rest = np.ones((len(goal.wanted), 1)), np.zeros((len(goal.wanted), len(cost) - count - 1))
+    rows = np.vstack([np.hstack([matrix, -ones, rest]), np.hstack([-matrix, -ones, rest]), *more])
+    limits = np.concatenate([goal.wanted, -goal.wanted, np.zeros(len(more))])
     bounds = [
         (low * scale, None if top is None else top * scale)
         for (low, top), scale in zip(goal.bounds, scales, strict=True)
     ]
+    bounds += [(0.0, worst), *[(0.0, None)] * rest.shape[1]]
+    others = np.zeros(len(cost) - count)
     equal: dict[str, Any] = {}
     if goal.held is not None:
         row, held = _normalise_row(goal.held[0] / scales, goal.held[1])
-        equal = {"A_eq": np.append(row, 0.0)[None], "b_eq": [held]}
-    limits = np.concatenate([goal.wanted, -goal.wanted])
+        equal = {"A_eq": np.append(row, others)[None], "b_eq": [held]}
     if goal.least is not None:
         row, least = _normalise_row(goal.least[0] / scales, goal.least[1])
-        rows = np.vstack([rows, np.append(-row, 0.0)[None]])
+        rows = np.vstack([rows, np.append(-row, others)])
         limits = np.append(limits, -least)
-    solved = linprog(cost, A_ub=rows, b_ub=limits, bounds=[*bounds, (0.0, worst)], method="highs", **equal)
-    lowest = np.array([*(low for low, _ in bounds), 0.0])
+    solved = linprog(cost, A_ub=rows, b_ub=limits, bounds=bounds, method="highs", **equal)
+    lowest = np.array([low for low, _ in bounds])
     return None if solved.status != 0 or solved.x is None else np.maximum(solved.x, lowest)
 
 
@@ -265,16 +269,14 @@ def _free_least_squares(
 
 def ranges(goal: RateGoal, worst: float) -> FloatArray:
     """Return the smallest and the largest rate of each spring, (m, 2), with no deviation above `worst`."""
-    count = goal.matrix.shape[1]
-    ranges = np.full((count, 2), np.nan)
-    for k in range(count):
+    count, scales = len(goal.upper), goal.scales()
+    ends = np.full((count, 2), np.nan)
+    for k, cost in enumerate(np.eye(count + 1)[:count]):
         for end, sign in enumerate((1.0, -1.0)):
-            cost = np.zeros(count + 1)
-            cost[k] = sign
-            solved = _solve_programme(goal, cost, worst)
+            solved = _solve_programme(goal, sign * cost, worst, scales)
             if solved is not None:
-                ranges[k, end] = solved[k] / goal.scales()[k]
-    return ranges
+                ends[k, end] = solved[k] / scales[k]
+    return ends
 
 
 def choose_preferred(
@@ -285,41 +287,14 @@ def choose_preferred(
     rule: str,
 ) -> FloatArray | None:
     """Return one of the rates with no deviation above `worst`: the softest, or the most even ones."""
-    count = goal.matrix.shape[1]
+    count, scales = len(goal.upper), goal.scales()
     if rule == "soft-springs":
-        solved = _solve_programme(goal, np.append(np.ones(count), 0.0), worst)
-        return None if solved is None else solved[:-1] / goal.scales()
-    return _most_even(goal, worst)
-
-
-def _most_even(goal: RateGoal, worst: float) -> FloatArray | None:
-    """Return the rates whose torsion springs differ least: one more unknown above all of them, one below."""
-    from scipy.optimize import linprog
-
-    scales, torsion = goal.scales(), min(3, goal.matrix.shape[1])
-    usable = [k for k in range(torsion) if goal.upper[k] > 0.0]
-    unit = float(1.0 / scales[usable].max()) if usable else 1.0
-    count = goal.matrix.shape[1]
-    matrix = np.hstack([goal.matrix * unit, np.zeros((len(goal.wanted), 2))])
-    rows, right = [*matrix, *-matrix], [*(goal.wanted + worst), *(worst - goal.wanted)]
-    for k in usable:
-        above, below = np.zeros(count + 2), np.zeros(count + 2)
-        above[[k, count]], below[[k, count + 1]] = (1.0, -1.0), (-1.0, 1.0)
-        rows += [above, below]
-        right += [0.0, 0.0]
-    if goal.least is not None:
-        row, least = _normalise_row(goal.least[0] * unit, goal.least[1])
-        rows.append(np.concatenate([-row, [0.0, 0.0]]))
-        right.append(-least)
-    equal: dict[str, Any] = {}
-    if goal.held is not None:
-        row, held = _normalise_row(goal.held[0] * unit, goal.held[1])
-        equal = {"A_eq": np.concatenate([row, [0.0, 0.0]])[None], "b_eq": [held]}
-    cost = np.concatenate([np.zeros(count), [1.0, -1.0]])
-    scaled_bounds = [(low / unit, None if top is None else top / unit) for low, top in goal.bounds]
-    bounds = [*scaled_bounds, (0.0, None), (0.0, None)]
-    solved = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs", **equal)
-    if solved.status != 0 or solved.x is None:
-        return None
-    rates: FloatArray = np.maximum(solved.x[:count], [low for low, _ in scaled_bounds]) * unit
-    return rates
+        solved = _solve_programme(goal, np.append(np.ones(count), 0.0), worst, scales)
+        return None if solved is None else solved[:-1] / scales
+    # one more unknown above all torsion rates that may be used, and one below
+    usable = [k for k in range(min(3, count)) if goal.upper[k] > 0.0]
+    scales = np.full(count, scales[usable].max() if usable else 1.0)
+    unit = np.eye(count + 3)
+    more = [row for k in usable for row in (unit[k] - unit[count + 1], unit[count + 2] - unit[k])]
+    solved = _solve_programme(goal, unit[count + 1] - unit[count + 2], worst, scales, more)
+    return None if solved is None else solved[:count] / scales

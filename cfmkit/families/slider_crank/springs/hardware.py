@@ -48,7 +48,7 @@ from cfmkit.families.hardware import (
 )
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.sprung_linkage import coupler_angle, pull_on_coupler
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.specs.units import format_short
 from cfmkit.stock.joint_strength import (
     SHEAR_SHARE,
@@ -388,20 +388,16 @@ def _parts(
     long = sheet + thick + _tallest_spring(spec, solution)
     yield pin_part("joints", 3 * legs, pin, long, load, "joint")
     for entry in mechanism.springs.bought:
-        value = getattr(mechanism.springs, entry.at)
-        rate = format_short(value, "stiffness" if entry.at == "slider" else "rotational_stiffness")
-        kind = f"{entry.loaded or ''} spring".strip() if entry.at == "slider" else "torsion spring"
+        joint, wound = JOINTS_BY_NAME[entry.at], entry.wound
+        rate = format_short(getattr(mechanism.springs, entry.at), joint.rate)
+        kind = f"{entry.loaded or ''} spring".strip() if joint.motion == "length" else "torsion spring"
         data = ", ".join([kind, f"{rate} of all in one leg", *guide_words(entry)])
-        wound = entry.wound
         size = f"wire {mm(wound.wire)}, coil {mm(wound.coil)}, {wound.turns:g} turns" if wound else ""
-        yield ListedPart(
-            entry.at.replace("_", " "), entry.name, entry.count * legs, data, "buy", size, "", f"spring-{entry.at}"
-        )
-    reference = {entry.at for entry in mechanism.springs.bought}
-    for name, stiffness in zip(JOINT_NAMES, mechanism.springs.rates, strict=True):
-        if stiffness > 0.0 and name not in reference:
-            kind = "spring" if name == "slider" else "torsion spring"
-            value = format_short(float(stiffness), "stiffness" if name == "slider" else "rotational_stiffness")
-            yield ListedPart(
-                name.replace("_", " "), "", legs, f"{kind}, {value}, not chosen", "buy", "", "", f"spring-{name}"
-            )
+        count, name = entry.count * legs, f"spring-{entry.at}"
+        yield ListedPart(joint.words, entry.name, count, data, "buy", size, "", name)
+    listed = {entry.at for entry in mechanism.springs.bought}
+    for joint, stiffness in zip(JOINTS_BY_NAME.values(), mechanism.springs.rates, strict=True):
+        if stiffness > 0.0 and joint.name not in listed:
+            kind = "spring" if joint.motion == "length" else "torsion spring"
+            data = f"{kind}, {format_short(stiffness, joint.rate)}, not chosen"
+            yield ListedPart(joint.words, "", legs, data, "buy", "", "", f"spring-{joint.name}")

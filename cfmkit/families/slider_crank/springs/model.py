@@ -119,17 +119,15 @@ def solve_rows(variants: Variants) -> Iterator[tuple[NDArray[np.intp], SolvedRow
         if spec.fidelity != "prb" or not any(spec.mechanism.springs.rates):
             continue
         try:
-            resolved = resolve(spec)
-            assembly = assemble(resolved)
+            assembly = assemble(spec)
         except CannotBuild:
             continue
-        asked = asked_motion(resolved, assembly)
+        asked = asked_motion(spec, assembly)
         if assembly.clip_motion(*asked) == asked:
-            built[index] = resolved, assembly, asked
-            own_kind = repr(_kind(resolved)) if kind is None else kind
-            alike.setdefault((own_kind, spec.target_curve, *_flags(assembly), is_wide(assembly, *asked)), []).append(
-                index
-            )
+            built[index] = spec, assembly, asked
+            own_kind = repr(_kind(spec)) if kind is None else kind
+            key = own_kind, spec.target_curve, *_flags(assembly), is_wide(assembly, *asked)
+            alike.setdefault(key, []).append(index)
     for members in alike.values():
         for start in range(0, len(members), ROWS_TOGETHER):
             chosen = members[start : start + ROWS_TOGETHER]

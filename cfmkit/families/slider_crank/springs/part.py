@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.export.posed_part import PosedBody, PosedPart
 from cfmkit.families.slider_crank.springs.hardware import hardware, joints
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -74,7 +74,7 @@ def _depth(spec: SliderCrankSpec, rates: FloatArray, turns: FloatArray, joining:
     for name, turn in ((name, turn) for name, rate, turn in zip(JOINT_NAMES, rates, turns, strict=True) if rate):
         wound = [(spring.coil, spring.count) for spring in springs.bought if spring.at == name and spring.coil]
         if not wound:
-            return None, f"; the spring at the {name.replace('_', ' ')} has no size"
+            return None, f"; the spring at the {JOINTS_BY_NAME[name].words} has no size"
         high[name] = sum(count * height_of(name, coil, float(turn)) for coil, count in wound)
     below, above = high.pop("pivot", 0.0), max(high.values(), default=0.0)
     links = (N_SHEETS - 1) * part.sheet + joining.slider_excess

@@ -16,7 +16,7 @@ from cfmkit.families.slider_crank.springs.hardware import STRENGTH_DEFINITIONS a
 from cfmkit.families.slider_crank.springs.hardware import LinkBar, LinkLoads, allowable_of, link_loads, link_of
 from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
-from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.stock.springs.stress_and_life import (
     WIRE_DEFINITIONS,
     SpringInUse,
@@ -165,10 +165,9 @@ def _drop(solution: Solution) -> FloatArray:
 
 
 def _quantity_of_turn(joint: int) -> ScalarQuantity[Solution]:
-    words = JOINT_NAMES[joint].replace("_", " ")
     return ScalarQuantity(
         "angle",
-        f"largest rotation of the spring at the {words}",
+        f"largest rotation of the spring at the {JOINTS_BY_NAME[JOINT_NAMES[joint]].words}",
         lambda solution: solution.extremes.largest_turns[joint],
     )
 
