@@ -328,11 +328,12 @@ def _describe_overload(solution: Solution) -> tuple[str, ...]:
 
 def _is_overstressed(solution: Solution) -> Any:
     allowable = allowable_stress(solution.mechanism)
-    return allowable is not None and yields(solution.largest_pressure[0], allowable)
+    return allowable is not None and yields(solution.largest_pressure, allowable)
 
 
 def _describe_overstress(solution: Solution) -> tuple[str, ...]:
-    top, travel = (float(values[0, 0]) for values in solution.largest_pressure)
+    top = float(solution.largest_pressure[0, 0])
+    travel = float(solution.travel_of_largest_pressure[0, 0])
     return overstress(solution.mechanism, top, f"at {mm(travel)} of travel")
 
 

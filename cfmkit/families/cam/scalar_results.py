@@ -256,7 +256,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "contact_pressure_max": _quantity(
         "stress",
         "largest Hertzian pressure of the line contact on the flank, on the way up; in motion, of both sides",
-        lambda solution: solution.largest_pressure[0],
+        lambda solution: solution.largest_pressure,
         lambda solution: solution.mechanism.contact is not None,
     ),
     **{

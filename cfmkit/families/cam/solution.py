@@ -99,7 +99,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def displacement(self) -> FloatArray:
-        """Displacement of the slider, the travel from the origin that is asked for [m]."""
+        """Displacement of the slider, the travel from the origin that is requested [m]."""
         return np.asarray(self.travel + self.origin)
 
     @cached_property
@@ -148,7 +148,7 @@ class Solution(ShortRepr):
         return corner_travel if self.count > 1 else float(corner_travel[0])
 
     @cached_property
-    def flank(self) -> tuple[FlankSamples, ...]:
+    def _flank(self) -> tuple[FlankSamples, ...]:
         """Contacts on the flank: those at the samples, and before them that with which the roller leaves the corner."""
         corner, travel, states = np.atleast_1d(self.corner_travel), self.travel, self.states
         leaves = (corner > 0) & (corner <= travel[..., -1:])
@@ -161,7 +161,7 @@ class Solution(ShortRepr):
     @property
     def largest_angle_on_flank(self) -> FloatArray:
         """Largest angle between a brace's pull and its roller's motion on the flank, (..., 1) [rad]."""
-        return largest_of_each(*(np.where(at.there, at.states.pressure_angle, np.nan) for at in self.flank))
+        return largest_of_each(*(np.where(at.there, at.states.pressure_angle, np.nan) for at in self._flank))
 
     @property
     def largest_half_gap(self) -> FloatArray:
@@ -172,11 +172,20 @@ class Solution(ShortRepr):
             usable = at.there & np.isfinite(up) & np.isfinite(down) & (up + down > self.effort_error)
             return np.where(usable, (up - down) / np.where(usable, up + down, 1.0), np.nan)
 
-        return largest_of_each(*map(half_gap, self.flank))
+        return largest_of_each(*map(half_gap, self._flank))
+
+    @property
+    def largest_pressure(self) -> FloatArray:
+        """Largest pressure on the flank on the way up, (m, 1) [Pa]; NaN without a contact."""
+        return self._largest_pressure[0]
+
+    @property
+    def travel_of_largest_pressure(self) -> FloatArray:
+        """Travel at which about it is, (m, 1) [m]."""
+        return self._largest_pressure[1]
 
     @cached_property
-    def largest_pressure(self) -> tuple[FloatArray, FloatArray]:
-        """Largest pressure on the flank on the way up [Pa], NaN without a contact, and about its place [m], (m, 1)."""
+    def _largest_pressure(self) -> tuple[FloatArray, FloatArray]:
 
         def pressure(states: TrackStates, up: Forces) -> FloatArray:
             return flank_pressure(self.assembly, states, up.contact)
@@ -184,8 +193,8 @@ class Solution(ShortRepr):
         def evaluate(travel: FloatArray) -> FloatArray:
             return pressure(*self.evaluate_travel(travel, 1.0, flank=True))
 
-        pressed = (np.where(at.there, pressure(at.states, at.up), np.nan) for at in self.flank)
-        travel, values = (reduce(_append_column, parts) for parts in ((at.travel for at in self.flank), pressed))
+        pressed = (np.where(at.there, pressure(at.states, at.up), np.nan) for at in self._flank)
+        travel, values = (reduce(_append_column, parts) for parts in ((at.travel for at in self._flank), pressed))
         return extreme_next_to(evaluate, travel, values, self.count)
 
     # --- at any travel ----------------------------------------------------------------------------------------------

@@ -211,7 +211,7 @@ def safe_divide(load: FloatArray, lever: FloatArray) -> FloatArray:
 
 
 def _is_dead_point(states: TrackStates, loads: Loads, lever: FloatArray) -> NDArray[np.bool_]:
-    """Return where the slider has no lever on a roller whose springs carry nothing."""
+    """Return where the slider has no leverage on a roller whose springs carry nothing."""
     idle = np.abs(lever) < 1e-13
     if idle.any():
         idle &= np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
