@@ -164,7 +164,7 @@ def command_of_a_point(options: StudyOptions, redesigns: bool) -> str:
 
 def wants_parquet(text: str) -> bool:
     """Return whether ``--table`` names Parquet; UsageError if it names anything else than formats that can be had."""
-    wanted = names(text)
+    wanted = split_names(text)
     unknown = [name for name in wanted if name not in ("csv", "parquet")]
     if unknown or not wanted:
         raise UsageError(f"--table: there is no format {''.join(unknown[:1])!r}; there are csv, parquet")
@@ -175,8 +175,8 @@ def wants_parquet(text: str) -> bool:
     return "parquet" in wanted
 
 
-def names(text: str | None) -> tuple[str, ...]:
-    """Return what an option lists with commas."""
+def split_names(text: str | None) -> tuple[str, ...]:
+    """Return the names that an option lists, separated by commas; () without it."""
     return tuple(name.strip() for name in (text or "").split(",") if name.strip())
 
 

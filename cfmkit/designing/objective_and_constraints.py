@@ -44,8 +44,8 @@ class Missed:
     about: str
 
 
-def worst(rows: Iterable[LimitRows]) -> float:
-    """Return by how much the worst row is missed; zero or less where all hold."""
+def find_largest_violation(rows: Iterable[LimitRows]) -> float:
+    """Return the largest amount by which a row is missed; zero if all hold."""
     return max((-float(row.values.min(initial=0.0)) for row in rows), default=0.0)
 
 

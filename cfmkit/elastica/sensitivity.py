@@ -185,13 +185,14 @@ class Gradient:
 
     def dual_sections(self, elements: Sequence[int], fractions: Any = None) -> beam_states.BeamSections:
         """Return section forces and stresses with their derivatives, as of `dual_states`."""
-        return beam_states.sections_of_width(*self._widths_and_states(elements, fractions))
+        return beam_states.sections_of_width(*self._dual_widths_and_states(elements, fractions))
 
     def dual_stresses(self, elements: Sequence[int], fractions: Any = None) -> tuple[Any, Any]:
         """Return bending and axial stress with their derivatives, as of `dual_states`."""
-        return beam_states.bending_and_axial_stress(*self._widths_and_states(elements, fractions))
+        return beam_states.bending_and_axial_stress(*self._dual_widths_and_states(elements, fractions))
 
-    def _widths_and_states(self, elements: Sequence[int], fractions: Any) -> tuple[Any, beam_states.BeamStates]:
+    def _dual_widths_and_states(self, elements: Sequence[int], fractions: Any) -> tuple[Any, beam_states.BeamStates]:
+        """Return the beams' widths [m] at the places of `dual_states`, (n,), and these states, all with derivatives."""
         states = self.dual_states(elements, fractions)
         names = [self.path.mesh.elements.beam[element] for element in elements]
         each = np.array([[net.beams[name].section.width for name in names] for net, _ in self.designs.networks])

@@ -134,7 +134,7 @@ def _record(name: str) -> Family:
         return _REGISTERED_FAMILIES[name]
     for offer in entry_point_plugins.offers():
         if offer.name == name:
-            return entry_point_plugins.record_of(offer, FAMILY_MODULES)
+            return entry_point_plugins.import_family(offer, FAMILY_MODULES)
     close = get_close_matches(name, names(), n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
     raise UsageError(f"unknown family {name!r}; known are {', '.join(names())}{hint}")
@@ -164,7 +164,7 @@ def list_skipped() -> tuple[str, ...]:
 
 def _try_family(offer: entry_point_plugins.InstalledFamily) -> Family | str:
     try:
-        return entry_point_plugins.record_of(offer, FAMILY_MODULES)
+        return entry_point_plugins.import_family(offer, FAMILY_MODULES)
     except Unusable as problem:
         return str(problem)
 

@@ -106,8 +106,8 @@ def usable_names(taken: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in offer_names if offer_names.count(name) == 1 and name not in set(taken))
 
 
-def record_of(offer: InstalledFamily, taken: Iterable[str]) -> Family:
-    """Return the family that a package offers; its code is imported.
+def import_family(offer: InstalledFamily, taken: Iterable[str]) -> Family:
+    """Import and return the family that a package offers, under a name that is not `taken`.
 
     Raises Unusable with the reason in one line, if it cannot be used.
     """

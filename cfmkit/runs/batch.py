@@ -82,7 +82,9 @@ class BatchWork:
         spec = read(wanted)[1]
         verb = _verb(self.verb or _natural(spec), self.fresh)
         name = " ".join(spec.name.split())
-        described = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec, entry.spec))
+        described = replace(
+            entry, verb=verb.name, family=spec.family, name=name, data=_hash_input_files(spec, entry.spec)
+        )
         try:
             outcome = carry_out_run(verb, wanted, self.arguments)
         except CfmError as error:
@@ -98,8 +100,8 @@ def _natural(spec: Spec) -> str:
     return "design" if designs else "analyze"
 
 
-def _data_of(spec: Spec, file: str) -> tuple[tuple[str, str | None], ...]:
-    """Return the files that a specification takes values and data from, and the hashes of their content."""
+def _hash_input_files(spec: Spec, file: str) -> tuple[tuple[str, str | None], ...]:
+    """Return (file, hash) of each file that a specification takes values or data from."""
     from cfmkit.specs.data_file_paths import list_data_files
     from cfmkit.specs.yamlio.base_file import base_files
     from cfmkit.store import file_hash

@@ -196,7 +196,7 @@ def folders(files: Sequence[str]) -> tuple[str, ...]:
     depths = dict.fromkeys(paths, 1)
     while twice := _find_repeated(depths):
         depths |= {path: depths[path] + 1 for path in twice}
-    return tuple(_distinct(_tail(path, depths[path]) for path in paths))
+    return tuple(_make_folder_names(_tail(path, depths[path]) for path in paths))
 
 
 def _tail(path: Path, depth: int) -> str:
@@ -211,7 +211,8 @@ def _find_repeated(depths: Mapping[Path, int]) -> list[Path]:
     ]
 
 
-def _distinct(names: Iterable[str]) -> Iterator[str]:
+def _make_folder_names(names: Iterable[str]) -> Iterator[str]:
+    """Yield each name as a folder may have it; "-2", "-3", ... follow those that are taken, as by a batch's files."""
     taken = set(TAKEN_NAMES)
     for name in names:
         plain = "".join(char if char.isprintable() and char not in '\\/:*?"<>|' else "_" for char in name)

@@ -101,7 +101,7 @@ def _sets_samples(change: str) -> bool:
 
 def changes_of(options: SensitivityOptions) -> dict[str, Any]:
     """Return what the options say, by key of the block."""
-    from cfmkit.cli.run_study_in_folder import names
+    from cfmkit.cli.run_study_in_folder import split_names
 
     said = {
         "method": options.method,
@@ -109,7 +109,7 @@ def changes_of(options: SensitivityOptions) -> dict[str, Any]:
         "parameters": dict(map(spread, options.vary)) if options.vary else None,
         # What the spec says goes together names parameters that may not be there any more.
         "correlated": () if options.vary else None,
-        "metrics": names(options.metrics) or None,
+        "metrics": split_names(options.metrics) or None,
         "design": options.design or None,
     }
     return {key: value for key, value in said.items() if value is not None}

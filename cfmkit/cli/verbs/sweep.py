@@ -79,7 +79,7 @@ def request(options: SweepOptions) -> SweepRequest:
 
     Raises UsageError if one is malformed, or two contradict each other.
     """
-    from cfmkit.cli.run_study_in_folder import names
+    from cfmkit.cli.run_study_in_folder import split_names
     from cfmkit.studies.sweep_request_and_files import SweepRequest
     from cfmkit.studies.variations import parse_variation
 
@@ -92,7 +92,7 @@ def request(options: SweepOptions) -> SweepRequest:
         samples=samples,
         design=options.design or None,
         curves=options.curves or None,
-        metrics=names(options.metrics),
+        metrics=split_names(options.metrics),
         seed=options.seed,
         most=options.max_points,
         pictures=options.report or not options.no_plots,

@@ -322,7 +322,10 @@ class EquilibriumPath(ShortRepr):
 
     # -- stresses ----------------------------------------------------------------------------------------------------
     def beam_stresses(self, axial: bool = True) -> tuple[FloatArray, FloatArray]:
-        """Return the largest stress of b beams at every point, (b, n) [Pa], and its place (share of the length)."""
+        """Return the largest stress magnitude of b beams at every point, (b, n) [Pa], and its share of the length.
+
+        Bending and axial stress together; of bending alone if not `axial`.
+        """
         if axial not in self._beam_stresses:
             found = stress_extremes.largest_stresses(self.network, self.at, list(self.network.beams), axial)
             self._beam_stresses[axial] = read_only(found[0]), read_only(found[1])

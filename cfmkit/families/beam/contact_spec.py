@@ -297,7 +297,7 @@ def end_radii(mechanism: Mechanism, beam: str) -> dict[str, float]:
 
 
 def list_names(names: Iterable[str]) -> str:
-    """Return the first of some names in a row."""
+    """Return names separated by commas, twelve at most; ", ..." stands for the rest."""
     listed = list(names)
     return ", ".join(listed[:12]) + (", ..." if len(listed) > 12 else "")
 

@@ -40,11 +40,11 @@ def taut_beams(path: Path, last: int) -> list[str]:
 
     These are beams, or else ways along several of them from the driven node to a support.
     """
-    return list(_find_pulled(path, last)) or list(_find_taut_supports(path, last))
+    return list(_describe_pulled_beams(path, last)) or list(_describe_taut_supports(path, last))
 
 
-def _find_pulled(path: Path, last: int) -> Iterator[str]:
-    """Yield the beams that are straight and pulled hard."""
+def _describe_pulled_beams(path: Path, last: int) -> Iterator[str]:
+    """Yield a text for each beam that is straight and pulled hard: distance of its ends, and length."""
     for name, beam in path.network.beams.items():
         line = path.shape(name, last)
         chord = line[-1] - line[0]
@@ -57,8 +57,8 @@ def _find_pulled(path: Path, last: int) -> Iterator[str]:
             yield f"{name}: {_describe_beam(distance_of_ends, length)}"
 
 
-def _find_taut_supports(path: Path, last: int) -> Iterator[str]:
-    """Yield the supports that the driven node has moved away from by nearly the whole way along the beams."""
+def _describe_taut_supports(path: Path, last: int) -> Iterator[str]:
+    """Yield a text for each support to which the beams from the driven node are straight: distance, and length."""
     network, drive = path.network, path.load_case
     if not isinstance(drive, Displacement):
         return

@@ -130,7 +130,8 @@ def _move_across(motion: FloatArray, drive: Any) -> FloatArray:
     return np.asarray(np.cos(drive.direction) * motion[:, 1] - np.sin(drive.direction) * motion[:, 0])
 
 
-def _cross_stiffness(solution: Solution) -> float:
+def _smallest_cross_stiffness(solution: Solution) -> float:
+    """Return the smallest stiffness across the drive in the window [N/m]; NaN at a pole, or if the drive turns."""
     drive: Any = solution.spec.mechanism.drive
     if drive.turns:
         return math.nan
@@ -352,7 +353,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "smallest stiffness of the driven node across the drive, in the window, of all copies: force over displacement "
         "with the drive held and the rotation as supported, without the guide that holds the node across; no value at "
         "a bifurcation, where it is unbounded",
-        _cross_stiffness,
+        _smallest_cross_stiffness,
     ),
     "frequency_held_min": _quantity(
         "frequency", "lowest natural frequency in the window while the drive is held", _lowest_frequency("held")

@@ -102,7 +102,7 @@ class MeasuredCam(ShortRepr):
 
     @property
     def slider(self) -> FloatArray:
-        """Heights of the slider above the path's first point, (n,) [m]."""
+        """Heights of the slider above the first point of the design's roller path, (n,) [m]."""
         return self.assembly.track.start + self.travel
 
     @property

@@ -48,8 +48,8 @@ _MAX_ROUNDS = 12
 _DIFFERENCE_STEP = 1e-6  # of friction, and of the rest half width [m], for derivatives
 
 
-def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
-    """Return what explains a measured loop of a mechanism at rest, by name; nothing for a motion."""
+def attribute_deviation(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
+    """Return causes of a measured loop's deviation from a quasi-static model, by name; empty for a model in time."""
     state = result.state
     if not isinstance(state, MeasuredCam | Solution):
         return {}

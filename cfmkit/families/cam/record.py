@@ -15,7 +15,7 @@ with deferred_imports():
     from cfmkit.families.cam.design import design
     from cfmkit.families.cam.dynamics import analyze as analyze_motion
     from cfmkit.families.cam.figures import figures, moving
-    from cfmkit.families.cam.measured_deviation_causes import attribute
+    from cfmkit.families.cam.measured_deviation_causes import attribute_deviation
     from cfmkit.families.cam.model import analyze, solve_rows
     from cfmkit.families.cam.outline import drawing
     from cfmkit.families.cam.part import part_over_motion
@@ -47,7 +47,7 @@ FAMILY_RECORD = Family(
     rows=solve_rows,
     free=free,
     errors=errors,
-    attribution=attribute,
+    attribution=attribute_deviation,
     draw=Pictures(figures, moving),
     outline=drawing,
     propose=propose,

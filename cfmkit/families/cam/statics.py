@@ -311,14 +311,14 @@ def _forces_with_losses(states: TrackStates, loads: Loads, rolling: Any, directi
         guided,
         lambda: (np.maximum(right.contact, left.contact), np.maximum(np.abs(right.axial), np.abs(left.axial))),
         np.minimum(right.contact, left.contact),
-        _friction_power(states, loads, losses, (right, left)) | {"guide": np.abs(guided - free)},
+        _find_friction_forces(states, loads, losses, (right, left)) | {"guide": np.abs(guided - free)},
     )
 
 
-def _friction_power(
+def _find_friction_forces(
     states: TrackStates, loads: Loads, losses: Losses, sides: tuple[_Side, _Side]
 ) -> dict[str, FloatArray]:
-    """Return the power that each kind of friction takes, over the slider's speed [N]."""
+    """Return the power that each kind of friction takes, divided by the slider's speed [N]."""
     tangent = states.tangent
     axial, contact = (sum(np.abs(getattr(side, name)) for side in sides) for name in ("axial", "contact"))
     worn = losses.bearing * np.sqrt(1.0 + normal_turn(losses, losses.rolling) ** 2)

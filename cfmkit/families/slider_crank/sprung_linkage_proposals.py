@@ -349,7 +349,11 @@ def _hole_of_coil(spec: SliderCrankSpec, name: str, turn: float) -> float:
 
 
 def _find_springs(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEffort | None:
-    """Return the flattest springs; for a force those of the first motion that are flat enough, and none is left out."""
+    """Return the springs and the window that hold the effort with the smallest deviation; None if no springs fit.
+
+    For a force, candidate motions are tried in order up to the first that is flat enough, and only springs without
+    which the deviation does not grow are dropped; for a torque as many as it takes to stay flat enough.
+    """
     flat = FLAT_DEVIATION_SHARE * request.ripple
     if request.kind == "torque":
         turning = _turning(request, linkage_of(spec.mechanism), float(spec.mechanism.unloaded_angle or 0.0), sheet)

@@ -262,13 +262,13 @@ def fillets(solution: Solution) -> tuple[tuple[FilletRow, ...], tuple[FilletRow,
     """
     sampler: Any = solution.sampler  # of solids
     leaf = _rows(solution, "leaf", "shuttle", (sampler.pushed, sampler.pulled))
-    network, placed = leaf_network(solution.spec), partial(_place_in_leaf_network, solution.spec)
+    network, placed = leaf_network(solution.spec), partial(_to_leaf_network, solution.spec)
     leaf = _with_nominal(leaf, [row.motion for row in leaf], network, "shuttle", placed)
     if not sampler.sides:
         return leaf, ()
     chain, spring = sampler.chain, _rows(solution, "spring", "block", sampler.sides)
     travel = [chain.travel * (row.motion + (row.preload or 0.0)) for row in spring]
-    return leaf, _with_nominal(spring, travel, chain.network, chain.node, partial(_place_in_chain, solution.spec))
+    return leaf, _with_nominal(spring, travel, chain.network, chain.node, partial(_to_spring_network, solution.spec))
 
 
 def _rows(solution: Solution, piece: str, moved: str, ways: Sequence[Any]) -> tuple[FilletRow, ...]:
@@ -297,15 +297,15 @@ def _with_nominal(
     return with_nominal(rows, nominal_stresses(rows, np.array(travel), paths, placed))
 
 
-def _place_in_leaf_network(spec: VcfmSpec, points: FloatArray) -> FloatArray:
-    """Return where in the network of leaves points of the drawing are (m, 2) [m]: there the walls come first."""
+def _to_leaf_network(spec: VcfmSpec, points: FloatArray) -> FloatArray:
+    """Return points of the drawing, (m, 2) [m], in axes of the leaf network: right wall at x = 0, x to the left."""
     strip, half = strip_of(spec.mechanism.bistable, spec.mechanism.material), 0.5 * spec.mechanism.frame.shuttle_width
     x, y = points.T
     return np.column_stack([float(strip.reach) + half * np.sign(x) - x, y + float(strip.rise)])
 
 
-def _place_in_chain(spec: VcfmSpec, points: FloatArray) -> FloatArray:
-    """Return where in the network of the spring points of the drawing are (m, 2) [m]: there the block stands."""
+def _to_spring_network(spec: VcfmSpec, points: FloatArray) -> FloatArray:
+    """Return points of the drawing, (m, 2) [m], in axes of the spring's network, in which the block stands."""
     block = spec.mechanism.frame.block
     return np.column_stack([points[:, 0] - 0.5 * block, -points[:, 1] - block])
 

@@ -158,7 +158,7 @@ class Parts:
         try:
             return cls.from_block(spec, _block(stated, design.correlated), *_count_and_seed(spec, design, seed))
         except SpecError as error:
-            raise SpecError([replace(one, path=_rename_fault(one.path)) for one in error.problems]) from None
+            raise SpecError([replace(one, path=_to_design_path(one.path)) for one in error.problems]) from None
 
     @classmethod
     def from_expected_errors(cls, spec: Spec, seed: int, process: str | None = None) -> tuple[Parts | None, str]:
@@ -249,8 +249,8 @@ def errs_nowhere(spec: Spec, design: DesignBlock) -> bool:
     return spec.fidelity != "solid" and not stated_tolerances(spec, design)
 
 
-def _rename_fault(path: str) -> str:
-    """Return where a fault of a block `sensitivity` stands in a block `design`."""
+def _to_design_path(path: str) -> str:
+    """Return the path in a block `design` that stands for a path in a block `sensitivity`."""
     head, _, rest = path.partition(".parameters.")
     return f"design.tolerances.{rest}" if rest else head.replace("sensitivity", "design", 1)
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.objective_and_constraints import LimitRows, worst
+from cfmkit.designing.objective_and_constraints import LimitRows, find_largest_violation
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.numerics.sampled_extremes import largest, largest_of_three, soft_least
 
@@ -65,8 +65,8 @@ class View:
 
     @property
     def violation(self) -> float:
-        """By how much the worst limit is missed."""
-        return worst(self.list_limits())
+        """Largest amount by which a limit is missed, in that limit's own scale [1]; zero if all hold."""
+        return find_largest_violation(self.list_limits())
 
     @cached_property
     def window_force(self) -> FloatArray:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint, worst
+from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint, find_largest_violation
 from cfmkit.families.beam.shaping.limits import View
 from cfmkit.families.beam.shaping.response import NoAnswer, poses_of, respond
 
@@ -67,7 +67,7 @@ class Shaping(DesignProgram):
         z = np.concatenate([x, self.goal.start(view)])
         if not self.elastic:
             return z
-        return np.append(z, worst(rows for rows in view.list_limits() if rows.name in self.elastic))
+        return np.append(z, find_largest_violation(rows for rows in view.list_limits() if rows.name in self.elastic))
 
     def evaluate(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the goal, its rows and those of all limits at the design and the goal's own variables."""

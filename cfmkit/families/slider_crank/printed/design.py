@@ -110,7 +110,7 @@ def _strip(spec: SliderCrankSpec, run: Run) -> Design:
             continue
         if allowed is not None:
             allowed /= max(1.0, judged.overstress)
-        reported = _report(_write_strip(spec, judged, wanted.shape == "uniform"), judged.window, run)
+        reported = _report(_with_finished_strip(spec, judged, wanted.shape == "uniform"), judged.window, run)
         if not reported.keeps(*limits):
             refused = _not_kept(reported, judged.window, limits)
             continue
@@ -387,10 +387,11 @@ def _with_strip(
     return with_values(spec, changes | {"mechanism.beam": strip})
 
 
-def _write_strip(spec: SliderCrankSpec, judged: FinishedStrip, uniform: bool) -> SliderCrankSpec:
-    listed = tuple(round(float(value), LENGTH_DECIMALS) for value in np.asarray(judged.strip.thickness))
-    width = round(float(judged.strip.width), LENGTH_DECIMALS)
-    return _with_strip(spec, width, listed[0] if uniform else listed, judged.shares, judged.window)
+def _with_finished_strip(spec: SliderCrankSpec, finished: FinishedStrip, uniform: bool) -> SliderCrankSpec:
+    """Return a specification with a finished strip, rounded; if it is uniform, with one thickness instead of a list."""
+    listed = tuple(round(float(value), LENGTH_DECIMALS) for value in np.asarray(finished.strip.thickness))
+    width = round(float(finished.strip.width), LENGTH_DECIMALS)
+    return _with_strip(spec, width, listed[0] if uniform else listed, finished.shares, finished.window)
 
 
 def _message(strip: FoundStrip, judged: FinishedStrip, reported: Reported) -> str:

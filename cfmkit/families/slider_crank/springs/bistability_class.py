@@ -102,18 +102,18 @@ def _drop(walk: FloatArray) -> FloatArray:
     return np.where(drop > EFFORT_RTOL, drop, 0.0)
 
 
-def signs(curves: Monotone, start: FloatArray) -> NDArray[np.int8]:
-    """Return the signs of the efforts, (m, k): 0 in the unloaded position and where only rounding is left."""
+def find_effort_signs(curves: Monotone, rest: FloatArray) -> NDArray[np.int8]:
+    """Return the signs of the efforts, (m, k): 0 at `rest` (m, 1), NaN for nowhere, and where only rounding is left."""
     scale = np.nanmax(np.abs(curves.value), axis=1, initial=0.0, keepdims=True)
     sign = np.sign(curves.value).astype(np.int8)
     same_place = EFFORT_RTOL * np.maximum(np.ptp(curves.place, axis=1, keepdims=True), 1e-300)
-    sign[(np.abs(curves.value) <= EFFORT_RTOL * scale) | (np.abs(curves.place - start) <= same_place)] = 0
+    sign[(np.abs(curves.value) <= EFFORT_RTOL * scale) | (np.abs(curves.place - rest) <= same_place)] = 0
     return sign
 
 
-def _equilibria(curves: Monotone, start: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _equilibria(curves: Monotone, rest: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the numbers of stable and unstable equilibria, those at the ends included."""
-    sign = signs(curves, start)
+    sign = find_effort_signs(curves, rest)
     ends = sign[:, [0]] == 0, sign[:, [-1]] == 0
     filled = _fill_zeros(sign)
     ups = ((filled[:, :-1] < 0) & (filled[:, 1:] > 0)).sum(axis=1)
@@ -155,7 +155,7 @@ def scale_factors(
         return _required_factor(unit[:3].sum(axis=0), unit[3], sign)
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        first = _highest(lambda motion: compute_factor(assembly.forces(motion), motion - assembly.start), low, high)
+        first = _highest(lambda motion: compute_factor(assembly.forces(motion), motion - assembly.rest), low, high)
         second = _highest(lambda motion: compute_factor(assembly.units(motion).stiffness, 1.0), low, high)
     return Several((np.where(none, np.nan, first), np.where(none, np.nan, second)))
 

@@ -26,6 +26,8 @@ from cfmkit.stock.springs.support_spec import guide_cure, guide_needed
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.solution import Solution
@@ -90,7 +92,8 @@ def _is_restless(solution: Solution) -> Any:
 # --- driven by a torque ---------------------------------------------------------------------------------------------
 
 
-def _winds_up(solution: Solution) -> Any:
+def _spring_winds_up(solution: Solution) -> NDArray[np.bool_]:
+    """Return where a torque drives a full turn against a spring at the pivot or the crank pin, (m,)."""
     turns = (solution.high - solution.low)[:, 0] >= FULL_TURN * (1 - 1e-9)
     return (solution.drive == "torque") & turns & (solution.assembly.rates.reshape(4, -1)[:2] > 0.0).any(axis=0)
 
@@ -313,7 +316,7 @@ FINDING_RULES: tuple[Rule, ...] = (
             "fourth power there, and the stiffness at rest is zero; add a torsion spring",
         ),
     ),
-    FindingRule("spring_winds_up", _winds_up, _winding),
+    FindingRule("spring_winds_up", _spring_winds_up, _winding),
     FindingRule("same_position_twice", _rests_again, _again),
     FindingRule(
         "stretched_start",

@@ -27,8 +27,8 @@ from cfmkit.families.slider_crank.springs.bistability_class import (
     CLASS_NAMES,
     Classified,
     classify,
+    find_effort_signs,
     scale_factors,
-    signs,
 )
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
@@ -305,7 +305,7 @@ class Solution(ShortRepr):
     @cached_property
     def all_equilibria(self) -> tuple[NDArray[Any], ...]:
         """Row, place, stability and energy of every equilibrium, (k,) each, in order."""
-        place, sign, rest = self.curve.place, signs(self.curve, self.rest), self.rest[:, 0]
+        place, sign, rest = self.curve.place, find_effort_signs(self.curve, self.rest), self.rest[:, 0]
         roots = [(row, *root) for row in range(len(self)) for root in _roots(place[row], sign[row], rest[row])]
         if not roots:
             return Several((np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0)))

@@ -65,9 +65,9 @@ class CosineLeaf(LeafLaw):
 
     @cached_property
     def linear(self) -> tuple[Any, Any]:
-        """Range in which the arch is buckled, from and to [m]; NaN where it never is.
+        """Travels between which the arch is buckled and its force is linear, (from, to) [m]; NaN if it never is.
 
-        At a given load the shortening is quadratic in the travel: where it fits the load of buckling, that begins.
+        The shortening under the buckling load is quadratic in the travel: these are the roots of that equation.
         """
         rise = float(self.strip.rise)
         constant, by_drop, by_square = (float(item[0]) for item in self._quadratic(np.array([BUCKLING_LOAD])))

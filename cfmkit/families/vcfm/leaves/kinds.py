@@ -154,7 +154,7 @@ class LeafSpring(ABC):
 
     @abstractmethod
     def edges(self, block: float, corner: float, fillet: float, top: float) -> Edges:
-        """Return outer and inner edge of the right half between its blocks, from the top down, and its lowest point.
+        """Return outer and inner edge of the right half between its blocks, from the top down, and the lowest y.
 
         The inner edge is empty where the two blocks are one.
 

@@ -106,7 +106,7 @@ class Diamond(LeafSpring):
         return float(max(BLOCK_HEIGHT_RATIO * thickness, 0.5 * thickness / np.cos(angle) + FILLET_MARGIN * beside))
 
     def edges(self, block: float, corner: float, fillet: float, top: float) -> Edges:
-        """Return outer and inner edge of the right chain from its top down, and its lowest point [m]."""
+        """Return outer and inner edge of the right chain from its top down, and the lowest y [m]."""
         strip = self.strip
         half, x = 0.5 * block, 0.5 * block + float(strip.reach)
         rise, v, rim = float(strip.rise), 0.5 * strip.thickness / float(np.cos(strip.angle)), self.rim(fillet)
@@ -212,7 +212,7 @@ class UShape(LeafSpring):
         return SpringChain(Network(nodes, beams), "end", 1.0, 2.0 * self.share)
 
     def edges(self, block: float, _corner: float, _fillet: float, top: float) -> Edges:
-        """Return outer and inner edge of the right chain from its top down, and its lowest point [m]."""
+        """Return outer and inner edge of the right chain from its top down, and the lowest y [m]."""
         from cfmkit.export.contours import Arc
 
         half, v, radius = 0.5 * block, 0.5 * self.strip.thickness, float(self.radius)
@@ -299,7 +299,7 @@ class StraightSpring(LeafSpring):
         return leaf_chain(self.strip, section, slider_support(0.5 * np.pi), 1.0, 2.0 * self.share)
 
     def edges(self, block: float, _corner: float, _fillet: float, top: float) -> Edges:
-        """Return the edge of the right half, with its end block, and its lowest point [m]."""
+        """Return the outer edge of the right half with its end block, no inner edge, and the lowest y [m]."""
         half, v = 0.5 * block, 0.5 * self.strip.thickness
         x, middle = half + self.strip.length, top - block
         out, bottom = x + block, top - block - half
