@@ -96,7 +96,7 @@ AT_END = {"design.rescale.force": "nominal_force"}
 """Levels that are no mean over the window, but the force at its end; and the metric that is compared."""
 
 
-def verify_by_solid(given: Spec, design: Design, run: Run) -> Design:
+def verify_by_solid(requested: Spec, design: Design, run: Run) -> Design:
     """Return a design that ends with its part as a solid, whose force is the wanted one: the mean, or that at the end.
 
     Parameters
@@ -116,7 +116,7 @@ def verify_by_solid(given: Spec, design: Design, run: Run) -> Design:
     """
     if design.spec is None:
         return design
-    record = family(given.family)
+    record = family(requested.family)
     try:
         as_solid = design.spec.replace({FIDELITY_KEY: "solid"})
     except SpecError as error:
@@ -125,23 +125,23 @@ def verify_by_solid(given: Spec, design: Design, run: Run) -> Design:
     beams = record.analyze(design.spec, run)
     solid = record.analyze(as_solid, run)
     levels = record.design.levels if record.design else ()
-    path = next((path for path in levels if _level(given, path)), None)
-    own, found, where = _values(beams, solid, AT_END[path]) if path in AT_END else _means(beams, solid)
-    wanted = own if path is None else math.copysign(_level(given, path), own or 0.0)
-    if solid.status is not Status.COMPLETE or not wanted or not found or not own or wanted / found <= 0:
+    path = next((path for path in levels if _level(requested, path)), None)
+    by_beams, by_solid, where = _values(beams, solid, AT_END[path]) if path in AT_END else _means(beams, solid)
+    wanted = by_beams if path is None else math.copysign(_level(requested, path), by_beams or 0.0)
+    if solid.status is not Status.COMPLETE or not wanted or not by_solid or not by_beams or wanted / by_solid <= 0:
         reported = f"the part as a solid has no force that could be corrected: {solid.message}"
         return replace(design, spec=as_solid, notes=(*design.notes, ("verify", reported)))
-    factor = wanted / found
+    factor = wanted / by_solid
     kind = solid.curve.kind
     mean, which = ("", f"force{where}") if path in AT_END else ("mean ", "mean force")
     begun = (
-        f"{design.spec.fidelity} has a {mean}{kind} of {format_short(own, kind)}, the part as a solid of "
-        f"{format_short(found, kind)} ({100 * (found / own - 1):+.2g} %){where}"
+        f"{design.spec.fidelity} has a {mean}{kind} of {format_short(by_beams, kind)}, the part as a solid of "
+        f"{format_short(by_solid, kind)} ({100 * (by_solid / by_beams - 1):+.2g} %){where}"
     )
     if _sheet(as_solid):
-        return _relevel(given, design, as_solid, path, factor, begun, run)
+        return _relevel(requested, design, as_solid, path, factor, begun, run)
     corrected = {path: float(f"{factor * width:.{WIDTH_DIGITS}g}") for path, width in _widths(as_solid).items()}
-    outside = _explain_outside(given, design.spec, corrected)
+    outside = _explain_outside(requested, design.spec, corrected)
     if outside is not None:
         return outside
     reported = "; ".join(
@@ -153,8 +153,8 @@ def verify_by_solid(given: Spec, design: Design, run: Run) -> Design:
     note = f"{begun}; all widths are multiplied by {factor:.5g}, so that the solid has {aim}: {reported}"
     numbers = {
         "verified_target": (wanted, kind, f"requested {which} of the part as a solid"),
-        "verified_before": (own, kind, f"{which} of the design by its own model"),
-        "verified_solid_before": (found, kind, f"{which} of the part as a solid, before its correction"),
+        "verified_before": (by_beams, kind, f"{which} of the design by its own model"),
+        "verified_solid_before": (by_solid, kind, f"{which} of the part as a solid, before its correction"),
         "verified_width_factor": (factor, "ratio", "factor by which all widths were multiplied"),
     }
     about = search_values(numbers, "solid", solid.travel or (0.0, 0.0), made.motion or "length")
@@ -162,24 +162,24 @@ def verify_by_solid(given: Spec, design: Design, run: Run) -> Design:
 
 
 def _relevel(
-    given: Spec, design: Design, as_solid: Spec, path: str | None, factor: float, begun: str, run: Run
+    requested: Spec, design: Design, as_solid: Spec, path: str | None, factor: float, begun: str, run: Run
 ) -> Design:
     """Return a design of another force, whose solid has the wanted one: the widths are those of the sheet."""
     if path is None:
         reported = f"{begun}; the sheet fixes the widths and the design states no force: no correction is made"
         return replace(design, spec=as_solid, notes=(*design.notes, ("verify", reported)))
-    wanted = _level(given, path)
-    method = family(given.family).design
+    wanted = _level(requested, path)
+    method = family(requested.family).design
     assert method is not None
-    again = method.make(given.replace({path: factor * wanted}), run)
+    again = method.make(requested.replace({path: factor * wanted}), run)
     if again.spec is None:
         return replace(again, message=f"design.verify: for a solid of {format_short(wanted, 'force')}, {again.message}")
     # what is wanted stays what is wanted
     made = again.spec.replace({path: wanted, FIDELITY_KEY: "solid"})
-    other, aim = format_short(factor * wanted, "force", 5), format_short(wanted, "force")
-    note = f"{begun}; the sheet fixes the widths, so it is designed for {other} instead of {aim}"
+    reached, aim = format_short(factor * wanted, "force", 5), format_short(wanted, "force")
+    note = f"{begun}; the sheet fixes the widths, so it is designed for {reached} instead of {aim}"
     if (
-        getattr(given.get_value("design"), "yield", None) is not None
+        getattr(requested.get_value("design"), "yield", None) is not None
     ):  # these are judged by requirements about what is wanted
         note += "; the margins of design.yield are not repeated for that force"
     return replace(again, spec=made, notes=(*again.notes, ("verify", note)))
@@ -187,15 +187,15 @@ def _relevel(
 
 def _values(beams: Result, solid: Result, name: str) -> tuple[float | None, float | None, str]:
     """Return the forces of both at the end of the window, and that they are those there."""
-    own, found = (evaluate(one, [name])[name].value if one.curves else None for one in (beams, solid))
-    return own, found, " at the end of the window"
+    by_beams, by_solid = (evaluate(result, [name])[name].value if result.curves else None for result in (beams, solid))
+    return by_beams, by_solid, " at the end of the window"
 
 
 def _means(beams: Result, solid: Result) -> tuple[float | None, float | None, str]:
     """Return the mean forces or torques of both, and over which travel where that is not their window."""
     if not beams.curves or not solid.curves or np.allclose(beams.travel or 0.0, solid.travel or 0.0, rtol=1e-9):
         return mean_effort(beams), mean_effort(solid), ""
-    far = min(abs(float(one.curve.motion[-1])) for one in (beams, solid))
+    far = min(abs(float(result.curve.motion[-1])) for result in (beams, solid))
     window = window_of(beams)
     low, high = sorted((abs(window.lo), abs(window.hi))) if window is not None else (0.0, far)
     reported = format_short(min(high, far), solid.spec.motion or "length")
@@ -231,9 +231,9 @@ def _level(spec: Spec, path: str) -> float:
         return 0.0
 
 
-def _explain_outside(given: Spec, designed: Spec, corrected: Mapping[str, float]) -> Design | None:
+def _explain_outside(requested: Spec, designed: Spec, corrected: Mapping[str, float]) -> Design | None:
     """Return why there is no design, where a corrected width is not in the range that it is designed in."""
-    for path, (low, high) in family(given.family).free(given, designed).items():
+    for path, (low, high) in family(requested.family).free(requested, designed).items():
         if path in corrected and not low * (1 - 1e-9) <= corrected[path] <= high * (1 + 1e-9):
             reported = (
                 f"design.verify: for the requested force of the solid {path} would be "

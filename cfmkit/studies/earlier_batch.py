@@ -74,8 +74,8 @@ def read_earlier_batch(folder: str) -> Known:
     folders = {}
     for entry in listed:
         if isinstance(entry, dict) and isinstance(name := entry.get("folder"), str):
-            own = _read_json(os.path.join(folder, name, "metrics.json")) or {}
-            metrics = flat_metrics(own.get("metrics", {}))
+            record = _read_json(os.path.join(folder, name, "metrics.json")) or {}
+            metrics = flat_metrics(record.get("metrics", {}))
             folders[name] = Earlier(str(entry.get("status", "")), int(entry.get("exit_code", 0)), metrics)
     return folders
 
@@ -105,8 +105,8 @@ def changes(
             ends = _outcome_text(before.status, before.exit_code), _outcome_text(entry.status, int(entry.code))
             changes.append(MetricChange(entry.spec, "status", *ends, "", None, True))
         if entry.written:
-            own = _read_json(os.path.join(folder, entry.folder, "metrics.json")) or {}
-            now = flat_metrics(own.get("metrics", {}))
+            record = _read_json(os.path.join(folder, entry.folder, "metrics.json")) or {}
+            now = flat_metrics(record.get("metrics", {}))
             sides = Compared("the earlier batch", metrics=before.metrics), Compared(entry.spec, metrics=now)
             changes += compare(*sides, tolerance=tolerance).changes
     return tuple(changes)

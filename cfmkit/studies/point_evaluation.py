@@ -168,8 +168,8 @@ class Study:
     def check_requirements(self, kind: Kind) -> None:
         """Raise SpecError if a requirement is not well put for curves of a kind."""
         if kind not in self._checked:
-            known = self.definitions(kind).values()
-            self._checked[kind] = tuple(requirement_problems(self.spec.part_requirements, known, kind))
+            definitions = self.definitions(kind).values()
+            self._checked[kind] = tuple(requirement_problems(self.spec.part_requirements, definitions, kind))
         if problems := self._checked[kind]:
             raise SpecError(problems)
 
@@ -216,8 +216,8 @@ def metrics_of(
         left_out = _left_out(spec, sample)
         listed = (item.name for item in definitions(kind, family_values))
         asked = tuple(name for name in dict.fromkeys(listed) if name not in left_out)
-    known = metrics_by_name(kind, family_values)
-    meant = [(name, definition_of(name, known, outputs.branches)) for name in asked]
+    metrics = metrics_by_name(kind, family_values)
+    meant = [(name, definition_of(name, metrics, outputs.branches)) for name in asked]
     return tuple(
         Metric(name, definition.dimension, definition.definition, words=outputs.words.get(name, ()))
         for name, definition in meant

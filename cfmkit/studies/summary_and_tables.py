@@ -57,21 +57,21 @@ def results_csv(
 def results_table(records: Records, indices: NDArray[np.int64], rows: ResultRows) -> Table:
     """Return some rows as a table in border units."""
     study = records.work.study
-    metrics = (_noted_column(one, rows.values[:, k]) for k, one in enumerate(study.metrics))
+    metrics = (_noted_column(metric, rows.values[:, k]) for k, metric in enumerate(study.metrics))
     met = [TableColumn("requirements_met", _met_words(rows))] if study.spec.part_requirements else []
     reported = [rows.status(k) for k in range(len(rows))] if rows.odd else None
-    status = tuple(one.key for one, _ in reported) if reported else ("complete",) * len(rows)
+    status = tuple(reported_row.key for reported_row, _ in reported) if reported else ("complete",) * len(rows)
     message = tuple(text or None for _, text in reported) if reported else (None,) * len(rows)
     ends = TableColumn("status", status), TableColumn("warnings", _warnings(rows)), text_column("message", message)
     return Table((*varied_columns(records.work.plan, indices), *metrics, *met, *ends))
 
 
-def _noted_column(one: Metric, values: FloatArray) -> TableColumn:
+def _noted_column(metric: Metric, values: FloatArray) -> TableColumn:
     """Return a metric as a column: numbers in the border unit, or words."""
-    if not one.words:
-        return border_column(one.label, values, one.dimension)
-    words = np.array([*one.words, None], dtype=object)
-    return TableColumn(one.label, tuple(words[np.where(np.isfinite(values), values, -1).astype(int)].tolist()))
+    if not metric.words:
+        return border_column(metric.label, values, metric.dimension)
+    words = np.array([*metric.words, None], dtype=object)
+    return TableColumn(metric.label, tuple(words[np.where(np.isfinite(values), values, -1).astype(int)].tolist()))
 
 
 def varied_columns(plan: Plan, indices: NDArray[np.int64]) -> Iterator[TableColumn]:
@@ -103,8 +103,8 @@ def _warnings(rows: ResultRows) -> tuple[str | None, ...]:
     names = sorted(rows.warned)
     for k, name in enumerate(names):
         combined |= rows.warned[name].astype(np.int64) << k
-    found, place = np.unique(combined, return_inverse=True)
-    texts = [WARNINGS_JOINT.join(name for k, name in enumerate(names) if code >> k & 1) or None for code in found]
+    codes, place = np.unique(combined, return_inverse=True)
+    texts = [WARNINGS_JOINT.join(name for k, name in enumerate(names) if code >> k & 1) or None for code in codes]
     return tuple(texts[at] for at in place.tolist())
 
 
@@ -132,25 +132,26 @@ def curves_csv(records: Records) -> Iterator[bytes]:
 
 def _headers(records: Records) -> tuple[str, ...]:
     """Return every header that occurs in a curve, in order."""
-    found: dict[str, None] = {}
+    headers: dict[str, None] = {}
     seen: set[bytes] = set()
     for _, rows in records.batches(1):
         for text in rows.curves.values():
             line = text[: text.index(b"\n") + 1]
             if line not in seen:
                 seen.add(line)
-                found |= dict.fromkeys(read_csv(line).headers)
-    return tuple(found)
+                headers |= dict.fromkeys(read_csv(line).headers)
+    return tuple(headers)
 
 
 def _with_values(plan: Plan, index: int, curve: Table, headers: tuple[str, ...]) -> Table:
     """Return the curve of one point with the point's values in front and every column of the file."""
     count = len(curve)
     leading = (
-        TableColumn(one.name, tuple(one.cells()) * count, one.unit) for one in varied_columns(plan, np.array([index]))
+        TableColumn(variable.name, tuple(variable.cells()) * count, variable.unit)
+        for variable in varied_columns(plan, np.array([index]))
     )
-    own = {column.header: column for column in curve.columns}
-    return Table((*leading, *(own.get(header) or _empty(header, count) for header in headers)))
+    columns = {column.header: column for column in curve.columns}
+    return Table((*leading, *(columns.get(header) or _empty(header, count) for header in headers)))
 
 
 def _empty(header: str, count: int) -> TableColumn:
@@ -189,19 +190,22 @@ class Objective:
 
 def objective(study: Study) -> Objective | None:
     """Return by what the best point is chosen; None if the study notes nothing of the kind."""
-    for one in study.spec.part_requirements:
-        names = one.metric, other_name(one.metric)
+    for requirement in study.spec.part_requirements:
+        names = requirement.metric, other_name(requirement.metric)
         noted = [column for column, item in enumerate(study.metrics) if item.name in names]
         # over another window is the next best that is known: points that meet the requirement come first anyway
         best = min(
             noted,
-            key=lambda column: (study.metrics[column].over != one.over, study.metrics[column].name != one.metric),
+            key=lambda column: (
+                study.metrics[column].over != requirement.over,
+                study.metrics[column].name != requirement.metric,
+            ),
             default=None,
         )
         if best is not None:
-            limits = Bounds.from_requirement(one, study.metrics[best].dimension)
+            limits = Bounds.from_requirement(requirement, study.metrics[best].dimension)
             middle = None if limits.min is None or limits.max is None else 0.5 * (limits.min + limits.max)
-            return Objective(best, one.max is None, middle)
+            return Objective(best, requirement.max is None, middle)
     for name in DEFAULT_OBJECTIVES:
         if name in study.names:
             return Objective(study.names.index(name), False)
@@ -210,7 +214,11 @@ def objective(study: Study) -> Objective | None:
 
 def main_columns(study: Study, headline: tuple[str, ...]) -> tuple[int, ...]:
     """Return the columns that are looked at first: the objective, the requirements, the family's headline."""
-    required = [name for one in study.spec.part_requirements for name in (one.metric, other_name(one.metric))]
+    required = [
+        name
+        for requirement in study.spec.part_requirements
+        for name in (requirement.metric, other_name(requirement.metric))
+    ]
     wanted = [*required, *DEFAULT_OBJECTIVES, *headline, *study.names]
     chosen = objective(study)
     first = [] if chosen is None else [chosen.column]
@@ -368,23 +376,23 @@ class Summary:
     def _metrics(self) -> dict[str, Any]:
         values = [] if self.best_values is None else self.best_values.tolist()
         return {
-            one.name: {
+            metric.name: {
                 "value": self.study.format_metric(k, value),
-                "unit": border_unit(one.dimension),
-                "definition": one.definition,
+                "unit": border_unit(metric.dimension),
+                "definition": metric.definition,
             }
-            for k, (one, value) in enumerate(zip(self.study.metrics, values, strict=False))
+            for k, (metric, value) in enumerate(zip(self.study.metrics, values, strict=False))
         }
 
     def _range(self) -> dict[str, Any]:
         """Return the smallest and largest value of each metric over all points; words have none."""
-        found = {}
-        for k, one in enumerate(self.study.metrics):
+        values_by_name = {}
+        for k, metric in enumerate(self.study.metrics):
             low, high = float(self._low[k]), float(self._high[k])
-            if low <= high and not one.words:
-                ends = {"min": float(to_border(low, one.dimension)), "max": float(to_border(high, one.dimension))}
-                found[one.name] = ends | {"unit": border_unit(one.dimension)}
-        return found
+            if low <= high and not metric.words:
+                ends = {"min": float(to_border(low, metric.dimension)), "max": float(to_border(high, metric.dimension))}
+                values_by_name[metric.name] = ends | {"unit": border_unit(metric.dimension)}
+        return values_by_name
 
     def _warnings(self) -> list[dict[str, str]]:
         if not self.gapped:
@@ -396,8 +404,15 @@ class Summary:
     def _requirements(self) -> list[dict[str, Any]]:
         listed = zip(self.study.spec.part_requirements, self.met.tolist(), strict=True)
         return [
-            {"metric": one.metric, "min": one.min, "max": one.max, "met": count, "of": self.usable, "ok": count > 0}
-            for one, count in listed
+            {
+                "metric": warning.metric,
+                "min": warning.min,
+                "max": warning.max,
+                "met": count,
+                "of": self.usable,
+                "ok": count > 0,
+            }
+            for warning, count in listed
         ]
 
 

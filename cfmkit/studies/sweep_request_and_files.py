@@ -127,15 +127,15 @@ def _drawn_data(records: Records, summary: Summary) -> dict[str, Any]:
     return {
         "varied": [
             {
-                "path": one.path,
-                "dimension": one.dimension,
-                "words": [*map(str, one.shown)] if one.dimension == "text" else [],
+                "path": variable.path,
+                "dimension": variable.dimension,
+                "words": [*map(str, variable.shown)] if variable.dimension == "text" else [],
             }
-            for one in plan.variables
+            for variable in plan.variables
         ],
-        "grid": [] if plan.joint else [len(one.values) for one in plan.variables],
+        "grid": [] if plan.joint else [len(variable.values) for variable in plan.variables],
         "metrics": [
-            {"name": one.name, "column": one.label, "dimension": one.dimension, "words": list(one.words)}
-            for one in shown
+            {"name": metric.name, "column": metric.label, "dimension": metric.dimension, "words": list(metric.words)}
+            for metric in shown
         ],
     }

@@ -101,7 +101,7 @@ class SolvedVariants:
 
     def _places(self, ends: Sequence[Ends | None]) -> Places | None:
         """Return windows of the variants in places, (m,) each; None for the full travel."""
-        if all(one is None for one in ends):
+        if all(end is None for end in ends):
             return None
         start, stop = self._travels
         if len(ends) == 1 and ends[0] is not None and (first := _window_places(ends[0], start, stop)) is not None:
@@ -121,8 +121,8 @@ class SolvedVariants:
 
         `left`: what is left of it where the curve of a partial result ends inside it.
         """
-        own = [getattr(getattr(spec, "analysis", None), "window", None) for spec in self.specs]
-        window = self._places(own if over is None else [over])
+        windows = [getattr(getattr(spec, "analysis", None), "window", None) for spec in self.specs]
+        window = self._places(windows if over is None else [over])
         if window is None or not left:
             return window
         low, high = np.maximum(window[0], self._common[0]), np.minimum(window[1], self._common[1])
@@ -141,11 +141,11 @@ class SolvedVariants:
     def _compute(self, name: str, over: Ends | None, left: bool) -> ByBranch:
         plain, bracket = split_name(name)
         definition = self._definitions[plain]
-        own = self.solved.value(name)
-        if own is None and (bracket is None or definition.scope == "value"):
-            own = self.solved.value(plain)
-        if own is not None:
-            return {"": own}
+        values = self.solved.value(name)
+        if values is None and (bracket is None or definition.scope == "value"):
+            values = self.solved.value(plain)
+        if values is not None:
+            return {"": values}
         if (over, left) not in self._cycles:
             self._cycles[over, left] = CycleRows.from_curves(self.solved.branches, self._window(over, left))
         cycle = self._cycles[over, left]
@@ -159,8 +159,11 @@ class SolvedVariants:
     @property
     def _asked(self) -> tuple[tuple[str, Ends | None], ...]:
         """Name and window of everything that is read: the metrics, then the requirements."""
-        metrics = [(one.name, one.over) for one in self.study.metrics]
-        return (*metrics, *((one.metric, one.over) for one in self.study.spec.part_requirements))
+        metrics = [(metric.name, metric.over) for metric in self.study.metrics]
+        return (
+            *metrics,
+            *((requirement.metric, requirement.over) for requirement in self.study.spec.part_requirements),
+        )
 
     @property
     def known(self) -> bool:
@@ -189,9 +192,11 @@ class SolvedVariants:
             values[:, k] = self._worst(name, over)
         values[~np.isfinite(values)] = np.nan
         met = np.ones((shape[0], shape[2]), dtype=bool)
-        for k, one in enumerate(self.study.spec.part_requirements):
-            limits = Bounds.from_requirement(one, self._definitions[split_name(one.metric)[0]].dimension)
-            by_branch = self.values(one.metric, one.over, left=False).values()
+        for k, requirement in enumerate(self.study.spec.part_requirements):
+            limits = Bounds.from_requirement(
+                requirement, self._definitions[split_name(requirement.metric)[0]].dimension
+            )
+            by_branch = self.values(requirement.metric, requirement.over, left=False).values()
             met[:, k] = np.logical_and.reduce([limits.met_by(item) for item in by_branch]) if by_branch else False
         warned = self._findings()  # behind the values: many paths are solved at once for these
         if result is None or result.status is Status.COMPLETE:

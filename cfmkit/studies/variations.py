@@ -50,41 +50,41 @@ class Leaf:
         """Return whether a value has to know its own dimension, as a place that is a length or an angle."""
         return self.quantity is not None and len(self.quantity.dimensions) > 1
 
-    def read(self, given: Any) -> tuple[Value, str]:
+    def read(self, stated: Any) -> tuple[Value, str]:
         """Return (value as `Spec.replace` takes it, dimension) of what a user wrote.
 
         Raises CannotVary if it is not what this leaf holds.
         """
         if self.kind == "quantity" and self.quantity is not None:
-            return self._quantity(given, self.quantity)
+            return self._quantity(stated, self.quantity)
         if self.kind == "word":
-            if self.choices and given not in self.choices:
-                raise CannotVary(not_among(given, self.choices))
-            if not isinstance(given, str | int) or isinstance(given, bool):
-                raise CannotVary(f"{describe_value(given)} is not text")
-            return given, "text"
+            if self.choices and stated not in self.choices:
+                raise CannotVary(not_among(stated, self.choices))
+            if not isinstance(stated, str | int) or isinstance(stated, bool):
+                raise CannotVary(f"{describe_value(stated)} is not text")
+            return stated, "text"
         if self.kind == "switch":
-            if not isinstance(given, bool):
-                raise CannotVary(f"{describe_value(given)} is not true or false")
-            return given, "text"
-        return self._number(given)
+            if not isinstance(stated, bool):
+                raise CannotVary(f"{describe_value(stated)} is not true or false")
+            return stated, "text"
+        return self._number(stated)
 
-    def _quantity(self, given: Any, quantity: UnitField) -> tuple[Value, str]:
-        marked = BareFloat(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
+    def _quantity(self, stated: Any, quantity: UnitField) -> tuple[Value, str]:
+        marked = BareFloat(stated) if isinstance(stated, int | float) and not isinstance(stated, bool) else stated
         try:
             value, dimension = quantity.read(marked)
         except QuantityError as error:
             raise CannotVary(str(error)) from None
         return (attach_dimension(value, dimension) if self.has_several_dimensions else value), dimension
 
-    def _number(self, given: Any) -> tuple[Value, str]:
-        if isinstance(given, bool) or not isinstance(given, int | float):
-            raise CannotVary(f"{describe_value(given)} is not a {'whole ' * (self.kind == 'whole')}number")
+    def _number(self, stated: Any) -> tuple[Value, str]:
+        if isinstance(stated, bool) or not isinstance(stated, int | float):
+            raise CannotVary(f"{describe_value(stated)} is not a {'whole ' * (self.kind == 'whole')}number")
         if self.kind == "whole":
-            if given != int(given):
-                raise CannotVary(f"{given} is not a whole number")
-            return int(given), "count"
-        return float(given), "ratio"
+            if stated != int(stated):
+                raise CannotVary(f"{stated} is not a whole number")
+            return int(stated), "count"
+        return float(stated), "ratio"
 
 
 def length_to_vary(spec: Spec) -> tuple[str, float]:
@@ -100,8 +100,8 @@ def _lengths(tree: Any, path: str) -> Iterator[tuple[str, float]]:
         below = f"{path}.{key}"
         if isinstance(value, dict):
             yield from _lengths(value, below)
-        elif isinstance(value, str) and (found := re.fullmatch(r"([0-9.]+) mm", value)) and float(found[1]) > 0:
-            yield below, float(found[1])
+        elif isinstance(value, str) and (match := re.fullmatch(r"([0-9.]+) mm", value)) and float(match[1]) > 0:
+            yield below, float(match[1])
 
 
 def leaf(spec_type: type[Spec], path: str) -> Leaf:
@@ -109,17 +109,17 @@ def leaf(spec_type: type[Spec], path: str) -> Leaf:
 
     Raises CannotVary if there is nothing, or nothing that can be varied; a near miss is named.
     """
-    here: tuple[Slot, ...] = (Slot(spec_type),)
+    slots: tuple[Slot, ...] = (Slot(spec_type),)
     parts = path.split(".")
     if parts[0] in FIXED_BLOCKS:
         raise CannotVary(f"{parts[0]!r} is nothing to vary: it is not part of the mechanism or its analysis")
     for depth, part in enumerate(parts):
         key: str | int = int(part) if part.isdecimal() and part.isascii() and len(part) < 10 else part
-        below = tuple(inner for slot in here for inner in slot.child(key))
+        below = tuple(inner for slot in slots for inner in slot.child(key))
         if not below:
-            raise CannotVary(_unknown(spec_type, path, ".".join(parts[:depth]), here))
-        here = below
-    return _leaf_of(path, here)
+            raise CannotVary(_unknown(spec_type, path, ".".join(parts[:depth]), slots))
+        slots = below
+    return _leaf_of(path, slots)
 
 
 def _leaf_of(path: str, slots: tuple[Slot, ...]) -> Leaf:
@@ -143,16 +143,16 @@ def _kind(slot: Slot) -> Kind | None:
     return kinds.get(slot.kind)
 
 
-def _unknown(spec_type: type[Spec], path: str, above: str, here: tuple[Slot, ...]) -> str:
+def _unknown(spec_type: type[Spec], path: str, above: str, slots: tuple[Slot, ...]) -> str:
     """Return an error that there is nothing at a path, and which one could be meant."""
-    known = list(paths(spec_type))
+    known_paths = list(paths(spec_type))
     last = path.rpartition(".")[2]
-    endings = {one.rpartition(".")[2] for one in known}
+    endings = {path.rpartition(".")[2] for path in known_paths}
     similar = [last] if last in endings else difflib.get_close_matches(last, endings, n=1, cutoff=0.65)
-    alike = [one for one in known if one.rpartition(".")[2] in similar]
-    if near := difflib.get_close_matches(path, alike, n=1, cutoff=0.0):
-        return f"there is no {path!r}; did you mean {near[0]!r}?"
-    names = [name for slot in here if slot.model is not None for name in slot.model.model_fields]
+    alike = [path for path in known_paths if path.rpartition(".")[2] in similar]
+    if close := difflib.get_close_matches(path, alike, n=1, cutoff=0.0):
+        return f"there is no {path!r}; did you mean {close[0]!r}?"
+    names = [name for slot in slots if slot.model is not None for name in slot.model.model_fields]
     inside = [name for name in names if above or name not in FIXED_BLOCKS]
     where = f"below {above!r} there are" if above else "a path starts with"
     return f"there is no {path!r}; {where} {', '.join(inside)}" if inside else f"there is nothing below {above!r}"
@@ -227,12 +227,12 @@ def parse_variation(option: str) -> WantedVariation:
 
 def collect_variations(vary: Mapping[str, Any]) -> tuple[WantedVariation, ...]:
     """Return what a mapping asks for: path -> ``"start:stop:n"`` or a sequence of values."""
-    found = []
+    axes = []
     for path, content in vary.items():
-        found.append(
+        axes.append(
             WantedVariation(path, content if isinstance(content, str) else tuple(content), f"sweep.vary: {path}")
         )
-    return tuple(found)
+    return tuple(axes)
 
 
 def axes(
@@ -246,39 +246,45 @@ def axes(
     Raises SpecError with every fault of every request.
     """
     asked = tuple(wanted)
-    problems = [Problem(one.source, 0, 0, "", message) for one, message in faults(spec, asked, drawn, joint)]
+    problems = [Problem(problem.source, 0, 0, "", message) for problem, message in faults(spec, asked, drawn, joint)]
     if problems:
         raise SpecError(problems)
-    return tuple(axis(spec, one, drawn) for one in asked)
+    return tuple(axis(spec, variation, drawn) for variation in asked)
 
 
 def faults(
     spec: Spec, asked: tuple[WantedVariation, ...], drawn: bool, joint: bool = False
 ) -> Iterator[tuple[WantedVariation, str]]:
     """Yield (request, what is wrong with it)."""
-    for index, one in enumerate(asked):
+    for index, variation in enumerate(asked):
         try:
-            found = axis(spec, one, drawn)
+            axis_of_path = axis(spec, variation, drawn)
         except CannotVary as problem:
-            yield one, str(problem)
+            yield variation, str(problem)
             continue
-        if not joint and (twice := [value for k, value in enumerate(found.listed) if value in found.listed[:k]]):
-            yield one, f"{write_value(twice[0], found.dimension)} appears twice in the list"
-        for other in asked[:index]:
-            if one.path == other.path or f"{one.path}.".startswith(f"{other.path}."):
-                yield one, f"{other.path!r} is varied already; one of them is enough"
-            elif other.path.startswith(f"{one.path}."):
-                yield one, f"{other.path!r}, which lies in it, is varied already; one of them is enough"
+        if not joint and (
+            twice := [value for k, value in enumerate(axis_of_path.listed) if value in axis_of_path.listed[:k]]
+        ):
+            yield variation, f"{write_value(twice[0], axis_of_path.dimension)} appears twice in the list"
+        for earlier in asked[:index]:
+            if variation.path == earlier.path or f"{variation.path}.".startswith(f"{earlier.path}."):
+                yield variation, f"{earlier.path!r} is varied already; one of them is enough"
+            elif earlier.path.startswith(f"{variation.path}."):
+                yield variation, f"{earlier.path!r}, which lies in it, is varied already; one of them is enough"
 
 
-def axis(spec: Spec, one: WantedVariation, drawn: bool) -> Axis:
+def axis(spec: Spec, variation: WantedVariation, drawn: bool) -> Axis:
     """Return one thing that varies.
 
     Raises CannotVary if path or values are wrong.
     """
-    found = leaf(type(spec), one.path)
-    made = _listed_axis(found, one.content) if isinstance(one.content, tuple) else _range(found, one.content, drawn)
-    _try(spec, one.path, made.listed[0] if made.listed else made.ends)
+    place = leaf(type(spec), variation.path)
+    made = (
+        _listed_axis(place, variation.content)
+        if isinstance(variation.content, tuple)
+        else _range(place, variation.content, drawn)
+    )
+    _try(spec, variation.path, made.listed[0] if made.listed else made.ends)
     return made
 
 
@@ -292,49 +298,49 @@ def _try(spec: Spec, path: str, value: Any) -> None:
         return  # a value out of bounds is a matter of one point
 
 
-def _listed_axis(found: Leaf, items: tuple[Any, ...]) -> Axis:
+def _listed_axis(place: Leaf, items: tuple[Any, ...]) -> Axis:
     if not items:
         raise CannotVary("the list is empty")
-    read = [found.read(item) for item in items]
+    read = [place.read(item) for item in items]
     dimensions = {dimension for _, dimension in read}
     if len(dimensions) > 1:
         raise CannotVary(f"the values are of several kinds: {', '.join(sorted(dimensions))}")
     values = tuple(value for value, _ in read)
-    return Axis(found, read[0][1], values, count=len(values))
+    return Axis(place, read[0][1], values, count=len(values))
 
 
-def _range(found: Leaf, text: str, drawn: bool) -> Axis:
+def _range(place: Leaf, text: str, drawn: bool) -> Axis:
     parts = [part.strip() for part in text.split(":")]
-    if found.kind in ("word", "switch"):
-        words = ", ".join(map(str, found.choices)) or "a, b"
+    if place.kind in ("word", "switch"):
+        words = ", ".join(map(str, place.choices)) or "a, b"
         raise CannotVary(f"{text!r} is not a list of words; write [{words}]")
     wanted = "start:stop" if drawn else "start:stop:n"
     if len(parts) != (2 if drawn else 3):
         more = "; samples are drawn from it, so that it has no number of steps" if drawn and len(parts) == 3 else ""
         raise CannotVary(f"{text!r} is not a range; write {wanted}, with units, or a list [a, b]{more}")
-    start, stop = (_end(found, part) for part in parts[:2])
+    start, stop = (_end(place, part) for part in parts[:2])
     if start[1] != stop[1]:
         raise CannotVary(f"{text!r} starts as {start[1]} and stops as {stop[1]}")
     low, high = float(start[0]), float(stop[0])
     if low == high:
         raise CannotVary(f"{text!r} starts where it stops; write [{parts[0]}] for one value")
     if drawn:
-        return Axis(found, start[1], ends=(low, high))
+        return Axis(place, start[1], ends=(low, high))
     count = _count(parts[2])
-    if found.kind == "whole" and (high - low) % (count - 1):
+    if place.kind == "whole" and (high - low) % (count - 1):
         raise CannotVary(f"{count} steps from {parts[0]} to {parts[1]} are no whole numbers")
-    return Axis(found, start[1], ends=(low, high), count=count)
+    return Axis(place, start[1], ends=(low, high), count=count)
 
 
-def _end(found: Leaf, text: str) -> tuple[Any, str]:
+def _end(place: Leaf, text: str) -> tuple[Any, str]:
     """Return (SI value, dimension) of one end of a range."""
     from cfmkit.errors import QuantityError
     from cfmkit.specs.units import read_number
 
-    if found.kind == "quantity":
-        return found.read(text)
+    if place.kind == "quantity":
+        return place.read(text)
     try:
-        return found.read(read_number(text))
+        return place.read(read_number(text))
     except QuantityError as error:
         raise CannotVary(str(error)) from None
 

@@ -79,23 +79,25 @@ def limits_along_errors(
     middle = None if rows is None else numbers_of(spec, rows, run)
     if rows is None or middle is None:
         raise SolutionError("the specification cannot be followed at a few poses: no tolerance can be stated")
-    found = []
-    for one, factor in zip(parts.parameters, factors.tolist(), strict=True):
-        tight = one.spread.tighten(factor)
-        offsets = factor * ERRORS_TRIED * one.spread.standard_deviation
-        there = one.spread.nominal + offsets
-        tried = (offsets != 0.0) & (tight.low <= there) & (there <= tight.high)
-        near = numbers_of_parts(spec, {one.path: there[tried]}, rows, run)
-        known = dict(zip(offsets[tried].tolist(), near, strict=True))
-        moved = {offset: numbers - middle for offset, numbers in sorted(known.items()) if numbers is not None}
+    limits = []
+    for parameter, factor in zip(parts.parameters, factors.tolist(), strict=True):
+        tight = parameter.spread.tighten(factor)
+        offsets = factor * ERRORS_TRIED * parameter.spread.standard_deviation
+        values = parameter.spread.nominal + offsets
+        tried = (offsets != 0.0) & (tight.low <= values) & (values <= tight.high)
+        near = numbers_of_parts(spec, {parameter.path: values[tried]}, rows, run)
+        numbers_by_offset = dict(zip(offsets[tried].tolist(), near, strict=True))
+        moved = {
+            offset: numbers - middle for offset, numbers in sorted(numbers_by_offset.items()) if numbers is not None
+        }
         if not moved:
             raise SolutionError(
-                f"parts with an error of {one.path} cannot be followed: state a smaller tolerance for it"
+                f"parts with an error of {parameter.path} cannot be followed: state a smaller tolerance for it"
             )
         offsets, at = np.array(list(moved)), int(np.searchsorted(list(moved), 0.0))
         changes = np.array(list(moved.values())) @ rows.matrix.T
-        found.append(LimitsAlong(np.insert(offsets, at, 0.0), np.insert(changes, at, 0.0, axis=0)))
-    return rows.limits(middle), tuple(found)
+        limits.append(LimitsAlong(np.insert(offsets, at, 0.0), np.insert(changes, at, 0.0, axis=0)))
+    return rows.limits(middle), tuple(limits)
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ def factors_that_keep(
     `rows`, (m,): limits of a perfect part, at least zero where they hold; `along`, of d errors: how they move with
     each; `errors`, (k, d): of parts as the tolerances are stated; `costs`, (d,): of each tolerance, over its width.
     """
-    stated = [one(error) for one, error in zip(along, errors.T, strict=True)]
+    stated = [limit(error) for limit, error in zip(along, errors.T, strict=True)]
     all_moved: FloatArray = np.sum(stated, axis=0)
     ones = np.ones(errors.shape[1])
 
@@ -130,7 +132,9 @@ def factors_that_keep(
         return float((rows + moved >= 0).all(axis=1).mean())
 
     def share(factors: FloatArray) -> float:
-        return good(np.sum([one(f * error) for one, f, error in zip(along, factors, errors.T, strict=True)], axis=0))
+        return good(
+            np.sum([limit(f * error) for limit, f, error in zip(along, factors, errors.T, strict=True)], axis=0)
+        )
 
     def share_alone(k: int) -> Callable[[float], float]:
         others = all_moved - stated[k]
@@ -157,7 +161,7 @@ def allowed_tolerances(
     known: tuple[LimitsAlong | None, ...] = (None,) * len(factors)
     for _ in range(MAX_SOLUTIONS):
         rows, seen = limits_along_errors(parts, nominal, factors)
-        known = along = tuple(one.and_at(before) for one, before in zip(seen, known, strict=True))
+        known = along = tuple(limit.and_at(before) for limit, before in zip(seen, known, strict=True))
         answer = factors_that_keep(rows, along, errors[:N_ROUGH], costs, wanted)
         ends = np.where(np.isfinite(answer.allocated), answer.allocated, factors)
         ends = np.clip(ends, LEAST_FACTOR, 1.0 if answer.perfect < wanted else MAX_TOLERANCE_FACTOR)
@@ -189,6 +193,6 @@ def _shape(rows: FloatArray, moved: FloatArray, costs: FloatArray) -> FloatArray
     weights = near / near.sum() if near.sum() > 0 else np.full(len(rows), 1.0 / len(rows))
     scaled = np.where(spread[:, None] > 0, (moved / np.maximum(spread, 1e-300)[:, None]) ** 2, 0.0)
     adds = np.maximum(weights @ scaled, 1e-9)
-    found: FloatArray = (costs / costs.max() / adds) ** (1.0 / 3.0)
-    found = np.maximum(found, MIN_TOLERANCE_RATIO * found.max())
-    return np.asarray(found / found.mean())
+    ratios: FloatArray = (costs / costs.max() / adds) ** (1.0 / 3.0)
+    ratios = np.maximum(ratios, MIN_TOLERANCE_RATIO * ratios.max())
+    return np.asarray(ratios / ratios.mean())

@@ -85,17 +85,17 @@ def analyze_parts(parts: Parts, values: FloatArray, nominal: Result, run: Run, w
     journal = run.notes if isinstance(run.notes, Journal) else None
     records = computed(work, run.executor, journal, _Progress(run, what, len(values)))
     met, failed = np.zeros((len(values), len(spec.part_requirements)), dtype=bool), np.ones(len(values), dtype=bool)
-    found, why = np.full((len(values), len(metrics)), np.nan), ""
+    numbers, why = np.full((len(values), len(metrics)), np.nan), ""
     for indices, rows in records.batches():
         early = {k: text for k, (status, text) in rows.odd.items() if status.key != "complete"}
         why = why or next((text for text in early.values() if text), "")
         complete = np.ones(len(indices), dtype=bool)
         complete[list(early)] = False
-        failed[indices], met[indices], found[indices] = ~complete, rows.met & complete[:, None], rows.values
-    lacking = np.flatnonzero(np.isnan(found[:, 1:]).any(axis=1) & ~failed)
+        failed[indices], met[indices], numbers[indices] = ~complete, rows.met & complete[:, None], rows.values
+    lacking = np.flatnonzero(np.isnan(numbers[:, 1:]).any(axis=1) & ~failed)
     reason = _why_lacking(parts.part(values[lacking[0]]), run) if len(lacking) else ""
     level = Study(nominal.spec, (), metrics[:1]).quantities(nominal)[0].value
-    trimmed = _judge_trimmed(spec, nominal, metrics, found, met, np.nan if level is None else level)
+    trimmed = _judge_trimmed(spec, nominal, metrics, numbers, met, np.nan if level is None else level)
     return Outcomes(met, trimmed, failed, why, (len(lacking), reason))
 
 
@@ -105,7 +105,7 @@ def _why_lacking(part: Spec, run: Run) -> str:
         result = windows_judged(family(part.family).analyze(part, run))
     except CfmError as error:
         return str(error)
-    return next((one.message for one in result.warnings if one.name == "window_outside"), "")
+    return next((warning.message for warning in result.warnings if warning.name == "window_outside"), "")
 
 
 def _metrics_to_note(spec: Spec, nominal: Result) -> tuple[Metric, ...]:
@@ -114,15 +114,19 @@ def _metrics_to_note(spec: Spec, nominal: Result) -> tuple[Metric, ...]:
     prefix = "torque" if curve.kind == "torque" else "force"
     # of one branch, always the same: the worse of two changes from part to part
     # and without a window over that of a requirement: at the ends of the travel a part may have no force
-    over = None if window_of(nominal) else next((one.over for one in spec.part_requirements if one.over), None)
+    over = (
+        None
+        if window_of(nominal)
+        else next((requirement.over for requirement in spec.part_requirements if requirement.over), None)
+    )
     first = f"[{curve.branches[0]}]" if any(curve.branches) else ""
     wanted: list[tuple[str, Any]] = [(f"{prefix}_mean{first}", over)]
-    for one in spec.part_requirements:
-        wanted.append((one.metric, one.over))
-        name, branch = split_name(one.metric)
+    for requirement in spec.part_requirements:
+        wanted.append((requirement.metric, requirement.over))
+        name, branch = split_name(requirement.metric)
         if name == "deviation_from_target":
             bracket = f"[{branch}]" if branch else ""
-            wanted += [(f"{prefix}_{end}{bracket}", one.over) for end in ("max", "min")]
+            wanted += [(f"{prefix}_{end}{bracket}", requirement.over) for end in ("max", "min")]
     return tuple(
         replace(metrics_of(spec, [name], curve)[0], over=over, label=f"{k}") for k, (name, over) in enumerate(wanted)
     )
@@ -132,7 +136,7 @@ def _judge_trimmed(
     spec: Spec,
     nominal: Result,
     metrics: Sequence[Metric],
-    found: FloatArray,
+    numbers: FloatArray,
     met: NDArray[np.bool_],
     level: float,
 ) -> NDArray[np.bool_]:
@@ -142,13 +146,13 @@ def _judge_trimmed(
     of the force. Whatever else follows the force in a way of its own is left as it was.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        factor = level / found[:, 0]
+        factor = level / numbers[:, 0]
     column, out = 1, met.copy()
-    for k, one in enumerate(spec.part_requirements):
-        metric, values = metrics[column], found[:, column]
+    for k, requirement in enumerate(spec.part_requirements):
+        metric, values = metrics[column], numbers[:, column]
         column += 1
-        if split_name(one.metric)[0] == "deviation_from_target":
-            ends = found[:, column : column + 2]
+        if split_name(requirement.metric)[0] == "deviation_from_target":
+            ends = numbers[:, column : column + 2]
             column += 2
             if nominal.target:
                 values = np.abs(factor[:, None] * ends / nominal.target - 1.0).max(axis=1)
@@ -156,7 +160,7 @@ def _judge_trimmed(
             values = factor * values
         else:
             continue
-        out[:, k] = np.isfinite(values) & Bounds.from_requirement(one, metric.dimension).met_by(values)
+        out[:, k] = np.isfinite(values) & Bounds.from_requirement(requirement, metric.dimension).met_by(values)
     return out
 
 
@@ -200,7 +204,10 @@ class Yields:
     def as_json(self) -> dict[str, Any]:
         """Return the block `yield` of metrics.json."""
         requirements = self.parts.spec.part_requirements
-        each = [{"metric": one.metric} | share.as_json() for one, share in zip(requirements, self.each, strict=True)]
+        each = [
+            {"metric": requirement.metric} | share.as_json()
+            for requirement, share in zip(requirements, self.each, strict=True)
+        ]
         return self.after.as_json() | {
             "seed": self.parts.seed,
             "before": self.before.as_json() if self.before else None,
@@ -234,57 +241,61 @@ class Yields:
         return reported
 
 
-def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
+def yields_of(design: Result, requested: Spec | None, run: Run) -> Yields | None:
     """Return the yield of an analysed design and of the specification that it began with; None without tolerances.
 
     Raises SpecError if a tolerance is on a value that the design does not have.
     """
-    block: DesignKeys | None = getattr(design.spec, "design", None) or getattr(given, "design", None)
+    block: DesignKeys | None = getattr(design.spec, "design", None) or getattr(requested, "design", None)
     if not isinstance(block, DesignKeys) or (parts := Parts.from_design(design.spec, block, run.seed)) is None:
         return None
     values = parts.draw()
-    found = analyze_parts(parts, values, design, run.part(0.0, 0.4))
+    analyzed = analyze_parts(parts, values, design, run.part(0.0, 0.4))
     shared, frozen = common_errors(parts, design, run), None
     if shared:
         still = parts.remove_errors(values, shared)
         frozen = analyze_parts(parts, still, design, run.part(0.4, 0.7), "parts without common errors").share()
-    is_same = given == design.spec  # a design that is designed again: its parts are known
-    before, why = (found.share(), "") if is_same else _yield_before(given, block, run.part(0.7, 1.0))
-    each = tuple(found.share(found.met[:, [k]]) for k in range(found.met.shape[1]))
+    is_same = requested == design.spec  # a design that is designed again: its parts are known
+    before, why = (analyzed.share(), "") if is_same else _yield_before(requested, block, run.part(0.7, 1.0))
+    shares = tuple(analyzed.share(analyzed.met[:, [k]]) for k in range(analyzed.met.shape[1]))
     paths = tuple(parts.paths[k] for k in shared)
-    return Yields(parts, found.share(), found.share(found.trimmed), frozen, paths, each, before, why, found.lacking)
+    return Yields(
+        parts, analyzed.share(), analyzed.share(analyzed.trimmed), frozen, paths, shares, before, why, analyzed.lacking
+    )
 
 
-def no_yields(given: Spec) -> dict[str, Quantity]:
+def no_yields(requested: Spec) -> dict[str, Quantity]:
     """Return the metrics of many parts that requirements are on, without values: no tolerance is known."""
-    asked = dict.fromkeys(one.metric for one in given.requirements if one.metric in OF_MANY_PARTS)
+    asked = dict.fromkeys(
+        requirement.metric for requirement in requested.requirements if requirement.metric in OF_MANY_PARTS
+    )
     return {name: Quantity(None, "ratio", OF_MANY_PARTS[name], NO_TOLERANCE) for name in asked}
 
 
-def _yield_before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[Share | None, str]:
+def _yield_before(requested: Spec | None, block: DesignBlock, run: Run) -> tuple[Share | None, str]:
     """Return the yield of the specification as given, or why there is none."""
-    if given is None:
+    if requested is None:
         return None, "nothing was given to begin with"
     try:
-        parts = Parts.from_design(given, block, run.seed)
-        result = family(given.family).analyze(given, run)
+        parts = Parts.from_design(requested, block, run.seed)
+        result = family(requested.family).analyze(requested, run)
         if parts is None or not result.curves:
             return None, f"the specification as given has no curve: {result.message}"
         return analyze_parts(parts, parts.draw(), result, run, "parts as given").share(), ""
     except SpecError as error:
-        return None, "; ".join(f"{one.path}: {one.message}" for one in error.problems)
+        return None, "; ".join(f"{problem.path}: {problem.message}" for problem in error.problems)
     except CfmError as error:
         return None, str(error)
 
 
 def common_errors(parts: Parts, nominal: Result, run: Run) -> tuple[int, ...]:
     """Return the parameters whose errors change the force by the same share everywhere in the window."""
-    found: list[int] = []
+    places: list[int] = []
     for members in parts.joined:
         share = _force_change(parts, members, nominal, run)
         if share is not None and np.ptp(share) <= COMMON_SPREAD * abs(share.mean()) and abs(share.mean()) > 0:
-            found += members
-    return tuple(sorted(found))
+            places += members
+    return tuple(sorted(places))
 
 
 def _force_change(parts: Parts, members: tuple[int, ...], nominal: Result, run: Run) -> FloatArray | None:

@@ -51,24 +51,24 @@ class Unknown(Exception):
     """Why nothing is said of parts near a design."""
 
 
-def near_parts(parts: Parts, middle: FloatArray, numbers: Numbers, known: FloatArray | None = None) -> NearParts:
+def near_parts(parts: Parts, middle: FloatArray, numbers: Numbers, exact: FloatArray | None = None) -> NearParts:
     """Return the numbers of parts by linear estimate.
 
     `middle`: those of the design, (q,); `numbers`: of a part, all of them or those after the exactly known ones;
-    `known`: exact derivatives of the first numbers by all errors, (k, d).
+    `exact`: exact derivatives of the first numbers by all errors, (k, d).
 
     Raises Unknown if a part near the design has no numbers.
     """
-    if known is not None and len(known) == len(middle):
-        return NearParts(middle, known)
+    if exact is not None and len(exact) == len(middle):
+        return NearParts(middle, exact)
 
     def analyze_shifted(k: int, value: float) -> FloatArray:
         return _finite(numbers, parts.spec.replace({parts.paths[k]: value}, as_made=True))
 
     step = SIGMA_STEP * parts.deviations
-    found = differentiate(analyze_shifted, np.column_stack([parts.nominal - step, parts.nominal + step]))
-    assert found is not None  # a part without numbers has ended the estimate
-    return NearParts(middle, found if known is None else np.concatenate([known, found]))
+    derivatives = differentiate(analyze_shifted, np.column_stack([parts.nominal - step, parts.nominal + step]))
+    assert derivatives is not None  # a part without numbers has ended the estimate
+    return NearParts(middle, derivatives if exact is None else np.concatenate([exact, derivatives]))
 
 
 def _finite(numbers: Numbers, part: Spec) -> FloatArray:
@@ -78,14 +78,14 @@ def _finite(numbers: Numbers, part: Spec) -> FloatArray:
         raise Unknown(str(error)) from None
 
 
-def _complete(found: FloatArray | None) -> FloatArray:
+def _complete(derivatives: FloatArray | None) -> FloatArray:
     """Return the numbers of a part, if it has them all."""
-    if found is None or not np.isfinite(found).all():
+    if derivatives is None or not np.isfinite(derivatives).all():
         raise Unknown(
             "a part near the design has no curve, or it ends within a window of the requirements (windows in shares of "
             "the travel, such as [1 %, 100 %], follow the travel of each part)"
         )
-    return found
+    return derivatives
 
 
 def _refuse_many(parts: Parts, quick: bool = True) -> None:
@@ -102,15 +102,15 @@ def efforts_of_parts(parts: Parts, places: FloatArray, branch: str, run: Run) ->
     """
 
     def efforts(part: Spec) -> FloatArray | None:
-        found = rr.sampled_of(part, places, run)
-        return None if found is None else found.effort.get(branch)
+        sampled = rr.sampled_of(part, places, run)
+        return None if sampled is None else sampled.effort.get(branch)
 
     exact = rr.exact_derivatives(parts.spec, places, parts.paths)
     columns = [exact[path].effort.get(branch) for path in parts.paths if path in exact]
-    known = np.array(columns).T if len(columns) == len(parts.paths) and all(c is not None for c in columns) else None
-    if known is None:
+    slopes = np.array(columns).T if len(columns) == len(parts.paths) and all(c is not None for c in columns) else None
+    if slopes is None:
         _refuse_many(parts)
-    return near_parts(parts, _finite(efforts, parts.spec), efforts, known)
+    return near_parts(parts, _finite(efforts, parts.spec), efforts, slopes)
 
 
 @dataclass(frozen=True)
@@ -137,30 +137,30 @@ def expected_shares(result: Result, parts: Parts, run: Run) -> ExpectedShares:
     rows = rr.rows_of(result, first, places)
     middle = _complete(rr.numbers_of_known(result, quick, rows))
     exact = rr.exact_derivatives(spec, places, parts.paths)
-    known = None
+    slopes = None
     if set(parts.paths) <= set(exact):
-        known = np.array([rr.numbers_in(exact[path]) for path in parts.paths]).T
-    if rows.metrics or known is None:
+        slopes = np.array([rr.numbers_in(exact[path]) for path in parts.paths]).T
+    if rows.metrics or slopes is None:
         _refuse_many(parts, quick=not rows.metrics)
     if rows.metrics and (thin := _thin_curve(result)) is not None:
         count, numbers = len(rows.metrics), _finite(lambda part: _numbers(part, rows, run, quick is None), thin)
         if np.allclose(numbers[-count:], middle[-count:], rtol=SAME_RTOL, atol=0.0):
             parts, middle = replace(parts, spec=thin), np.concatenate([middle[: len(middle) - len(numbers)], numbers])
-    near = near_parts(parts, middle, lambda part: _numbers(part, rows, run, known is None), known)
+    parts_near = near_parts(parts, middle, lambda part: _numbers(part, rows, run, slopes is None), slopes)
     values = parts.draw(N_DRAWN)
     errors, still, proportional = values - parts.nominal, values, False
     if MODULUS_KEY in parts.paths:
         k = parts.paths.index(MODULUS_KEY)
         still = parts.remove_errors(values, (k,))
-        change = parts.nominal[k] * near.by_error[: rows.efforts, k]
+        change = parts.nominal[k] * parts_near.by_error[: rows.efforts, k]
         proportional = bool(np.allclose(change, middle[: rows.efforts], rtol=PROPORTIONALITY_RTOL, atol=0.0))
-    made = near.numbers(errors)
+    made = parts_near.numbers(errors)
 
     def share(numbers: FloatArray) -> Share:
         kept = rows.limits(numbers) >= -1e-9 * np.abs(rows.constant)  # a design on its limit keeps it
         return Share(int(kept.all(axis=1).sum()), 0, len(numbers))
 
-    measured, trimmed = near.numbers(still - parts.nominal), _trim_parts(result, rows, middle, made)
+    measured, trimmed = parts_near.numbers(still - parts.nominal), _trim_parts(result, rows, middle, made)
     return ExpectedShares(share(made), share(measured), share(trimmed), proportional)
 
 
@@ -189,9 +189,9 @@ def _trim_parts(result: Result, rows: RequirementRows, middle: FloatArray, parts
     low, high = (rows.places[0], rows.places[-1]) if window is None else (window.lo, window.hi)
     slack = 1e-9 * (rows.places[-1] - rows.places[0])
     at = np.flatnonzero((rows.places >= low - slack) & (rows.places <= high + slack))
-    level, means = (np.trapezoid(one[..., at], rows.places[at], axis=-1) for one in (middle, parts))
+    level, means = (np.trapezoid(efforts[..., at], rows.places[at], axis=-1) for efforts in (middle, parts))
     scaled = np.arange(len(middle)) < rows.efforts
-    scaled[len(middle) - len(rows.metrics) :] = [one.dimension in FORCE_DIMENSIONS for one in rows.metrics]
+    scaled[len(middle) - len(rows.metrics) :] = [metric.dimension in FORCE_DIMENSIONS for metric in rows.metrics]
     with np.errstate(divide="ignore", invalid="ignore"):
         factor = np.where(means, level / means, np.nan)  # without a force there is nothing to trim: never good
     return np.asarray(np.where(scaled, parts * factor[:, None], parts))
@@ -200,34 +200,34 @@ def _trim_parts(result: Result, rows: RequirementRows, middle: FloatArray, parts
 def expected_yield(result: Result, run: Run) -> str:
     """Return in a sentence how many parts of a design would be good, or why that is not known; empty of no part."""
     spec = result.spec
-    found = assume_errors(spec)
-    if found is None or not spec.part_requirements or not result.curves:
+    assumed = assume_errors(spec)
+    if assumed is None or not spec.part_requirements or not result.curves:
         return ""
-    name = found.process.name
+    name = assumed.process.name
     again = f"the same command with --set design.process={name}"
     try:
         shares = expected_shares(result, Parts.from_assumed_errors(spec, run.seed), run)
     except Unknown as why:
         return f"not estimated ({name}, assumed tolerances): {why}; {again} draws parts"
     if not family(spec.family).free(spec, spec):
-        return f"{_yield_sentence(found, shares)}; margins need 'design.free' to name values that may change"
-    return f"{_yield_sentence(found, shares)}; with margins: {again} --set design.yield=90%"
+        return f"{_yield_sentence(assumed, shares)}; margins need 'design.free' to name values that may change"
+    return f"{_yield_sentence(assumed, shares)}; with margins: {again} --set design.yield=90%"
 
 
-def _yield_sentence(found: Assumed, shares: ExpectedShares) -> str:
-    process = found.process
-    used = {kind: getattr(process, kind) for kind in ("thickness", "position") if kind in found.kinds.values()}
+def _yield_sentence(assumed: Assumed, shares: ExpectedShares) -> str:
+    process = assumed.process
+    used = {kind: getattr(process, kind) for kind in ("thickness", "position") if kind in assumed.kinds.values()}
     reported = [f"{kind} +- {format_short(sigma, 'length')}" for kind, sigma in used.items()]
-    if found.modulus is not None:
-        low, high = (format_short(end, "stress") for end in found.modulus)
+    if assumed.modulus is not None:
+        low, high = (format_short(end, "stress") for end in assumed.modulus)
         reported.append(f"modulus {low} to {high}")
-    if found.rates:
+    if assumed.rates:
         reported.append(f"rates of springs within {100.0 * SPRING_RATE:g} %")
-    if found.as_stated:
+    if assumed.as_stated:
         reported.append("moduli of beams' own materials as stated")
     reason = f": {process.reason}" if "thickness" in used else ""
     text = f"{_format_share(shares.good)} ({process.name}, assumed tolerances)"
-    if found.modulus is not None:
+    if assumed.modulus is not None:
         text += f", {_format_share(shares.measured)} once the modulus is measured"
     return f"{text}: {', '.join(reported)}{reason}; linear estimate"
 
@@ -253,17 +253,20 @@ def expected_forces(result: Result, run: Run) -> str:
         if parts is None:
             return ""
         places = _places(result)
-        near = efforts_of_parts(parts, places, result.curve.branches[0], run)
+        parts_near = efforts_of_parts(parts, places, result.curve.branches[0], run)
     except (CfmError, Unknown):
         return ""
     errors = parts.draw(N_DRAWN) - parts.nominal
     low, high = np.quantile(
-        near.numbers(errors), ((1.0 - NAMED_PARTS_SHARE) / 2.0, (1.0 + NAMED_PARTS_SHARE) / 2.0), axis=0
+        parts_near.numbers(errors), ((1.0 - NAMED_PARTS_SHARE) / 2.0, (1.0 + NAMED_PARTS_SHARE) / 2.0), axis=0
     )
-    weight = (np.abs(near.by_error) * errors.std(axis=0)).sum(axis=0)
+    weight = (np.abs(parts_near.by_error) * errors.std(axis=0)).sum(axis=0)
     curve = result.curve
     at = [format_short(place, curve.motion_dimension) for place in places]
-    ends = [[format_short(force, curve.kind, 3) for force in one] for one in zip(near.middle, low, high, strict=True)]
+    ends = [
+        [format_short(force, curve.kind, 3) for force in ends_of_place]
+        for ends_of_place in zip(parts_near.middle, low, high, strict=True)
+    ]
     expected = [
         f"{force} at {place} ({least.partition(' ')[0]} to {most})"
         for place, (force, least, most) in zip(at, ends, strict=True)
@@ -314,6 +317,6 @@ def _list_names(items: list[str]) -> str:
 
 def _places(result: Result) -> FloatArray:
     """Return the two ends of the window, or the middle and the end of the travel."""
-    found, motion = window_of(result), result.curve.motion
+    window, motion = window_of(result), result.curve.motion
     least, most = float(motion.min()), float(motion.max())
-    return np.array([found.lo, found.hi] if found else [0.5 * (most + least), most if most > 0.0 else least])
+    return np.array([window.lo, window.hi] if window else [0.5 * (most + least), most if most > 0.0 else least])

@@ -65,7 +65,7 @@ def assume_errors(spec: Spec, process: str | None = None) -> Assumed | None:
     if not kinds:
         return None
     accuracy, (shared, owned) = accuracy_of(spec, process), _materials(spec)
-    band = next((found for one in shared if (found := _band(one))), None)
+    band = next((found for block in shared if (found := _band(block))), None)
     rates = {path: float(spec.get_value(path)) for path, kind in kinds.items() if kind == "rate"}
     made = {path: kind for path, kind in kinds.items() if kind != "rate"}
     return Assumed(accuracy, made, band, any(map(_band, owned)), rates)
@@ -85,16 +85,16 @@ def accuracy_of(spec: Spec, process: str | None = None) -> ProcessAccuracy:
 
 def tolerances(spec: Spec, process: str | None = None) -> dict[str, Any]:
     """Return the same in the words of `design.tolerances`; nothing of no part."""
-    found = assume_errors(spec, process)
-    if found is None:
+    assumed = assume_errors(spec, process)
+    if assumed is None:
         return {}
     stated: dict[str, Any] = {
-        path: Tolerance(normal=f"{1e3 * sigma:.9g} mm") for path, sigma in found.deviations.items()
+        path: Tolerance(normal=f"{1e3 * sigma:.9g} mm") for path, sigma in assumed.deviations.items()
     }
-    if found.modulus is not None:
-        low, high = found.modulus
+    if assumed.modulus is not None:
+        low, high = assumed.modulus
         stated[MODULUS_KEY] = (f"{low / 1e6:.9g} MPa", f"{high / 1e6:.9g} MPa")
-    return stated | {path: Tolerance(uniform=f"{100.0 * SPRING_RATE:g} %") for path in found.rates}
+    return stated | {path: Tolerance(uniform=f"{100.0 * SPRING_RATE:g} %") for path in assumed.rates}
 
 
 def _materials(spec: Spec) -> tuple[tuple[MaterialSpec, ...], tuple[MaterialSpec, ...]]:
@@ -102,22 +102,22 @@ def _materials(spec: Spec) -> tuple[tuple[MaterialSpec, ...], tuple[MaterialSpec
     mechanism = getattr(spec, "mechanism", None)
     material: MaterialSpec | None = getattr(mechanism, "material", None)
     beams = getattr(mechanism, "beams", None)
-    own = [getattr(beam, "material", None) for beam in beams.values()] if isinstance(beams, dict) else []
-    shared = () if material is None or (own and None not in own) else (material,)
-    return shared, tuple(one for one in own if one is not None)
+    materials = [getattr(beam, "material", None) for beam in beams.values()] if isinstance(beams, dict) else []
+    shared = () if material is None or (materials and None not in materials) else (material,)
+    return shared, tuple(material for material in materials if material is not None)
 
 
 def _band(material: MaterialSpec) -> tuple[float, float] | None:
     """Return the range of the modulus of a material [Pa], if it is that of its name."""
-    known = MATERIALS_BY_NAME.get(material.name or "")
-    return known.scatter.youngs_modulus if known and material.modulus == known.youngs_modulus else None
+    listed = MATERIALS_BY_NAME.get(material.name or "")
+    return listed.scatter.youngs_modulus if listed and material.modulus == listed.youngs_modulus else None
 
 
 def process_of_part(spec: Spec) -> PartProcess | None:
     """Return how a part is made, as `mechanism.part.process` says; None: unsaid."""
     mechanism = getattr(spec, "mechanism", None)
     blocks = (getattr(mechanism, name, None) for name in ("part", "plate"))
-    return next((one for block in blocks if (one := getattr(block, "process", None))), None)
+    return next((process for block in blocks if (process := getattr(block, "process", None))), None)
 
 
 NO_TOLERANCE = "no value of this part is known to err by its process: state 'design.tolerances'"
@@ -143,7 +143,7 @@ class Parts:
         Raises SpecError with every fault, at ``sensitivity.parameters`` and the path.
         """
         parameters = parameters_of(spec, block)
-        paths = tuple(one.path for one in parameters)
+        paths = tuple(parameter.path for parameter in parameters)
         return cls(spec, parameters, groups(block, paths), correlations(block, paths), samples, seed)
 
     @classmethod
@@ -158,7 +158,9 @@ class Parts:
         try:
             return cls.from_block(spec, _block(stated, design.correlated), *_count_and_seed(spec, design, seed))
         except SpecError as error:
-            raise SpecError([replace(one, path=_to_design_path(one.path)) for one in error.problems]) from None
+            raise SpecError(
+                [replace(problem, path=_to_design_path(problem.path)) for problem in error.problems]
+            ) from None
 
     @classmethod
     def from_expected_errors(cls, spec: Spec, seed: int, process: str | None = None) -> tuple[Parts | None, str]:
@@ -168,32 +170,32 @@ class Parts:
             return None, ""
         if design.tolerances_of(spec)[0]:
             return cls.from_design(spec, design, seed), "within design.tolerances"
-        found = assume_errors(spec, process)
-        if found is None:
+        assumed = assume_errors(spec, process)
+        if assumed is None:
             return None, ""
-        return cls.from_assumed_errors(spec, seed, process), f"made by {found.process.name} (assumed tolerances)"
+        return cls.from_assumed_errors(spec, seed, process), f"made by {assumed.process.name} (assumed tolerances)"
 
     @classmethod
     def from_assumed_errors(cls, spec: Spec, seed: int, process: str | None = None) -> Parts:
         """Return the parts that a process is assumed to make, for a specification some of whose values err by it."""
         design = getattr(spec, "design", None)
-        known = _count_and_seed(spec, design, seed) if isinstance(design, DesignKeys) else (0, seed)
-        return cls.from_block(spec, _block(tolerances(spec, process)), *known)
+        count_and_seed = _count_and_seed(spec, design, seed) if isinstance(design, DesignKeys) else (0, seed)
+        return cls.from_block(spec, _block(tolerances(spec, process)), *count_and_seed)
 
     @property
     def paths(self) -> tuple[str, ...]:
         """Paths of the values that err."""
-        return tuple(one.path for one in self.parameters)
+        return tuple(parameter.path for parameter in self.parameters)
 
     @cached_property
     def nominal(self) -> FloatArray:
         """The values of a perfect part, (d,) [SI]."""
-        return np.array([one.spread.nominal for one in self.parameters])
+        return np.array([parameter.spread.nominal for parameter in self.parameters])
 
     @cached_property
     def deviations(self) -> FloatArray:
         """Standard deviations of the errors, (d,) [SI]."""
-        return np.array([one.spread.standard_deviation for one in self.parameters])
+        return np.array([parameter.spread.standard_deviation for parameter in self.parameters])
 
     def unit(self, samples: int, seed: Seed) -> FloatArray:
         """Return the shares of all parts that lie below each value of drawn parts, (n, d)."""
@@ -202,7 +204,7 @@ class Parts:
     def draw(self, samples: int | None = None, seed: Seed | None = None) -> FloatArray:
         """Return the values of drawn parts, (n, d) [SI]; of another seed those that no search has seen."""
         unit = self.unit(samples or self.samples, self.seed if seed is None else seed)
-        return values_at([one.spread for one in self.parameters], unit)
+        return values_at([parameter.spread for parameter in self.parameters], unit)
 
     def part(self, values: FloatArray) -> Spec:
         """Return the specification of one part, of its values (d,)."""
@@ -259,11 +261,11 @@ def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, .
     """Yield what is wrong with a block's keys on made parts as far as that can be seen before anything is designed."""
     for path in design.tolerances or ():
         try:
-            found = leaf(type(spec), path.replace(".*", ".0"))
+            place = leaf(type(spec), path.replace(".*", ".0"))
         except CannotVary as problem:
             yield ("design", "tolerances", path), str(problem)
             continue
-        if found.kind not in ("quantity", "number"):
+        if place.kind not in ("quantity", "number"):
             yield ("design", "tolerances", path), f"{path!r} does not vary continuously"
     for path in design.free:
         try:

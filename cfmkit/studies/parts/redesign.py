@@ -176,12 +176,12 @@ class PartNumbers:
         return ", ".join(self.parts.paths[k] for k in groups[costliest(design, problem, groups)])
 
 
-def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
+def free_of(requested: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
     """Return which values may move, and in which ranges [SI]: those of `design.free`, else those of the family.
 
     Raises SpecError if a path of `design.free` is not in the design, or its value is not in the range.
     """
-    block = getattr(given, "design", None)
+    block = getattr(requested, "design", None)
     stated = getattr(block, "free", None)
     if stated:
         ranges, faults = {}, []
@@ -193,7 +193,7 @@ def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
         if faults:
             raise SpecError(faults)
         return ranges
-    return dict(family(designed.family).free(given, designed))
+    return dict(family(designed.family).free(requested, designed))
 
 
 def _range_of(spec: Spec, path: str, ends: tuple[str, str]) -> tuple[float, float]:

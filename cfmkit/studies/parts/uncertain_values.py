@@ -82,12 +82,12 @@ _FLOAT_EPSNEG = float(np.finfo(np.float64).epsneg)
 
 def values_at(spreads: Sequence[ParameterSpread], unit: FloatArray) -> FloatArray:
     """Return points in the unit cube, (n, d), as values of the parameters."""
-    return np.stack([one.evaluate_quantiles(unit[:, k]) for k, one in enumerate(spreads)], axis=1)
+    return np.stack([spread.evaluate_quantiles(unit[:, k]) for k, spread in enumerate(spreads)], axis=1)
 
 
 def values_across(spreads: Sequence[ParameterSpread], unit: FloatArray) -> FloatArray:
     """Return points in the unit cube, (n, d), spread evenly over the ranges of the parameters."""
-    ends = np.array([one.ends for one in spreads])
+    ends = np.array([spread.ends for spread in spreads])
     return np.asarray(ends[:, 0] + unit * (ends[:, 1] - ends[:, 0]))
 
 
@@ -98,10 +98,10 @@ def correlation_matrix(count: int, groups: Iterable[tuple[Sequence[int], float]]
     """
     matrix = np.eye(count)
     for members, correlation in groups:
-        for one in members:
-            for other in members:
-                if one != other:
-                    matrix[one, other] = correlation
+        for first in members:
+            for second in members:
+                if first != second:
+                    matrix[first, second] = correlation
     if np.linalg.eigvalsh(matrix).min() < -1e-9:
         raise Incompatible(
             "these correlations are impossible together: of three parameters not all pairs can be opposed"
@@ -141,10 +141,10 @@ def parameters_of(spec: Spec, block: Sensitivity) -> tuple[Parameter, ...]:
 
     Raises SpecError with every fault, at ``sensitivity.parameters`` and the path.
     """
-    found = list(faults(spec, block))
-    if found:
-        raise SpecError([Problem("", 0, 0, ".".join(map(str, place)), message) for place, message in found])
-    return tuple(one for path, stated in block.parameters.items() for one in _expand(spec, path, stated))
+    problems = list(faults(spec, block))
+    if problems:
+        raise SpecError([Problem("", 0, 0, ".".join(map(str, place)), message) for place, message in problems])
+    return tuple(parameter for path, stated in block.parameters.items() for parameter in _expand(spec, path, stated))
 
 
 def faults(spec: Spec, block: Sensitivity) -> Iterator[tuple[Place, str]]:
@@ -158,16 +158,16 @@ def faults(spec: Spec, block: Sensitivity) -> Iterator[tuple[Place, str]]:
             yield ("sensitivity", "parameters", path), str(problem)
             spoilt = True
             continue
-        for one in expanded:
-            if clash := next((other for other in seen if _overlap(one.path, other)), None):
+        for parameter in expanded:
+            if clash := next((path for path in seen if _overlap(parameter.path, path)), None):
                 yield ("sensitivity", "parameters", path), f"{clash!r} is a parameter already; one of them is enough"
-            seen.append(one.path)
+            seen.append(parameter.path)
     if not spoilt:
         yield from _group_faults(block, seen)
 
 
-def _overlap(one: str, other: str) -> bool:
-    return one == other or one.startswith(f"{other}.") or other.startswith(f"{one}.")
+def _overlap(first: str, second: str) -> bool:
+    return first == second or first.startswith(f"{second}.") or second.startswith(f"{first}.")
 
 
 def _group_faults(block: Sensitivity, paths: Sequence[str]) -> Iterator[tuple[Place, str]]:
@@ -220,7 +220,7 @@ def together(block: Sensitivity, paths: Sequence[str]) -> tuple[tuple[int, ...],
 
 
 def _expand(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> list[Parameter]:
-    return [_parameter(spec, one, stated) for one in _items(spec, path)]
+    return [_parameter(spec, item, stated) for item in _items(spec, path)]
 
 
 def _items(spec: Spec, path: str) -> list[str]:
@@ -234,49 +234,49 @@ def _items(spec: Spec, path: str) -> list[str]:
         values = None
     if not isinstance(values, tuple):
         raise CannotVary(f"{before!r} is not a list in this specification; leave the star out")
-    return [one for index in range(len(values)) for one in _items(spec, f"{before}.{index}{after}")]
+    return [item for index in range(len(values)) for item in _items(spec, f"{before}.{index}{after}")]
 
 
 def _parameter(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> Parameter:
-    found = leaf(type(spec), path)
-    if found.kind not in ("quantity", "number"):
+    place = leaf(type(spec), path)
+    if place.kind not in ("quantity", "number"):
         raise CannotVary(f"{path!r} does not vary continuously; `cfmkit sweep` goes through its values")
-    nominal, dimension = _nominal(spec, found)
-    spread = _tolerance(found, stated, nominal) if isinstance(stated, Tolerance) else _range(found, stated, nominal)
-    return Parameter(path, dimension, spread, found.has_several_dimensions)
+    nominal, dimension = _nominal(spec, place)
+    spread = _tolerance(place, stated, nominal) if isinstance(stated, Tolerance) else _range(place, stated, nominal)
+    return Parameter(path, dimension, spread, place.has_several_dimensions)
 
 
-def _nominal(spec: Spec, found: Leaf) -> tuple[float, str]:
+def _nominal(spec: Spec, place: Leaf) -> tuple[float, str]:
     try:
-        value = spec.get_value(found.path)
+        value = spec.get_value(place.path)
     except KeyError:
         value = None
     if isinstance(value, tuple):
-        raise CannotVary(f"{found.path!r} is a list here; write {found.path}.{ALL_ITEMS} for all its items")
+        raise CannotVary(f"{place.path!r} is a list here; write {place.path}.{ALL_ITEMS} for all its items")
     if value is None:
-        raise CannotVary(f"{found.path!r} has no value in this specification; give it one")
-    if found.kind == "number":
+        raise CannotVary(f"{place.path!r} has no value in this specification; give it one")
+    if place.kind == "number":
         return float(value), "ratio"
-    return float(value), getattr(value, "dimension", found.quantity.dimensions[0] if found.quantity else "ratio")
+    return float(value), getattr(value, "dimension", place.quantity.dimensions[0] if place.quantity else "ratio")
 
 
-def _range(found: Leaf, stated: tuple[str, str], nominal: float) -> ParameterSpread:
-    low, high = (_read_value(found, text) for text in stated)
+def _range(place: Leaf, stated: tuple[str, str], nominal: float) -> ParameterSpread:
+    low, high = (_read_value(place, text) for text in stated)
     if not low < high:
         raise CannotVary(f"[{stated[0]}, {stated[1]}] is not a range: the first must be smaller than the second")
     return ParameterSpread("uniform", nominal, low, high)
 
 
-def _tolerance(found: Leaf, stated: Tolerance, nominal: float) -> ParameterSpread:
+def _tolerance(place: Leaf, stated: Tolerance, nominal: float) -> ParameterSpread:
     if stated.uniform is not None:
-        width = _width(found, "uniform", stated.uniform, nominal)
+        width = _width(place, "uniform", stated.uniform, nominal)
         return ParameterSpread("uniform", nominal, nominal - width, nominal + width)
-    deviation = _width(found, "normal", stated.normal or "", nominal)
-    reach = math.inf if stated.truncate is None else _width(found, "truncate", stated.truncate, nominal)
+    deviation = _width(place, "normal", stated.normal or "", nominal)
+    reach = math.inf if stated.truncate is None else _width(place, "truncate", stated.truncate, nominal)
     return ParameterSpread("normal", nominal, nominal - reach, nominal + reach, deviation)
 
 
-def _width(found: Leaf, key: str, text: str, nominal: float) -> float:
+def _width(place: Leaf, key: str, text: str, nominal: float) -> float:
     """Return the size of a tolerance [SI]; a percentage is of the nominal value."""
     if text.endswith("%"):
         share = _percent(key, text)
@@ -286,8 +286,8 @@ def _width(found: Leaf, key: str, text: str, nominal: float) -> float:
         if not nominal:
             raise CannotVary(f"{key}: {text} of zero is zero; give it in the unit of the value")
     else:
-        width = _read_value(found, text, key)
-        share = found.quantity is not None and found.quantity.dimensions == ("ratio",) and abs(nominal) <= 1
+        width = _read_value(place, text, key)
+        share = place.quantity is not None and place.quantity.dimensions == ("ratio",) and abs(nominal) <= 1
         if share and (meant := meant_as_percent(text)):
             raise CannotVary(f"{key}: {text} is more than the value itself; did you mean {meant}?")
     if not width > 0:
@@ -302,11 +302,11 @@ def _percent(key: str, text: str) -> float:
         raise CannotVary(f"{key}: {problem}") from None
 
 
-def _read_value(found: Leaf, text: str, key: str = "") -> float:
+def _read_value(place: Leaf, text: str, key: str = "") -> float:
     """Return the SI value of text in the unit of a value."""
     try:
-        given: Any = read_number(text) if found.kind == "number" else text
-        return float(found.read(given)[0])
+        stated: Any = read_number(text) if place.kind == "number" else text
+        return float(place.read(stated)[0])
     except (CannotVary, QuantityError) as problem:
         raise CannotVary(f"{key}: {problem}" if key else str(problem)) from None
 
@@ -326,7 +326,9 @@ def plan_of(parameters: Sequence[Parameter], points: FloatArray) -> Plan:
     """Return points, (n, d), as a plan of the engine."""
     columns = map(np.ascontiguousarray, points.T)
     varied = (
-        Variable(one.path, one.dimension, values, border_values(values, one.dimension), one.several)
-        for one, values in zip(parameters, columns, strict=True)
+        Variable(
+            parameter.path, parameter.dimension, values, border_values(values, parameter.dimension), parameter.several
+        )
+        for parameter, values in zip(parameters, columns, strict=True)
     )
     return Plan(tuple(varied), len(points), joint=True)

@@ -112,17 +112,17 @@ YIELD_METRIC = Metric("yield", "ratio", "share of parts that meet every requirem
 def run(setup: Setup, evaluator: Evaluator) -> Findings:
     """Return shares of good parts, and what tighter tolerances gain."""
     count, groups = len(setup.parameters), setup.together
-    spreads = [one.spread for one in setup.parameters]
+    spreads = [parameter.spread for parameter in setup.parameters]
     unit = setup.parts.unit(setup.samples, setup.seed).reshape(setup.samples, count)
     points = sample(unit, spreads, groups)
     names = tuple(", ".join(setup.paths[k] for k in group) for group in groups)
     outputs = evaluator.outputs(points, [DRAWN_ROLE, *(f"halved {name}" for name in names)])
     drops = partial(variance_drops, seed=setup.seed)
-    found: list[IndexLine] = []
+    lines: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         analysis = analyze_complete(outputs[..., m], drops, (VARIANCE_DROP,), len(names))
-        found += lines_of(metric, names, analysis, len(outputs))
-    plain = Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+        lines += lines_of(metric, names, analysis, len(outputs))
+    plain = Findings(setup, evaluator, tuple(lines), points=points, outputs=outputs)
     return _with_yield(plain, names) if setup.study.spec.part_requirements else plain
 
 
@@ -132,21 +132,23 @@ def judge_samples(setup: Setup, outputs: FloatArray) -> tuple[NDArray[np.bool_],
     return np.asarray(~np.isnan(met) & (met > 0.5)), np.asarray(np.isnan(met).any(axis=-1))
 
 
-def with_shares(found: Findings, met: NDArray[np.bool_], failed: NDArray[np.bool_]) -> Findings:
+def with_shares(findings: Findings, met: NDArray[np.bool_], failed: NDArray[np.bool_]) -> Findings:
     """Return findings with the shares of parts, as drawn, that meet all requirements and each of them."""
-    each = tuple(Share.from_outcomes(met[:, 0, k], failed[:, 0]) for k in range(met.shape[-1]))
-    return replace(found, all_met=Share.from_outcomes(np.asarray(met[:, 0].all(axis=-1)), failed[:, 0]), each_met=each)
+    shares = tuple(Share.from_outcomes(met[:, 0, k], failed[:, 0]) for k in range(met.shape[-1]))
+    return replace(
+        findings, all_met=Share.from_outcomes(np.asarray(met[:, 0].all(axis=-1)), failed[:, 0]), each_met=shares
+    )
 
 
-def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
+def _with_yield(findings: Findings, names: tuple[str, ...]) -> Findings:
     """Return findings with the yield, and what it gains from tighter tolerances."""
-    setup, outputs = found.setup, found.outputs
+    setup, outputs = findings.setup, findings.outputs
     if outputs is None:
-        return found
+        return findings
     met, failed = judge_samples(setup, outputs)
     gains = yield_gains(np.asarray(met.all(axis=-1)), failed)
-    lines = (*lines_of(YIELD_METRIC, names, (gains,), len(outputs)), *found.lines)
-    return replace(with_shares(found, met, failed), lines=lines)
+    lines = (*lines_of(YIELD_METRIC, names, (gains,), len(outputs)), *findings.lines)
+    return replace(with_shares(findings, met, failed), lines=lines)
 
 
 SENSITIVITY_METHOD = Method(

@@ -38,14 +38,14 @@ def to_one_scale(
     links: Sequence[str] = (),  # where each drawing leads on a page; none in a picture
 ) -> Figure:
     """Return every proposal as it is made, to one scale, in the envelope."""
-    drawn = [_find_drawing(one) for one in proposals[:MAX_DRAWN_PROPOSALS]]
+    drawn = [_find_drawing(proposal) for proposal in proposals[:MAX_DRAWN_PROPOSALS]]
     sizes = [_envelope_in_drawing(space, request) for _, space in drawn]
     wide, high = (max(size[k] for size in sizes) * 1.08 for k in (0, 1))
     rows = -(-len(drawn) // N_COLUMNS)
     columns = min(N_COLUMNS, len(drawn))
     names = [
-        _wrap_text(150.0 / columns - 2.0, label_proposal(number, one))
-        for number, one in enumerate(proposals[:MAX_DRAWN_PROPOSALS], 1)
+        _wrap_text(150.0 / columns - 2.0, label_proposal(number, proposal))
+        for number, proposal in enumerate(proposals[:MAX_DRAWN_PROPOSALS], 1)
     ]
     above = 3.5 + LINE_SPACING * max(len(text.split("\n")) for text in names)
     scale = min(150.0 / (columns * wide), 190.0 / (rows * high), 90.0 / max(wide, high))
@@ -123,8 +123,8 @@ def _frame(ax: Axes, space: Any, size: tuple[float, float], view: tuple[float, f
     """Draw the envelope around a mechanism, in the middle of a view."""
     from matplotlib.patches import Rectangle
 
-    own = (space.along, space.across) if space.sideways else (space.across, space.along)
-    middle = [1e3 * (corner + 0.5 * side) for corner, side in zip(space.corner, own, strict=True)]
+    sides = (space.along, space.across) if space.sideways else (space.across, space.along)
+    middle = [1e3 * (corner + 0.5 * side) for corner, side in zip(space.corner, sides, strict=True)]
     corner = [at - 500.0 * side for at, side in zip(middle, size, strict=True)]
     look: dict[str, Any] = {
         "fill": False,

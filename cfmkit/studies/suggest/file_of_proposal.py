@@ -152,9 +152,9 @@ def add_process_and_materials(spec: Spec, request: Request) -> Spec:
         {"mechanism.part.process": request.process},
         {"mechanism.plate.process": request.process},
     )
-    for one in changes:
+    for change in changes:
         try:
-            return spec.replace(one)
+            return spec.replace(change)
         except CfmError:  # another kind of part
             continue
     return spec
@@ -222,6 +222,6 @@ def _list_own_spring_targets(spec: Spec, request: Request) -> Mapping[str, Any] 
 def _as_listed(spring: Any) -> Mapping[str, Any]:
     """Return a spring at a pin as a catalogue lists it, in the number that it is built in."""
     wire = {} if spring.wound is None else spring.wound.model_dump(exclude_unset=True)
-    known = {"free_length": spring.free_length, "life": spring.life}
+    stated = {"free_length": spring.free_length, "life": spring.life}
     listed = {"name": spring.name, "kind": spring.spring_type.kind, "counts": (spring.count,)}
-    return wire | listed | {key: value for key, value in known.items() if value is not None}
+    return wire | listed | {key: value for key, value in stated.items() if value is not None}

@@ -56,8 +56,8 @@ class Suggestions:
         """0 if a proposal does all that is required, 70 if a bug ended all, 6 if not all was judged, else 4."""
         if self.proposals:
             return ExitCode.OK
-        reasons = [one.offer.reason for one in self.answers if one.offer.reason]
-        reasons += [reason for each in self.failed.values() for reason in each]
+        reasons = [answer.offer.reason for answer in self.answers if answer.offer.reason]
+        reasons += [reason for reasons_of_family in self.failed.values() for reason in reasons_of_family]
         if self.bugs and not self.near and all(reason.startswith(BUG_PREFIX) for reason in reasons):
             return ExitCode.BUG
         return ExitCode.PARTIAL if self.late or self.unjudged else ExitCode.NO_SOLUTION

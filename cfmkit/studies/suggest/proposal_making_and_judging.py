@@ -216,14 +216,14 @@ def _design_candidate(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]
 def finest_of(name: str, spec: Spec) -> str:
     """Return the finest model of a family that can run a specification; its own where there is no finer one."""
     models = list(family(name).models)
-    own = spec.fidelity if spec.fidelity in models else models[0]
-    for finer in reversed(models[models.index(own) + 1 :]):
+    designed_by = spec.fidelity if spec.fidelity in models else models[0]
+    for finer in reversed(models[models.index(designed_by) + 1 :]):
         try:
             spec.replace({FIDELITY_KEY: finer})
         except CfmError:  # what that model needs is not there: other parts, a motion in time
             continue
         return finer
-    return own
+    return designed_by
 
 
 FIDELITY_KEY = "analysis.fidelity"
@@ -245,12 +245,12 @@ def _judge_by_finest_model(job: ProposalJob, near: Proposal, clock: Clock) -> Pr
         made = correct(spec, aimed) if correct else spec.replace({FIDELITY_KEY: near.pending})
         if clock.late():
             break
-        found = judge_proposal(job.family, near.variant, made, job.request, job.seed, clock, near)
-        if best is None or (found.text and len(found.missed) <= len(best.missed)):
-            best = found
-        if found.passes or not found.text:
+        judged = judge_proposal(job.family, near.variant, made, job.request, job.seed, clock, near)
+        if best is None or (judged.text and len(judged.missed) <= len(best.missed)):
+            best = judged
+        if judged.passes or not judged.text:
             break
-        spec = remove_end_stop(use_own_model(found), job.request)
+        spec = remove_end_stop(use_own_model(judged), job.request)
     return Proposal(job.family, near.variant, message=OUT_OF_TIME) if best is None else best
 
 
@@ -262,10 +262,12 @@ def _with_margins(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
     def judge(spec: Spec) -> Proposal:
         return judge_proposal(job.family, near.variant, spec, job.request, job.seed, clock)
 
-    found = redesign_for_yield(
+    redesigned = redesign_for_yield(
         near, job.candidate, job.request, Run(job.seed, time_budget=clock.get_time_left()), judge
     )
-    return found if found.good or not clock.late() else Proposal(job.family, near.variant, message=OUT_OF_TIME)
+    return (
+        redesigned if redesigned.good or not clock.late() else Proposal(job.family, near.variant, message=OUT_OF_TIME)
+    )
 
 
 def redesign_for_yield(
@@ -284,18 +286,18 @@ def redesign_for_yield(
         moved = None if clock.late() else moved_for_yield(candidate, spec, request, asked, run)
         if moved is None:
             break
-        last, there = moved, judge(moved.spec)
-        if there.good:
-            return replace(there, notes=(_note(moved), *there.notes))
-        if not there.movable:
-            obstacle = "; ".join(there.missed) or there.message
+        last, judged = moved, judge(moved.spec)
+        if judged.good:
+            return replace(judged, notes=(_note(moved), *judged.notes))
+        if not judged.movable:
+            obstacle = "; ".join(judged.missed) or judged.message
             break
-        share = float(there.numbers["yield"] or 0.0)
+        share = float(judged.numbers["yield"] or 0.0)
         if share > float(best.numbers["yield"] or 0.0):
-            best = there
+            best = judged
         if moved.share < asked or asked >= MOST_ASKED:
             break
-        asked, spec = min(MOST_ASKED, max(moved.share, asked) + 0.5 * (wanted - share)), there.spec
+        asked, spec = min(MOST_ASKED, max(moved.share, asked) + 0.5 * (wanted - share)), judged.spec
     return replace(best, missed=(f"{best.missed[0]}; {_explain_margins(last, obstacle)}",), movable=False)
 
 
@@ -354,9 +356,9 @@ def judge_proposal(
     text = dump(with_made_parts(required, request, seed))
     written = spec_of(name, text)
     outcomes = check(written.part_requirements, result, values)
-    missed = [one for one in outcomes if not one.ok]
+    missed = [outcome for outcome in outcomes if not outcome.ok]
     misses = [
-        *((topic_of(one.metric), one.sentence) for one in missed if one.metric not in ENVELOPE_METRICS),
+        *((topic_of(outcome.metric), outcome.sentence) for outcome in missed if outcome.metric not in ENVELOPE_METRICS),
         *(("size", text) for text in sides_outside(request, space)),
         *(("stress", text) for text in (space.faults if space else ())),
         *(("stress", text) for text in list_misses_within_mesh_error(request, result, values)),
@@ -366,7 +368,10 @@ def judge_proposal(
     pending = finest_of(name, written)
     pending = "" if pending == model_of(name, written) else pending
     numbers, movable = numbers_of(result, space, request), False
-    warnings = {one.name: f"{one.name}: {one.short}" if one.short else one.name for one in result.warnings}
+    warnings = {
+        warning.name: f"{warning.name}: {warning.short}" if warning.short else warning.name
+        for warning in result.warnings
+    }
     if "wide_beam" in warnings and not misses:
         coarser = written if near is None else written.replace({FIDELITY_KEY: near.model})
         numbers["stiffening"] = raised = stiffening(coarser, record.analyze)
@@ -403,45 +408,49 @@ def model_of(name: str, spec: Spec) -> str:
 def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> dict[str, float | None]:
     """Return what proposals are compared by, in SI."""
     kind = request.kind
-    found = evaluate(result)
+    quantities = evaluate(result)
 
     def worst(name: str) -> float | None:
-        values = [one.value for key, one in found.items() if key.partition("[")[0] == name and one.value is not None]
+        values = [
+            quantity.value
+            for key, quantity in quantities.items()
+            if key.partition("[")[0] == name and quantity.value is not None
+        ]
         return max(values) if values else None
 
     lost, mechanism = worst("hysteresis_area"), result.spec.get_value("mechanism")
     rubs = not hasattr(mechanism, "pins") or any(_friction(mechanism, name) for name in RUBBING_BLOCKS)
-    means = {key: one.value for key, one in found.items() if key.partition("[")[0] == f"{kind}_mean"}
+    means = {key: quantity.value for key, quantity in quantities.items() if key.partition("[")[0] == f"{kind}_mean"}
     each = [value for key, value in means.items() if value is not None and ("[" in key or len(means) == 1)]
     mean = float(np.mean(each)) if each else None
     return {
         "mean": mean,
         "ripple": worst(f"{kind}_ripple"),
         "hysteresis": None if lost is None or not mean or not rubs else lost / (mean * request.travel),
-        "safety_factor": _least_factor(found),
+        "safety_factor": _least_factor(quantities),
         "across": None if space is None else space.across,
         "along": None if space is None else space.along,
         "depth": None if space is None else space.depth,
         "parts": None if space is None else float(space.parts),
-        "life": _life(found),
+        "life": _life(quantities),
         "yield": None,
         "stiffening": None,
     }
 
 
-def _least_factor(found: Mapping[str, Any]) -> float | None:
+def _least_factor(quantities: Mapping[str, Any]) -> float | None:
     """Return the smallest safety factor: of the part that bends, of links, or of springs."""
-    known = [found[name].value for name in SAFETY_METRICS if name in found]
-    return min((value for value in known if value is not None), default=None)
+    factors = [quantities[name].value for name in SAFETY_METRICS if name in quantities]
+    return min((value for value in factors if value is not None), default=None)
 
 
-def _life(found: Mapping[str, Any]) -> float | None:
+def _life(quantities: Mapping[str, Any]) -> float | None:
     """Return the life of what lasts shortest; None if that of the material, or of a bought spring, is not known."""
-    lives = [found[name].value for name in LIFE_METRICS if name in found]
-    known = [life for life in lives if life is not None]
-    if len(known) < len(lives) or ("wire_stress_max" in found and "spring_life" not in found):
+    lives = [quantities[name].value for name in LIFE_METRICS if name in quantities]
+    finite = [life for life in lives if life is not None]
+    if len(finite) < len(lives) or ("wire_stress_max" in quantities and "spring_life" not in quantities):
         return None
-    return min(known, default=None)
+    return min(finite, default=None)
 
 
 def _notes(space: BoundingBox | None, result: Result) -> Iterator[str]:

@@ -50,9 +50,9 @@ def edges(request: Request, names: Sequence[str], seed: int, clock: Clock) -> It
     Families that have candidates already, of which none is good, come first: a little more of any key may be enough.
     """
     relaxations = _relaxations(request)
-    near = [name for name in names if not clock.late() and _offer(request, name, seed)]
-    yield from (Edge(name, key, 1.0) for name in near for key in relaxations)
-    pairs = [(name, key) for name in names if name not in near for key in relaxations]
+    reachable = [name for name in names if not clock.late() and _offer(request, name, seed)]
+    yield from (Edge(name, key, 1.0) for name in reachable for key in relaxations)
+    pairs = [(name, key) for name in names if name not in reachable for key in relaxations]
     left = [
         (name, key)
         for name, key in pairs
@@ -118,16 +118,16 @@ def confirm(request: Request, seed: int, clock: Clock, edge: Edge) -> str | None
 
 def _relaxations(request: Request) -> dict[str, Relaxation]:
     """Return what may be relaxed of a request, by key."""
-    found: dict[str, Relaxation] = {"envelope": _larger, request.kind: _weaker}
-    found["travel" if request.kind == "force" else "angle"] = _shorter
-    found["ripple"] = _relax_ripple
+    relaxations: dict[str, Relaxation] = {"envelope": _larger, request.kind: _weaker}
+    relaxations["travel" if request.kind == "force" else "angle"] = _shorter
+    relaxations["ripple"] = _relax_ripple
     if request.safety > 1.0:
-        found["safety"] = _less_safe
+        relaxations["safety"] = _less_safe
     if request.hysteresis is not None:
-        found["hysteresis"] = _lossy
+        relaxations["hysteresis"] = _lossy
     if request.adjustable is not None:
-        found["adjustable"] = _less_adjustable
-    return found
+        relaxations["adjustable"] = _less_adjustable
+    return relaxations
 
 
 def _offer(request: Request, name: str, seed: int) -> Sequence[Candidate]:

@@ -50,27 +50,27 @@ def list_requirements(
     values: Iterable[Definition],  # of the scalar results of its family
 ) -> tuple[dict[str, Any], ...]:
     """Return the requirements that say what is required of a mechanism, over the window of its analysis."""
-    found = evaluate(result, None, None, values)
+    quantities = evaluate(result, None, None, values)
     return (
         *_require_effort(request),
-        *_require_stress(request, result, found),
+        *_require_stress(request, result, quantities),
         *_require_box(request, space),
         *_require_loss(request, result),
-        *_require_lives(request, result, found),
-        *_require_adjustment(request, found),
+        *_require_lives(request, result, quantities),
+        *_require_adjustment(request, quantities),
     )
 
 
 def list_unjudged(request: Request, result: Result) -> Iterator[str]:
     """Yield what is required and no model here can judge, each with the reason."""
-    found = evaluate(result)
+    quantities = evaluate(result)
     if request.hysteresis is not None and "unload" not in result.curve.branches:
         yield f"hysteresis not judged: no loss factor is known of {_material(result)}"
     if request.cycles is not None:
-        yield from _unknown_lives(result, found)
-    if request.adjustable is not None and "adjusted_force_min" not in found:
+        yield from _unknown_lives(result, quantities)
+    if request.adjustable is not None and "adjusted_force_min" not in quantities:
         yield "adjustment not judged: the model does not know its ends"
-    names = {one.name for one in result.warnings}
+    names = {warning.name for warning in result.warnings}
     if "sharp_corners" in names:
         yield "stress not judged: inside corners are sharp"
     if "mesh_coarse" in names:
@@ -84,8 +84,8 @@ def list_unjudged(request: Request, result: Result) -> Iterator[str]:
 
 def list_misses_within_mesh_error(request: Request, result: Result, values: Iterable[Definition]) -> Iterator[str]:
     """Yield what is missed if the largest stress of a solid is as much larger as its mesh may be off."""
-    found = evaluate(result, None, None, values)
-    factor, error = (_value_of(found, name) for name in ("safety_factor", "mesh_stress_error"))
+    quantities = evaluate(result, None, None, values)
+    factor, error = (_value_of(quantities, name) for name in ("safety_factor", "mesh_stress_error"))
     if factor is not None and error is not None and factor / (1.0 + error) < request.safety <= factor:
         least = factor / (1.0 + error)
         off = f"{100.0 * error:.2g} %"
@@ -108,8 +108,8 @@ def _share(value: float) -> str:
     return f"{100.0 * value:.12g} %"
 
 
-def _value_of(found: Mapping[str, Quantity], name: str) -> float | None:
-    return found[name].value if name in found else None
+def _value_of(quantities: Mapping[str, Quantity], name: str) -> float | None:
+    return quantities[name].value if name in quantities else None
 
 
 def _require_effort(request: Request) -> Iterator[dict[str, Any]]:
@@ -122,14 +122,14 @@ def _require_effort(request: Request) -> Iterator[dict[str, Any]]:
         yield {"metric": f"{request.kind}_mean", "min": low, "max": high}
 
 
-def _require_stress(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+def _require_stress(request: Request, result: Result, quantities: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
     least = f"{request.safety:.12g}"
-    if _value_of(found, "safety_factor") is not None:
+    if _value_of(quantities, "safety_factor") is not None:
         yield {"metric": "safety_factor", "min": least, "over": stressed_motion(request, result.spec)}
-    if _value_of(found, "link_safety_factor") is not None:
+    if _value_of(quantities, "link_safety_factor") is not None:
         yield {"metric": "link_safety_factor", "min": least}
         yield {"metric": "link_turn_share_max", "max": STRAIGHT_LINKS}
-    if _value_of(found, "spring_safety_factor") is not None:
+    if _value_of(quantities, "spring_safety_factor") is not None:
         yield {"metric": "spring_safety_factor", "min": least}
 
 
@@ -152,23 +152,23 @@ def _require_loss(request: Request, result: Result) -> Iterator[dict[str, Any]]:
         yield {"metric": "hysteresis_area", "max": format_short(lost, "energy", 12)}
 
 
-def _require_lives(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+def _require_lives(request: Request, result: Result, quantities: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
     if request.cycles is None:
         return
-    if _bends(result) and "fatigue_life" in found and getattr(_block(result.spec), "fatigue", None) is not None:
+    if _bends(result) and "fatigue_life" in quantities and getattr(_block(result.spec), "fatigue", None) is not None:
         yield {"metric": "fatigue_life", "min": f"{request.cycles}", "over": stressed_motion(request, result.spec)}
-    if _value_of(found, "spring_life") is not None:
+    if _value_of(quantities, "spring_life") is not None:
         yield {"metric": "spring_life", "min": f"{request.cycles}"}
 
 
-def _unknown_lives(result: Result, found: Mapping[str, Quantity]) -> Iterator[str]:
-    wired = "wire_stress_max" in found or _has_springs(result.spec)
-    links = "link_safety_factor" in found
+def _unknown_lives(result: Result, quantities: Mapping[str, Quantity]) -> Iterator[str]:
+    wired = "wire_stress_max" in quantities or _has_springs(result.spec)
+    links = "link_safety_factor" in quantities
     if (_bends(result) or links) and getattr(_block(result.spec), "fatigue", None) is None:
         yield f"life not judged: no S-N data for {_material(result)}"
-    elif _bends(result) and "fatigue_life" not in found:
+    elif _bends(result) and "fatigue_life" not in quantities:
         yield "life not judged: no model of the fatigue of its contact"
-    if wired and _value_of(found, "spring_life") is None:
+    if wired and _value_of(quantities, "spring_life") is None:
         yield "life not judged: no S-N data for the wire of its springs"
     if not (_bends(result) or links or wired):
         yield "life not judged: no stress of its parts is modelled"
@@ -195,8 +195,8 @@ def _material(result: Result) -> str:
     return getattr(_block(result.spec), "name", None) or "its material"
 
 
-def _require_adjustment(request: Request, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
-    if request.adjustable is None or "adjusted_force_min" not in found:
+def _require_adjustment(request: Request, quantities: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+    if request.adjustable is None or "adjusted_force_min" not in quantities:
         return
     low, high = request.adjustable
     yield {"metric": "adjusted_force_min", "max": format_short(low * (1.0 + ADJUSTMENT_TOL), "force", 12)}
@@ -238,13 +238,15 @@ def topic_of(metric: str) -> str:
 def disqualifying(result: Result) -> Iterator[tuple[str, str]]:
     """Yield topic and sentence of every warning with which a mechanism is no proposal."""
     for topic, names in DISQUALIFYING_FINDINGS.items():
-        yield from ((topic, f"{one.name}: {one.message}") for one in result.warnings if one.name in names)
+        yield from (
+            (topic, f"{warning.name}: {warning.message}") for warning in result.warnings if warning.name in names
+        )
 
 
 def largest_force(request: Request, result: Result) -> float:
     """Return the largest mean of all branches, or of a band the largest force [N or N m]."""
     name = f"{request.kind}_{'max' if request.banded else 'mean'}"
-    values = [one.value for key, one in evaluate(result).items() if key.partition("[")[0] == name]
+    values = [quantity.value for key, quantity in evaluate(result).items() if key.partition("[")[0] == name]
     return max((value for value in values if value is not None), default=0.0)
 
 
@@ -263,10 +265,10 @@ def sides_outside(request: Request, space: BoundingBox | None) -> Iterator[str]:
         yield "the envelope that it needs is not known"
         return
     sides = [space.across, space.along]
-    given = list(request.envelope[:2])
+    envelope = list(request.envelope[:2])
     if request.kind == "torque":
-        sides, given = sorted(sides), sorted(given)
-    for name, need, have in zip(("across the travel", "along the travel"), sides, given, strict=True):
+        sides, envelope = sorted(sides), sorted(envelope)
+    for name, need, have in zip(("across the travel", "along the travel"), sides, envelope, strict=True):
         if need > have * (1.0 + LENGTH_RTOL):
             needed, given_side = _apart(need, have)
             yield f"needs {needed} {name}: {given_side} given"
@@ -277,7 +279,7 @@ def sides_outside(request: Request, space: BoundingBox | None) -> Iterator[str]:
         yield f"needs a depth of {needed}: {given_depth} given"
 
 
-def _apart(one: float, other: float) -> tuple[str, str]:
+def _apart(first: float, second: float) -> tuple[str, str]:
     """Return two lengths that differ with as many digits as it takes to see that they do.
 
     Examples
@@ -286,7 +288,7 @@ def _apart(one: float, other: float) -> tuple[str, str]:
     (('12 mm', '10 mm'), ('10.00004 mm', '10 mm'))
     """
     for digits in range(4, 17):
-        texts = format_short(one, "length", digits), format_short(other, "length", digits)
+        texts = format_short(first, "length", digits), format_short(second, "length", digits)
         if texts[0] != texts[1]:
             break
     return texts

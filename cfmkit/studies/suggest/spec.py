@@ -95,11 +95,11 @@ class SuggestBlock(Model):
     def _is_one_request(self) -> Self:
         if (self.force is None) == (self.torque is None):
             raise ValueError("give either 'force' (with 'travel') or 'torque' (with 'angle')")
-        wanted, other = ("travel", "angle") if self.force is not None else ("angle", "travel")
+        wanted, unused = ("travel", "angle") if self.force is not None else ("angle", "travel")
         what = "force" if self.force is not None else "torque"
-        if getattr(self, other) is not None:
+        if getattr(self, unused) is not None:
             raise ValueError(
-                f"a {what} is constant over {article(wanted)} {wanted}: '{other}' does not go with '{what}'"
+                f"a {what} is constant over {article(wanted)} {wanted}: '{unused}' does not go with '{what}'"
             )
         if getattr(self, wanted) is None:
             raise ValueError(f"'{wanted}' is missing: over which the {what} is constant")
@@ -121,9 +121,9 @@ class SuggestBlock(Model):
         if self.overload is not None:
             if self.force is None:
                 refuse("SuggestBlock", {("overload",): "goes with 'force' only"})
-            own = max((self.ends[1], *(self.adjustable or ())))
-            if self.overload <= own:
-                texts = format_short(self.overload, "force"), format_short(own, "force")
+            largest = max((self.ends[1], *(self.adjustable or ())))
+            if self.overload <= largest:
+                texts = format_short(self.overload, "force"), format_short(largest, "force")
                 refuse("SuggestBlock", {("overload",): f"{texts[0]} is not above the largest own force, {texts[1]}"})
         return self
 
@@ -131,7 +131,7 @@ class SuggestBlock(Model):
     def _can_be_made(self) -> Self:
         if self.process is None:
             return self
-        reasons = [why_not_made(self.process, one.name, one.modulus) for one in self._materials]
+        reasons = [why_not_made(self.process, material.name, material.modulus) for material in self._materials]
         if reported := "; ".join(dict.fromkeys(filter(None, reasons))):
             refuse("SuggestBlock", {("process",): reported})
         least = PROCESSES_BY_NAME[self.process].least_feature
@@ -180,7 +180,7 @@ class SuggestBlock(Model):
         value: Any = self.force if self.force is not None else self.torque
         usual = USUAL_MATERIALS[self.process] if self.process else ()
         materials = self._materials or tuple(MaterialSpec(name=name) for name in usual)
-        blocks = tuple(self._lasting(one) for one in materials)
+        blocks = tuple(self._lasting(material) for material in materials)
         low, high = self.ends
         derived: dict[str, Any] = {
             "kind": "force" if self.force is not None else "torque",
@@ -195,8 +195,8 @@ class SuggestBlock(Model):
         if self.process:
             derived["thinnest"] = PROCESSES_BY_NAME[self.process].least_feature
         # every other key goes on under its own name
-        own = {field.name for field in fields(Request)} & type(self).model_fields.keys() - derived.keys()
-        return Request(**{name: getattr(self, name) for name in own}, **derived)
+        names = {field.name for field in fields(Request)} & type(self).model_fields.keys() - derived.keys()
+        return Request(**{name: getattr(self, name) for name in names}, **derived)
 
 
 def _middle(low: float, high: float) -> float:

@@ -78,7 +78,8 @@ def with_made_parts(spec: Spec, request: Request, seed: int) -> Spec:
     if not stated:
         return spec
     parameters: dict[str, Any] = {
-        path: one if isinstance(one, tuple) else one.model_dump(exclude_none=True) for path, one in stated.items()
+        path: tolerance if isinstance(tolerance, tuple) else tolerance.model_dump(exclude_none=True)
+        for path, tolerance in stated.items()
     }
     block = {
         "method": "tolerance", "parameters": parameters, "samples": N_DRAWN, "seed": seed,
@@ -96,44 +97,44 @@ def good_parts(
 ) -> GoodParts:
     """Return what becomes of the made parts of a mechanism."""
     wanted = float(request.good_parts or 0.0)
-    found = assume_errors(result.spec, request.process)
-    if found is None or result.spec.sensitivity is None:
+    assumed = assume_errors(result.spec, request.process)
+    if assumed is None or result.spec.sensitivity is None:
         return GoodParts(
             None, "its yield is not known: the errors that the process causes in its dimensions are not known"
         )
     parts = Parts.from_block(result.spec, result.spec.sensitivity, N_DRAWN, result.spec.sensitivity.seed or 0)
     first = _first_order(result, parts)
-    most = 1.0 if first is None else _most(first, found, request)
+    most = 1.0 if first is None else _most(first, assumed, request)
     if first is not None and first.good.value < wanted:
-        text = _report_yield(first.good.value, f"made by {found.process.name}, linear estimate", wanted)
-        return GoodParts(first.good.value, text + _cures(first, found, most, wanted), movable=most >= wanted)
+        text = _report_yield(first.good.value, f"made by {assumed.process.name}, linear estimate", wanted)
+        return GoodParts(first.good.value, text + _cures(first, assumed, most, wanted), movable=most >= wanted)
     if not draw:
         return GoodParts(None if first is None else first.good.value)
-    drawn = _draw_parts(result, parts, found, wanted, clock)
+    drawn = _draw_parts(result, parts, assumed, wanted, clock)
     return replace(drawn, movable=first is not None and bool(drawn.missed) and most >= wanted)
 
 
-def _most(first: ExpectedShares, found: Assumed, request: Request) -> float:
+def _most(first: ExpectedShares, assumed: Assumed, request: Request) -> float:
     """Return the largest yield of any shape, by the modulus alone, which no shape makes any surer.
 
     A force that goes with a modulus between E0 and E1, all equally likely, is within [F0, F1] for a share of
     (1 - F0/F1) E1/(E1 - E0) at most: the range of moduli that give such forces is widest at its upper end.
     """
-    if found.modulus is None or not first.proportional:
+    if assumed.modulus is None or not first.proportional:
         return 1.0
-    low, high = found.modulus
+    low, high = assumed.modulus
     return min(1.0, (1.0 - request.low / request.high) * high / (high - low))
 
 
-def _cures(first: ExpectedShares, found: Assumed, most: float, wanted: float) -> str:
+def _cures(first: ExpectedShares, assumed: Assumed, most: float, wanted: float) -> str:
     """Return what a yield would be without errors that a whole part has in common, and how one gets there."""
     better = {"once the modulus is measured": first.measured, "after a trim of each part's force": first.trimmed}
     least = first.good.value + 0.005
     shown = [f"{percent(share.value)} {words}" for words, share in better.items() if share.value > least]
     text = f" ({', '.join(shown)})" if shown else ""
-    if most >= wanted or found.modulus is None:
+    if most >= wanted or assumed.modulus is None:
         return text
-    ends = " to ".join(format_short(end, "stress") for end in found.modulus)
+    ends = " to ".join(format_short(end, "stress") for end in assumed.modulus)
     return (
         f"{text}; no shape exceeds {percent(most)}, because its force is proportional to the modulus of {ends}: "
         "measure it on a coupon and state it as material, fit it to a measured part with 'cfmkit "
@@ -149,7 +150,7 @@ def _first_order(result: Result, parts: Parts) -> ExpectedShares | None:
         return None
 
 
-def _draw_parts(result: Result, parts: Parts, found: Assumed, wanted: float, clock: Clock) -> GoodParts:
+def _draw_parts(result: Result, parts: Parts, assumed: Assumed, wanted: float, clock: Clock) -> GoodParts:
     """Return how many drawn parts are good; the first that are too many bad ones end it."""
     good, looked, most_bad = 0, 0, (1.0 - wanted) * N_DRAWN + 1e-9
     for met in _judge_parts(result, parts):
@@ -158,7 +159,7 @@ def _draw_parts(result: Result, parts: Parts, found: Assumed, wanted: float, clo
         looked += len(met)
         good += int(met.sum())
         if looked - good > most_bad:
-            made = f"of {looked} parts made by {found.process.name}"
+            made = f"of {looked} parts made by {assumed.process.name}"
             return GoodParts(good / looked, _report_yield(good / looked, made, wanted))
     return GoodParts(good / looked)
 
@@ -207,28 +208,31 @@ def moved_for_yield(candidate: Candidate, spec: Spec, request: Request, asked: f
     numbers = PartNumbers(parts, tuple(free), rows, run)
     problem = numbers.problem(free, asked, Clock.from_budgets(run.time_budget))
     try:
-        found = with_margins(problem, numbers.start, MAX_REDESIGN_STEPS)
+        redesigned = with_margins(problem, numbers.start, MAX_REDESIGN_STEPS)
     except NoPart:
         return None
     return MovedForYield(
-        numbers.build_spec(found, problem), found.began, found.share, numbers.costliest(found, problem)
+        numbers.build_spec(redesigned, problem),
+        redesigned.began,
+        redesigned.share,
+        numbers.costliest(redesigned, problem),
     )
 
 
 def _free(candidate: Candidate, spec: Spec, request: Request) -> dict[str, tuple[float, float]]:
     """Return what may move, and in which ranges [SI]."""
-    given = candidate.spec
-    found: dict[str, tuple[float, float]] = {}
+    spec_of_candidate = candidate.spec
+    ranges: dict[str, tuple[float, float]] = {}
     if candidate.design:
-        found |= family(spec.family).free(given, spec)
+        ranges |= family(spec.family).free(spec_of_candidate, spec)
     for path in candidate.free:
         value: Any = spec.get_value(path)
         if isinstance(value, float):
             thin = path.endswith("thickness")
-            found[path] = range_about(
+            ranges[path] = range_about(
                 value, low=request.thinnest if thin else None, high=None if thin else request.depth
             )
     # a value at the end of its range, as a leaf as thin as can be made, may still move away from it
-    at = {path: float(spec.get_value(path)) for path in found}
-    inside = {path: (min(low, at[path]), max(high, at[path])) for path, (low, high) in found.items()}
+    at = {path: float(spec.get_value(path)) for path in ranges}
+    inside = {path: (min(low, at[path]), max(high, at[path])) for path, (low, high) in ranges.items()}
     return {path: ends for path, ends in inside.items() if ends[0] < ends[1]}
