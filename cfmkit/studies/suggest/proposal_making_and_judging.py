@@ -368,10 +368,7 @@ def judge_proposal(
     pending = finest_of(name, written)
     pending = "" if pending == model_of(name, written) else pending
     numbers, movable = numbers_of(result, space, request), False
-    warnings = {
-        warning.name: f"{warning.name}: {warning.short}" if warning.short else warning.name
-        for warning in result.warnings
-    }
+    warnings = {item.name: f"{item.name}: {item.short}" if item.short else item.name for item in result.warnings}
     if "wide_beam" in warnings and not misses:
         coarser = written if near is None else written.replace({FIDELITY_KEY: near.model})
         numbers["stiffening"] = raised = stiffening(coarser, record.analyze)

@@ -155,7 +155,7 @@ def scale_factors(
         return _required_factor(unit[:3].sum(axis=0), unit[3], sign)
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        first = _highest(lambda motion: compute_factor(assembly.forces(motion), motion - assembly.rest), low, high)
+        first = _highest(lambda motion: compute_factor(assembly.forces(motion), motion - assembly.start), low, high)
         second = _highest(lambda motion: compute_factor(assembly.units(motion).stiffness, 1.0), low, high)
     return Several((np.where(none, np.nan, first), np.where(none, np.nan, second)))
 
