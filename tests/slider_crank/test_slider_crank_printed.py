@@ -636,6 +636,23 @@ def test_what_bends_is_in_every_pose_as_thick_as_specified(name: str, thickness:
     np.testing.assert_allclose(halves, 0.5 * MM * np.array(thickness)[:, None])
 
 
+@pytest.mark.parametrize("name", ["strip", "tapered", "lumped"])
+def test_the_section_at_the_place_of_the_largest_stress_has_it(name: str) -> None:
+    """Places along the whole part: one beam from end to end, or flexures with links between them."""
+    solution = api.analyze(config(name, "analysis.points=7")).state
+    path, lengths = solution.pressed.path, np.hypot(*np.diff(solution.chain.points, axis=0).T)
+    starts = np.cumsum([0.0, *lengths])
+    beams = list(path.network.beams)
+    ends = [(0.0, starts[-1])] if len(beams) == 1 else list(zip(starts[::2], starts[1::2], strict=True))
+    for k, point in enumerate(path.at_requested[1:], 1):
+        places, stresses = [], []
+        for beam, (start, end) in zip(beams, ends, strict=True):
+            sections = path.sections(beam)
+            places.extend(start + (end - start) * np.broadcast_to(sections.place, sections.moment.shape)[point])
+            stresses.extend(sections.stress()[point])
+        assert np.interp(solution.place[k], places, stresses) == pytest.approx(solution.stress[k], rel=2e-3)
+
+
 @pytest.mark.parametrize("name", ["strip", "lumped"])
 def test_forces_are_within_their_stated_error(name: str) -> None:
     solution = api.analyze(config(name, "analysis.points=7")).state
