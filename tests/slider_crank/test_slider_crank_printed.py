@@ -476,6 +476,14 @@ def test_a_strip_too_wide_for_its_range_is_infeasible_and_says_what_would_do() -
     assert api.design(wider).status is Status.COMPLETE
 
 
+@pytest.mark.parametrize(("force", "limit"), [(5.0, 10.0), (0.1, 5.0)])
+def test_a_strip_at_the_nearest_of_its_widths_has_a_force_in_proportion(force: float, limit: float) -> None:
+    refused = api.design(config("strip", "design.beam.width=[5 mm, 10 mm]", f"design.force={force} N"))
+    assert "'design.beam.width', 5 mm to 10 mm" in refused.message
+    reached, width = (float(refused.nearest_feasible[f"design.{key}"].split()[0]) for key in ("force", "beam.width"))
+    assert reached / force == pytest.approx(limit / width, rel=2e-3)
+
+
 def test_a_design_tells_what_holds_it() -> None:
     found = api.design(config("taper_design"))
     text = " | ".join(found.active_bounds)
