@@ -152,7 +152,6 @@ def test_two_ends_of_a_piece_that_lies_on_a_wall_join_where_they_parted():
     assert pushed == pytest.approx(pushed[::-1], rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.slow  # it ends where a search for a path that goes on fails
 def test_a_pinned_column_between_walls_touches_lies_flat_and_buckles_again():
     path, euler = press_column_between_walls(0.5, 1.001, 2.0, 3.0, 3.9, 5.0, 8.0, 12.0, 15.0, 16.0)
     first, flat = (event.drive / euler for event in path.contact_events)
@@ -178,7 +177,6 @@ def test_a_ring_between_plates_has_the_forces_of_shooting_and_lies_flat():
     assert path.contact_events[0].drive == pytest.approx(1 - 0.7177700110461, abs=1e-7)
 
 
-@pytest.mark.slow
 def test_a_snap_is_caught_by_a_disc_where_the_path_becomes_stable_again():
     held = el.Support(True, True, True, displacement=(-0.02, 0, 0))
     nodes = {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "mid": el.Node(0.5, 0), "tip": el.Node(1, 0, held)}
