@@ -11,7 +11,7 @@ from parts_lists import assert_assembly_has_the_numbers_of_the_list, table
 import cfmkit
 from cfmkit.families import PIN_STRENGTH, family
 from cfmkit.families.cam.hardware import _SizingLoads, hardware
-from cfmkit.families.hardware import series_sizes
+from cfmkit.stock import series_of
 
 
 def solved(*changes, name="cam"):
@@ -94,7 +94,9 @@ def test_a_shaft_is_no_thicker_than_half_of_the_press_and_the_springs_beside_it_
     loads = _SizingLoads.from_solution(solved(name="studies/cam_bought_parts").state)
     strength = replace(loads.strength, allowable=1e12)
     hooks = replace(loads.hooks, pull=beside, arm=12e-3)
-    slender = [size for size in series_sizes("pin", None) if size <= 12e-3]  # thicker ones are sheared off
+    slender = [
+        size for size in series_of("pin", "metric").sizes if 1e-3 <= size <= 12e-3
+    ]  # thicker ones are sheared off
     for thin, next_size in pairwise(slender):
         moment = PIN_STRENGTH / 1.5 * math.pi * thin**3 / 32.0
         press = (moment - hooks.pull * hooks.arm) / (0.25 * (loads.thickness + loads.brace))

@@ -67,7 +67,7 @@ def test_gradient_and_hessian_are_the_derivatives_of_the_energy() -> None:
 
 @pytest.mark.parametrize("shift", [-3e-2, 0.0, 3e-2])
 def test_the_energy_of_the_spring_is_the_work_from_no_displacement_on(shift: float) -> None:
-    """Wherever its curve is measured: that may lie on one side of no displacement."""
+    """Its curve may be measured on one side of it alone."""
     spring = CurveSpring("tip", 0.0, tuple(shift + u for u in CURVE.displacement), CURVE.force)
     assert spring.evaluate(0.0)[0] == pytest.approx(0.0, abs=1e-18)
     nodes, weights = np.polynomial.legendre.leggauss(4)  # exact for cubics
