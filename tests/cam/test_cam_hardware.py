@@ -10,7 +10,7 @@ from parts_lists import assert_assembly_has_the_numbers_of_the_list, table
 
 import cfmkit
 from cfmkit.families import PIN_STRENGTH, family
-from cfmkit.families.cam.hardware import _SizingLoads, hardware
+from cfmkit.families.cam.hardware import _SizingLoads, _slider_pin, hardware
 from cfmkit.stock import series_of
 
 
@@ -94,9 +94,8 @@ def test_a_shaft_is_no_thicker_than_half_of_the_press_and_the_springs_beside_it_
     loads = _SizingLoads.from_solution(solved(name="studies/cam_bought_parts").state)
     strength = replace(loads.strength, allowable=1e12)
     hooks = replace(loads.hooks, pull=beside, arm=12e-3)
-    slender = [
-        size for size in series_of("pin", "metric").sizes if 1e-3 <= size <= 12e-3
-    ]  # thicker ones are sheared off
+    # thicker ones are sheared off
+    slender = [size for size in series_of("pin", "metric").sizes if 1e-3 <= size <= 12e-3]
     for thin, next_size in pairwise(slender):
         moment = PIN_STRENGTH / 1.5 * math.pi * thin**3 / 32.0
         press = (moment - hooks.pull * hooks.arm) / (0.25 * (loads.thickness + loads.brace))
@@ -107,6 +106,14 @@ def test_a_shaft_is_no_thicker_than_half_of_the_press_and_the_springs_beside_it_
             for share in (0.999, 1.001)
         ]
         assert chosen == [thin, next_size]
+
+
+def test_the_pin_of_a_slider_is_no_thicker_than_the_pull_of_a_brace_beside_it_requires():
+    loads = _SizingLoads.from_solution(solved().state)
+    arm = 0.5 * (loads.brace + loads.rods.slider_thickness)
+    for thin, next_size in pairwise([1e-3, 1.2e-3, 1.5e-3, 2e-3]):
+        pull = PIN_STRENGTH / 1.5 * math.pi * thin**3 / (32.0 * arm)
+        assert [_slider_pin(replace(loads, pull=share * pull), {}) for share in (0.999, 1.001)] == [thin, next_size]
 
 
 def test_a_slider_has_walls_around_its_rods_which_leave_its_pin_free():
