@@ -314,7 +314,7 @@ def test_friction_makes_the_way_back_a_branch_of_its_own_with_hysteresis():
     assert rough.curve.branches == ("load", "unload")
     assert "work_tip_state" not in smooth.curve.extra
     motion, unload = rough.curve.displacement, rough.curve.branch == "unload"
-    assert motion[unload][0] == motion[~unload][-1]
+    assert motion[unload][0] == motion[~unload][-1] == motion.max()
     assert motion[unload][-1] == motion[0]
     columns = rough.curve.extra
     force, rubbing = columns["work_tip_force"].values, columns["work_tip_tangential"].values

@@ -27,7 +27,14 @@ from cfmkit.families.beam.shaping.multistart import (
 )
 from cfmkit.families.beam.shaping.report import judge_design, write_design
 from cfmkit.families.beam.shaping.response import view_closely
-from cfmkit.families.beam.shaping.search import ShapeCandidate, StartBudget, flatten, search_start, verify
+from cfmkit.families.beam.shaping.search import (
+    ShapeCandidate,
+    StartBudget,
+    evaluate_in_model,
+    flatten,
+    search_start,
+    verify,
+)
 from cfmkit.families.beam.shaping.spec import Tolerances
 from cfmkit.families.beam.shaping.sqp_program import Flattest, ForceRatio, Shaping, Widest
 from cfmkit.families.beam.shaping.task_and_variables import (
@@ -139,6 +146,18 @@ def test_table_3_has_the_half_band_that_its_range_says() -> None:
     )
     assert metric(design.spec, "stress_max") == pytest.approx(48.31e6, rel=3e-3)
     assert (scatter_within_tolerances(task, found, Tolerances(samples=4)).bands > 0.02).all()
+
+
+def test_a_design_of_another_model_is_ranked_as_its_analysis_in_this_one() -> None:
+    """Without any extent beams have no shape: nothing is worse."""
+    task = lan()
+    found = replace(found_of(task, table_3(task)), objective=0.0, violation=0.0)
+    again = evaluate_in_model(task, found)
+    judged = judge_design(load("configs/beam_design_lan.yaml", ["analysis.fidelity=inextensible"]), task, found)
+    assert again.objective == pytest.approx(judged.half_band, rel=0.02)
+    assert again.violation > 0.0  # its stress is 48.3 MPa, 48 are allowed
+    collapsed = replace(found, x=0.0 * found.x)
+    assert evaluate_in_model(task, collapsed).violation == np.inf
 
 
 def metric(spec: Any, name: str) -> float | None:

@@ -239,16 +239,18 @@ def test_targets_that_cannot_be_met_are_refused_with_the_reason(mechanism, chang
     assert re.search(r"'(mechanism|design|analysis)\b", reason.message), "the key to change is not named"
 
 
-def test_a_refused_stroke_names_one_that_is_feasible():
+def test_a_refused_stroke_names_the_longest_that_is_feasible():
     for spec in (
         targets(stroke="1 m"),
         targets({"springs": SHORT}),
+        targets({"springs": SHORT | {"initial_tension": "5 N"}}),
         targets({"springs": SHORT}, friction=0.02),
         targets(friction=0.2, stroke="5 m"),
     ):
         _, nearest = refused(spec)
-        shorter = spec.replace({"design.stroke": nearest["design.stroke"]})
-        assert design(shorter).status is Status.COMPLETE
+        longest = spec.replace({"design.stroke": nearest["design.stroke"]})
+        assert design(longest).status is Status.COMPLETE
+        assert refused(longest.replace({"design.stroke": 1.01 * longest.design.stroke}))
 
 
 def test_a_refused_force_constant_names_one_that_is_feasible():

@@ -14,9 +14,10 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.export import Arc, polygons
 from cfmkit.families.cam.figures import figures
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
 from cfmkit.families.cam.part_sizes_and_clearances import BESIDE_FLANKS_PAIR, clearances, nearest_pairs
 from cfmkit.families.cam.scalar_results import SCALAR_QUANTITIES
-from cfmkit.families.cam.statics import Losses, leverage
+from cfmkit.families.cam.statics import Losses, forces, leverage
 
 PINS = {"diameter": "6 mm", "friction": 0.15}
 BEARINGS = {"bore": "8 mm", "friction": 0.004}
@@ -82,6 +83,26 @@ def test_forces_are_those_of_rollers_braces_and_slider_in_balance(mounting, way)
         )
         got = forces.slider[index], forces.contact[index], forces.least_contact[index]
         np.testing.assert_allclose(got, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_pins_rub_on_a_brace_that_pushes_as_on_one_that_pulls(way):
+    """Rollers that hang push their braces until the springs carry them: looked at where that changes."""
+    hanging = rubbing(mounting="down", pins={"diameter": "18 mm", "friction": 0.3})
+    loads = analyze(hanging).state.assembly.loads
+    weights = (loads.roller_weight, loads.slider_weight), loads.sideways, loads.off_plane
+
+    def forces_at(x):
+        tangent = x / np.sqrt(loads.brace_length**2 - x**2)
+        states = TrackStates(x, np.zeros_like(x), np.ones_like(x), tangent, np.zeros(len(x), dtype=bool), x, None)
+        return forces(states, loads, way * hanging.mechanism.rolling_friction, way)
+
+    x = loads.rest_half_width * np.linspace(1.0, 1.5, 401)
+    lightest = np.argmin(forces_at(x).brace)
+    x = np.linspace(x[lightest - 1], x[lightest + 1], 41)
+    slider, contact = forces_at(x).slider, forces_at(x).contact
+    for place, *got in zip(x, slider, contact, strict=True):
+        np.testing.assert_allclose(got, free_bodies(place, 1.0, hanging, way, weights)[:2], rtol=1e-9)
 
 
 @pytest.mark.parametrize("rubs", [{}, {"bearing": 1e-3}, {"pin": 1e-3}])

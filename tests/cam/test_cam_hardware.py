@@ -1,6 +1,8 @@
 """Links, pins, guides and screws of cams: sizes that bear, lists, and the assembly."""
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,7 +10,8 @@ from parts_lists import assert_assembly_has_the_numbers_of_the_list, table
 
 import cfmkit
 from cfmkit.families import PIN_STRENGTH, family
-from cfmkit.families.cam.hardware import hardware
+from cfmkit.families.cam.hardware import _SizingLoads, _slider_pin, hardware
+from cfmkit.stock import series_of
 
 
 def solved(*changes, name="cam"):
@@ -83,6 +86,34 @@ def test_shafts_and_hook_bars_of_a_cam_bear_the_springs_beyond_the_braces():
     assert np.allclose(bars, [[1e-3 * width, 2.0 * outer]] * 2)  # those in front hide those behind
     rows_of_springs = [body.outline()[:, 1].mean() for body in drawn if body.name == "spring"]
     assert np.allclose(np.diff(sorted(rows_of_springs)), outer)
+
+
+@pytest.mark.parametrize("beside", [0.0, 30.0])
+def test_a_shaft_is_no_thicker_than_half_of_the_press_and_the_springs_beside_it_require(beside):
+    """In links that bear everything, so that bending decides."""
+    loads = _SizingLoads.from_solution(solved(name="studies/cam_bought_parts").state)
+    strength = replace(loads.strength, allowable=1e12)
+    hooks = replace(loads.hooks, pull=beside, arm=12e-3)
+    # thicker ones are sheared off
+    slender = [size for size in series_of("pin", "metric").sizes if 1e-3 <= size <= 12e-3]
+    for thin, next_size in pairwise(slender):
+        moment = PIN_STRENGTH / 1.5 * math.pi * thin**3 / 32.0
+        press = (moment - hooks.pull * hooks.arm) / (0.25 * (loads.thickness + loads.brace))
+        if press <= 0.0:
+            continue
+        chosen = [
+            replace(loads, press=share * press, strength=strength, hooks=hooks).thinnest_shaft
+            for share in (0.999, 1.001)
+        ]
+        assert chosen == [thin, next_size]
+
+
+def test_the_pin_of_a_slider_is_no_thicker_than_the_pull_of_a_brace_beside_it_requires():
+    loads = _SizingLoads.from_solution(solved().state)
+    arm = 0.5 * (loads.brace + loads.rods.slider_thickness)
+    for thin, next_size in pairwise([1e-3, 1.2e-3, 1.5e-3, 2e-3]):
+        pull = PIN_STRENGTH / 1.5 * math.pi * thin**3 / (32.0 * arm)
+        assert [_slider_pin(replace(loads, pull=share * pull), {}) for share in (0.999, 1.001)] == [thin, next_size]
 
 
 def test_a_slider_has_walls_around_its_rods_which_leave_its_pin_free():

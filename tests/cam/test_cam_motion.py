@@ -158,6 +158,13 @@ def test_at_rest_with_rolling_resistance_it_is_the_quasi_static_model(upward, ch
     np.testing.assert_allclose(found.contact[1], expected.contact, rtol=1e-9)
 
 
+@pytest.mark.parametrize(("position", "stroke"), [("220 mm", "100 mm"), ("320 mm", "-100 mm")], ids=["up", "down"])
+def test_the_force_of_a_slow_motion_is_that_at_rest_on_the_same_way(position, stroke):
+    motion = {"analysis__dynamics__slider_position": position, "analysis__dynamics__stroke": stroke}
+    curve = analyze(moving(rolling_friction=0.01, analysis__dynamics__time="1000 s", **motion)).curve
+    np.testing.assert_allclose(curve.force, curve.extra["static_force"].values, rtol=1e-6)
+
+
 def test_rolling_resistance_costs_the_power_of_force_times_speed_of_the_rollers():
     free, held = response(moving(), 101), response(moving(rolling_friction=0.002), 101)
     lost = 0.002 * (held.contact * held.at.way).sum(axis=0)

@@ -65,6 +65,20 @@ def test_gradient_and_hessian_are_the_derivatives_of_the_energy() -> None:
         assert tangent == pytest.approx(tangent.T, abs=1e-9)
 
 
+@pytest.mark.parametrize("shift", [-3e-2, 0.0, 3e-2])
+def test_the_energy_of_the_spring_is_the_work_from_no_displacement_on(shift: float) -> None:
+    """Its curve may be measured on one side of it alone."""
+    spring = CurveSpring("tip", 0.0, tuple(shift + u for u in CURVE.displacement), CURVE.force)
+    assert spring.evaluate(0.0)[0] == pytest.approx(0.0, abs=1e-18)
+    nodes, weights = np.polynomial.legendre.leggauss(4)  # exact for cubics
+    for end in (-4e-2, -3e-2, 2e-2, 4.5e-2):
+        places = np.unique([0.0, end, *(u for u in spring.displacement if min(0.0, end) < u < max(0.0, end))])
+        half, middle = 0.5 * np.diff(places), 0.5 * (places[1:] + places[:-1])
+        forces = [[spring.evaluate(u)[1] for u in m + h * nodes] for h, m in zip(half, middle, strict=True)]
+        work = np.sign(end) * half @ np.array(forces) @ weights
+        assert spring.evaluate(end)[0] == pytest.approx(work, rel=1e-10, abs=1e-15)
+
+
 @pytest.mark.parametrize(("displacement", "force"), [((0.0, 1.0), (1.0,)), ((0.0,), (1.0,)), ((0.0, 0.0), (0.0, 1.0))])
 def test_a_curve_must_increase_and_be_whole(displacement: tuple[float, ...], force: tuple[float, ...]) -> None:
     with pytest.raises(InputError):

@@ -132,16 +132,28 @@ def test_a_leaf_wraps_around_a_disc_without_compiled_code(monkeypatch):
     assert path.contact_places(0)[-1] == pytest.approx([0.0, 0.1998403214625088], rel=1e-10)
 
 
-@pytest.mark.slow  # it ends where a search for a path that goes on fails
-def test_a_pinned_column_between_walls_touches_lies_flat_and_buckles_again():
+def press_column_between_walls(*loads):
+    """Return the path of a pinned column between two walls at loads over that of Euler, and that load."""
     walls = side("top", el.line_edge((0, 0.05 + HALF), np.pi)), side("bottom", el.line_edge((0, -0.05 - HALF), 0.0))
     nodes = {"root": el.Node(0, 0, el.Support(True, True, False)), "tip": el.Node(1, 0, el.Support(False, True, False))}
     net = el.Network(nodes, {"leaf": el.Beam("root", "tip", THIN)}, contacts=walls)
-    euler = np.pi**2
-    drive = el.Loading(
-        (el.PointLoad("tip", -1.0),), euler * np.array([0.5, 1.001, 2.0, 3.0, 3.9, 5.0, 8.0, 12.0, 15.0, 16.0])
-    )
-    path = el.trace(net, drive, EXACT)
+    return el.trace(net, el.Loading((el.PointLoad("tip", -1.0),), np.pi**2 * np.array(loads)), EXACT), np.pi**2
+
+
+def test_two_ends_of_a_piece_that_lies_on_a_wall_join_where_they_parted():
+    """Loaded and unloaded, a column has the same states on both ways, and is straight again."""
+    path, euler = press_column_between_walls(0.5, 1.001, 3.0, 5.0, 3.0, 1.001, 0.5)
+    kinds, drives = zip(*((event.kind, event.drive / euler) for event in path.contact_events), strict=True)
+    assert path.status is el.PathStatus.COMPLETE
+    assert kinds == ("begins", "spreads", "closes", "ends")
+    assert drives[2:] == pytest.approx(drives[1::-1], rel=1e-8)
+    energy, pushed = path.energy[path.at_requested], path.motion("tip")[path.at_requested, 0]
+    assert energy == pytest.approx(energy[::-1], rel=1e-9, abs=1e-12)
+    assert pushed == pytest.approx(pushed[::-1], rel=1e-9, abs=1e-12)
+
+
+def test_a_pinned_column_between_walls_touches_lies_flat_and_buckles_again():
+    path, euler = press_column_between_walls(0.5, 1.001, 2.0, 3.0, 3.9, 5.0, 8.0, 12.0, 15.0, 16.0)
     first, flat = (event.drive / euler for event in path.contact_events)
     assert first == pytest.approx(1.00310705881604, abs=1e-9)
     assert flat == pytest.approx(3.984869364316, abs=1e-7)
@@ -165,7 +177,6 @@ def test_a_ring_between_plates_has_the_forces_of_shooting_and_lies_flat():
     assert path.contact_events[0].drive == pytest.approx(1 - 0.7177700110461, abs=1e-7)
 
 
-@pytest.mark.slow
 def test_a_snap_is_caught_by_a_disc_where_the_path_becomes_stable_again():
     held = el.Support(True, True, True, displacement=(-0.02, 0, 0))
     nodes = {"root": el.Node(0, 0, el.CLAMPED_SUPPORT), "mid": el.Node(0.5, 0), "tip": el.Node(1, 0, held)}

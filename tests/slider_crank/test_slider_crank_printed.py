@@ -478,6 +478,14 @@ def test_a_strip_too_wide_for_its_range_is_infeasible_and_says_what_would_do() -
     assert api.design(wider).status is Status.COMPLETE
 
 
+@pytest.mark.parametrize(("force", "limit"), [(5.0, 10.0), (0.1, 5.0)])
+def test_a_strip_at_the_nearest_of_its_widths_has_a_force_in_proportion(force: float, limit: float) -> None:
+    refused = api.design(config("strip", "design.beam.width=[5 mm, 10 mm]", f"design.force={force} N"))
+    assert "'design.beam.width', 5 mm to 10 mm" in refused.message
+    reached, width = (float(refused.nearest_feasible[f"design.{key}"].split()[0]) for key in ("force", "beam.width"))
+    assert reached / force == pytest.approx(limit / width, rel=2e-3)
+
+
 def test_a_design_tells_what_holds_it() -> None:
     found = api.design(config("taper_design"))
     text = " | ".join(found.active_bounds)
@@ -646,6 +654,23 @@ def test_what_bends_is_in_every_pose_as_thick_as_specified(name: str, thickness:
     bodies = family("slider-crank").part(cfmkit.analyze(config(name, "analysis.points=11"))).bodies
     halves = [np.unique(body.half_thickness) for body in bodies if body.name == "flexure"]
     np.testing.assert_allclose(halves, 0.5 * MM * np.array(thickness)[:, None])
+
+
+@pytest.mark.parametrize("name", ["strip", "tapered", "lumped"])
+def test_the_section_at_the_place_of_the_largest_stress_has_it(name: str) -> None:
+    """Places along the whole part: one beam from end to end, or flexures with links between them."""
+    solution = api.analyze(config(name, "analysis.points=7")).state
+    path, lengths = solution.pressed.path, np.hypot(*np.diff(solution.chain.points, axis=0).T)
+    starts = np.cumsum([0.0, *lengths])
+    beams = list(path.network.beams)
+    ends = [(0.0, starts[-1])] if len(beams) == 1 else list(zip(starts[::2], starts[1::2], strict=True))
+    for k, point in enumerate(path.at_requested[1:], 1):
+        places, stresses = [], []
+        for beam, (start, end) in zip(beams, ends, strict=True):
+            sections = path.sections(beam)
+            places.extend(start + (end - start) * np.broadcast_to(sections.place, sections.moment.shape)[point])
+            stresses.extend(sections.stress()[point])
+        assert np.interp(solution.place[k], places, stresses) == pytest.approx(solution.stress[k], rel=2e-3)
 
 
 @pytest.mark.parametrize("name", ["strip", "lumped"])

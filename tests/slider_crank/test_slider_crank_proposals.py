@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from suggest_support import proposal_of, propose, request, request_of
 
@@ -36,6 +38,17 @@ def test_what_takes_long_to_design_is_offered_behind_everything_else(materials):
     kinds = [one.variant.partition(",")[0] for one in offer.candidates]
     assert {"strip", "springs at pins", "tapered strip"} <= set(kinds)
     assert "tapered strip" not in kinds[: -kinds.count("tapered strip")]
+
+
+@pytest.mark.parametrize("depth", ["", ", 12 mm"])
+def test_the_room_that_a_refusal_names_is_enough(depth):
+    def offer_within(across, along):
+        return propose("slider-crank", request(force="0.01 N", envelope=f"[{across} mm, {along} mm{depth}]"))
+
+    refusal = offer_within(4.0, 4.0).reason
+    across, along = map(float, re.search(r"needs ([\d.]+) mm across it and ([\d.]+) mm along it", refusal).groups())
+    assert offer_within(1.001 * across, 1.001 * along).candidates
+    assert not offer_within(0.5 * across, 0.5 * along).candidates
 
 
 def test_springs_at_pins_hold_no_more_energy_than_steel_wire_in_the_room():

@@ -246,6 +246,23 @@ def test_what_is_wrong_is_told_by_name(name):
         assert name not in {item.name for item in cfmkit.analyze(config("li2019")).warnings}
 
 
+@pytest.mark.parametrize(("name", "end", "low", "high"), [
+    ("coupler_dead_point", "last", "-5 deg", "90 deg"), ("coupler_dead_point", "first", "-90 deg", "5 deg"),
+    ("out_of_reach", "last", "10 mm", "210 mm"), ("out_of_reach", "first", "-120 mm", "30 mm"),
+])  # fmt: skip
+def test_a_motion_beyond_one_end_is_followed_up_to_there_and_to_its_other_end(name, end, low, high):
+    if name == "out_of_reach":
+        spec = config("bilancia2019", analysis__travel=(low, high), analysis__window=None)
+        requested = spec.analysis.travel
+    else:
+        spec = config("li2019", mechanism__coupler_length="50 mm", analysis__angle=(low, high))
+        requested = spec.analysis.angle
+    result = cfmkit.analyze(spec)
+    assert name in {item.name for item in result.warnings}
+    first, last = result.curve.motion[[0, -1]]
+    assert (first > requested[0], last < requested[1]) == (end == "first", end == "last")
+
+
 DESIGNS = {
     "infeasible_targets": {"torque": "2 N*mm", "angle": ("0 deg", "8 deg"), "tolerance": "0.5 %"},
     "no_zero_stiffness": {

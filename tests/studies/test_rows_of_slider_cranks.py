@@ -97,6 +97,11 @@ def test_rows_of_springs_and_legs_are_runs_of_their_own(name, design):
     assert_rows_equal_runs(*study_of(spec, values))
 
 
+def test_rows_of_different_branches_and_points_are_runs_of_their_own():
+    values = {"mechanism.branch": ["left", "right", "left"], "analysis.points": [41, 57, 57]}
+    assert_rows_equal_runs(*study_of(config("li2019"), values))
+
+
 def test_a_sweep_of_a_mechanism_with_a_screwed_anchor_has_the_force_per_travel_of_it():
     """A design with `anchor_travel` states `anchor: 0 mm`."""
     spec = config("bilancia2019", mechanism__springs__anchor="0 mm", mechanism__springs__slider="0.1 N/mm")

@@ -260,3 +260,37 @@ def test_leaves_that_relax_beside_springs_that_do_not_have_no_common_law(spec):
     leaf = {"length": "30 mm", "angle": "7 deg", "thickness": "1.5 mm", "width": "10 mm"}
     cut = spec.replace({"mechanism.springs": None, "mechanism.positive": leaf, "design": None})
     assert cut.replace(relaxing).durability.relaxation is not None
+
+
+# --- drawn -------------------------------------------------------------------------------------------------------
+
+
+def boxes(bodies, name, pose):
+    """Return corners of the boxes around all bodies of a name, from the left, (n, 2, 2) [m]."""
+    outlines = [body.outline(pose) for body in bodies if body.name == name]
+    return np.array(sorted(([line.min(axis=0), line.max(axis=0)] for line in outlines), key=lambda box: box[0][0]))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize(("kind", "carrier", "side"), [("compression", "shuttle", -1.0), ("extension", "beam", 1.0)])
+def test_bought_springs_are_drawn_side_by_side_between_what_moves_and_their_base(spec, kind, carrier, side, count):
+    """Those that are pressed below the shuttle, and shorter at the end; those that are pulled above, and longer."""
+    changes = {"kind": kind, "count": count, "wound": None}
+    changes = {f"mechanism.springs.{key}": value for key, value in changes.items()}
+    changed = spec.replace(changes | {"design": None, "requirements": ()})
+    bodies, diameter = family("vcfm").part(cfmkit.analyze(changed)).bodies, changed.mechanism.springs.outer_diameter
+    half_wire, lengths = 0.03 * diameter, []
+    for pose in (0, -1):
+        springs = boxes(bodies, "spring", pose)
+        (base,), (moving,) = (boxes(bodies, name, pose) for name in ("base", carrier))
+        assert np.ptp(springs[..., 0], axis=1).tolist() == pytest.approx([diameter] * count, rel=0.02)
+        assert (springs[1:, 0, 0] > springs[:-1, 1, 0]).all()
+        margins = springs[0, 0, 0] - base[0, 0], base[1, 0] - springs[-1, 1, 0]
+        assert 0.0 < margins[0] < 0.5 * diameter
+        assert margins[0] == pytest.approx(margins[1], rel=1e-6)
+        near, far = sorted(side * springs[0, :, 1])
+        assert near == pytest.approx((side * moving[:, 1]).max(), abs=1.01 * half_wire)
+        assert far == pytest.approx((side * base[:, 1]).min(), abs=1.01 * half_wire)
+        lengths.append(far - near)
+    deflection = changed.travel + changed.analysis.preloads[-1]
+    assert lengths[1] - lengths[0] == pytest.approx(side * deflection, rel=0.02)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import yaml
+from suggest_support import propose, request
 from vcfm_support import CONFIGS, MM, TABLE_I
 
 import cfmkit
@@ -181,3 +184,22 @@ def test_worked_designs_by_closed_forms_and_one_exact_pass(stem):
     after, (stress, _) = fit_widths(spec, spec.design, sizes)
     assert (after.leaf.width / MM, after.spring_leaf.width / MM) == pytest.approx(fitted, rel=2e-4)
     assert stress == pytest.approx(spec.mechanism.allowable_stress, rel=2e-3)
+
+
+# --- proposals ---------------------------------------------------------------------------------------------------
+
+
+def test_the_width_that_a_refusal_of_leaves_names_is_the_least_that_they_fit():
+    """There with helical springs, as narrow as their leaves; with a diamond in a wider envelope."""
+
+    def offer_within(across):
+        return propose("vcfm", request(envelope=f"[{across} mm, 100 mm]"))
+
+    across = float(re.search(r"need ([\d.]+) mm across", offer_within(20.0).reason)[1])
+    assert not offer_within(0.998 * across).candidates
+    (coiled,) = offer_within(1.002 * across).candidates
+    assert coiled.variant == "2 Vs, catalogue springs"
+    unrefined = coiled.spec.replace({"design.refine": False})
+    drawn = family("vcfm").envelope(cfmkit.analyze(family("vcfm").design.make(unrefined, Run()).spec))
+    assert drawn.across == pytest.approx(1e-3 * across, rel=2e-3)
+    assert {"2 Vs", "2 Vs, catalogue springs"} <= {each.variant for each in offer_within(60.0).candidates}

@@ -175,6 +175,19 @@ def test_the_cure_of_a_force_that_is_not_flat_works(changes):
     assert api.evaluate(cured, ["force_ripple"])["force_ripple"].value <= cured.spec.analysis.flatness
 
 
+def test_an_uneven_force_is_made_even_by_wider_leaves_or_a_narrower_spring_as_its_finding_says():
+    """Both by the ratio of the stiffnesses that do not cancel."""
+    uneven = analyzed("analysis.flatness=5 %")
+    stiffness = {name: uneven.values[f"{name}_stiffness"].value for name in ("positive", "negative")}
+    proposed = re.search(r"leaves ([\d.]+) times as wide, or a spring ([\d.]+) times", message(uneven, "not_flat"))
+    assert proposed
+    wider, narrower = map(float, proposed.groups())
+    assert wider == pytest.approx(stiffness["positive"] / stiffness["negative"], rel=5e-3)
+    assert wider * narrower == pytest.approx(1.0, rel=5e-3)
+    for key, width in (("bistable", 6.0 * wider), ("positive", 10.0 * narrower)):
+        assert "not_flat" not in names(analyzed("analysis.flatness=5 %", f"mechanism.{key}.width={width} mm"))
+
+
 @pytest.mark.parametrize("flexure", [5, 7, 10])
 @pytest.mark.parametrize("thickness", [0.4, 0.8, 1.2])
 def test_hybrid_leaves_are_told_with_their_exact_force_and_stress(flexure, thickness):

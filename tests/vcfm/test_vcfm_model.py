@@ -17,12 +17,13 @@ from cfmkit.export import files
 from cfmkit.families import family
 from cfmkit.families.vcfm.curves_in_rows import Preloaded
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring, parts
+from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, stack_laws
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond, Folded, UShape
 from cfmkit.families.vcfm.leaves.s_form import POLE_LOAD, axial_root, compliance, end_curvature, pose
-from cfmkit.families.vcfm.leaves.v_beam import TrussLeaf, VBeam
+from cfmkit.families.vcfm.leaves.v_beam import TrussLeaf, VBeam, critical_force
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import rests_by_laws, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
@@ -392,6 +393,24 @@ def test_exact_leaves_have_their_force_where_a_coarse_sampling_cut_the_peak_off(
 LEAF = LeafStrip(35 * MM, np.radians(7), 1 * MM, 6 * MM, 1477e6, 0.3)
 
 
+def test_force_and_stress_of_a_bar_are_those_of_its_shortened_line():
+    """By the half difference of the squares of its lengths: pressed up to twice the rise, drawn beyond."""
+    bar = TrussLeaf(LEAF)
+    for travel in np.array([0.1, 0.7, 1.0, 1.5, 2.4]) * LEAF.rise:
+        across, along = bar.bent_line(travel)[-1] - bar.bent_line(travel)[0]
+        strain = 0.5 * (1.0 - (across**2 + along**2) / LEAF.length**2)
+        assert bar.stress(travel) == pytest.approx(LEAF.youngs_modulus * abs(strain), rel=1e-10)
+        assert bar.force(travel) == pytest.approx(LEAF.axial * strain * along / LEAF.length, rel=1e-10, abs=1e-12)
+
+
+def test_an_arch_has_a_finite_shortening_at_the_load_of_its_own_wave():
+    """There its own wave grows without bound, and the other one cancels it."""
+    before, there, behind = 0.25 * np.pi**2 * np.array([1.0 - 1e-4, 1.0, 1.0 + 1e-4])
+    arch = CosineLeaf(LEAF)
+    coefficients = np.array([arch._quadratic(np.array([z])) for z in (before, there, behind)])[..., 0]
+    assert coefficients[1] == pytest.approx(0.5 * (coefficients[0] + coefficients[2]), rel=1e-6)
+
+
 # --- kinds ------------------------------------------------------------------------------------------------------
 
 
@@ -490,6 +509,28 @@ def test_drawn_leaves_have_the_shape_of_exact_ones(stem, error, travel):
         exact = trace(leaf_network(spec), drive, Control(sign=sign)).shape("leaf", -1)
         apart.append(np.abs(np.interp(drawn[:, 0], *exact.T) - drawn[:, 1]).max())
     assert min(apart) < error * MM
+
+
+def test_an_arch_without_travel_is_drawn_along_its_unloaded_centre_line():
+    """But for the square of its slope, some thousandth."""
+    arch = CosineLeaf(LEAF)
+    x, y, _ = arch.centre_line
+    across, along = arch.bent_line(0.0).T
+    unloaded = np.interp(across, LEAF.reach - x[::-1], LEAF.rise + y[::-1])
+    assert np.abs(along - unloaded).max() < 1e-3 * LEAF.rise
+    assert np.hypot(np.diff(x), np.diff(y)).sum() == pytest.approx(arch.developed, rel=1e-5)
+
+
+@pytest.mark.parametrize("travel", [2.0, 3.0, 4.0])
+def test_a_drawn_buckled_leaf_is_shorter_by_the_strain_of_its_axial_force(travel):
+    arch, beam = CosineLeaf(LEAF), VBeam(LEAF)
+    for law, length, force, rtol in (
+        (arch, arch.developed, arch.critical_force, 0.05),
+        (beam, LEAF.length, critical_force(LEAF), 0.005),
+    ):
+        assert law.is_buckled(travel * MM)
+        drawn = np.hypot(*np.diff(law.bent_line(travel * MM), axis=0).T).sum()
+        assert 1.0 - drawn / length == pytest.approx(force / LEAF.axial, rel=rtol)
 
 
 def test_a_drawn_u_shape_has_the_shape_of_the_exact_one():

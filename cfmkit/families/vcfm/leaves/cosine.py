@@ -224,7 +224,7 @@ class CosineLeaf(LeafLaw):
             )
             turn = np.real(-c * drawn_slope + g * (np.cos(q) - np.cos(q * eta)))
         end = (float(self.strip.reach), rise - travel)
-        return line_between(np.arctan(turn), np.full(N_LINE_POINTS, length / N_LINE_POINTS), end)
+        return line_between(np.arctan(turn), np.full(N_LINE_POINTS, length / (N_LINE_POINTS - 1)), end)
 
 
 COSINE_LEAF = LeafKind(

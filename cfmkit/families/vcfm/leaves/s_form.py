@@ -209,11 +209,9 @@ def bent_leaf(
         spare = float(at.shortening) - critical / float(strip.axial) - 0.25 * float(at.turn) ** 2
         slope = slope + 2.0 * np.sqrt(max(spare, 0.0)) * np.sin(2.0 * np.pi * place)
     angles = angle - float(at.turn) + slope
-    end = (float(strip.reach), float(strip.rise) - travel)
-    if free:
-        steps = np.full(N_LINE_POINTS, length / N_LINE_POINTS)
-        end = (float((np.cos(angles) * steps).sum()), end[1])
-    return line_between(angles, np.full(N_LINE_POINTS, length / N_LINE_POINTS), end)
+    step = length / (N_LINE_POINTS - 1)
+    across = float(np.trapezoid(np.cos(angles), dx=step)) if free else float(strip.reach)
+    return line_between(angles, np.full(N_LINE_POINTS, step), (across, float(strip.rise) - travel))
 
 
 def _s_slope(z: float, eta: FloatArray) -> FloatArray:
