@@ -1,4 +1,10 @@
-"""The first change of a contact between two points of a piece of a path."""
+"""Search for the first change of a contact on the way from one equilibrium of a path to the next.
+
+Along a piece of a path the same contacts are closed. It ends where a gap becomes zero (a contact begins), a contact force
+becomes zero (it ends), or friction is exceeded or holds again (it slips or sticks). Each is a condition, dimensionless and
+positive before its change; the first root of all of them on the way is searched for, also where a condition dips below
+zero between the two points.
+"""
 
 from __future__ import annotations
 

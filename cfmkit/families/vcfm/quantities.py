@@ -1,4 +1,7 @@
-"""Scalar results of a mechanism, beside the constant-force metrics of every family, and its tables.
+"""Scalar results of a vcfm, buckling leaves on a spring whose preload adjusts the force, and its tables.
+
+They stand beside the constant-force metrics of every family: stiffnesses [N/m], travels [m], stresses [Pa], effects of
+the preload.
 
 Tables are what each preload gives, and what other readings of a paper's table of sizes would give.
 """

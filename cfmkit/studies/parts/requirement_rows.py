@@ -1,7 +1,7 @@
-"""Requirements on a part as rows of smooth values: effort and stress at a few poses.
+"""Requirements on one manufactured part as inequalities, linear in its force (or torque) and stress at a few poses.
 
-Metrics are largest and smallest values, which have corners; a requirement on one of them holds where rows of the force,
-or of the stress, at the poses of its window do. Any other metric is a number of its own.
+Metrics are largest and smallest values over a window, which have corners. A requirement on one holds if a row of
+inequalities does, one for each pose of the window: matrix @ values + constant >= 0. Other metrics are values of their own.
 """
 
 from __future__ import annotations
