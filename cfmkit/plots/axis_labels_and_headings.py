@@ -1,4 +1,4 @@
-"""Text on a picture: axis labels with units, ticks, headings that fit."""
+"""Text and axes of a figure: labels with units, headings that fit, colour keys, second axes, ranges without poles."""
 
 from __future__ import annotations
 

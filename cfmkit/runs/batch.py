@@ -1,4 +1,4 @@
-"""Batches, for `cfmkit batch` and `cfmkit.batch`: many specifications, each run as alone, serially or in parallel."""
+"""The whole of a batch (`cfmkit.batch`): a job per specification, reuse of unchanged runs, summary and exit code."""
 
 from __future__ import annotations
 

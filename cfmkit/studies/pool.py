@@ -1,4 +1,4 @@
-"""A pool of processes that loses nothing but what a dead process was working on.
+"""Process pool that retries a job once if its worker dies and gives it up if it exceeds its time; no other job is lost.
 
 Each worker has pipes of its own, its standard input and output, and no lock is shared: killing one at any moment
 leaves the others untouched. A thread for each worker sends it the work and waits for what it says: there is no other

@@ -1,9 +1,9 @@
-"""Search for the first change of a contact on the way from one equilibrium of a path to the next.
+"""First change of a contact within a step: where a gap, contact force or other margin along it becomes negative.
 
-Along a piece of a path the same contacts are closed. It ends where a gap becomes zero (a contact begins), a contact force
-becomes zero (it ends), or friction is exceeded or holds again (it slips or sticks). Each is a condition, dimensionless and
-positive before its change; the first root of all of them on the way is searched for, also where a condition dips below
-zero between the two points.
+Along a piece of a path the same contacts are closed. It ends where a gap becomes zero (a contact begins), a contact
+force becomes zero (it ends), or friction is exceeded or holds again (it slips or sticks). Each of these is a condition,
+dimensionless and positive before its change. The first root of all on the way to the next equilibrium is searched for,
+also where a condition dips below zero in between.
 """
 
 from __future__ import annotations

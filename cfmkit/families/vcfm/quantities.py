@@ -1,4 +1,4 @@
-"""Scalar results of a vcfm, buckling leaves on a spring whose preload adjusts the force, and its tables.
+"""Scalar results of snap-through leaves beside a preloaded spring, and its force by preload, leaves and stiffness.
 
 They stand beside the constant-force metrics of every family: stiffnesses [N/m], travels [m], stresses [Pa], effects of
 the preload.

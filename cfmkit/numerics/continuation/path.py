@@ -1,4 +1,4 @@
-"""Parts of a path: points, events and an ending; and the state of its follower."""
+"""Data of path following: settings, points, events, reasons to stop, and the follower's state between two steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Annotated types for specifications: ``Length``, ``Force``, ... and special ones, as windows of the motion.
+"""Pydantic types of specification fields: SI floats read from text with units, and windows by place or travel share.
 
 A field ``width: Length = Field(gt=0)`` takes text with a unit, or a Python number
 that is SI already (so do defaults); inside it is a plain SI float. A number that

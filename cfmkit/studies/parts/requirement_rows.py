@@ -1,7 +1,8 @@
 """Requirements on one manufactured part as inequalities, linear in its force (or torque) and stress at a few poses.
 
 Metrics are largest and smallest values over a window, which have corners. A requirement on one holds if a row of
-inequalities does, one for each pose of the window: matrix @ values + constant >= 0. Other metrics are values of their own.
+inequalities does, one for each pose of the window: matrix @ values + constant >= 0. Other metrics are values of their
+own. The values of many parts come from the family's rows, or from one analysis each.
 """
 
 from __future__ import annotations

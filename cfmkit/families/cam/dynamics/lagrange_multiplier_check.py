@@ -1,4 +1,4 @@
-"""The paper's model: nine coordinates, nine constraints, forces by Lagrange multipliers.
+"""Cam dynamics by Lagrange multipliers in nine coordinates [SS]: the method `multibody`, and a check of `inverse`.
 
 The coordinates are x = (s2, theta3, theta4, xi4, y4, theta5, theta6, xi6, y6) [SS, eq. 4]:
 slider, right brace, right roller, its contact seen from the roller, height of the contact
