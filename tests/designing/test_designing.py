@@ -91,8 +91,8 @@ def test_missed_limits_are_told_the_worst_first_each_with_its_worst_row() -> Non
         ("b", "b0"),
         ("a", "a2"),
     ]
-    assert objective_and_constraints.worst(rows) == 0.5
-    assert objective_and_constraints.worst([]) == 0.0
+    assert objective_and_constraints.find_largest_violation(rows) == 0.5
+    assert objective_and_constraints.find_largest_violation([]) == 0.0
 
 
 def test_rows_near_zero_hold_a_design_unless_nothing_moves_them() -> None:
