@@ -317,7 +317,7 @@ class Design:
     warnings: tuple[Finding, ...] = ()
     """What the user must know."""
     search: Mapping[str, Searched] = field(default_factory=dict)
-    """What only the search knows, by name: of its starts, of its audit, of parts that it has drawn."""
+    """Values that only the search knows, by name: of its starts, of its audit, of parts that it has drawn."""
     notes: tuple[tuple[str, str], ...] = ()
     """Paragraphs of the page: the word that begins each, and the text."""
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)

@@ -363,7 +363,7 @@ def test_a_part_of_a_flank_without_points_leaves_no_force_there(tmp_path, cut, h
     messages = {item.name: item.message for item in found.warnings}
     assert "up_jam" not in messages
     assert "is not known" in messages["profile_hole"]
-    assert messages["part_measured"].count(" to ") == 1 + len(found.state.unmeasured)
+    assert messages["part_measured"].count(" to ") == 1 + len(found.state.unmeasured_spans)
 
 
 def test_a_hole_outside_the_window_and_a_small_one_do_not_matter(tmp_path):

@@ -86,9 +86,9 @@ class Control:
     bifurcations are reported. Requested values that are passed several times are delivered every time. It ends where
     the last of them (the last before the points turn round) is passed first."""
     branch: Literal["stable", "primary", "stop"] = "stable"
-    """Where stability is lost leave for a stable branch, stay on the path and say so, or end the path there: the
-    quickest way to know that a design is no good. With `through_folds` the path stays on its curve also where no stable
-    branch begins."""
+    """Way on after a loss of stability: leave for a stable branch, stay on the path and say so, or end the path there,
+    the quickest way to know that a design is no good. With `through_folds` the path stays on its curve also where no
+    stable branch begins."""
     # which of two mirror-image branches is taken, at every bifurcation anew, also where the points turn round
     sign: Literal[1, -1] = 1
     largest_turn: float = 0.35  # largest change in one step, of a rotation [rad], or of a position [mean beam length]

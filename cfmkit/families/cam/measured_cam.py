@@ -2,7 +2,7 @@
 
 `MeasuredCam` is the solved cam as built, with its measured flanks. It is computed over travels that count from its own
 start; `MeasuredCam.origin` added to one gives the displacement of the specification. Where a flank was not measured the
-force is not known (`MeasuredCam.unmeasured`).
+force is not known (`MeasuredCam.unmeasured_spans`).
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ class MeasuredCam(ShortRepr):
     # --- how much was measured, and what of it counts --------------------------------------------------------------
 
     @property
-    def unmeasured(self) -> tuple[tuple[float, float], ...]:
+    def unmeasured_spans(self) -> tuple[tuple[float, float], ...]:
         """Travels between which the force is not known, in their order, those that overlap joined [m]."""
         joined: list[tuple[float, float]] = []
         start = self.assembly.track.start
@@ -192,9 +192,13 @@ class MeasuredCam(ShortRepr):
         return tuple(joined)
 
     @property
-    def measured(self) -> tuple[tuple[float, float], ...]:
+    def measured_spans(self) -> tuple[tuple[float, float], ...]:
         """Travels between which both contacts are on measured points [m]."""
-        ends = [float(self.travel[0]), *(place for hole in self.unmeasured for place in hole), float(self.travel[-1])]
+        ends = [
+            float(self.travel[0]),
+            *(place for hole in self.unmeasured_spans for place in hole),
+            float(self.travel[-1]),
+        ]
         return tuple((low, high) for low, high in zip(ends[::2], ends[1::2], strict=True) if low < high)
 
     @property
@@ -209,7 +213,7 @@ class MeasuredCam(ShortRepr):
         return self.sides.forces(loads, direction * friction, loads.rest_half_width)
 
     @property
-    def requested(self) -> tuple[float, float]:
+    def requested_ends(self) -> tuple[float, float]:
         """Displacements at which the motion starts, and at which it was to end [m]."""
         start, end = float(self.travel[0]), self.assembly.spec.analysis.travel or float(self.travel[-1])
         return start + self.origin, end + self.origin
@@ -219,7 +223,7 @@ class MeasuredCam(ShortRepr):
         """Displacements at which the window begins and ends, by default those of the whole travel [m]."""
         stated = self.assembly.spec.analysis.window
         if stated is not None:
-            return window_places(stated, self.requested)
+            return window_places(stated, self.requested_ends)
         return float(self.travel[0] + self.origin), float(self.travel[-1] + self.origin)
 
     @property
@@ -233,7 +237,7 @@ class MeasuredCam(ShortRepr):
     def hole_shares(self) -> list[float]:
         """Widths of the intervals in the window that were not measured, over that of the window."""
         low, high = self.window
-        ends = ((start + self.origin, stop + self.origin) for start, stop in self.unmeasured)
+        ends = ((start + self.origin, stop + self.origin) for start, stop in self.unmeasured_spans)
         return [max(min(stop, high) - max(start, low), 0.0) / (high - low) for start, stop in ends]
 
     @property
@@ -401,17 +405,17 @@ def findings_of_built(built: MeasuredCam) -> list[Finding]:
     """Return what the user must know about the measured profile."""
     warnings = [*_built_mechanics(built), *_weak_registration(built), *_doubtful_points(built)]
     last = built.assembly.stroke
-    if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0 or built.unmeasured:
-        measured = f"{_join_spans(built.measured)} of the travel only, which is {mm(last)}"
+    if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0 or built.unmeasured_spans:
+        measured = f"{_join_spans(built.measured_spans)} of the travel only, which is {mm(last)}"
         warnings.append(finding("part_measured", f"the flanks were measured for {measured}"))
-    if built.unmeasured:
+    if built.unmeasured_spans:
         warnings.append(finding("profile_hole", describe_unmeasured(built)))
     return warnings
 
 
 def describe_unmeasured(built: MeasuredCam) -> str:
     """Return what is said of parts of the flanks without points."""
-    spans = _join_spans(built.unmeasured)
+    spans = _join_spans(built.unmeasured_spans)
     return f"a flank has no points where the rollers touch it from {spans} of travel: the force there is not known"
 
 

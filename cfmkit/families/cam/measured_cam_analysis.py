@@ -104,8 +104,8 @@ def analyze_built(spec: CamSpec) -> Result:
             *rubbing_left_out(spec, "the model of a measured cam"),
             *findings_of_built(built),
         ),
-        travel=built.requested,
-        valid=tuple((low + built.origin, high + built.origin) for low, high in built.measured),
+        travel=built.requested_ends,
+        valid=tuple((low + built.origin, high + built.origin) for low, high in built.measured_spans),
         target=(
             target_force(spec, assembly)
             if spec.design or assembly.spec.mechanism.profile.curve

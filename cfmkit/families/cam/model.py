@@ -105,7 +105,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         return no_result(spec, problem.finding)
     solution = with_band(solution, run.seed)
     first, last = solution.travel[[0, -1]].tolist()
-    short, requested = shortfalls(assembly, last), solution.requested
+    short, requested = shortfalls(assembly, last), solution.requested_travel
     if short and not spec.analysis.travel:  # as far as the flank was to be cut
         requested = float(assembly.spec.mechanism.profile.stroke or 0.0)
     failed = int(np.isnan(solution.up.slider[1:]).sum() + np.isnan(solution.down.slider[1:]).sum())
@@ -153,7 +153,7 @@ def with_band(solution: Solution, seed: int) -> Solution:
 
 def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:
     """Return the spec with the defaults of the analysis made explicit."""
-    stated = {"travel": solution.requested, "gravity": spec.gravity, "fidelity": "quasi-static"}
+    stated = {"travel": solution.requested_travel, "gravity": spec.gravity, "fidelity": "quasi-static"}
     return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=stated)})
 
 

@@ -296,7 +296,7 @@ class Solution(ShortRepr):
         return Several(ends[..., None] if low.ndim > 1 or self.windows else ends)
 
     @property
-    def requested(self) -> Any:
+    def requested_travel(self) -> Any:
         """Requested travel of the sliders [m]; without a request, as far as the flank was to be cut."""
         analysis, stroke, last = self.assembly.spec.analysis, self.mechanism.profile.stroke, self.travel[..., -1:]
         if analysis.travel is not None:
@@ -360,7 +360,7 @@ class Solution(ShortRepr):
                 partial(self._part_efforts_in_rows, name),
                 self._stress_rows(name, state),
                 peaks=self._spread_over_rows(self.peaks),
-                travel=(motion[:, 0], self.column(self.requested) + self.column(self.origin)),
+                travel=(motion[:, 0], self.column(self.requested_travel) + self.column(self.origin)),
                 followed=self.assembly.spec.target_curve,
             )
             for name, state in (("load", self.up), ("unload", self.down))

@@ -5,6 +5,7 @@ That is a rod inside of it, or a tube around it.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
@@ -74,9 +75,9 @@ class BuiltInSpring(SpringSupport):
     """Wire and support of springs that are built in, of any kind."""
 
     @property
+    @abstractmethod
     def spring_type(self) -> type[HelicalSpring]:
-        """Their kind."""
-        raise NotImplementedError
+        """Kind of the springs."""
 
     @property
     def coil(self: Any) -> HelicalSpring | None:

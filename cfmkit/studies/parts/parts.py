@@ -110,7 +110,7 @@ def _materials(spec: Spec) -> tuple[tuple[MaterialSpec, ...], tuple[MaterialSpec
 def _band(material: MaterialSpec) -> tuple[float, float] | None:
     """Return the range of the modulus of a material [Pa], if it is that of its name."""
     listed = MATERIALS_BY_NAME.get(material.name or "")
-    return listed.scatter.youngs_modulus if listed and material.modulus == listed.youngs_modulus else None
+    return listed.scatter.youngs_modulus if listed and material.youngs_modulus == listed.youngs_modulus else None
 
 
 def process_of_part(spec: Spec) -> PartProcess | None:

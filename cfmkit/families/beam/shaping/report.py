@@ -186,7 +186,7 @@ SEARCH_DEFINITIONS = {
     "tolerance_strict_range_p10": ("travel", "ratio", "the same share that nine of ten of them reach"),
     "tolerance_lost": ("travel", "count", "such networks that cannot be followed to the end of the window"),
 }  # fmt: skip
-"""What only the search knows, with the window that it is of: the one requested, the one designed, or the whole travel.
+"""Values that only the search knows, with their window: the one requested, the one designed, or the whole travel.
 
 What the analysis of the design knows, too, is not said a second time.
 """

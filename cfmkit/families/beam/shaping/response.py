@@ -90,7 +90,7 @@ _COLUMN_PARTS = {
     "left": {"axial": 1.0, "bending": 1.0},
     "right": {"axial": 1.0, "bending": -1.0},
 }
-"""What limits look at, as sums of what the engine knows: the centre line; the bending stress on the left side, signed;
+"""Quantities of limits as sums of those of the engine: the centre line; the bending stress on the left side, signed;
 the stress on either side with its axial part, tension positive."""
 
 

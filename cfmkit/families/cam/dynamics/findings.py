@@ -49,7 +49,7 @@ def leaves_profile(parts: Build, span: tuple[float, float]) -> Finding:
 
 def runs_on_corner(parts: Build) -> Finding:
     """Return what to say about a motion on the corner that the nine-coordinate model cannot describe."""
-    above = max(side.turned.corner_end - side.height for side in (parts.machine.right, parts.machine.left))
+    above = max(side.turned_track.corner_end - side.height for side in (parts.machine.right, parts.machine.left))
     return finding(
         "undercut",
         "on the corner of the cam the contact is not a function of its height, as the nine-coordinate model needs: "

@@ -136,7 +136,7 @@ class Side:
     height: float = 0.0  # of the origin of all positions above the start of the roller path [m]
 
     @cached_property
-    def turned(self) -> Track:
+    def turned_track(self) -> Track:
         """The track of the roller's centre; raises NoTrack if the slider does not rise on it."""
         return TurnedTrack(self.track, self.angle, self.height) if self.angle else self.track
 
@@ -147,11 +147,11 @@ class Side:
     @property
     def span(self) -> tuple[float, float]:
         """Lowest and highest position of the slider [m]."""
-        return self.turned.dead_point - self.height, self.turned.end - self.height
+        return self.turned_track.dead_point - self.height, self.turned_track.end - self.height
 
     def stance(self, slider: FloatArray) -> Stance:
         """Return where the roller is for slider positions within `span` [m]."""
-        states, turn = self.turned.states(slider + self.height), cmath.exp(1j * self.angle)
+        states, turn = self.turned_track.states(slider + self.height), cmath.exp(1j * self.angle)
         length = np.sqrt(1.0 + states.slope * states.slope)
         center = (states.x + 1j * (states.y - self.height)) * turn
         return Stance(center, (1.0 + 1j * states.slope) / length * turn, states.bend / length**3, states.on_corner)
