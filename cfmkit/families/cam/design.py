@@ -162,17 +162,13 @@ def design(spec: CamSpec, run: Run) -> Design:
     task = _Task.from_spec(spec, target)
     _check_start_of(task)
     best, *others = _CHOICE_FUNCTIONS[target.choose](task)
-    next_best = tuple(partial(_with_next, task, choice) for choice in others)
-    return replace(_with_choice(task, best), next_best=next_best)
+    next_best = tuple(partial(_design_choice, task, choice) for choice in others)
+    return replace(_design_choice(task, best), next_best=next_best)
 
 
 @refusals_answered
-def _with_next(task: _Task, choice: Choice) -> Design:
-    """Return the design with springs that are not the best of the catalogue."""
-    return _with_choice(task, choice)
-
-
-def _with_choice(task: _Task, choice: Choice) -> Design:
+def _design_choice(task: _Task, choice: Choice) -> Design:
+    """Return the design with chosen springs, force constant and preload."""
     law = task.law(choice.force_constant, choice.preload)
     _check_stroke(law, task.target, choice.springs)
     _check_bend(task, law)
@@ -194,7 +190,7 @@ def _check_start_of(task: _Task) -> None:
         raise Infeasible(rollers_overlap(gap), {"mechanism.roller_radius": format_at_most(x0)})
 
 
-def _from_springs(task: _Task) -> list[Choice]:
+def _choose_constant(task: _Task) -> list[Choice]:
     """Choose A from the springs; where that would undercut, the smallest A that does not, and softer springs."""
     springs, preload = task.mechanism.springs, task.mechanism.effective_preload
     constant = task.pull / (4.0 * springs.total)
@@ -208,7 +204,7 @@ def _from_springs(task: _Task) -> list[Choice]:
     return [Choice(task.smallest, softer, preload, note, ("design.avoid_undercut",))]
 
 
-def _with_preload(task: _Task) -> list[Choice]:
+def _choose_preload(task: _Task) -> list[Choice]:
     """Choose A from the springs, and the smallest preload with which the roller can follow the path."""
     mechanism, constant = task.mechanism, task.pull / (4.0 * task.mechanism.springs.total)
     half = task.law(constant, 0.0).smallest_preload(mechanism.roller_radius)
@@ -230,7 +226,7 @@ def _with_preload(task: _Task) -> list[Choice]:
     return [Choice(constant, mechanism.springs, preload, note)]
 
 
-def _from_constant(task: _Task) -> list[Choice]:
+def _choose_stiffness(task: _Task) -> list[Choice]:
     """Choose the stiffness from a given A."""
     constant = task.target.force_constant or task.mechanism.profile.force_constant
     if task.smallest is not None and task.undercuts(task.law(constant)):
@@ -244,10 +240,10 @@ def _from_constant(task: _Task) -> list[Choice]:
     return [Choice(constant, springs, task.mechanism.effective_preload)]
 
 
-def _from_catalogue(task: _Task) -> list[Choice]:
+def _choose_listed_springs(task: _Task) -> list[Choice]:
     """Return the springs and numbers within all limits, the one whose cam has the smallest two-way deviation first."""
     tried = [
-        _with_spring(task, item, count)
+        _try_listed_spring(task, item, count)
         for item in offers(task.target.catalogue, ExtensionSpring)
         for count in item.counts
     ]
@@ -265,10 +261,10 @@ def _from_catalogue(task: _Task) -> list[Choice]:
 
 
 _CHOICE_FUNCTIONS: dict[str, Callable[[_Task], list[Choice]]] = {
-    "force-constant": _from_springs,
-    "stiffness": _from_constant,
-    "preload": _with_preload,
-    "catalogue": _from_catalogue,
+    "force-constant": _choose_constant,
+    "stiffness": _choose_stiffness,
+    "preload": _choose_preload,
+    "catalogue": _choose_listed_springs,
 }
 """Functions by the word of `design.choose`: each returns the best choice, then those that are nearly as good."""
 _BLOCKING_KEYS = {
@@ -281,7 +277,7 @@ _BLOCKING_KEYS = {
 """Which key blocks a spring of the catalogue that is refused for a reason."""
 
 
-def _with_spring(task: _Task, item: Offer, count: int) -> tuple[float, Choice] | Miss:
+def _try_listed_spring(task: _Task, item: Offer, count: int) -> tuple[float, Choice] | Miss:
     """Return the deviation of both ways and the choice of one spring of a catalogue, or why it does not fit.
 
     Between axes that are farther apart than its free length a spring is stretched at the start; its initial tension
