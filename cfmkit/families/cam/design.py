@@ -162,11 +162,16 @@ def design(spec: CamSpec, run: Run) -> Design:
     task = _Task.from_spec(spec, target)
     _check_start_of(task)
     best, *others = _CHOICE_FUNCTIONS[target.choose](task)
-    next_best = tuple(partial(_design_choice, task, choice) for choice in others)
+    next_best = tuple(partial(_design_next_best, task, choice) for choice in others)
     return replace(_design_choice(task, best), next_best=next_best)
 
 
 @refusals_answered
+def _design_next_best(task: _Task, choice: Choice) -> Design:
+    """Return the design with springs that are not the best of the catalogue; a refusal is its outcome."""
+    return _design_choice(task, choice)
+
+
 def _design_choice(task: _Task, choice: Choice) -> Design:
     """Return the design with chosen springs, force constant and preload."""
     law = task.law(choice.force_constant, choice.preload)
