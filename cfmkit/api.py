@@ -1,4 +1,4 @@
-"""The functions of ``import cfmkit``: from a specification to curves, designs, metrics and drawings.
+"""The functions of ``import cfmkit`` on one specification: load, write, check, analyze, design, evaluate, draw, export.
 
 Everything is a value: nothing here prints or plots, and a disk is written to only where a folder is named.
 """
@@ -58,7 +58,7 @@ def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
     """
     from cfmkit.runs.specfile import bind, read_spec
 
-    return bind(read_spec(os.fspath(path), _each_change(changes)))
+    return bind(read_spec(os.fspath(path), _as_changes(changes)))
 
 
 def loads(text: str | bytes, source: str = "text") -> Spec:
@@ -275,15 +275,15 @@ def check(spec: AnySpec, changes: Iterable[str] = ()) -> tuple[Problem, ...]:
 
     try:
         if isinstance(spec, Spec):
-            bind(apply_options(read_document(dumps(spec), spec.name), _each_change(changes)))
+            bind(apply_options(read_document(dumps(spec), spec.name), _as_changes(changes)))
         else:
-            bind(read_spec(os.fspath(_path_of(spec)), _each_change(changes)))
+            bind(read_spec(os.fspath(_path_of(spec)), _as_changes(changes)))
     except SpecError as error:
         return error.problems
     return ()
 
 
-def _each_change(changes: Iterable[str]) -> Iterable[str]:
+def _as_changes(changes: Iterable[str]) -> Iterable[str]:
     return (changes,) if isinstance(changes, str) else changes
 
 

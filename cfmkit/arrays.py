@@ -1,6 +1,7 @@
-"""Arrays as the whole package writes them: of numbers, in SI units, read-only once they are handed out.
+"""Read-only arrays, mappings and sequences computed when they are read, and short texts (`repr`) of what holds arrays.
 
-The full text of a result would have a million characters: what holds arrays, and its containers, has a short `repr`.
+Arrays are in SI units, and read-only once they are handed out. The full text of a result would have a million
+characters.
 """
 
 from __future__ import annotations
@@ -201,7 +202,7 @@ def brief(value: Any) -> str:
     ('array of 2 x 2: 1 ... 3', 'list of 30', '0.25')
     """
     if hasattr(value, "dtype") and getattr(value, "shape", None):
-        text = _array(value)
+        text = _describe_array(value)
     elif isinstance(value, (Mapping, tuple, list)):
         few = not isinstance(value, Mapping) and len(value) <= 4
         is_short = few and all(isinstance(item, PLAIN_TYPES) for item in value)
@@ -216,7 +217,7 @@ def brief(value: Any) -> str:
     return text if len(text) <= LONGEST_ITEM else text[: LONGEST_ITEM - 1] + "…"
 
 
-def _array(values: Any) -> str:
+def _describe_array(values: Any) -> str:
     import numpy as np
 
     shape = " x ".join(map(str, values.shape))

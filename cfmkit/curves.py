@@ -26,8 +26,7 @@ Kind = Literal["force", "torque"]
 class Column(ShortRepr):
     """One more column of a curve: values in SI and the dimension that names their unit.
 
-    `dimension` is a name of `cfmkit.specs.units` ("force", "length", "ratio", ...), or
-    "text" for labels.
+    `dimension` is a name of `cfmkit.specs.units` ("force", "length", "ratio", ...), or "text" for labels.
     """
 
     values: NDArray[Any]

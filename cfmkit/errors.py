@@ -1,4 +1,4 @@
-"""The exceptions of cfmkit and the exit code that each one becomes.
+"""The exceptions of cfmkit with their exit codes, the problem of a specification, and text made safe to print.
 
 ::
 
@@ -31,10 +31,10 @@ _LONG_WORD = re.compile(r"\S{400,}")
 def shorten_quotes(message: str) -> str:
     """Return a message in which whatever somebody gave is quoted only as far as he needs to recognise it."""
     quoted = _LONG_QUOTE.sub(lambda match: f"{match['quote']}{match['text'][:47]}...{match['quote']}", message)
-    return _words_shortened(quoted)
+    return _shorten_words(quoted)
 
 
-def _words_shortened(text: str) -> str:
+def _shorten_words(text: str) -> str:
     return _LONG_WORD.sub(lambda match: f"{match[0][:60]}...{match[0][-20:]}", text)
 
 
@@ -108,7 +108,7 @@ class Problem:
         """Return the one line that the user reads: ``file:line:col: path: message``."""
         place = f"{self.source}:{self.line}:{self.column}" if self.line else self.source
         path = "" if self.source == f"--set {self.path}" else self.path  # said once
-        return ": ".join(part for part in (_words_shortened(place), _words_shortened(path), self.message) if part)
+        return ": ".join(part for part in (_shorten_words(place), _shorten_words(path), self.message) if part)
 
     @property
     def excerpt(self) -> tuple[str, ...]:

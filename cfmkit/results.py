@@ -1,8 +1,7 @@
-"""Outcome of an analysis or a design: values, never half-finished objects.
+"""Outcome of an analysis or a design as values: status, findings, scalars, curves, and protocols of closed forms.
 
-A `Status` says how far the solver came; its value is the sentence the user
-reads. Whether the mechanism is any good is not a status: that is what the
-requirements decide.
+A `Status` says how far the solver came; its value is the sentence the user reads. Whether the mechanism is any good is
+not a status: that is what the requirements decide.
 """
 
 from __future__ import annotations
@@ -72,10 +71,9 @@ class Status(Enum):
 class Finding(ShortRepr):
     """Something about the mechanism that the user must know, by name.
 
-    `name` is stable (scripts match it); `message` holds the numbers that decide
-    and, where there is one, the cure. `cures` are changes of the specification that
-    cure it, as ``--set`` takes them: ``design.avoid_undercut=true``; several that only
-    work together are a tuple.
+    `name` is stable (scripts match it); `message` holds the numbers that decide and, where there is one, the cure.
+    `cures` are changes of the specification that cure it, as ``--set`` takes them: ``design.avoid_undercut=true``;
+    several that only work together are a tuple.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Verbs as commands: found in the folder `verbs`, imported when they are needed."""
+"""Verbs as commands of typer, imported when needed, with options read off dataclasses; parsing of arguments."""
 
 from __future__ import annotations
 
@@ -45,33 +45,33 @@ class Verbs(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, in the order of the help."""
-        return sorted(names(), key=lambda name: _module(name).HELP_POSITION)
+        return sorted(names(), key=lambda name: _import_verb(name).HELP_POSITION)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return one verb as a command, None if there is no such verb."""
-        return _command(cmd_name) if cmd_name in names() else None
+        return _make_command(cmd_name) if cmd_name in names() else None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the verb that the arguments begin with."""
         if args and args[0] not in names() and not args[0].startswith("-") and not ctx.resilient_parsing:
-            ctx.fail(_unknown(args[0]))
+            ctx.fail(_describe_unknown(args[0]))
         return super().resolve_command(ctx, args)
 
 
-def _unknown(name: str) -> str:
+def _describe_unknown(name: str) -> str:
     from cfmkit.specs.yamlio import did_you_mean
 
     hint = did_you_mean(name, names()) or f"there are {', '.join(sorted(names()))}"
     return f"there is no command {name!r}; {hint}"
 
 
-def _module(name: str) -> ModuleType:
+def _import_verb(name: str) -> ModuleType:
     return import_module(f"{verbs.__name__}.{name.replace('-', '_')}")
 
 
-def _command(name: str) -> Any:
+def _make_command(name: str) -> Any:
     """Return the command of a verb: its options are the fields of what its `run` takes."""
-    module = _module(name)
+    module = _import_verb(name)
     options = vars(module)[module.run.__annotations__["options"]]
 
     def callback(**values: Any) -> Call:
@@ -88,7 +88,7 @@ def _command(name: str) -> Any:
     app = typer.Typer(**_TYPER_OPTIONS)
     example = f"Example: {module.HELP_EXAMPLE}" if hasattr(module, "HELP_EXAMPLE") else None
     app.command(name, help=_unwrap_paragraphs(inspect.getdoc(module.run) or ""), epilog=example)(callback)
-    return _plain(typer.main.get_command(app))
+    return _without_types(typer.main.get_command(app))
 
 
 def _unwrap_paragraphs(text: str) -> str:
@@ -102,18 +102,18 @@ def _unwrap_paragraphs(text: str) -> str:
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 
 
-def _plain(command: Any) -> Any:
+def _without_types(command: Any) -> Any:
     """Return a command whose help names no types of Python: neither ``<bool>`` of a flag nor ``<str>`` of a file."""
     helped = command.get_help_option
 
     def help_option(ctx: Any) -> Any:
-        option = _drop_types(helped(ctx))
+        option = _hide_type(helped(ctx))
         _convert_if_given(option)
         return option
 
     command.get_help_option = help_option
     for item in command.params:
-        _convert_if_given(_drop_types(item))
+        _convert_if_given(_hide_type(item))
     return command
 
 
@@ -132,7 +132,7 @@ def _convert_if_given(item: Any) -> None:
     item.process_value = process_value
 
 
-def _drop_types(item: Any) -> Any:
+def _hide_type(item: Any) -> Any:
     if getattr(item, "is_flag", False) or getattr(item, "count", False):
         item.metavar = ""
     elif getattr(item, "param_type_name", "") == "argument":
@@ -177,7 +177,7 @@ def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
     Raises Exception of typer's kind, if it is malformed.
     """
     try:
-        call = _plain(typer.main.get_command(app)).main(
+        call = _without_types(typer.main.get_command(app)).main(
             _spell_out_empty_values(arguments), "cfmkit", standalone_mode=False
         )
     except SystemExit:

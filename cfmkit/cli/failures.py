@@ -1,4 +1,4 @@
-"""From whatever ended a command to an exit code, lines for the user and the JSON document."""
+"""From whatever ended a command (an error, a signal) to an exit code, lines for the user and the JSON document."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def fail(error: BaseException, terminal: Terminal) -> ExitCode:
 
 def answer_to(error: BaseException, excerpts: bool = False) -> Document:
     """Return the answer that an exception is; its lines with those of the file that they are about, if wanted."""
-    code, lines, entries = code_of(error), list(_lines(error, excerpts)), list(_entries(error))
+    code, lines, entries = code_of(error), list(_lines(error, excerpts)), list(_json_entries(error))
     data = {"message": "; ".join(str(entry["message"]) for entry in entries)}
     return Document(data, exit_code=code, complaints=tuple(lines), errors=tuple(entries))
 
@@ -90,11 +90,11 @@ def _lines(error: BaseException, excerpts: bool) -> Iterator[str]:
             yield line
             yield from error.problems[number].excerpt if excerpts and number < MAX_EXCERPTS else ()
         return
-    for entry in _entries(error):
+    for entry in _json_entries(error):
         yield f"error    {entry['message']}"
 
 
-def _entries(error: BaseException) -> Iterator[dict[str, Any]]:
+def _json_entries(error: BaseException) -> Iterator[dict[str, Any]]:
     if isinstance(error, SpecError):
         for problem in error.problems:
             yield {name: value for name, value in asdict(problem).items() if name != "text"}

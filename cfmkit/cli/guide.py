@@ -1,4 +1,4 @@
-"""Documentation pages shipped with cfmkit, for `cfmkit docs`: listed, found by name, and searched by word.
+"""Documentation pages for `cfmkit docs`: listed, found by name, searched by word; the terms of the glossary.
 
 A search also finds the names by which cfmkit calls what a user calls otherwise. They are in the second of two tables of
 docs/glossary.md: word and meaning; synonym and the words used here.

@@ -1,4 +1,4 @@
-"""The program ``cfmkit``: parse, one call, print."""
+"""The program ``cfmkit``: parse, one call, print; signals, errors and exit codes of the process."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def main(
 def _run(words: list[str]) -> ExitCode:
     terminal = Terminal.guess(words)
     try:
-        _listen()
+        _catch_signals()
         if not sys.warnoptions:
             # Libraries warn about their own affairs; what concerns the user is in the results.
             warnings.simplefilter("ignore")
@@ -106,7 +106,7 @@ def _answer(words: list[str], terminal: Terminal) -> ExitCode:
         verbose=call.options.verbose,
     )
     if output.verbose:
-        _tell_more()
+        _log_more()
     Stopped.began = False
     try:
         with _locks_of(call.options):
@@ -133,7 +133,7 @@ def _locks_of(options: Any) -> AbstractContextManager[None]:
     return disable_locks()
 
 
-def _tell_more() -> None:
+def _log_more() -> None:
     """Let the parts of the program say on standard error what they do beside their work: where they keep files."""
     import logging
 
@@ -153,7 +153,7 @@ def _report_error(error: BaseException, terminal: Terminal) -> ExitCode:
         return fail(second, replace(terminal, json=False))
 
 
-def _listen() -> None:
+def _catch_signals() -> None:
     """Turn the first signal into `Stopped`; a second one ends the process at once."""
 
     def stop(number: int, _frame: FrameType | None) -> None:
@@ -165,14 +165,14 @@ def _listen() -> None:
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, stop)
-        sys.unraisablehook = partial(_again, sys.unraisablehook, stop)
+        sys.unraisablehook = partial(_resend, sys.unraisablehook, stop)
 
 
 SIGNAL_RESEND_DELAY = 0.02
 """Until a signal that was lost is sent again [s]: a compiler's callbacks are over sooner than anybody notices this."""
 
 
-def _again(plain: Callable[[Any], Any], stop: Callable[[int, FrameType | None], None], lost: Any) -> None:
+def _resend(plain: Callable[[Any], Any], stop: Callable[[int, FrameType | None], None], lost: Any) -> None:
     """Send a signal again where its exception was raised in code that lets none out: callbacks, finalizers."""
     if not isinstance(lost.exc_value, Stopped):
         plain(lost)

@@ -1,4 +1,4 @@
-"""Command-line options: functions that declare one, sets of them that several commands share, and their completion.
+"""Command-line options: functions that declare them, sets that commands share, completion, and what values mean.
 
 An option or argument is a field of the dataclass that a verb's `run` takes, called as the field unless it states names.
 A shell completes verbs, options and files by itself; here are names of families, topics, and keys.

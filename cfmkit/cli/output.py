@@ -1,4 +1,4 @@
-"""Output: results to standard output, all else to standard error, and options for both.
+"""Output of a command: results to standard output, all else to standard error, progress as a bar or as lines.
 
 Standard output and error never end a run: not by a closed pipe, nor by a character that cannot be encoded.
 """

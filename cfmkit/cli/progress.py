@@ -1,7 +1,6 @@
-"""Progress of a study on standard error: a bar for whoever watches, else a line now and then.
+"""Progress of a study on standard error, with its rate and time left; Ctrl-C as a request to stop.
 
-The first Ctrl-C asks the study to finish what runs and to write what there is; the
-second ends it at once.
+The first Ctrl-C asks the study to finish what runs and to write what there is; the second ends it at once.
 """
 
 from __future__ import annotations
@@ -58,28 +57,28 @@ class StudyProgress:
         self._reused += points if reused else 0
         now = time.monotonic()
         if not reused:
-            self._note(now)
+            self._remember_count(now)
         if self._tells and now - self._reported >= (LINE_EVERY if self._bar is None else DRAW_EVERY):
             self._reported = now
-            self._tell(now)
+            self._show_progress(now)
 
     def stopping(self) -> bool:
         """Return whether the user asked to stop."""
         return self._stopped
 
-    def _tell(self, now: float) -> None:
+    def _show_progress(self, now: float) -> None:
         if self._bar is not None:
-            text = f"{self._done} of {self._all} {self._things}, {self._sentence(now)}"
+            text = f"{self._done} of {self._all} {self._things}, {self._describe_rate(now)}"
             self._bar.show(self._done, self._all, text)
         else:
-            output.write_error(f"{self._done} of {self._all} {self._things}, {self._sentence(now)}\n")
+            output.write_error(f"{self._done} of {self._all} {self._things}, {self._describe_rate(now)}\n")
 
-    def _sentence(self, now: float) -> str:
+    def _describe_rate(self, now: float) -> str:
         rate = self._rate(now)
         left = f"{rate:.3g}/s, {duration((self._all - self._done) / rate)} left, " if rate else ""
         return f"{left}{self._failed} failed"
 
-    def _note(self, now: float) -> None:
+    def _remember_count(self, now: float) -> None:
         """Remember how many points were computed by now; what came from the journal does not count."""
         if self._first is None:
             self._first = now

@@ -1,4 +1,4 @@
-"""Common part of `design`, `analyze` and `calibrate`: options in, the document of a run out."""
+"""Common part of `design`, `analyze` and `calibrate`: options in, the folder written, the document of the run out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Common part of the verbs that evaluate many points: a folder, a journal, an executor, files and the report."""
+"""Common part of verbs that evaluate many points: a locked folder with its journal, an executor, files, report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Subjects of `cfmkit show`: topics and families as pages, and everything else by its name.
+"""Subjects of `cfmkit show`: pages on topics and families, and records of everything that has a name, found by it.
 
 A page is the answer of the command: records for ``--json``, and the same as tables for people.
 """
@@ -119,7 +119,7 @@ def metrics_page() -> Document:
         "brackets the worst branch counts; force_mean[load] selects one. For torques force_... is called torque_..., "
         "in N*mm over deg. `cfmkit show FAMILY` lists what a family adds."
     )
-    records = _metrics("force")
+    records = _metric_records("force")
     return _page("metrics", text, (("", records, METRIC_FIELDS),), {"metrics": records})
 
 
@@ -191,23 +191,23 @@ def _key_sections(spec_keys: Sequence[Record]) -> list[Section]:
     about = {key["path"]: key["description"] for key in spec_keys}
     top = [key for key in blocks.pop("", []) if key["path"] not in {parent.removesuffix("[]") for parent in blocks}]
     sections = [("spec", top)]
-    for parent in sorted(blocks, key=_when_read):
+    for parent in sorted(blocks, key=_position_of_block):
         name = parent.removesuffix("[]").removesuffix(".NAME")
         sections.append((f"{parent.removesuffix('[]')}: {about.get(name, '')}", blocks[parent]))
     return [(heading, rows, KEY_FIELDS) for heading, rows in sections]
 
 
-def _when_read(block: str) -> int:
+def _position_of_block(block: str) -> int:
     """Return the place of a block in the order in which a file is written."""
     return READ_FIRST.get(block.partition(".")[0].removesuffix("[]"), len(READ_FIRST))
 
 
-def _kind(key: Record) -> str:
+def _kind_with_unit(key: Record) -> str:
     unit = key["example"].partition(" ")[2]
     return f"{key['kind']} [{unit}]" if unit and unit != "%" else str(key["kind"])
 
 
-def _default(key: Record) -> str:
+def _default_or_required(key: Record) -> str:
     return "required" if key["required"] else str(key["default"])
 
 
@@ -215,10 +215,10 @@ def find_page(name: str) -> Document | None:
     """Return the page on everything that has a name; None if nothing has."""
     sections: list[Section] = []
     for heading, kind in TOPIC_KINDS.items():
-        wanted = _keys(heading, name)
+        wanted = _keys_for_lookup(heading, name)
         if named := [record for record in kind.records() if not wanted.isdisjoint(kind.names(record))]:
             sections.append((heading, named, kind.fields))
-    if not sections and (drawn := _symbols(name)):
+    if not sections and (drawn := _symbol_records(name)):
         sections.append(("symbols", drawn, SYMBOL_FIELDS))
     if not sections:
         return None
@@ -230,7 +230,7 @@ def find_page(name: str) -> Document | None:
     return Document({**data, **({"bibtex": bibtex} if bibtex else {})}, (*page.body, *more))
 
 
-def _symbols(name: str) -> list[Record]:
+def _symbol_records(name: str) -> list[Record]:
     """Return what a symbol such as ``theta2`` is in the drawings of the families."""
     from cfmkit.runs.shipped_files import DRAWING_FILE, read_dimensions
 
@@ -258,7 +258,7 @@ def references() -> list[dict[str, str]]:
     ]
 
 
-def _keys(heading: str, name: str) -> set[str]:
+def _keys_for_lookup(heading: str, name: str) -> set[str]:
     """Return a name as its kind is listed: a metric without its branch, a dimension also by any unit of it."""
     if heading == "metrics":
         return {name.partition("[")[0]}
@@ -280,17 +280,17 @@ def _measured_in(unit: str) -> list[str]:
     ]
 
 
-def _terms() -> list[Record]:
+def _term_records() -> list[Record]:
     return [{"name": name, "meaning": meaning} for name, meaning in read_terms().items()]
 
 
-def _materials() -> list[Record]:
+def _material_records() -> list[Record]:
     from cfmkit.stock import MATERIALS_BY_NAME
 
     return [asdict(entry) for entry in dict.fromkeys(MATERIALS_BY_NAME.values())]
 
 
-def _metrics(effort: Kind | None = None) -> list[Record]:
+def _metric_records(effort: Kind | None = None) -> list[Record]:
     """Return the metrics of curves of an effort, or of any, and those of many parts."""
     from cfmkit.metrics import definitions
     from cfmkit.specs.further_metrics import OF_MANY_PARTS
@@ -304,7 +304,7 @@ def _metrics(effort: Kind | None = None) -> list[Record]:
     ]
 
 
-def _values() -> list[Record]:
+def _value_records() -> list[Record]:
     """Return the values of the families, of the causes that they find in a measured loop, and of recordings."""
     from cfmkit.experiment.recorded_values import define_recorded_values
     from cfmkit.specs.units import border_unit
@@ -334,7 +334,7 @@ def _spec_keys() -> list[Record]:
     ]
 
 
-def _findings() -> list[Record]:
+def _finding_records() -> list[Record]:
     """Return what a run of a family, of a recording or of a study may warn of."""
     from cfmkit.experiment import calibration, correction, findings
     from cfmkit.studies.findings import STUDY_FINDINGS
@@ -349,14 +349,14 @@ def _findings() -> list[Record]:
     ]
 
 
-def _units() -> list[Record]:
+def _unit_records() -> list[Record]:
     from cfmkit.specs.units import unit_table
 
     keys = ("symbol", "name", "dimension", "si", "input_only")
     return [dict(zip(keys, entry, strict=True)) for entry in unit_table()]
 
 
-def _dimensions() -> list[Record]:
+def _dimension_records() -> list[Record]:
     from cfmkit.specs.units import DIMENSIONS_BY_NAME
 
     keys = ("name", "unit", "description", "example")
@@ -373,29 +373,31 @@ class TopicKind(NamedTuple):
 
 KEY_FIELDS = (
     field("path", "key"),
-    Field("value", _kind, wraps=True),
-    Field("default", _default),
+    Field("value", _kind_with_unit, wraps=True),
+    Field("default", _default_or_required),
     Field("meaning", lambda key: "; ".join(filter(None, (key["description"], key["allowed"]))), wraps=True),
 )
 SYMBOL_FIELDS = (field("name", "symbol"), field("family"), field("key", wraps=True), field("meaning", wraps=True))
 METRIC_FIELDS = (field("name", "metric"), field("unit"), field("definition", wraps=True))
 TOPIC_KINDS: Mapping[str, TopicKind] = {
-    "terms": TopicKind(_terms, (field("name", "word"), field("meaning", wraps=True))),
+    "terms": TopicKind(_term_records, (field("name", "word"), field("meaning", wraps=True))),
     "materials": TopicKind(
-        _materials,
+        _material_records,
         (field("name", "material"), Field("properties", properties, wraps=True), field("source", wraps=True)),
         lambda record: (record["name"], *record["aliases"]),
     ),
-    "metrics": TopicKind(_metrics, METRIC_FIELDS),
-    "values": TopicKind(_values, (field("name"), field("family"), field("unit"), field("definition", wraps=True))),
+    "metrics": TopicKind(_metric_records, METRIC_FIELDS),
+    "values": TopicKind(
+        _value_records, (field("name"), field("family"), field("unit"), field("definition", wraps=True))
+    ),
     "keys": TopicKind(
         _spec_keys,
         (field("path", "key"), field("family", wraps=True), *KEY_FIELDS[1:]),
         lambda record: {record["path"], record["path"].rpartition(".")[2].removesuffix("[]")},
     ),
-    "findings": TopicKind(_findings, (field("name"), field("family"), field("meaning", wraps=True))),
+    "findings": TopicKind(_finding_records, (field("name"), field("family"), field("meaning", wraps=True))),
     "units": TopicKind(
-        _units,
+        _unit_records,
         (
             field("symbol", "unit"),
             field("name"),
@@ -406,7 +408,7 @@ TOPIC_KINDS: Mapping[str, TopicKind] = {
         lambda record: (record["symbol"], record["name"]),
     ),
     "dimensions": TopicKind(
-        _dimensions,
+        _dimension_records,
         (
             Field("dimension", lambda item: name_in_words(item["name"])),
             field("unit", "written in"),

@@ -1,18 +1,11 @@
-"""The kit that optimised designs are made with, whatever the mechanism: it knows no family.
+"""Parts of every design by optimisation: problem as a program, many starts, margins for tolerances, rounded values.
 
-`objective_and_constraints`
-    What a family sees at a point, an objective and limits by name, becomes a program of `cfmkit.numerics.sqp`; which
-    limits the point misses, and which of them hold it.
-`rounded_and_reported_values`
-    Numbers within bounds: rounded to what is written, and those that are at a bound.
-`run_many_starts`
-    Many starts, in this process or several, each noted when it is finished, within a time budget.
-`rounded_and_reported_values`
-    What is reported of a design is what the analysis of its written specification measures.
-`robust_design`
-    Values for which made parts are good: margins from tolerances by linear estimate, and drawn parts.
+`objective_and_constraints`: objective and limits of a family as a program of `cfmkit.numerics.sqp`; limits that are
+missed or active. `run_many_starts`: starts in one process or several, each kept when it is finished, within a time
+budget. `robust_design`: values for which manufactured parts are good. `rounded_and_reported_values`: of a finished
+design.
 
-What a design is to do, the start it begins with and the words for what blocks it belong to the family.
+Targets, first guesses and the words for what blocks a design belong to the family.
 """
 
 from cfmkit.lazy_names import lazy_names

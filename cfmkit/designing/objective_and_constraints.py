@@ -1,6 +1,4 @@
-"""A design problem as a program of `cfmkit.numerics.sqp`: an objective, and limits as rows that must be at least zero.
-
-Of limits is known which are missed, by how much and where, and which hold a design.
+"""A design problem as a program of `cfmkit.numerics.sqp`: objective, limits as rows >= 0; limits missed or active.
 
 A family says what is seen at a point; here that becomes the vectors and matrices that the solver wants. Limits may be
 let give way, all by the same amount, which is then the last variable and is minimised in place of the objective: zero

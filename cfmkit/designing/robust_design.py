@@ -1,8 +1,9 @@
-"""Values of a design for which the parts that are made of it are good: margins from tolerances, and drawn parts.
+"""Robust design: values for which most parts meet all limits, by linear estimate or on drawn parts; the costliest
+errors.
 
-What is seen of a part are numbers such as the force at some poses; limits are rows of them that must be at least zero.
-Near a design both move in proportion to its values and to the errors of its parts. So the numbers of drawn parts are
-known by linear estimate, without solving one of them, and so is how far each limit must be drawn in: none is guessed.
+A limit is a row of numbers of a part, such as the force at some poses, that must be at least zero. Near a design the
+numbers move in proportion to its values and to the errors of its parts. So the numbers of drawn parts are known by
+linear estimate, without solving one of them, and so is how far each limit must be drawn in: none is guessed.
 Derivatives are exact where the family has them, and central differences elsewhere.
 
 A step minimises, over such parts, the mean of the worst share of them: the conditional value at risk of the row that is
@@ -63,15 +64,15 @@ class NearParts:
     by_error: FloatArray  # (q, d)
 
     def numbers(self, errors: FloatArray) -> FloatArray:
-        """Return the numbers of parts with errors (k, d), (k, q)."""
+        """Return the estimated numbers (k, q) of parts with errors (k, d)."""
         return np.asarray(self.middle + errors @ self.by_error.T)
 
     def share(self, errors: FloatArray) -> float:
-        """Return the share of parts all of whose numbers are at least zero: of limits, those that keep every one."""
+        """Return the share of parts with errors (k, d) all of whose numbers are at least zero."""
         return float((self.numbers(errors) >= 0).all(axis=1).mean())
 
     def spread(self, deviations: FloatArray) -> FloatArray:
-        """Return the standard deviation of each number, (q,), for errors of so large ones (d,)."""
+        """Return the standard deviation of each number, (q,), for errors with standard deviations (d,)."""
         return np.asarray(np.sqrt(((self.by_error * deviations) ** 2).sum(axis=1)))
 
 
@@ -106,7 +107,7 @@ def best_move(
     chosen = np.zeros(parts.shape, dtype=bool)
     np.put_along_axis(chosen, np.argpartition(parts, kept - 1, axis=1)[:, :kept], True, axis=1)
     for _ in range(MOST_PROGRAMS):
-        solution = _program(parts, slopes, chosen, share, bounds, x, trust)
+        solution = _solve_linear_program(parts, slopes, chosen, share, bounds, x, trust)
         if solution is None:
             return None
         move, level, slack = solution
@@ -120,7 +121,7 @@ def best_move(
     return move
 
 
-def _program(
+def _solve_linear_program(
     parts: FloatArray,
     slopes: NDArray[np.float64],
     chosen: NDArray[np.bool_],
@@ -129,7 +130,7 @@ def _program(
     x: FloatArray,
     trust: float,
 ) -> tuple[FloatArray, float, FloatArray] | None:
-    """Return the move (n,), the level and the slack of each part (k,) that are best for chosen rows (k, m)."""
+    """Return the move (n,), the risk level and the slack of each part (k,) that are best for chosen rows (k, m)."""
     from scipy.optimize import linprog
     from scipy.sparse import csr_matrix, hstack
 
@@ -366,7 +367,7 @@ def _risk_at(
 
 
 def _scale(now: Linear, problem: RobustProblem) -> FloatArray:
-    """Return by what each row is divided: its standard deviation over the drawn parts."""
+    """Return the divisor of each row: its standard deviation over the drawn parts; None if it cannot be known."""
     moved = (problem.errors @ now.by_error.T).std(axis=0)
     out: FloatArray = np.empty(len(moved))
     for number in np.unique(problem.about):

@@ -1,7 +1,4 @@
-"""Values of a finished design: rounded to what is written, those that are at a bound, and those that are reported.
-
-What a search reports of a design are the values of the analysis of its specification.
-"""
+"""Values of a finished design: rounded within bounds, at a bound or not, ranges about them, metrics that it has."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many starts, in one process or several, each noted when it is finished, so that a run that was ended goes on."""
+"""Many starts of a search, in one process or several, in a time budget; results are noted, so that a run can go on."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def junit(
     root = Element("testsuites", name="cfmkit batch")
     for entry in entries:
         root.append(_suite(entry))
-    _count(root, list(root))
+    _set_counts_and_time(root, list(root))
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
@@ -112,13 +112,13 @@ def junit(
 
 def _suite(entry: Entry) -> Element:
     suite = Element("testsuite", name=clean(entry.spec))
-    suite.extend([_solution(entry), *_requirements(entry)])
-    _count(suite, [suite])
+    suite.extend([_solution_case(entry), *_requirement_cases(entry)])
+    _set_counts_and_time(suite, [suite])
     return suite
 
 
-def _count(element: Element, suites: Sequence[Element]) -> None:
-    """Note how many tests there are and how they ended, and how long they took."""
+def _set_counts_and_time(element: Element, suites: Sequence[Element]) -> None:
+    """Set the numbers of tests by outcome, and the time that they took, as attributes of an element."""
     cases = [case for suite in suites for case in suite.iter("testcase")]
     element.set("tests", str(len(cases)))
     for key, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
@@ -131,14 +131,14 @@ def _case(entry: Entry, name: str, seconds: float = 0.0) -> Element:
     return Element("testcase", place | {"time": f"{seconds:.3f}"})
 
 
-def _solution(entry: Entry) -> Element:
+def _solution_case(entry: Entry) -> Element:
     case = _case(entry, "solved", entry.seconds)
     if entry.skipped:
         case.append(Element("skipped", message=clean(entry.message)))
     elif entry.code not in PASSED_CODES:
         tag = "failure" if entry.code in FAILURE_CODES else "error"
         reported = "\n".join((*entry.errors, entry.bug)).strip() or entry.message
-        case.append(_problem(tag, entry.status, entry.message, reported))
+        case.append(_problem_element(tag, entry.status, entry.message, reported))
     if entry.warnings:
         said = Element("system-out")
         said.text = clean("\n".join(f"warning {warning['name']}: {warning['message']}" for warning in entry.warnings))
@@ -146,13 +146,13 @@ def _solution(entry: Entry) -> Element:
     return case
 
 
-def _problem(tag: str, kind: str, message: str, text: str) -> Element:
+def _problem_element(tag: str, kind: str, message: str, text: str) -> Element:
     problem = Element(tag, type=clean(kind), message=clean(message))
     problem.text = clean(text)
     return problem
 
 
-def _requirements(entry: Entry) -> Iterator[Element]:
+def _requirement_cases(entry: Entry) -> Iterator[Element]:
     names: dict[str, int] = {}
     for requirement in entry.requirements:
         name = requirement_name(requirement)
@@ -161,7 +161,7 @@ def _requirements(entry: Entry) -> Iterator[Element]:
         if entry.code not in (*PASSED_CODES, ExitCode.PARTIAL):
             case.append(Element("skipped", message="there is no solution to measure"))
         elif not requirement["ok"]:
-            case.append(_problem("failure", "requirement", requirement["sentence"], requirement["sentence"]))
+            case.append(_problem_element("failure", "requirement", requirement["sentence"], requirement["sentence"]))
         yield case
 
 
@@ -225,10 +225,10 @@ def summary(
     compared: BatchComparison | None = None,  # with an earlier batch
 ) -> bytes:
     """Return the summary: one row per specification, what is missed, and what has changed."""
-    return ("\n".join(_lines(entries, compared)) + "\n").encode()
+    return ("\n".join(_summary_lines(entries, compared)) + "\n").encode()
 
 
-def _lines(entries: Sequence[Entry], compared: BatchComparison | None) -> Iterator[str]:
+def _summary_lines(entries: Sequence[Entry], compared: BatchComparison | None) -> Iterator[str]:
     yield f"## cfmkit: {plain(message(entries))}"
     yield ""
     yield "| specification | verb | verdict | requirements | warnings |"
@@ -236,21 +236,21 @@ def _lines(entries: Sequence[Entry], compared: BatchComparison | None) -> Iterat
     for entry in entries:
         met = len(entry.requirements) - len(entry.missed)
         required = f"{met} of {len(entry.requirements)} met" if entry.requirements else ""
-        cells = (plain(entry.spec), plain(entry.verb), _mark(entry), required, plain(entry.warned or ""))
+        cells = (plain(entry.spec), plain(entry.verb), _verdict_cell(entry), required, plain(entry.warned or ""))
         yield f"| {' | '.join(cells)} |"
-    troubles = [line for entry in entries for line in _troubles(entry)]
+    troubles = [line for entry in entries for line in _trouble_lines(entry)]
     if troubles:
         yield from ("", "### What is wrong", "", *troubles)
     if compared is not None:
         yield from _comparison_lines(compared)
 
 
-def _mark(entry: Entry) -> str:
+def _verdict_cell(entry: Entry) -> str:
     word = outcome(entry)
     return word if word == "ok" or entry.skipped else f"**{word}**"
 
 
-def _troubles(entry: Entry) -> Iterator[str]:
+def _trouble_lines(entry: Entry) -> Iterator[str]:
     if entry.errors:
         yield from (f"- {plain(line)}" for line in entry.errors)
     elif entry.code is ExitCode.REQUIREMENT_MISSED:

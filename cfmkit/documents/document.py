@@ -1,4 +1,4 @@
-"""The one description of a result: `Document`, which every command returns and every renderer reads.
+"""The description of a result, `Document`, that commands return and renderers read: its parts, its `--json` data.
 
 A document says what was found, not how it looks: `terminal`, `html`, `notebook` and `continuous_integration` of this
 package each show it in their way, and `envelope` has it as JSON, with the same keys first whatever the verb and the
@@ -187,10 +187,10 @@ def next_command(*words: str) -> TextLine:
 
 def command_line(*words: str) -> str:
     """Return a command as it is typed, on one line whatever its words hold."""
-    return " ".join(map(_quote, words))
+    return " ".join(map(_quote_word, words))
 
 
-def _quote(word: str) -> str:
+def _quote_word(word: str) -> str:
     import shlex
 
     if word.isprintable():
@@ -322,7 +322,10 @@ def _beginning(text: str, limit: int) -> str:
     if len(text) <= limit:
         return text
     ends = [
-        at for mark in ("; ", ": ", ". ", ", ", " (") for at in _places(text, mark) if MIN_CLAUSE_LENGTH <= at <= limit
+        at
+        for mark in ("; ", ": ", ". ", ", ", " (")
+        for at in _find_all(text, mark)
+        if MIN_CLAUSE_LENGTH <= at <= limit
     ]
     whole = [at for at in ends if text.count("(", 0, at) == text.count(")", 0, at)]
     if whole:
@@ -333,7 +336,8 @@ def _beginning(text: str, limit: int) -> str:
     return text[:cut] if cut > 0 else text[:limit]
 
 
-def _places(text: str, mark: str) -> Iterator[int]:
+def _find_all(text: str, mark: str) -> Iterator[int]:
+    """Yield the index of each occurrence of a mark in a text."""
     at = text.find(mark)
     while at >= 0:
         yield at

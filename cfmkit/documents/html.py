@@ -1,7 +1,7 @@
-"""A document as one HTML file that can be sent to somebody.
+"""A document as one HTML file to send to somebody, and what all pages need: templates, figures as SVG, escaped JSON.
 
-Nothing in it leads outside: figures, films and scripts stand in the file. Every text is escaped by the template, what a
-script reads is JSON in which no tag can end the script, and without scripts all of it can be read.
+Nothing in a page leads outside: figures, films and scripts stand in the file. Every text is escaped by the template,
+what a script reads is JSON in which no tag can end the script, and without scripts all of it can be read.
 """
 
 from __future__ import annotations

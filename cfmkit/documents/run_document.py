@@ -1,4 +1,4 @@
-"""The document of a run over one specification: what `design`, `analyze` and `calibrate` found."""
+"""The document of a run (`design`, `analyze`, `calibrate`): verdict, requirements, metrics, warnings with remedies."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _all_met(count: int) -> str:
 def warning_of(item: Finding, command: RunCommand | None = None) -> WarningEntry:
     """Return the entry of a finding."""
     options = tuple(_option(cure, command) for cure in item.cures)
-    commands = tuple(command.with_remedy(cure) if command else command_line(*_settings(cure)) for cure in item.cures)
+    commands = tuple(command.with_remedy(cure) if command else command_line(*_set_options(cure)) for cure in item.cures)
     short = shortened_to_clause(item.short or item.message, MAX_WARNING_LENGTH - len(item.name) - 2)
     return WarningEntry(item.name, short, item.message, options, commands)
 
@@ -133,10 +133,10 @@ def _option(cure: str | tuple[str, ...], command: RunCommand | None) -> str:
     """Return a remedy as options; with the verb where it is another one than that of the run."""
     first = cure if isinstance(cure, str) else cure[0]
     is_other_verb = first.startswith("design.") and command is not None and command.verb != "design"
-    return command_line(*(["design"] if is_other_verb else []), *_settings(cure))
+    return command_line(*(["design"] if is_other_verb else []), *_set_options(cure))
 
 
-def _settings(cure: str | tuple[str, ...]) -> list[str]:
+def _set_options(cure: str | tuple[str, ...]) -> list[str]:
     return [word for change in ((cure,) if isinstance(cure, str) else cure) for word in ("--set", change)]
 
 
@@ -152,7 +152,7 @@ def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
         yield Note("partial" if status.usable else "failed", report.message, tone=Tone.BAD, whole=True)
         cures = dict.fromkeys(cure for item in _reasons(report) for cure in item.cures)
         for cure in cures:
-            text = command.with_remedy(cure) if command else command_line(*_settings(cure))
+            text = command.with_remedy(cure) if command else command_line(*_set_options(cure))
             yield Note("remedy", text, is_command=True)
     elif design is not None and design.message != design.status.value:
         yield Note("design", design.message)

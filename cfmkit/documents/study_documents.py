@@ -71,10 +71,10 @@ def sweep_document(
                 )
                 for requirement in summary["requirements"]
             ),
-            *_best(summary, dimensions),
+            *_best_point_rows(summary, dimensions),
         ),
-        tables=tuple(_ranges(summary, dimensions)),
-        notes=tuple(_settings(summary)),
+        tables=tuple(_range_tables(summary, dimensions)),
+        notes=tuple(_best_settings(summary)),
         warnings=tuple(
             WarningEntry(
                 warning["name"],
@@ -95,7 +95,7 @@ def _sweep_verdict(summary: Mapping[str, Any], code: ExitCode) -> str:
     return "requirements can be met" if summary["requirements"] else "complete"
 
 
-def _settings(summary: Mapping[str, Any]) -> Iterator[Note]:
+def _best_settings(summary: Mapping[str, Any]) -> Iterator[Note]:
     """Yield what was varied, at the best point, as options that can be pasted."""
     if summary["best"]:
         values = summary["best"]["values"].items()
@@ -103,7 +103,7 @@ def _settings(summary: Mapping[str, Any]) -> Iterator[Note]:
         yield Note("best", " ".join(f"--set {setting}" for setting in settings), whole=True, is_command=True)
 
 
-def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[ValueRow]:
+def _best_point_rows(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[ValueRow]:
     best = summary["best"]
     if not best:
         return
@@ -113,7 +113,7 @@ def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator
     yield ValueRow(f"{best['sense']} {_describe_objective(best['by'])}", f"{value}, point {best['point']}{tie}")
 
 
-def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[PageTable]:
+def _range_tables(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[PageTable]:
     """Yield the range of every result, beside its value at the best point; what does not change comes last."""
     leading: list[tuple[str, ...]] = []
     rows: list[tuple[str, ...]] = []
@@ -176,8 +176,8 @@ def sensitivity_document(findings: Findings, files: Written | None = None) -> Do
         title=" ".join(spec.name.split()),
         summary=f"{findings.setup.method}, {evaluator.count} samples{again}",
         verdict=_yield_verdict(findings),
-        headline=tuple(_yields(findings)),
-        tables=tuple(_rankings(findings)),
+        headline=tuple(_yield_rows(findings)),
+        tables=tuple(_ranking_tables(findings)),
         notes=tuple(_notes(findings)),
         warnings=tuple(warning_of(item) for item in warnings(findings)),
         files=files,
@@ -210,7 +210,7 @@ def _notes(findings: Findings) -> Iterator[Note]:
         yield Note("first", findings.evaluator.first_failure)
 
 
-def _yields(findings: Findings) -> Iterator[ValueRow]:
+def _yield_rows(findings: Findings) -> Iterator[ValueRow]:
     if findings.all_met is None:
         return
     wanted = findings.setup.block.min_yield
@@ -230,7 +230,7 @@ def share_of(share: Share) -> str:
     return f"{value} (95 %: {low} to {high} %)"
 
 
-def _rankings(findings: Findings) -> Iterator[PageTable]:
+def _ranking_tables(findings: Findings) -> Iterator[PageTable]:
     shares = {metric.label for metric in findings.setup.study.metrics if metric.dimension == "ratio"}
     for metric, lines_by_parameter in _group_by_metric(findings).items():
         indices = [
@@ -244,7 +244,7 @@ def _rankings(findings: Findings) -> Iterator[PageTable]:
             *(GridColumn(name_in_words(name), wraps=False, rank=rank) for rank, name in ranked),
         )
         rows = tuple(
-            (_drop_block(parameter), *(_index(lines.get(name), metric in shares) for name in indices))
+            (_drop_block(parameter), *(_format_index(lines.get(name), metric in shares) for name in indices))
             for parameter, lines in lines_by_parameter.items()
         )
         yield PageTable("", heads, rows, MAX_PARAMETERS)
@@ -265,17 +265,17 @@ def _group_by_metric(findings: Findings) -> dict[str, dict[str, dict[str, IndexL
     tree: dict[str, dict[str, dict[str, IndexLine]]] = defaultdict(lambda: defaultdict(dict))
     for line in findings.lines:
         tree[line.metric][line.parameter][line.index] = line
-    rank = partial(_rank, findings.setup.record.indices)
+    rank = partial(_rank_by_influence, findings.setup.record.indices)
     return {metric: dict(sorted(lines_by_parameter.items(), key=rank)) for metric, lines_by_parameter in tree.items()}
 
 
-def _rank(indices: tuple[str, ...], item: tuple[str, dict[str, IndexLine]]) -> float:
-    """Return how far up a parameter stands: largest first, those without a value before all."""
+def _rank_by_influence(indices: tuple[str, ...], item: tuple[str, dict[str, IndexLine]]) -> float:
+    """Return minus the largest influence of a parameter, -inf without value: a sort key, the largest first."""
     line = next((item[1][name] for name in indices if name in item[1]), None)
     return 0.0 if line is None else -abs(line.value) if line.value is not None else -float("inf")
 
 
-def _index(line: IndexLine | None, of_share: bool) -> str:
+def _format_index(line: IndexLine | None, of_share: bool) -> str:
     """Return an index with its interval; in per cent if it is a share, or has the unit of a metric that is one."""
     if line is None or line.value is None:
         return "not stated"

@@ -48,19 +48,19 @@ def document_of(
         tables=tuple(_tables(record)),
         notes=(
             *notes,
-            *_remarks(proposals),
-            *_unmet(record["near_misses"]),
+            *_common_notes(proposals),
+            *_miss_notes(record["near_misses"]),
             *(_incomplete(proposals, files) if files else ()),
         ),
         warnings=tuple(
             WarningEntry(warning["name"], warning["message"], warning["message"]) for warning in record["warnings"]
         ),
         files=files,
-        next=_next(proposals, files) if files else "",
+        next=_export_command(proposals, files) if files else "",
     )
 
 
-def _next(proposals: Sequence[Mapping[str, Any]], files: Written) -> str:
+def _export_command(proposals: Sequence[Mapping[str, Any]], files: Written) -> str:
     """Return the command that writes the files to cut or print of the best proposal."""
     if not proposals:
         return ""
@@ -102,7 +102,7 @@ def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
         yield PageTable("no proposals from these families", pair, without_proposal)
 
 
-def _remarks(proposals: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
+def _common_notes(proposals: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
     """Yield what was not judged, end stops, and what is warned of, each once with the numbers of its proposals."""
     texts_of_many: dict[str, list[int]] = defaultdict(list)
     warned: dict[str, dict[int, str]] = defaultdict(dict)
@@ -113,24 +113,24 @@ def _remarks(proposals: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
         for text in proposal["warnings"]:  # a name, and often what it means for this proposal
             warned[re.split("[: ]", text, maxsplit=1)[0]][number] = text
     for text, numbers in texts_of_many.items():
-        yield Note(f"no. {_numbers(numbers)}", text, whole=True)
+        yield Note(f"no. {_join_numbers(numbers)}", text, whole=True)
     for name, texts in warned.items():
         text = next(iter(texts.values())) if len(set(texts.values())) == 1 else name
-        yield Note(f"no. {_numbers(list(texts))}", f"{text} (see `cfmkit show {name}`)", whole=True)
+        yield Note(f"no. {_join_numbers(list(texts))}", f"{text} (see `cfmkit show {name}`)", whole=True)
 
 
-def _unmet(near_misses: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
+def _miss_notes(near_misses: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
     """Yield what each alternative misses."""
     for miss in near_misses:
         yield Note("unmet", f"{miss['family']} {miss['variant']}: {miss['misses'][0]}", whole=True)
 
 
-def _numbers(numbers: Sequence[int]) -> str:
-    """Return numbers with runs of them as ranges.
+def _join_numbers(numbers: Sequence[int]) -> str:
+    """Return numbers as text, successive ones as a range: ``1-3, 5``.
 
     Examples
     --------
-    >>> _numbers([1, 2, 3, 5, 9])
+    >>> _join_numbers([1, 2, 3, 5, 9])
     '1-3, 5, 9'
     """
     runs: list[list[int]] = []

@@ -1,4 +1,4 @@
-"""The page of a document on a terminal: what of it fits into 15 lines, or everything, as characters.
+"""A document as characters on a terminal: what of it fits into 15 lines, or everything, and the printing of its blocks.
 
 A short page has the title with the window, requirements beside what matters most, one line for each note and warning,
 and the files. Names, paths and commands are never broken, whatever the width.
@@ -98,7 +98,7 @@ def _short_page(document: Document, width: int, spare: int) -> Iterator[TextLine
     tables = [text for table in document.tables if table.most != 0 for text in _table_lines(table, width)]
     follow = _file_lines(document.files, width)
     if document.next:
-        follow.append(whole_line(_word("next", Tone.GOOD), document.next))
+        follow.append(whole_line(_leading_word("next", Tone.GOOD), document.next))
     needed = _most_of_headline(document.headline)
     spare -= len(notes) + len(tables) + len(follow)
     warnings = _warning_lines(document.warnings, width, max(spare - needed, min(len(document.warnings), 2)))
@@ -112,18 +112,20 @@ def _most_of_headline(rows: Sequence[ValueRow]) -> int:
     return max(required, min(MIN_FACTS, -(-len(rows) // 2)))
 
 
-def _word(word: str, tone: str = Tone.LABEL) -> Span:
+def _leading_word(word: str, tone: str = Tone.LABEL) -> Span:
     return Span(f"{' ' * INDENT_COLUMNS}{word:<{WORD_COLUMNS}}" + ("" if len(word) < WORD_COLUMNS else " "), tone)
 
 
 def _note_lines(note: Note, width: int) -> list[TextLine]:
     room = width - INDENT_COLUMNS - WORD_COLUMNS
     if note.is_command:
-        return [whole_line(_word(note.word, note.tone), note.text)]
+        return [whole_line(_leading_word(note.word, note.tone), note.text)]
     if note.whole:
         lines = textwrap.wrap(note.text, room, break_long_words=False, break_on_hyphens=False) or [""]
-        return [whole_line(_word(note.word if not at else "", note.tone), text) for at, text in enumerate(lines)]
-    return [_with_remedy(_word(note.word, note.tone), "", note.short or note.text, note.remedy, room)]
+        return [
+            whole_line(_leading_word(note.word if not at else "", note.tone), text) for at, text in enumerate(lines)
+        ]
+    return [_with_remedy(_leading_word(note.word, note.tone), "", note.short or note.text, note.remedy, room)]
 
 
 def _with_remedy(word: Span, name: str, text: str, remedy: str, room: int) -> TextLine:
@@ -149,11 +151,11 @@ def _warning_lines(warnings: Sequence[WarningEntry], width: int, most: int) -> l
     for at, warning in enumerate(shown):
         word = f"{'warning' if len(warnings) == 1 else f'warnings {len(warnings)}'}" if not at else ""
         remedy = warning.options[0] if warning.options else ""
-        lines.append(_with_remedy(_word(word, Tone.BAD), f"{warning.name}: ", warning.short, remedy, room))
+        lines.append(_with_remedy(_leading_word(word, Tone.BAD), f"{warning.name}: ", warning.short, remedy, room))
     if rest := warnings[len(shown) :]:
         names = ", ".join(dict.fromkeys(warning.name for warning in rest))
         text = shortened_to_clause(f"and {len(rest)} more (-v): {names}", room)
-        lines.append(whole_line(_word("" if shown else f"warnings {len(warnings)}", Tone.BAD), text))
+        lines.append(whole_line(_leading_word("" if shown else f"warnings {len(warnings)}", Tone.BAD), text))
     return lines
 
 
@@ -169,15 +171,15 @@ def _headline(rows: Sequence[ValueRow], width: int, most: int) -> Iterator[TextL
         half = min(most, -(-len(facts) // 2))
         required, facts = facts[:half], facts[half:]
     left = _cells(required, width)
-    room, tall = width - _wide(left) - GAP_COLUMNS, min(max(len(left), MIN_FACTS), most)
-    fitting = [row for row in facts if _wide(_cells([row], width)) <= room]
+    room, tall = width - _widest_line(left) - GAP_COLUMNS, min(max(len(left), MIN_FACTS), most)
+    fitting = [row for row in facts if _widest_line(_cells([row], width)) <= room]
     right = _cells(fitting[:tall], width)
-    while right and _wide(right) > room:  # one has the longest label, another the longest value
+    while right and _widest_line(right) > room:  # one has the longest label, another the longest value
         del right[-1]
     if facts[:2] != fitting[:2] or len(right) < min(2, tall, len(facts)):
         below = _cells([*required, *facts[: max(MIN_FACTS, len(required)) if left else None]], width)[:most]
         for cells in below:  # a number is never cut: at the margin the line goes on
-            if len(cells) == 3 and _wide([cells]) > width:
+            if len(cells) == 3 and _widest_line([cells]) > width:
                 yield TextLine((*cells[:1], Span(cells[1].text.partition("  ")[0].rstrip())))
                 yield TextLine(
                     (Span(" " * len(cells[0].text) + cells[1].text.partition("  ")[2].strip() + "  "), cells[2])
@@ -187,13 +189,13 @@ def _headline(rows: Sequence[ValueRow], width: int, most: int) -> Iterator[TextL
         return
     for at in range(max(len(left), len(right))):
         texts: tuple[Span, ...] = left[at] if at < len(left) else ()
-        pad = " " * (_wide(left) - sum(len(span.text) for span in texts) + GAP_COLUMNS)
+        pad = " " * (_widest_line(left) - sum(len(span.text) for span in texts) + GAP_COLUMNS)
         yield whole_line(*texts, *([Span(pad), *right[at]] if at < len(right) else []))
 
 
 def _cells(rows: Sequence[ValueRow], width: int) -> list[tuple[Span, ...]]:
     """Return rows as spans: label, value with its window, bound and verdict, in columns."""
-    texts = [_value(row) for row in rows]
+    texts = [_value_with_window(row) for row in rows]
     label = max([WORD_COLUMNS, *(len(row.label) + 2 for row in rows)])
     bounded = [at for at, row in enumerate(rows) if row.required]
     value = max([0, *(len(texts[at]) for at in bounded)])
@@ -210,11 +212,12 @@ def _cells(rows: Sequence[ValueRow], width: int) -> list[tuple[Span, ...]]:
     return lines
 
 
-def _value(row: ValueRow) -> str:
+def _value_with_window(row: ValueRow) -> str:
     return f"{row.value} over {row.window}" if row.window else row.value
 
 
-def _wide(lines: Iterable[Sequence[Span]]) -> int:
+def _widest_line(lines: Iterable[Sequence[Span]]) -> int:
+    """Return the number of characters of the widest line, at least 0."""
     return max([0, *(sum(len(span.text) for span in spans) for spans in lines)])
 
 
@@ -300,7 +303,7 @@ def _file_lines(files: Written | None, width: int) -> list[TextLine]:
         if len(text) + GAP_COLUMNS + len(MORE_TEXT) <= room
         else ""
     )
-    return [whole_line(_word("files", Tone.GOOD), text, Span(more, Tone.FAINT))]
+    return [whole_line(_leading_word("files", Tone.GOOD), text, Span(more, Tone.FAINT))]
 
 
 # --- everything -------------------------------------------------------------------------------------------------------
@@ -311,7 +314,7 @@ def _whole_page(document: Document) -> Iterator[Block]:
     yield BLANK_LINE
     rows = [*(row for row in document.headline if row.required), *(document.metrics or document.headline)]
     if rows:
-        cells = [(f"  {row.label}", _value(row), row.bound, verdict(row.ok)) for row in dict.fromkeys(rows)]
+        cells = [(f"  {row.label}", _value_with_window(row), row.bound, verdict(row.ok)) for row in dict.fromkeys(rows)]
         yield CellGrid((GridColumn(wraps=False), GridColumn(), GridColumn(wraps=False), GridColumn(wraps=False)), cells)
         yield BLANK_LINE
     for table in document.tables:
@@ -367,14 +370,14 @@ def _renderables(block: TextLine | Paragraph | CellGrid, width: int) -> Iterator
         yield _table(block, width)
     elif isinstance(block, Paragraph):
         lines = textwrap.wrap(block.text, width - LABEL_COLUMNS, break_long_words=False, break_on_hyphens=False) or [""]
-        yield _text(Span(f"{block.word:<{LABEL_COLUMNS}}", block.tone), Span(lines[0]), whole=True)
+        yield _rich_text(Span(f"{block.word:<{LABEL_COLUMNS}}", block.tone), Span(lines[0]), whole=True)
         for text in lines[1:]:
-            yield _text(Span(" " * LABEL_COLUMNS + text), whole=True)
+            yield _rich_text(Span(" " * LABEL_COLUMNS + text), whole=True)
     else:
-        yield _text(*block.spans, whole=block.whole)
+        yield _rich_text(*block.spans, whole=block.whole)
 
 
-def _text(*spans: Span, whole: bool = False) -> Text:
+def _rich_text(*spans: Span, whole: bool = False) -> Text:
     from rich.text import Text
 
     text = Text.assemble(*((span.text, span.tone) for span in spans))
@@ -402,7 +405,7 @@ def _table(block: CellGrid, width: int) -> RichTable:
     table = Table(box=None, show_header=headed, header_style=Tone.FAINT, padding=(0, block.gap, 0, 0), pad_edge=False)
     if block.indented:
         table.add_column("", width=0)
-    rows = [[_text(cell if isinstance(cell, Span) else Span(cell)) for cell in row] for row in block.rows]
+    rows = [[_rich_text(cell if isinstance(cell, Span) else Span(cell)) for cell in row] for row in block.rows]
     # Where the page is too narrow for what should not wrap, this is folded, too: a number that loses its last digit
     # or its unit at the margin would be a wrong one.
     folded = _least_width(block, rows) > width

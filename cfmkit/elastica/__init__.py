@@ -1,4 +1,4 @@
-"""Planar networks of slender beams in large deflection: one engine for all families that bend.
+"""Planar networks of slender beams in large deflection: equilibria, contacts, stresses, derivatives, frequencies.
 
 `Network` says what it is, a `Displacement`, `Rotation` or `Loading` what is done to it, `trace` follows the
 equilibria, `Path` answers questions about them.

@@ -5,9 +5,8 @@ what an output depends on besides has a complex step already, and is differentia
 by a motion need no solution: the slope of the path is the adjoint (`cfmkit.elastica.mechanics.design_derivatives`).
 Variables may change positions, shapes, sections, materials, offsets, links' arms, springs, loads, gaps and stiffnesses
 of stops, support displacements and directions; not obstacles, and not the number of anything. The drive keeps its
-values; a support that turns takes its drive with it.
-States along beams, of which there are many, are computed as dual arrays; what depends on them otherwise, variable by
-variable with the complex step.
+values; a support that turns takes its drive with it. States along beams, of which there are many, are computed as dual
+arrays; what depends on them otherwise, variable by variable with the complex step.
 
 Contacts of nodes stay closed or open as they are: at a point at which one begins or ends the derivative is that of one
 side.

@@ -1,7 +1,6 @@
-"""Measured curves: reading lab files, branches, filters, hysteresis, and what a model makes of them.
+"""Recordings of a test rig: read, split, filtered, measured; models compared with them, fitted or corrected by them.
 
-`reading` reads a file as it comes, `branches` splits it
-at reversals, `corrections_and_low_pass` smooths each branch,
+`reading` reads a file as it comes, `branches` splits it at reversals, `corrections_and_low_pass` smooths each branch,
 `curves_and_metrics_of_recording` puts the numbers together.
 """
 

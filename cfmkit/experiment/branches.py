@@ -1,9 +1,9 @@
-"""Strokes of a recording: split at reversals, robust against jitter, without the points at which it stood.
+"""Strokes and cycles of a recording: split at reversals, robust against jitter, without the points at which it stood;
+the cycles that are measured.
 
-A reversal is where the motion turns back by more than a stated part of its range;
-an encoder that flickers does not. Where the machine stands (before the start, at a
-reversal, at the end) many points at one place would weigh on every mean: they are
-counted and left out, all but the first and the last of each pause.
+A reversal is where the motion turns back by more than a stated part of its range; an encoder that flickers does not.
+Where the machine stands (before the start, at a reversal, at the end) many points at one place would weigh on every
+mean: they are counted and left out, all but the first and the last of each pause.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Strokes:
     @cached_property
     def complete(self) -> tuple[tuple[Stroke, Stroke], ...]:
         """The complete cycles, two strokes each, in their order; broken-off ones only where there is no other."""
-        strokes_by_cycle = [[item for item in self.strokes if item.cycle == number] for number in self._numbers]
+        strokes_by_cycle = [[item for item in self.strokes if item.cycle == number] for number in self._cycle_numbers]
         pairs = [
             (pair[0], pair[1])
             for pair in strokes_by_cycle
@@ -89,7 +89,7 @@ class Strokes:
         return self.cycles or ((max(self.strokes, key=lambda stroke: stroke.covered),),)
 
     @property
-    def _numbers(self) -> list[int]:
+    def _cycle_numbers(self) -> list[int]:
         return sorted({item.cycle for item in self.strokes})
 
 
@@ -262,10 +262,10 @@ def pauses(
     marked = np.zeros(len(motion), dtype=bool)
     if span >= len(motion) // 4:
         return marked
-    return _standing(motion, span, max(_PAUSE_SPEED_SHARE * usual * span, 4.0 * jitter))
+    return _paused_points(motion, span, max(_PAUSE_SPEED_SHARE * usual * span, 4.0 * jitter))
 
 
-def _standing(motion: FloatArray, span: int, slack: float) -> NDArray[np.bool_]:
+def _paused_points(motion: FloatArray, span: int, slack: float) -> NDArray[np.bool_]:
     """Return the points inside stretches of `span` steps over which the motion stays within `slack`."""
     shifted = [motion[part * span // 4 : len(motion) - span + part * span // 4] for part in range(5)]
     still = np.max(shifted, axis=0) - np.min(shifted, axis=0) <= slack

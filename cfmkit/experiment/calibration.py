@@ -167,18 +167,18 @@ def fit_samples(
 
     Raises SolutionError if the data do not determine the parameters, which are named.
     """
-    problem = replace(_problem(curves, before, parameters), tolerance=tolerance)
-    _check(problem, problem.start, parameters)
+    problem = replace(_least_squares_problem(curves, before, parameters), tolerance=tolerance)
+    _require_determined(problem, problem.start, parameters)
     fit = solve(problem, loss) if parameters else evaluate_start(problem)
-    _check(problem, fit.values, parameters)
+    _require_determined(problem, fit.values, parameters)
     fitted = curves.spec_with(parameters, fit.values)
     result = analyze_part(fitted)
-    zeros = _zeros(parameters, fit.values)
+    zeros = _zeros_of(parameters, fit.values)
     samples, branches = (
         tuple(item.correct_zeros(zeros) for item in measured) for measured in (before.samples, before.branches)
     )
     after = Comparison(samples, before.window, result.curve, before.holes, branches)
-    warnings = (*_warnings(parameters, fit), *_misfit(parameters, fit, after))
+    warnings = (*_fit_warnings(parameters, fit), *_misfit_warnings(parameters, fit, after))
     return Calibration(fitted, tuple(parameters), fit, before, after, result, zeros, warnings)
 
 
@@ -211,7 +211,7 @@ def has_no_loss(curves: ModelCurves, before: Comparison, parameters: Sequence[Fi
     branches = {item.model_branch for item in before.samples}
     if len(branches) == 1:
         return True
-    trials = (curves.solve_at([item], np.array([item.start + _step(item)])) for item in parameters)
+    trials = (curves.solve_at([item], np.array([item.start + _small_change(item)])) for item in parameters)
     places = np.linspace(before.window.lo, before.window.hi, 65)[1:-1]
     for curve in (before.curve, *trials):
         up, down = (model_at(curve, branch, places) for branch in sorted(branches))
@@ -220,7 +220,7 @@ def has_no_loss(curves: ModelCurves, before: Comparison, parameters: Sequence[Fi
     return True
 
 
-def _step(item: FitParameter) -> float:
+def _small_change(item: FitParameter) -> float:
     """Return a small change of a parameter inside its bounds."""
     step = 1e-3 * item.size
     return step if item.start + step <= item.high else -min(step, item.start - item.low)
@@ -230,7 +230,7 @@ def _is_shift(item: FitParameter) -> bool:
     return item.path in (f"{DATA_PREFIX}displacement_offset", f"{DATA_PREFIX}angle_offset")
 
 
-def _zeros(parameters: Sequence[FitParameter], values: FloatArray) -> Zeros:
+def _zeros_of(parameters: Sequence[FitParameter], values: FloatArray) -> Zeros:
     """Return what the parameters say of the recording."""
     totals = {"effort": 0.0, "motion": 0.0, "drift": 0.0}
     for item, value in zip(parameters, values, strict=True):
@@ -251,7 +251,7 @@ def analyze_part(spec: Spec) -> Result:
     return result
 
 
-def _problem(curves: ModelCurves, before: Comparison, parameters: Sequence[FitParameter]) -> LeastSquares:
+def _least_squares_problem(curves: ModelCurves, before: Comparison, parameters: Sequence[FitParameter]) -> LeastSquares:
     columns = np.array([(item.start, item.low, item.high, item.size) for item in parameters]).reshape(-1, 4).T
     level = float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
     weight = np.concatenate([item.weight for item in before.samples])
@@ -262,7 +262,7 @@ def _problem(curves: ModelCurves, before: Comparison, parameters: Sequence[FitPa
             curve = curves.solve_at(parameters, values)
         except CfmError:
             return nothing  # the solver then takes a shorter step
-        zeros = _zeros(parameters, values)
+        zeros = _zeros_of(parameters, values)
         errors: FloatArray = root * np.concatenate([item.correct_zeros(zeros).errors(curve) for item in before.samples])
         return errors
 
@@ -275,13 +275,13 @@ def scaled_jacobian(curves: ModelCurves, before: Comparison, parameters: Sequenc
 
     Raises SolutionError if the model has no value at some of the samples.
     """
-    problem = _problem(curves, before, parameters)
+    problem = _least_squares_problem(curves, before, parameters)
     if not np.isfinite(problem.residuals(problem.start)).all():
         raise SolutionError("the model has no equilibrium at some of the measured points")
     return problem.jacobian(problem.start)
 
 
-def _check(problem: LeastSquares, values: FloatArray, parameters: Sequence[FitParameter]) -> None:
+def _require_determined(problem: LeastSquares, values: FloatArray, parameters: Sequence[FitParameter]) -> None:
     """Raise if the data do not determine the parameters at some values."""
     try:
         groups = unidentifiable(problem, values)
@@ -301,7 +301,7 @@ def _name_undetermined(paths: Sequence[str]) -> str:
     return f"the measured curve cannot distinguish {reported}: one compensates for the other; fit only one of them"
 
 
-def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Finding]:
+def _fit_warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Finding]:
     """Return what is doubtful about a fit."""
     warnings, half = [], fit.half_widths()
     for k, item in enumerate(parameters):
@@ -331,7 +331,7 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
     return warnings
 
 
-def _misfit(parameters: Sequence[FitParameter], fit: FittedValues, after: Comparison) -> list[Finding]:
+def _misfit_warnings(parameters: Sequence[FitParameter], fit: FittedValues, after: Comparison) -> list[Finding]:
     """Return whether the residuals are random; a value on its bound explains by itself why not."""
     if fit.at_bound.any() or not len(fit.residuals):
         return []

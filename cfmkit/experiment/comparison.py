@@ -1,4 +1,4 @@
-"""A model beside a measurement: errors in numbers, branch by branch, where both exist."""
+"""A model beside a measurement: errors by branch over the window where both exist, and losses of the measured loop."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class Comparison(ShortRepr):
     def compare_mean(self) -> Comparison:
         """Return the comparison of a model without losses: with the mean of the branches, cycle by cycle."""
         up, down = (next(item for item in self.samples if item.branch == name) for name in (LOAD_BRANCH, UNLOAD_BRANCH))
-        parts = [_mean_of(up, down, cycle) for cycle in sorted(set(up.cycle) & set(down.cycle))]
+        parts = [_mean_of_branches(up, down, cycle) for cycle in sorted(set(up.cycle) & set(down.cycle))]
         motion, effort, passed = (
             np.concatenate(columns) for columns in zip(*(part[:3] for part in parts), strict=True)
         )
@@ -146,7 +146,7 @@ class Comparison(ShortRepr):
 MEAN_BRANCH = "mean"  # name of the samples that are the mean of both branches
 
 
-def _mean_of(up: Samples, down: Samples, cycle: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+def _mean_of_branches(up: Samples, down: Samples, cycle: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     """Return places, mean effort and time of the branches of one cycle, where both were recorded."""
     first, second = ({name: getattr(item, name)[item.cycle == cycle] for name in ("motion", "effort", "elapsed")}
                   for item in (up, down))  # fmt: skip
@@ -188,8 +188,8 @@ def compare(
     if curve.kind != source.recording.kind:
         raise DataError(f"{name}: holds a {source.recording.kind} curve, but the mechanism has a {curve.kind} curve")
     pairs = {branch: model_branch(curve, branch) for branch in source.raw[0].branches}
-    window = _common(curve, source, window or window_of(result), set(pairs.values()))
-    samples = tuple(_samples(source, branch, mine, window) for branch, mine in pairs.items())
+    window = _common_window_with_model(curve, source, window or window_of(result), set(pairs.values()))
+    samples = tuple(_samples_of_branch(source, branch, mine, window) for branch, mine in pairs.items())
     for item in samples:
         model_at(curve, item.model_branch, item.motion)  # a branch that turns back is refused at once
     if not all(len(item.motion) >= 2 for item in samples):
@@ -230,7 +230,9 @@ def _average_effort(samples: Samples, places: FloatArray) -> FloatArray:
     return averaged
 
 
-def _common(curve: Curve, source: MeasuredCurves, wanted: Window | None, branches: set[str]) -> Window:
+def _common_window_with_model(
+    curve: Curve, source: MeasuredCurves, wanted: Window | None, branches: set[str]
+) -> Window:
     """Return where every branch of model and measurement exists, inside the window that is wanted."""
     from cfmkit.experiment.curves_and_metrics_of_recording import common_window
 
@@ -248,7 +250,7 @@ def _common(curve: Curve, source: MeasuredCurves, wanted: Window | None, branche
     return common
 
 
-def _samples(source: MeasuredCurves, branch: str, mine: str, window: Window) -> Samples:
+def _samples_of_branch(source: MeasuredCurves, branch: str, mine: str, window: Window) -> Samples:
     parts = [curve.select_branch(branch) for curve in source.raw]
     slack = 1e-9 * (window.hi - window.lo)
     keep = [(part.motion >= window.lo - slack) & (part.motion <= window.hi + slack) for part in parts]

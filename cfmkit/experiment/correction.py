@@ -1,4 +1,4 @@
-"""A drawing corrected by the recording of a part that was made of it.
+"""A drawing corrected by the recording of a part that was made of it, with the force predicted for the next part.
 
 What differs in the part is fitted (`errors_of_made_part`); the next part is assumed to be made with the same errors.
 Then values that are drawn, not what is bought, are moved as little as possible until the part that will be made has the
@@ -122,7 +122,7 @@ def correct(
     built = analyze_part(made)
     told = tared or fit is not None or any(item.path.startswith(DATA_PREFIX) for item in best.calibration.parameters)
     zero = 0.0 if told else UNKNOWN_ZERO * float(np.abs(source.recording.effort).max())
-    before = _force(explanations, spec, aim, zero)
+    before = _predict_force(explanations, spec, aim, zero)
     off = _largest_departure(explanations, spec, aim)
     if any(not item.errors for item in explanations) or off <= LEAST_CORRECTION:
         return DesignCorrection(spec, spec, made, made, explanations, aim, nominal, built, built, before, before)
@@ -134,7 +134,7 @@ def correct(
         envelope = replace(redesign, missed_before=largest_miss(nominal, of_envelope=True), of_envelope=True)
         x = envelope.solve()
     corrected = redesign.drawing(x)
-    after = _force(explanations, corrected, aim, zero)
+    after = _predict_force(explanations, corrected, aim, zero)
     will_be_made = best.part_of(corrected)
     predicted = analyze_part(will_be_made)
     if _largest_departure(explanations[:1], corrected, aim) > LARGEST_REMAINDER:
@@ -147,7 +147,7 @@ def correct(
     stated = _state_modulus(corrected, best) if len(explanations) == 1 else corrected
     return DesignCorrection(
         spec, stated, made, will_be_made, explanations, aim, nominal, built, predicted, before, after, changes,
-        tuple(_warnings(spec, explanations)),
+        tuple(_correction_warnings(spec, explanations)),
     )  # fmt: skip
 
 
@@ -156,16 +156,16 @@ def _largest_departure(explanations: Sequence[Explanation], drawn: Spec, aim: Ai
     return max(abs(float(np.nanmean(aim.departure(analyze_part(item.part_of(drawn)).curves)))) for item in explanations)
 
 
-def _force(explanations: Sequence[Explanation], drawn: Spec, aim: AimedCurve, zero: float) -> PredictedForce:
+def _predict_force(explanations: Sequence[Explanation], drawn: Spec, aim: AimedCurve, zero: float) -> PredictedForce:
     """Return the mean force of the part of a drawing, with an interval that contains that of every explanation.
 
     `zero`: standard deviation of a zero of the sensor that is not known [N or N m].
     """
-    forces = [_interval(item, drawn, aim, zero) for item in explanations]
+    forces = [_predict_interval(item, drawn, aim, zero) for item in explanations]
     return PredictedForce(forces[0].value, min(item.low for item in forces), max(item.high for item in forces))
 
 
-def _interval(explanation: Explanation, drawn: Spec, aim: AimedCurve, zero: float) -> PredictedForce:
+def _predict_interval(explanation: Explanation, drawn: Spec, aim: AimedCurve, zero: float) -> PredictedForce:
     """Return the mean force of a part with one set of errors, and its interval by linear estimate."""
 
     def mean(values: FloatArray) -> float:
@@ -193,7 +193,7 @@ def _state_modulus(corrected: Spec, best: Explanation) -> Spec:
     return corrected.replace(changes) if changes else corrected
 
 
-def _warnings(spec: Spec, explanations: Sequence[Explanation]) -> Iterator[Finding]:
+def _correction_warnings(spec: Spec, explanations: Sequence[Explanation]) -> Iterator[Finding]:
     sets = [" with ".join(name_of(item) for item in explanation.errors) for explanation in explanations]
     if len(sets) > 1:
         reported = f"the recording cannot tell {' from '.join(sets)}: the correction suits each, the interval has all"

@@ -51,11 +51,14 @@ def correct_recording(
     effort, motion = words_of(recording.kind)
     if strange := next((word for word in flip if word not in (effort, motion)), None):
         raise UsageError(f"--flip: {strange!r} is not in this recording; it has {effort} and {motion}")
-    resting = _resting(recording)
+    resting = _count_resting(recording)
     subtracted = [_reading_to_subtract(tare, recording.effort[:resting], "--tare", recording.kind)]
     subtracted.append(_reading_to_subtract(zero, recording.motion[:1], "--zero", recording.motion_dimension))
     signs = [-1.0 if word in flip else 1.0 for word in (effort, motion)]
-    notes = [*_notes((effort, motion), subtracted, recording.kind), *(f"sign of the {word} reversed" for word in flip)]
+    notes = [
+        *_subtraction_notes((effort, motion), subtracted, recording.kind),
+        *(f"sign of the {word} reversed" for word in flip),
+    ]
     if not notes:
         return recording
     return replace(
@@ -74,7 +77,7 @@ def raw_zeros(recording: Recording, effort: float, motion: float) -> tuple[float
     return tare + sign_of_effort * effort, zero + sign_of_motion * motion
 
 
-def _resting(recording: Recording) -> int:
+def _count_resting(recording: Recording) -> int:
     """Return how many points there are before the machine moves; at least one."""
     moved = np.abs(recording.motion - recording.motion[0]) > _STANDSTILL_SHARE * recording.travel
     return max(int(np.argmax(moved)), 1)
@@ -96,7 +99,7 @@ def _reading_to_subtract(value: str | float | None, resting: FloatArray, option:
         raise UsageError(f"{option}: {error}; or write {START_WORD!r} for the mean before the machine moves") from None
 
 
-def _notes(words: tuple[str, str], subtracted: list[float], kind: str) -> list[str]:
+def _subtraction_notes(words: tuple[str, str], subtracted: list[float], kind: str) -> list[str]:
     from cfmkit.specs.units import format_short
 
     dimensions = (kind, "length" if kind == "force" else "angle")
@@ -220,15 +223,15 @@ def low_passed(
     if step == 0 or not len(steps):
         raise DataError("there is no travel to filter over: all points are at one position")
     if np.abs(steps - step).max() <= _STEP_RTOL * abs(step):
-        return _both_ways(values, abs(step), filtered_by)
+        return _filter_both_ways(values, abs(step), filtered_by)
     sign = 1 if step > 0 else -1
     even = np.linspace(over[0], over[-1], len(over))
-    smooth = _both_ways(np.interp(sign * even, sign * over, values), abs(step), filtered_by)
+    smooth = _filter_both_ways(np.interp(sign * even, sign * over, values), abs(step), filtered_by)
     back: FloatArray = np.interp(sign * over, sign * even, smooth)
     return back
 
 
-def _both_ways(values: FloatArray, step: float, filtered_by: LowPass) -> FloatArray:
+def _filter_both_ways(values: FloatArray, step: float, filtered_by: LowPass) -> FloatArray:
     sections = filtered_by.sections(step)
     padding = 3 * (2 * len(sections) + 1)
     if len(values) <= padding:
@@ -237,11 +240,11 @@ def _both_ways(values: FloatArray, step: float, filtered_by: LowPass) -> FloatAr
             "use a lower order or measure more points"
         )
     head, tail = 2.0 * values[0] - values[padding:0:-1], 2.0 * values[-1] - values[-2 : -padding - 2 : -1]
-    forth = _one_way(np.concatenate([head, values, tail]), sections)
-    return _one_way(forth[::-1], sections)[::-1][padding:-padding]
+    forth = _filter_one_way(np.concatenate([head, values, tail]), sections)
+    return _filter_one_way(forth[::-1], sections)[::-1][padding:-padding]
 
 
-def _one_way(values: FloatArray, sections: FloatArray) -> FloatArray:
+def _filter_one_way(values: FloatArray, sections: FloatArray) -> FloatArray:
     """Return values after one pass that starts at rest at the first value.
 
     The level is taken off before and put back: where the cut-off is far below the sampling rate the initial state that

@@ -1,9 +1,8 @@
-"""Evaluation of a recording: raw and filtered curves, metrics, repeatability.
+"""Evaluation of a recording: raw and filtered curves, points left out, window, metrics, coverage, repeatability.
 
-A recording becomes one curve per cycle. Within a branch the samples stand in the order of
-the motion, so that the flicker of an encoder makes no folds; they are filtered before, in
-the order of time. The value of a metric is its mean over the complete cycles, or over what
-there is if none is complete.
+A recording becomes one curve per cycle. Within a branch the samples stand in the order of the motion, so that the
+flicker of an encoder makes no folds; they are filtered before, in the order of time. The value of a metric is its mean
+over the complete cycles, or over what there is if none is complete.
 
 Reference
 ---------
@@ -95,11 +94,11 @@ def measure_recording(
     be used; UsageError if another word stands for the filter, or for what is left out.
     """
     _check_words(low_pass, leave_out)
-    strokes, reached, passage, left_out = _strokes(recording, leave_out, cycles)
+    strokes, reached, passage, left_out = _strokes_and_findings(recording, leave_out, cycles)
     measured = strokes.measured
     warnings = (*warnings_of(recording, strokes), *left_out)
-    chosen = _default(recording) if low_pass == "default" else low_pass
-    raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in measured)
+    chosen = _default_filter(recording) if low_pass == "default" else low_pass
+    raw = tuple(_cycle_curve(recording, cycle, recording.effort, strokes) for cycle in measured)
     if turned_loop(raw):
         reported = (
             f"the {recording.kind} on the way up is smaller than on the way back, and every cycle would deliver energy"
@@ -114,7 +113,7 @@ def measure_recording(
         if low_pass != "default":
             raise DataError(f"{recording.name}: {problem}") from None
         return replace(plain, warnings=(*warnings, Finding("not_filtered", str(problem))))
-    filtered = tuple(_curve(recording, cycle, smooth, strokes) for cycle in measured)
+    filtered = tuple(_cycle_curve(recording, cycle, smooth, strokes) for cycle in measured)
     return replace(plain, filtered=filtered, low_pass=chosen)
 
 
@@ -144,7 +143,7 @@ def read_measured(
     return measure_recording(recording, None, LEFT_OUT, chosen)
 
 
-def _strokes(
+def _strokes_and_findings(
     recording: Recording, leave_out: Collection[str], cycles: Cycles | None
 ) -> tuple[Strokes, Window, float, tuple[Finding, ...]]:
     """Return what counts of each stroke, what all branches reached, the longest passage, and what is said of both."""
@@ -167,13 +166,13 @@ def _spiky(recording: Recording) -> NDArray[np.bool_]:
     is_outlier: NDArray[np.bool_] = heights != 0
     strokes = _remove_points(recording, jumps).strokes
     for run in np.split(np.flatnonzero(is_outlier), np.flatnonzero(np.diff(np.flatnonzero(is_outlier)) > 1) + 1):
-        if len(run) and any(_is_of_the_mechanism(recording.motion, heights, strokes, int(k)) for k in run):
+        if len(run) and any(_recurs_in_strokes(recording.motion, heights, strokes, int(k)) for k in run):
             is_outlier[run] = False
     is_outlier |= jumps
     return is_outlier
 
 
-def _is_of_the_mechanism(motion: FloatArray, heights: FloatArray, strokes: Sequence[Stroke], point: int) -> bool:
+def _recurs_in_strokes(motion: FloatArray, heights: FloatArray, strokes: Sequence[Stroke], point: int) -> bool:
     """Return whether most strokes have something alike where one point is off its neighbours."""
     alike = passing = 0
     for stroke in strokes:
@@ -206,7 +205,7 @@ def _common_range(recording: Recording, strokes: Strokes) -> Window:
     return Window(max(low for low, _ in ends), min(high for _, high in ends))
 
 
-def _default(recording: Recording) -> LowPass:
+def _default_filter(recording: Recording) -> LowPass:
     cutoff = CYCLES_PER_STROKE / recording.travel
     return LowPass(cutoff, recording.motion_dimension, DEFAULT_ORDER)
 
@@ -234,7 +233,7 @@ def _sort_by_motion(recording: Recording, stroke: Stroke) -> NDArray[np.intp]:
     return np.argsort(motion if stroke.branch == LOAD_BRANCH else -motion, kind="stable")
 
 
-def _curve(recording: Recording, cycle: Sequence[Stroke], effort: FloatArray, strokes: Strokes) -> Curve:
+def _cycle_curve(recording: Recording, cycle: Sequence[Stroke], effort: FloatArray, strokes: Strokes) -> Curve:
     """Return the curve of one cycle."""
     points = np.concatenate([stroke.points[_sort_by_motion(recording, stroke)] for stroke in cycle])
     branch = np.repeat([stroke.branch for stroke in cycle], [len(stroke.points) for stroke in cycle])
@@ -287,7 +286,7 @@ def numbers_of(
 
     Raises DataError if a branch does not cover the window.
     """
-    window, warnings = _window(source, window)
+    window, warnings = _window_and_findings(source, window)
     frame, kind = replace(frame or MeasuringFrame(), over_motion=True), source.recording.kind
     holes = holes_of(source.raw, window)
     large = large_holes(holes, window, largest_hole)
@@ -305,8 +304,8 @@ def numbers_of(
     by_cycle = tuple({**metrics, **shares} for metrics, shares in zip(all_metrics(source.raw), covered_by, strict=True))
     smooth = all_metrics(source.filtered)
     repeated = empty_uncovered(repeatability(source.raw, window), large, kind)
-    raw = _mean(by_cycle) | least(covered_by) | repeated
-    return Measurement(raw, _mean(smooth) if smooth else {}, by_cycle, window, warnings, large)
+    raw = _mean_of_cycles(by_cycle) | least(covered_by) | repeated
+    return Measurement(raw, _mean_of_cycles(smooth) if smooth else {}, by_cycle, window, warnings, large)
 
 
 def _motion_definitions(kind: Kind) -> tuple[Definition, ...]:
@@ -317,7 +316,7 @@ def _motion_definitions(kind: Kind) -> tuple[Definition, ...]:
     return tuple(replace(definitions[name], definition=f"{words} {how}") for name, words in meanings.items())
 
 
-def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tuple[Finding, ...]]:
+def _window_and_findings(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tuple[Finding, ...]]:
     """Return where the numbers hold, and what is said where that is less than what was requested."""
     name, kind = source.recording.name, source.recording.kind
     try:
@@ -325,7 +324,7 @@ def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tupl
     except DataError as problem:
         raise DataError(f"{name}: {problem}") from None
     if wanted is None:
-        return common, _cut(source, common)
+        return common, _warn_of_short_window(source, common)
     slack = 1e-9 * (wanted.hi - wanted.lo)
     low, high = max(wanted.lo, common.lo), min(wanted.hi, common.hi)
     if wanted.lo >= common.lo - slack and wanted.hi <= common.hi + slack:
@@ -341,7 +340,7 @@ def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tupl
     return Window(low, high), (Finding("window_at_reversal", f"{reported}: {taken}"),)
 
 
-def _cut(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
+def _warn_of_short_window(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
     """Return what is said where one branch makes the window much shorter than the others would."""
     kind = source.recording.kind
     extents = {
@@ -392,7 +391,7 @@ def require_loop(source: MeasuredCurves) -> None:
         )
 
 
-def _mean(metrics_of_cycles: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
+def _mean_of_cycles(metrics_of_cycles: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
     """Return the mean of every metric over cycles; undefined where it is on one of them."""
     means = {}
     for name, first in metrics_of_cycles[0].items():

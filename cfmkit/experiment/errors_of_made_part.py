@@ -1,4 +1,5 @@
-"""In what a made part differs from its specification, as far as a recording can tell: modulus, thickness, friction ...
+"""Errors with which a part was made (modulus, thickness, friction, rates), as far as its recording can tell them:
+fitted, compared, and in words.
 
 Candidates are what errs in a part of that family: the moduli of its materials, one error of thickness all over the
 part, one coefficient of friction, and the rates of springs. All sets of them are fitted, with the zero of the force,
@@ -159,10 +160,10 @@ def errors_that_can_be_told(spec: Spec) -> tuple[FitParameter, ...]:
         elif kind == "rate":
             stem, _, last = path.rpartition(".")
             groups.setdefault((kind, stem if last.isdecimal() else path), []).append(path)
-    return tuple(_joint(spec, kind, tuple(paths)) for (kind, _), paths in groups.items())
+    return tuple(_joint_parameter(spec, kind, tuple(paths)) for (kind, _), paths in groups.items())
 
 
-def _joint(spec: Spec, kind: str, paths: tuple[str, ...]) -> FitParameter:
+def _joint_parameter(spec: Spec, kind: str, paths: tuple[str, ...]) -> FitParameter:
     first = paths[0]
     quantity = leaf(type(spec), first).quantity
     dimension = quantity.dimensions[0] if quantity else "ratio"
@@ -202,7 +203,7 @@ def explain(
     """
     _check_travel(analyze_part(spec).curve.motion, source, spec)
     candidates = errors_that_can_be_told(spec) if fit is None else parameters(spec, fit, None, source.recording)
-    spec, candidates = _rubbing(spec, candidates, source)
+    spec, candidates = _with_friction(spec, candidates, source)
     curves, result = ModelCurves(spec, as_made=True), analyze_part(spec)
     ends = Window(float(result.curve.motion.min()), float(result.curve.motion.max()))
     before = compare(result, source, ends)
@@ -212,15 +213,17 @@ def explain(
     if fit is not None:
         fits = [fit_samples(before, curves, candidates, "linear", FIT_TOLERANCE)]
     else:
-        zeros = () if tared else _zeros(spec, source, before)
+        zeros = () if tared else _force_zero(spec, source, before)
         told = Distinction.estimate(curves, before, (*candidates, *zeros))
-        fits = list(_fits(before, curves, candidates, zeros if told.zero_is_told(zeros) else (), told, tell))
+        fits = list(_fit_sets(before, curves, candidates, zeros if told.zero_is_told(zeros) else (), told, tell))
     if not fits:
         raise SolutionError("the recording determines neither modulus nor thickness nor friction of this part")
     explanations = _rank_explanations(fits, before, assume_errors(curves.spec))
     best = explanations[0]
     _check_best(best, before, source, float(np.median(np.abs(result.curve.effort[np.isfinite(result.curve.effort)]))))
-    return tuple(_irreducible([item for item in explanations if item.criterion <= best.criterion + STRONG_EVIDENCE]))
+    return tuple(
+        _without_supersets([item for item in explanations if item.criterion <= best.criterion + STRONG_EVIDENCE])
+    )
 
 
 def _check_travel(motion: FloatArray, source: MeasuredCurves, spec: Spec) -> None:
@@ -239,7 +242,7 @@ def _check_travel(motion: FloatArray, source: MeasuredCurves, spec: Spec) -> Non
     )
 
 
-def _rubbing(
+def _with_friction(
     spec: Spec, candidates: tuple[FitParameter, ...], source: MeasuredCurves
 ) -> tuple[Spec, tuple[FitParameter, ...]]:
     """Return a specification whose model has both branches of a loop, where friction can give it two."""
@@ -251,7 +254,7 @@ def _rubbing(
     )
 
 
-def _zeros(spec: Spec, source: MeasuredCurves, before: Comparison) -> tuple[FitParameter, ...]:
+def _force_zero(spec: Spec, source: MeasuredCurves, before: Comparison) -> tuple[FitParameter, ...]:
     """Return the zero of the force as a parameter."""
     return parameters(spec, [f"{DATA_PREFIX}{next(iter(ZERO_OFFSETS[before.curve.kind]))}"], None, source.recording)
 
@@ -272,7 +275,7 @@ class Distinction:
         Raises SolutionError if the model has no value at some of the samples.
         """
         level = float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
-        noise = max(_noise(before), FORCE_RESOLUTION * level)
+        noise = max(_neighbour_noise(before), FORCE_RESOLUTION * level)
         return cls(parameters, scaled_jacobian(curves, before, parameters), noise, level)
 
     def deviations(self, chosen: Sequence[FitParameter]) -> FloatArray:
@@ -297,7 +300,7 @@ class Distinction:
         return bool((2.0 * deviations <= POORLY_DETERMINED).all())
 
 
-def _noise(before: Comparison) -> float:
+def _neighbour_noise(before: Comparison) -> float:
     """Return the standard deviation of neighbouring samples about the line through them [N or N m]."""
     efforts = []
     for item in before.samples:
@@ -308,7 +311,7 @@ def _noise(before: Comparison) -> float:
     return float(robust_scale(bends)) / sqrt(6.0)
 
 
-def _fits(
+def _fit_sets(
     before: Comparison,
     curves: ModelCurves,
     candidates: tuple[FitParameter, ...],
@@ -328,14 +331,14 @@ def _fits(
                 fit = fit_samples(before, curves, (*chosen, *zeros), "linear", FIT_TOLERANCE)
             except CfmError:  # no such part exists, or none that could be measured so
                 continue
-            level = min(level, _criterion(fit, before, 1.0))
+            level = min(level, _schwarz_criterion(fit, before, 1.0))
             yield fit
         if count and level >= best - STRONG_EVIDENCE:
             return
         best = level
 
 
-def _surprise(fit: Calibration, expected: Assumed | None) -> float:
+def _squared_unusual_errors(fit: Calibration, expected: Assumed | None) -> float:
     """Return the squares of fitted errors over what is usual of material and process, added up."""
     total = 0.0
     for item, value in zip(fit.parameters, fit.fit.values, strict=True):
@@ -348,7 +351,7 @@ def _surprise(fit: Calibration, expected: Assumed | None) -> float:
     return total
 
 
-def _criterion(fit: Calibration, before: Comparison, inflation: float) -> float:
+def _schwarz_criterion(fit: Calibration, before: Comparison, inflation: float) -> float:
     """Return Schwarz's criterion, residuals counting as one in groups of `inflation`."""
     residuals = fit.fit.residuals
     count, level = len(residuals), float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
@@ -364,11 +367,14 @@ def _rank_explanations(fits: list[Calibration], before: Comparison, expected: As
     """
     closest = min(fits, key=lambda fit: float(fit.fit.residuals @ fit.fit.residuals))
     inflation = closest.fit.inflation
-    ranked = [Explanation(fit, _criterion(fit, before, inflation) + _surprise(fit, expected)) for fit in fits]
+    ranked = [
+        Explanation(fit, _schwarz_criterion(fit, before, inflation) + _squared_unusual_errors(fit, expected))
+        for fit in fits
+    ]
     return sorted(ranked, key=lambda item: item.criterion)
 
 
-def _irreducible(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
+def _without_supersets(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
     """Yield the explanations of which no part explains as much."""
     for explanation in explanations:
         paths = {item.path for item in explanation.errors}

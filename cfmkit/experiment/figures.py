@@ -1,4 +1,4 @@
-"""Pictures of measurements: the loop, raw and filtered."""
+"""Pictures of measurements: the loop, raw and filtered; a model beside its measurement, with their difference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Findings about a recording, and their sentences."""
+"""Findings about a recording, and their sentences: cycles, signs, spikes, passages at reversals."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def warnings_of(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
             Finding("unfinished_cycle", f"{left} of {len(strokes.strokes)} strokes complete no cycle: left out")
         )
     if strokes.shorter:
-        warnings.append(_shorter(recording, strokes))
+        warnings.append(_shorter_cycles_finding(recording, strokes))
     if strokes.pauses:
         reported = f"{strokes.pauses} of {len(recording)} points at which the machine stood are left out"
         warnings.append(Finding("pauses", reported))
@@ -60,7 +60,7 @@ def warnings_of(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
     return tuple(warnings)
 
 
-def _shorter(recording: Recording, strokes: Strokes) -> Finding:
+def _shorter_cycles_finding(recording: Recording, strokes: Strokes) -> Finding:
     """Return what is said of cycles that cover less than others."""
     first = strokes.cycles[0][0].cycle
     numbers = [cycle[0].cycle for cycle in strokes.shorter]

@@ -1,4 +1,4 @@
-"""Measurements as files and lines: what `measure` writes, and what a comparison or a calibration adds to a run.
+"""Outputs of measurements, comparisons and calibrations: tables, files, metrics.json, lines of the page, findings.
 
 Nothing here touches a disk.
 """
@@ -141,17 +141,17 @@ def _stack_tables(tables: Mapping[str, Table]) -> Table:
     if len(tables) == 1:
         return next(iter(tables.values()))
     names = list(dict.fromkeys(column.name for table in tables.values() for column in table.columns))
-    columns = [TableColumn("group", tuple(name for name, table in tables.items() for _ in range(_rows(table))))]
+    columns = [TableColumn("group", tuple(name for name, table in tables.items() for _ in range(_count_rows(table))))]
     for name in names:
         values: list[Any] = []
         for part_table in tables.values():
             values_of_column = next((column.values for column in part_table.columns if column.name == name), None)
-            values += [""] * _rows(part_table) if values_of_column is None else list(values_of_column)
+            values += [""] * _count_rows(part_table) if values_of_column is None else list(values_of_column)
         columns.append(TableColumn(name, tuple(values)))
     return Table(tuple(columns))
 
 
-def _rows(table: Table) -> int:
+def _count_rows(table: Table) -> int:
     return len(table.columns[0].values)
 
 
@@ -253,7 +253,7 @@ def reading_line(decisions: Sequence[str]) -> tuple[tuple[str, str], ...]:
 def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:
     """Return the paragraph that a page shows about the causes of a departure: every number with its name."""
     reported = [
-        f"{name.removeprefix('data_').replace('_', ' ')} {_exact(item.value, item.dimension, 4)}"
+        f"{name.removeprefix('data_').replace('_', ' ')} {_text(item.value, item.dimension, 4)}"
         for name, item in causes.items()
         if item.value is not None
     ]
@@ -305,13 +305,13 @@ def calibration_data(calibration: Calibration) -> dict[str, Any]:
             "noise": {"value": float(to_border(fit.noise, kind)), "unit": unit},
             "samples_that_count_as_one": float(fit.inflation),
             "degrees_of_freedom": float(fit.freedom),
-            "rms_at_the_start": {"value": float(to_border(_rms(calibration.before), kind)), "unit": unit},
+            "rms_at_the_start": {"value": float(to_border(_weighted_rms(calibration.before), kind)), "unit": unit},
             "converged": fit.converged,
         },
     }
 
 
-def _rms(comparison: Comparison) -> float:
+def _weighted_rms(comparison: Comparison) -> float:
     errors = np.concatenate([item.errors(comparison.curve) for item in comparison.samples])
     weight = np.concatenate([item.weight for item in comparison.samples])
     return float(np.sqrt(np.average(errors**2, weights=weight)))
@@ -327,19 +327,19 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
             lines.append(("fitted", f"{item.label} {UNDETERMINED_MESSAGE}"))
             continue
         low, high = max(value - width, item.low), min(value + width, item.high)
-        reported = f"± {_exact(width, item.dimension, 2)} (95 %)"
+        reported = f"± {_text(width, item.dimension, 2)} (95 %)"
         if (low, high) != (value - width, value + width):
-            reported = f"({_exact(low, item.dimension)} to {_exact(high, item.dimension)}, 95 %, within its bounds)"
+            reported = f"({_text(low, item.dimension)} to {_text(high, item.dimension)}, 95 %, within its bounds)"
         lines.append(
             (
                 "fitted",
-                f"{item.label} = {_exact(value, item.dimension)} {reported}, from {_exact(item.start, item.dimension)}",
+                f"{item.label} = {_text(value, item.dimension)} {reported}, from {_text(item.start, item.dimension)}",
             )
         )
     lines += _loss_lines(calibration.after)
     zeros = calibration.zeros
     if zeros.effort or zeros.motion:
-        options = _options(recording, zeros)
+        options = _options_with_zeros(recording, zeros)
         lines.append(("data", f"{options} gives the recording the zeros of the fitted model (analyze --data, measure)"))
     if zeros.drift:
         lines.append(("data", "no option subtracts the fitted drift from a recording (analyze --data, measure)"))
@@ -359,12 +359,12 @@ def _loss_lines(after: Comparison) -> list[tuple[str, str]]:
     return [("loss", f"the model has no losses: it is fitted to the mean of the branches; {reported}")]
 
 
-def _options(recording: Recording, zeros: Zeros) -> str:
+def _options_with_zeros(recording: Recording, zeros: Zeros) -> str:
     """Return the options that replace those with which a recording was read, and take fitted zeros out as well."""
     raw, fitted = raw_zeros(recording, zeros.effort, zeros.motion), (zeros.effort, zeros.motion)
     dimensions = (recording.kind, recording.motion_dimension)
     options = [
-        f'{name} "{_exact(value, dimension, 6)}"'
+        f'{name} "{_text(value, dimension, 6)}"'
         for name, value, more, dimension in zip(("--tare", "--zero"), raw, fitted, dimensions, strict=True)
         if value or more
     ]
@@ -372,7 +372,7 @@ def _options(recording: Recording, zeros: Zeros) -> str:
     return " ".join([*options, *([f"--flip {','.join(turned)}"] if turned else [])])
 
 
-def _exact(value: float, dimension: str, digits: int = 5) -> str:
+def _text(value: float, dimension: str, digits: int = 5) -> str:
     return f"{value:.{digits}g}" if dimension == "ratio" else format_short(value, dimension, digits)
 
 

@@ -1,4 +1,4 @@
-"""Which numbers of a specification are fitted, from where, within which bounds."""
+"""Numbers of a specification, or zeros of a recording, to be fitted: start, bounds, size of each, and their options."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def parameters(
     return tuple(
         _make_zero_parameter(name, (bounds or {}).get(name), recording)
         if name.startswith(DATA_PREFIX)
-        else _parameter(spec, name, (bounds or {}).get(name))
+        else _make_parameter(spec, name, (bounds or {}).get(name))
         for name in names
     )
 
@@ -97,7 +97,7 @@ def _make_zero_parameter(path: str, bounds: tuple[float, float] | None, recordin
         size = 0.01 * float(np.abs(recording.effort).max()) if recording else 1.0
         low, high = bounds or (-math.inf, math.inf)
     if not low <= 0.0 <= high:
-        raise UsageError(f"--fit: {path} starts at 0, outside its bounds {_range(low, high, dimension)}")
+        raise UsageError(f"--fit: {path} starts at 0, outside its bounds {_range_in_words(low, high, dimension)}")
     return FitParameter(path, dimension, 0.0, low, high, size)
 
 
@@ -111,7 +111,7 @@ def _dimension_of_offset(path: str, option: str, recording: Recording | None) ->
     return offsets[name]
 
 
-def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> FitParameter:
+def _make_parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> FitParameter:
     try:
         place = leaf(type(spec), path)
     except CannotVary as problem:
@@ -120,16 +120,16 @@ def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> Fit
         raise UsageError(f"--fit: {path!r} is not a number that varies continuously")
     value = _value(spec, path)
     dimension = place.quantity.dimensions[0] if place.quantity else "ratio"
-    low, high = _limits(type(spec), path)
+    low, high = _spec_bounds(type(spec), path)
     asked_low, asked_high = bounds or (-math.inf, math.inf)
-    size = _size(value, (max(low, asked_low), min(high, asked_high)), dimension)
+    size = _typical_size(value, (max(low, asked_low), min(high, asked_high)), dimension)
     margin = BOUND_CLEARANCE * size
-    low = max(low + margin * _open(type(spec), path, "gt"), asked_low)
-    high = min(high - margin * _open(type(spec), path, "lt"), asked_high)
+    low = max(low + margin * _excludes_bound(type(spec), path, "gt"), asked_low)
+    high = min(high - margin * _excludes_bound(type(spec), path, "lt"), asked_high)
     if not low < high or not low <= value <= high:
         raise UsageError(
             f"--fit: {path} starts at {format_short(value, dimension, 6)}, outside its bounds "
-            f"{_range(low, high, dimension)}"
+            f"{_range_in_words(low, high, dimension)}"
         )
     return FitParameter(path, dimension, value, low, high, size)
 
@@ -146,7 +146,7 @@ def _value(spec: Spec, path: str) -> float:
     return float(value)
 
 
-def _slots(spec_type: type[Spec], path: str) -> tuple[Slot, ...]:
+def _slots_at(spec_type: type[Spec], path: str) -> tuple[Slot, ...]:
     allowed: tuple[Slot, ...] = (Slot(spec_type),)
     for part in path.split("."):
         key: str | int = int(part) if part.isdecimal() else part
@@ -154,21 +154,21 @@ def _slots(spec_type: type[Spec], path: str) -> tuple[Slot, ...]:
     return allowed
 
 
-def _limits(spec_type: type[Spec], path: str) -> tuple[float, float]:
+def _spec_bounds(spec_type: type[Spec], path: str) -> tuple[float, float]:
     """Return the bounds that the specification sets."""
     low, high = -math.inf, math.inf
-    for slot in _slots(spec_type, path):
+    for slot in _slots_at(spec_type, path):
         bounds = slot.bounds
         low = max(low, *(float(bounds[name]) for name in ("gt", "ge") if bounds.get(name) is not None), low)
         high = min(high, *(float(bounds[name]) for name in ("lt", "le") if bounds.get(name) is not None), high)
     return low, high
 
 
-def _open(spec_type: type[Spec], path: str, name: str) -> float:
-    return float(any(slot.bounds.get(name) is not None for slot in _slots(spec_type, path)))
+def _excludes_bound(spec_type: type[Spec], path: str, name: str) -> float:
+    return float(any(slot.bounds.get(name) is not None for slot in _slots_at(spec_type, path)))
 
 
-def _size(value: float, limits: tuple[float, float], dimension: str) -> float:
+def _typical_size(value: float, limits: tuple[float, float], dimension: str) -> float:
     """Return how large a typical change is: the value itself; from zero a hundredth of the range, else one unit."""
     if value:
         return abs(value)
@@ -176,7 +176,7 @@ def _size(value: float, limits: tuple[float, float], dimension: str) -> float:
     return 0.01 * width if math.isfinite(width) else float(from_border(1.0, dimension))
 
 
-def _range(low: float, high: float, dimension: str) -> str:
+def _range_in_words(low: float, high: float, dimension: str) -> str:
     return f"{format_short(low, dimension, 6)} ... {format_short(high, dimension, 6)}"
 
 
@@ -193,7 +193,7 @@ def read_bounds(
         if len(ends) != 2:
             raise UsageError(f"--bounds: {option!r} is not 'a.b=low:high'")
         try:
-            low, high = (_bound(end, path, spec, recording) for end in ends)
+            low, high = (_read_bound(end, path, spec, recording) for end in ends)
         except (CannotVary, QuantityError, ValueError) as problem:
             raise UsageError(f"--bounds: {option!r}: {problem}") from None
         if not low < high:
@@ -216,7 +216,7 @@ def split_bounds(options: Iterable[str]) -> dict[str, str]:
     return fixed
 
 
-def _bound(text: str, path: str, spec: Spec, recording: Recording | None) -> float:
+def _read_bound(text: str, path: str, spec: Spec, recording: Recording | None) -> float:
     """Return one end of ``--bounds`` from its text [SI]: of a path of the file, or of the recording (`DATA_PREFIX`)."""
     if path.startswith(DATA_PREFIX):
         return read_quantity(text, _dimension_of_offset(path, "--bounds", recording))

@@ -1,8 +1,7 @@
-"""Measured curves from lab CSV files as they come, in SI; what was decided on the way can be read back.
+"""Measured curves from lab CSV files as they come, in SI, one for each specimen; what was decided can be read back.
 
-Separator, decimal sign, encoding and header are found out (`cfmkit.tables.lab_file`), units and roles
-of the columns are read or stated by the user. Only the columns that are used must be
-free of gaps.
+Separator, decimal sign, encoding and header are found out (`cfmkit.tables.lab_file`), units and roles of the columns
+are read or stated by the user. Only the columns that are used must be free of gaps.
 """
 
 from __future__ import annotations
@@ -130,7 +129,7 @@ def read_recording(
     if len(recordings) > 1:
         column = (group or "").strip()
         raise DataError(
-            f"{Path(path).name}: {column!r} has {len(recordings)} values; choose {_options(column, recordings)}"
+            f"{Path(path).name}: {column!r} has {len(recordings)} values; choose {_choices(column, recordings)}"
         )
     return next(iter(recordings.values()))
 
@@ -151,7 +150,7 @@ def read_recordings(
     """
     name = Path(path).name
     stated = read_units(units)
-    text, encoding = decode_file(_content(Path(path)), name)
+    text, encoding = decode_file(_read_bytes(Path(path)), name)
     lines = lines_of(text)
     tables = tables_in(lines, name, stated)
     key, _, value = (part.strip() for part in (group or "").partition("="))
@@ -162,24 +161,25 @@ def read_recordings(
     table = tables[0]
     roles = roles_of(table.numeric, table.columns, name)
     if key in ("", NO_COLUMN_WORD):
-        specimens = None if key else _specimens(table, roles)
+        specimens = None if key else _specimen_column(table, roles)
         if specimens is not None:
             values = list(dict.fromkeys(_labels(table, specimens)))
             raise DataError(
                 f"{name}: {quote(specimens.name)} tells {len(values)} specimens apart, which no single curve "
-                f"describes; choose {_options(specimens.name, values)}, or --group {NO_COLUMN_WORD} for rows of one"
+                f"describes; choose {_choices(specimens.name, values)}, or --group {NO_COLUMN_WORD} for rows of one"
             )
-        return {"": _recording(table, roles, encoding, name)}
+        return {"": _recording_from_table(table, roles, encoding, name)}
     column = column_named(key, table.columns, name)
-    parts = _parts(table.with_values(list(roles.values())), column)
+    parts = _tables_by_value(table.with_values(list(roles.values())), column)
     if value and value not in parts:
         raise DataError(
-            f"{name}: --group: {quote(column.name)} is nowhere {quote(value)}; there are {_options(key, parts)}"
+            f"{name}: --group: {quote(column.name)} is nowhere {quote(value)}; there are {_choices(key, parts)}"
         )
     chosen = {value: parts[value]} if value else parts
     total = sum(len(part.rows) for part in parts.values())
     return {
-        item: _recording(part, roles, encoding, f"{name}, {column.name} {item}", total) for item, part in chosen.items()
+        item: _recording_from_table(part, roles, encoding, f"{name}, {column.name} {item}", total)
+        for item, part in chosen.items()
     }
 
 
@@ -199,7 +199,7 @@ def _each_table(tables: Sequence[LabTable], group: str | None, encoding: str, na
     names = [str(number + 1) for number in range(len(tables))]
     if key != TABLE_WORD or (value and value not in names):
         places = ", ".join(str(table.rows[0] + 1) for table in tables)
-        choices = _options(TABLE_WORD, names)
+        choices = _choices(TABLE_WORD, names)
         raise DataError(
             f"{name}: there are {len(tables)} tables, with numbers from lines {places} on; choose {choices}"
         )
@@ -208,13 +208,13 @@ def _each_table(tables: Sequence[LabTable], group: str | None, encoding: str, na
     for item in chosen:
         table = tables[int(item) - 1]
         roles = roles_of(table.numeric, table.columns, name)
-        recordings[item] = _recording(
+        recordings[item] = _recording_from_table(
             table, roles, encoding, f"{name}, table {item}", sum(len(table_of_all.rows) for table_of_all in tables)
         )
     return recordings
 
 
-def _options(column: str, values: Iterable[str]) -> str:
+def _choices(column: str, values: Iterable[str]) -> str:
     """Return what to write for each of some values."""
     listed = list(values)
     shown_ones = [f'--group "{column}={value}"' for value in listed[:MOST_LISTED]]
@@ -232,13 +232,13 @@ def _labels(table: LabTable, column: ColumnInfo) -> list[str]:
     return cells
 
 
-def _parts(table: LabTable, column: ColumnInfo) -> dict[str, LabTable]:
+def _tables_by_value(table: LabTable, column: ColumnInfo) -> dict[str, LabTable]:
     """Return the rows of each value of a column."""
     labels = _labels(table, column)
     return {item: table.only(label == item for label in labels) for item in dict.fromkeys(labels)}
 
 
-def _specimens(table: LabTable, roles: Mapping[str, ColumnInfo]) -> ColumnInfo | None:
+def _specimen_column(table: LabTable, roles: Mapping[str, ColumnInfo]) -> ColumnInfo | None:
     """Return the column that tells specimens apart; None if none does.
 
     It has words or whole numbers without a unit, each over much of the travel, and in rows that follow each other
@@ -269,7 +269,7 @@ def _is_fraction(text: str, table: LabTable) -> bool:
     return number is not None and not number[0].is_integer()
 
 
-def _recording(
+def _recording_from_table(
     table: LabTable, roles: Mapping[str, ColumnInfo], encoding: str, name: str, n_rows: int | None = None
 ) -> Recording:
     """Return the curve of a table; of a part of one `n_rows` is how many rows the file has of it."""
@@ -308,7 +308,7 @@ def _is_unused(column: ColumnInfo, table: LabTable, roles: Mapping[str, ColumnIn
     return named and column not in roles.values() and column.index not in units
 
 
-def _content(path: Path) -> bytes:
+def _read_bytes(path: Path) -> bytes:
     try:
         if path.is_dir():
             raise UsageError(f"{path} is a folder; name a data file in it")

@@ -1,4 +1,4 @@
-"""Values of a recording: what it covers of a window, hysteresis and friction, repeatability of cycles.
+"""Values of a recording: coverage of a window and holes in it, the area of the loop, repeatability of cycles.
 
 A recording's samples stand where machine and clock put them. A mean over them is a mean over the displacement only if
 each counts for the way that it stands for. Where the way to the next sample is far longer than is usual there, nothing
@@ -135,7 +135,7 @@ def hole_finding(large: Sequence[UnrecordedInterval], window: Window, kind: Kind
     spans: dict[str, list[UnrecordedInterval]] = {}
     for hole in large:
         spans.setdefault(span_text(hole.low, hole.high, kind), []).append(hole)
-    named = [span + _whose(holes) for span, holes in spans.items()]
+    named = [span + _common_branch_and_cycle(holes) for span, holes in spans.items()]
     listed = ", ".join(named[:4]) + (f" and {len(named) - 4} more" if len(named) > 4 else "")
     share = max(hole.width for hole in large) / (window.hi - window.lo)
     reported = (
@@ -145,7 +145,7 @@ def hole_finding(large: Sequence[UnrecordedInterval], window: Window, kind: Kind
     return Finding("holes", reported)
 
 
-def _whose(holes: Sequence[UnrecordedInterval]) -> str:
+def _common_branch_and_cycle(holes: Sequence[UnrecordedInterval]) -> str:
     """Return on which branch and in which cycle holes at one place are; nothing where it is not one."""
     branches, cycles = {hole.branch for hole in holes}, {hole.cycle for hole in holes}
     branch = f" on {holes[0].branch!r}" if len(branches) == 1 else ""

@@ -1,4 +1,4 @@
-"""Drawn values moved until the part that is made of them has the curve that is aimed at.
+"""Drawn values moved as little as possible until the part that is made of them has the curve that is aimed at.
 
 That curve is the one of a perfect part of the design, at the force that is requested. Values of what is made may move:
 those that the design chooses, widths and thicknesses; not what is bought, and not the widths that a sheet decides. They
@@ -168,7 +168,7 @@ def limits_of(spec: Spec) -> dict[str, DrawnRange]:
         if path in fixed:
             continue
         limit = DrawnRange(low, high)
-        if process is not None and _kind(path) in SECTION_RELUCTANCE and process.process.least_feature > low:
+        if process is not None and _last_key(path) in SECTION_RELUCTANCE and process.process.least_feature > low:
             thinnest = min(process.process.least_feature, float(spec.get_value(path)))
             limit = DrawnRange(thinnest, max(high, thinnest), f"the least that {process.process.name} makes")
         if limit.low < limit.high:
@@ -193,7 +193,7 @@ def section_paths(spec: Spec) -> list[str]:
     return [path for path in leaves if path in made or path.removesuffix(read_item_suffix(path)) in beside]
 
 
-def _kind(path: str) -> str:
+def _last_key(path: str) -> str:
     return path.removesuffix(read_item_suffix(path)).rpartition(".")[2]
 
 
@@ -258,7 +258,7 @@ class Redesign:
             raise SolutionError(
                 "nothing that is made may change: the design says of no value that it is free; state 'design.free'"
             )
-        kinds = [_kind(path) for path in self.limits]
+        kinds = [_last_key(path) for path in self.limits]
         stages = [
             [k for k, kind in enumerate(kinds) if kind in names] for names in (("width",), tuple(SECTION_RELUCTANCE))
         ]
@@ -351,7 +351,7 @@ class Redesign:
             except (CfmError, ValueError):
                 departures.append(np.full(len(self.aim.places) * len(self.aim.efforts) + 1, NO_CURVE * share))
         curve_errors = np.nan_to_num(np.concatenate(departures), nan=NO_CURVE * count**-0.5)
-        reluctance = np.array([SECTION_RELUCTANCE.get(_kind(path), OTHER_RELUCTANCE) for path in self.limits])
+        reluctance = np.array([SECTION_RELUCTANCE.get(_last_key(path), OTHER_RELUCTANCE) for path in self.limits])
         moved: FloatArray = reluctance * (x - self.start) / self._size
         return np.concatenate([curve_errors, [MISSED_WEIGHT * missed], moved])
 
@@ -369,11 +369,11 @@ class Redesign:
         why = f", held by {' and '.join(held)}" if held else ""
         message = f"no part that can be made has {wanted}: the nearest has {reached}{why}"
         method = family(self.drawn.family).design
-        levels = [path for path in method.levels if _has(self.drawn, path)] if method else []
+        levels = [path for path in method.levels if _has_number(self.drawn, path)] if method else []
         return NotMakeable(message, {path: reached for path in levels[:1]})
 
 
-def _has(spec: Spec, path: str) -> bool:
+def _has_number(spec: Spec, path: str) -> bool:
     try:
         return isinstance(spec.get_value(path), float)
     except KeyError:

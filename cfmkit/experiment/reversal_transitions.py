@@ -1,16 +1,14 @@
-"""Ends of strokes at which the force still passes from one branch to the other: found, and left out.
+"""Ends of strokes at which the force still passes from one branch to the other: their length, and strokes without them.
 
-Where a motion turns back the force does not jump. The sample at the reversal may hold the
-force of either branch, backlash lets the displacement change while the force does not, and
-what is elastic in the drive lets the force run from one branch to the other over some way:
-linearly for a spring with dry friction [P], exponentially for the friction of [D]. None of
-that is the force of a branch, and a filter smears it over many samples.
+Where a motion turns back the force does not jump. The sample at the reversal may hold the force of either branch,
+backlash lets the displacement change while the force does not, and what is elastic in the drive lets the force run from
+one branch to the other over some way: linearly for a spring with dry friction [P], exponentially for the friction of
+[D]. None of that is the force of a branch, and a filter smears it over many samples.
 
-Features that both branches have in common say nothing; what reveals a transition is the gap
-between the branches, load less unload: it is smooth along the travel, but closes towards
-the reversal. So the gap near the end of a stroke is taken for a straight line less a step,
-a ramp or an exponential, and the transition is accepted where that explains what noise does
-not.
+Features that both branches have in common say nothing; what reveals a transition is the gap between the branches, load
+less unload: it is smooth along the travel, but closes towards the reversal. So the gap near the end of a stroke is
+taken for a straight line less a step, a ramp or an exponential, and the transition is accepted where that explains what
+noise does not.
 
 References
 ----------
@@ -73,7 +71,7 @@ def remove_transitions(recording: Recording, strokes: Strokes) -> Settled:
     Settled
         A stroke without a neighbour of the other direction stays as it is.
     """
-    ends = list(_ends(recording, strokes.strokes))
+    ends = list(_list_ends(recording, strokes.strokes))
     # Every reversal at one end of the travel is of the same machine: together they show what noise hides in one.
     alike = {side: passage([end for end in ends if end.side == side and end.reversal]) for side in (1.0, -1.0)}
     lengths = [max(passage([end]), alike[end.side] if end.reversal else 0.0) for end in ends]
@@ -118,7 +116,7 @@ class End:
         return GAP_REACH * min(float(part[0][-1]) for part in (self.up, self.down))
 
 
-def _ends(recording: Recording, strokes: tuple[Stroke, ...]) -> Iterator[End]:
+def _list_ends(recording: Recording, strokes: tuple[Stroke, ...]) -> Iterator[End]:
     """Yield the reversals of a recording, and its start and its end where a stroke of the other direction is beside."""
     last = len(strokes) - 1
     pairs = [(k, k + 1, (k, k + 1)) for k in range(last)]
@@ -159,7 +157,7 @@ def passage(
     if not ends:
         return 0.0
     reach = min(end.reach for end in ends)
-    distance, gap = (np.concatenate(parts) for parts in zip(*(_gap(end, reach) for end in ends), strict=True))
+    distance, gap = (np.concatenate(parts) for parts in zip(*(_gap_near_end(end, reach) for end in ends), strict=True))
     order = np.argsort(distance, kind="stable")
     distance, gap, weight = _thin_neighbours(distance[order], gap[order])
     if len(distance) < _MIN_SAMPLES:
@@ -172,14 +170,14 @@ def passage(
     length, level = 0.0, 0.0
     for _ in range(4):  # what no single shape describes, such as play before elasticity, goes in parts
         rest = distance >= length
-        more, level = _one_passage(distance[rest], gap[rest], weight[rest], reach, level)
+        more, level = _fit_passage(distance[rest], gap[rest], weight[rest], reach, level)
         if more <= length:
             return length
         length = more
     return length
 
 
-def _gap(end: End, reach: float) -> tuple[FloatArray, FloatArray]:
+def _gap_near_end(end: End, reach: float) -> tuple[FloatArray, FloatArray]:
     """Return distances from an end where both strokes have a force, and the way up less the way down there."""
     distances = [part[0][(part[0] >= 0) & (part[0] <= reach)] for part in (end.up, end.down)]
     if min(map(len, distances)) < _MIN_SAMPLES // 2:
@@ -203,13 +201,13 @@ def _thin_neighbours(places: FloatArray, gap: FloatArray) -> tuple[FloatArray, F
     return np.add.reduceat(places, edges) / counts, np.add.reduceat(gap, edges) / counts, counts
 
 
-def _one_passage(
+def _fit_passage(
     distance: FloatArray, gap: FloatArray, weight: FloatArray, reach: float, level: float
 ) -> tuple[float, float]:
     """Return the length of the passage that explains the gap best, 0 where none does, and the gap beyond it."""
     if len(distance) < _MIN_SAMPLES:
         return 0.0, level
-    shapes, lengths = _shapes(distance, reach)
+    shapes, lengths = _passage_shapes(distance, reach)
     root = np.sqrt(weight)
     line, _ = np.linalg.qr(np.column_stack([root, root * distance]))
     rest, bent = root * gap, root * shapes
@@ -234,7 +232,7 @@ def _one_passage(
     return min(decay * max(np.log(size / small), 1.0), 0.5 * reach), level
 
 
-def _shapes(distance: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
+def _passage_shapes(distance: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
     """Return how far each passage that is tried is from its end at each distance, 1 to 0, and the lengths of all."""
     spacing = max(
         float(distance[min(_MIN_SINGLE_SAMPLES, len(distance)) - 1] - distance[0]) / _MIN_SINGLE_SAMPLES, 1e-6 * reach

@@ -1,9 +1,8 @@
-"""The outlines of a drawing as chains of arcs, checked: what every writer starts from.
+"""Outlines of a drawing as chains of arcs, from which every writer starts: closed, and crossing nothing, or refused.
 
-Lines and arcs stay what they are; smooth edges become tangent-continuous arcs within
-the tolerance of the exact curve. What comes out is checked: edges meet, closed contours
-close, and nothing that is to be cut crosses itself or another cut. Crossings are found on a fine flattening, and named
-with their place.
+Lines and arcs stay what they are; smooth edges become tangent-continuous arcs within the tolerance of the exact curve.
+What comes out is checked: edges meet, closed contours close, and nothing that is to be cut crosses itself or another
+cut. Crossings are found on a fine flattening, and named with their place.
 """
 
 from __future__ import annotations
@@ -78,7 +77,7 @@ def _outline(contour: Contour, number: int, tolerance: float) -> Outline:
     if not edges:
         raise GeometryError(f"{name} has no edges")
     _check_joints(edges, contour.closed, name, gap)
-    chains = [_chain(edge, tolerance, f"{name}, edge {index}") for index, edge in enumerate(edges, start=1)]
+    chains = [_edge_chain(edge, tolerance, f"{name}, edge {index}") for index, edge in enumerate(edges, start=1)]
     nodes = np.concatenate([chains[0].nodes, *(chain.nodes[1:] for chain in chains[1:])])
     bulges = np.concatenate([chain.bulges for chain in chains])
     bulges[np.abs(bulges) * np.abs(np.diff(nodes)) < 2 * _LINE_RISE] = 0.0
@@ -104,7 +103,7 @@ def _check_joints(edges: list[Edge], closed: bool, name: str, gap: float) -> Non
         raise GeometryError(f"{name} is not closed: it begins at {place(ends[0][0])} and ends at {place(ends[-1][1])}")
 
 
-def _chain(edge: Edge, tolerance: float, name: str) -> ArcChain:
+def _edge_chain(edge: Edge, tolerance: float, name: str) -> ArcChain:
     if isinstance(edge, Line):
         return ArcChain(np.array(edge.ends), np.zeros(1))
     if isinstance(edge, Arc):
@@ -166,7 +165,7 @@ def check_outlines(outlines: Sequence[Outline]) -> None:
             _check_simple(shape, name)
         if outline.layer == "cut":
             cuts.append((name, outline, shape))
-    _check_apart(cuts)
+    _check_cuts_apart(cuts)
     _check_holes(cuts)
 
 
@@ -194,7 +193,7 @@ def _check_simple(shape: Any, name: str) -> None:
     raise GeometryError(f"{name} crosses or touches itself at {place(where)}")
 
 
-def _check_apart(cuts: Sequence[tuple[str, Outline, Any]]) -> None:
+def _check_cuts_apart(cuts: Sequence[tuple[str, Outline, Any]]) -> None:
     from shapely import STRtree
 
     lines = [shape.boundary if outline.closed else shape for _, outline, shape in cuts]

@@ -1,4 +1,4 @@
-"""A network of beams as an input deck of Abaqus and CalculiX: three-node beams (B32), supports, links, one large step.
+"""A network of beams as an input deck of Abaqus and CalculiX: elements (B32), supports, links, drive, one large step.
 
 Units are mm, N, MPa. The deck is planar: nothing moves out of the plane. Its Poisson ratio is zero, because beam theory
 has no lateral contraction: CalculiX expands beams to bricks, whose ends would hinder it (a wide strip 13 % too stiff).
@@ -72,7 +72,7 @@ class _Lines:
     def __init__(self, title: str, driven: DrivenNetwork, increments: int) -> None:
         self.title, self.network, self.drive, self.increments = title, driven.network, driven.drive, increments
         self.fits = BeamFits(driven.network)
-        self.number = _numbers(driven.network)
+        self.number = _number_nodes(driven.network)
         self.spare = len(driven.network.nodes) + 1
         self.spare_element = 1
         self.moves: list[str] = []
@@ -86,19 +86,19 @@ class _Lines:
         yield "*NODE, NSET=ALL"
         for number in sorted(set(self.number.values())):
             node = next(node for name, node in self.network.nodes.items() if self.number[name] == number)
-            yield _place(number, (node.x, node.y))
+            yield _node_line(number, (node.x, node.y))
         rows: list[tuple[str, list[tuple[int, int, int]]]] = []
         for name, chain in chains.items():
             beam, inner = self.network.beams[name], len(chain.places) - 2
             numbers = [self.number[beam.start], *range(self.spare, self.spare + inner), self.number[beam.end]]
             self.spare += inner
             for k, place in zip(numbers[1:-1], chain.places[1:-1], strict=True):
-                yield _place(k, place)
+                yield _node_line(k, place)
             rows.append((name, [tuple(numbers[k : k + 3]) for k in range(0, len(numbers) - 2, 2)]))
-        yield from self._elements(chains, rows)
-        yield from self._links()
+        yield from self._write_elements(chains, rows)
+        yield from self._write_links()
         for name, node in self.network.nodes.items():
-            yield from self._support(name, node.support)
+            yield from self._write_support(name, node.support)
         yield f"*STEP, NLGEOM, INC={100 * self.increments}"
         yield "*STATIC"
         yield f"{FIRST_INCREMENT_SHARE / self.increments:.10g}, 1., 1e-6, {1 / self.increments:.10g}"
@@ -116,7 +116,9 @@ class _Lines:
         yield "S"
         yield "*END STEP"
 
-    def _elements(self, chains: dict[str, _Chain], rows: list[tuple[str, list[tuple[int, int, int]]]]) -> Iterator[str]:
+    def _write_elements(
+        self, chains: dict[str, _Chain], rows: list[tuple[str, list[tuple[int, int, int]]]]
+    ) -> Iterator[str]:
         number = 1
         for index, (name, numbers) in enumerate(rows, start=1):
             chain = chains[name]
@@ -150,19 +152,21 @@ class _Lines:
             marks += np.linspace(left, right, max(4, math.ceil(share * MIN_ELEMENTS_PER_BEAM)) + 1)[1:].tolist()
         halves = np.interp(np.arange(2 * len(marks) - 1) / 2, np.arange(len(marks)), marks)
         start = np.array(beam_end_at(self.network, name, 0), float)
-        places = np.concatenate([[start], start + np.cumsum([_run(fit, *half) for half in pairwise(halves)], axis=0)])
+        places = np.concatenate(
+            [[start], start + np.cumsum([_arc_length(fit, *half) for half in pairwise(halves)], axis=0)]
+        )
         middles = 0.5 * (np.array(marks[1:]) + np.array(marks[:-1]))
         arcs = [float(np.real(fit.arc(float(middle)))) for middle in middles]
         thickness = np.array([float(np.real(beam.section.thickness_at(arc, arc))) for arc in arcs])
         return _Chain(places, thickness, float(beam.section.width), float(beam.section.youngs_modulus))
 
-    def _links(self) -> Iterator[str]:
+    def _write_links(self) -> Iterator[str]:
         """Yield rigid links as beams that are `RIGID_MODULUS_FACTOR` times as stiff as the stiffest beam of the
         network.
 
         CalculiX's rigid bodies do not take nodes of beams.
         """
-        section = max((beam.section for beam in self.network.beams.values()), key=_rigidity)
+        section = max((beam.section for beam in self.network.beams.values()), key=_largest_rigidity)
         modulus = RIGID_MODULUS_FACTOR * to_border(section.youngs_modulus, "stress")
         size = to_border(float(np.max(section.thickness_at(np.linspace(0.0, 1.0, 33), 0.5))), "length")
         links = [link for link in self.network.links if self.number[link.node] != self.number[link.master]]
@@ -175,7 +179,7 @@ class _Lines:
         for link in links:
             ends = [self.network.nodes[name] for name in (link.master, link.node)]
             yield "*NODE, NSET=ALL"
-            yield _place(self.spare, (0.5 * (ends[0].x + ends[1].x), 0.5 * (ends[0].y + ends[1].y)))
+            yield _node_line(self.spare, (0.5 * (ends[0].x + ends[1].x), 0.5 * (ends[0].y + ends[1].y)))
             yield "*ELEMENT, TYPE=B32, ELSET=LINKS"
             yield f"{self.spare_element}, {self.number[link.master]}, {self.spare}, {self.number[link.node]}"
             self.spare, self.spare_element = self.spare + 1, self.spare_element + 1
@@ -183,7 +187,7 @@ class _Lines:
         yield f"{to_border(float(section.width), 'length'):.10g}, {size:.10g}"
         yield "0, 0, 1"
 
-    def _support(self, name: str, support: Support) -> Iterator[str]:
+    def _write_support(self, name: str, support: Support) -> Iterator[str]:
         """Yield what holds and drives a node; prescribed motions go to `moves`."""
         number, drive = self.number[name], self.drive
         along, across, turn, direction = support.along, support.across, support.rotation, support.direction
@@ -194,13 +198,13 @@ class _Lines:
         if isinstance(drive, Displacement) and driven:
             end = float(drive.points[-1])
             direction = drive.direction
-            yield from self._led(name, direction, to_border(end, "length"), driven=True)
+            yield from self._write_equation(name, direction, to_border(end, "length"), driven=True)
         elif along and across:
             self.moves.append(f"{number}, 1, 2, 0")
         elif along:
-            yield from self._led(name, direction, 0.0)
+            yield from self._write_equation(name, direction, 0.0)
         if across and (driven or not along):
-            yield from self._led(name, direction + 0.5 * math.pi, 0.0)
+            yield from self._write_equation(name, direction + 0.5 * math.pi, 0.0)
         if turn:
             self.moves.append(f"{number}, 4, 6, 0")
 
@@ -210,7 +214,7 @@ class _Lines:
         CalculiX prints no moment of a node of beams: it is the reaction of DRIVE times the lever.
         """
         node, number = self.network.nodes[name], self.number[name]
-        section = max((beam.section for beam in self.network.beams.values()), key=_rigidity)
+        section = max((beam.section for beam in self.network.beams.values()), key=_largest_rigidity)
         size = to_border(float(np.max(section.thickness_at(np.linspace(0.0, 1.0, 33), 0.5))), "length")
         x, y = (to_border(float(coordinate), "length") for coordinate in (node.x, node.y))
         arm, (middle, end, pulling) = LEVER_LENGTH * size, (self.spare, self.spare + 1, self.spare + 2)
@@ -246,14 +250,14 @@ class _Lines:
         self.spare_element += 3
         self.moves.append(f"{pulling}, 3, 3, 0")
 
-    def _led(self, name: str, direction: float, end: float, driven: bool = False) -> Iterator[str]:
+    def _write_equation(self, name: str, direction: float, end: float, driven: bool = False) -> Iterator[str]:
         """Yield a node whose first displacement is that of a node along a direction; end of it [mm]."""
         number, node = self.number[name], self.network.nodes[name]
         terms = [(1, math.cos(direction)), (2, math.sin(direction))]
         terms = sorted((term for term in terms if abs(term[1]) > 1e-12), key=lambda term: -abs(term[1]))
         leader, self.spare = self.spare, self.spare + 1
         yield "*NODE"
-        yield _place(leader, (node.x, node.y))
+        yield _node_line(leader, (node.x, node.y))
         yield "*EQUATION"
         yield str(len(terms) + 1)
         factors = [(number, axis, factor) for axis, factor in terms]
@@ -271,7 +275,7 @@ class _Lines:
         """
         pulling, self.spare = self.spare, self.spare + 1
         yield "*NODE, NSET=DRIVE"
-        yield _place(pulling, place)
+        yield _node_line(pulling, place)
         yield "*ELEMENT, TYPE=SPRING2, ELSET=FIRM"
         yield f"{self.spare_element}, {number}, {pulling}"
         yield "*SPRING, ELSET=FIRM"
@@ -280,7 +284,7 @@ class _Lines:
         self.moves += [f"{pulling}, 1, 1, {end:.10g}", f"{pulling}, 2, 3, 0"]
 
 
-def _numbers(network: Network) -> dict[str, int]:
+def _number_nodes(network: Network) -> dict[str, int]:
     """Return numbers of nodes from 1 on; nodes that are linked and stand in one place share theirs."""
     number = {name: k for k, name in enumerate(network.nodes, start=1)}
     for name, node in network.nodes.items():
@@ -291,16 +295,16 @@ def _numbers(network: Network) -> dict[str, int]:
     return number
 
 
-def _rigidity(section: Section) -> float:
+def _largest_rigidity(section: Section) -> float:
     return float(np.max(section.rigidities(np.linspace(0.0, 1.0, 33), 0.5)[0]))
 
 
-def _place(number: int, place: tuple[float, float] | FloatArray) -> str:
+def _node_line(number: int, place: tuple[float, float] | FloatArray) -> str:
     x, y = (to_border(float(coordinate), "length") for coordinate in place)
     return f"{number}, {x:.10g}, {y:.10g}, 0"
 
 
-def _run(fit: Fit, left: float, right: float) -> FloatArray:
+def _arc_length(fit: Fit, left: float, right: float) -> FloatArray:
     """Return the way along a fitted shape between two parameters (2,) [m]."""
     middle, half = 0.5 * (left + right), 0.5 * (right - left)
     t = middle + half * _GAUSS_NODES

@@ -1,4 +1,4 @@
-"""Drawings as bodies, and files of them: STL, 3MF with each body a separate object [3MF core 1.3], and STEP.
+"""Drawings as bodies of triangles or solids, and their files: STL, 3MF with each body apart [3MF core 1.3], STEP.
 
 Outlines are extruded by the thickness of the sheet to closed surfaces of triangles. A body of one thickness is a prism.
 Where regions are thinner or thicker, it has steps, symmetric about its middle plane: flexures of another width than
@@ -262,7 +262,7 @@ def threemf_bytes(name: str, bodies: Sequence[Body]) -> bytes:
         for path, text in (
             ("[Content_Types].xml", _CONTENT_TYPES),
             ("_rels/.rels", _PACKAGE_RELATIONS),
-            ("3D/3dmodel.model", _model(name, bodies)),
+            ("3D/3dmodel.model", _model_xml(name, bodies)),
         ):
             entry = zipfile.ZipInfo(path, _FILE_DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
@@ -270,15 +270,19 @@ def threemf_bytes(name: str, bodies: Sequence[Body]) -> bytes:
     return file.getvalue()
 
 
-def _model(name: str, bodies: Sequence[Body]) -> str:
+def _model_xml(name: str, bodies: Sequence[Body]) -> str:
     lines = [f'{_XML_HEADER}<model unit="millimeter" xml:lang="en-US" xmlns="{_CORE_NAMESPACE}">', "<resources>"]
     for number, body in enumerate(bodies, start=1):
-        lines += [f'<object id="{number}" type="model" name="{name}-{number}"><mesh>', *_mesh(body), "</mesh></object>"]
+        lines += [
+            f'<object id="{number}" type="model" name="{name}-{number}"><mesh>',
+            *_mesh_xml(body),
+            "</mesh></object>",
+        ]
     items = "".join(f'<item objectid="{number}"/>' for number in range(1, len(bodies) + 1))
     return "\n".join([*lines, "</resources>", f"<build>{items}</build></model>", ""])
 
 
-def _mesh(body: Body) -> Iterator[str]:
+def _mesh_xml(body: Body) -> Iterator[str]:
     yield "<vertices>"
     for x, y, z in to_border(body.points, "length").tolist():
         yield f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>'
@@ -297,12 +301,14 @@ def step_bytes(name: str, drawn: Sequence[Outline], sheet: Sheet) -> bytes:
     Raises UsageError if build123d is not installed; GeometryError if nothing says how thick the parts are, or the
     kernel cannot make a body of them.
     """
-    kernel = _kernel()
+    kernel = _import_build123d()
     if sheet.thickness is None:
         where = f"give {sheet.key!r}, such as 5 mm" if sheet.key else "its family has no such key"
         raise GeometryError(f"nothing says how thick the part is: {where}")
     try:
-        return _step(kernel, name, [contour for contour in drawn if contour.layer == "cut" and contour.closed], sheet)
+        return _step_file(
+            kernel, name, [contour for contour in drawn if contour.layer == "cut" and contour.closed], sheet
+        )
     except CfmError:
         raise
     except Exception as error:  # the kernel has dozens of its own
@@ -310,7 +316,7 @@ def step_bytes(name: str, drawn: Sequence[Outline], sheet: Sheet) -> bytes:
         raise GeometryError(f"the CAD kernel cannot make a body from the outline ({reported})") from error
 
 
-def _step(kernel: Any, name: str, cut: Sequence[Outline], sheet: Sheet) -> bytes:
+def _step_file(kernel: Any, name: str, cut: Sequence[Outline], sheet: Sheet) -> bytes:
     wires = [(contour, kernel.Wire(_edges(kernel, contour))) for contour in cut]
     faces = [kernel.Face(wire) for contour, wire in wires if not contour.hole]
     holes = [kernel.Face(wire) for contour, wire in wires if contour.hole]
@@ -322,7 +328,7 @@ def _step(kernel: Any, name: str, cut: Sequence[Outline], sheet: Sheet) -> bytes
     return _write_step(kernel, whole)
 
 
-def _kernel() -> ModuleType:
+def _import_build123d() -> ModuleType:
     try:
         import build123d
     except ImportError:

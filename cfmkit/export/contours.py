@@ -1,9 +1,8 @@
-"""Planar outlines as values, with layers and sections of beams: what families draw and `cfmkit.export` writes.
+"""Planar outlines as values: edges, contours, layers, sections of beams, dimensions; `Drawing`, which families make.
 
-A contour is a chain of edges, each ending where the next begins. Smooth curves
-carry exact points and exact unit tangents, so that an exporter can fit arcs or
-splines within a stated tolerance instead of chopping them into a polyline.
-All lengths in metres. How each layer looks is said for every file format.
+A contour is a chain of edges, each ending where the next begins. Smooth curves carry exact points and exact unit
+tangents, so that an exporter can fit arcs or splines within a stated tolerance instead of chopping them into a
+polyline. All lengths in metres.
 
 Sections of beams, as specified, say how thick a drawn or meshed part must be: across the middle of every smooth piece
 of a beam it has the beam's thickness. Joints are left out: sections at which the part runs on into another beam or a
@@ -233,7 +232,7 @@ class Contour:
     @property
     def box(self) -> tuple[float, float, float, float]:
         """Smallest x and y, largest x and y of the edges [m], of arcs as far as they go."""
-        corners = np.concatenate([_farthest(edge) for edge in self.edges])
+        corners = np.concatenate([_extreme_points(edge) for edge in self.edges])
         return (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
 
     def points(self, sagitta: float, turn: float = math.inf) -> FloatArray:
@@ -253,7 +252,7 @@ def _corners(edge: Edge) -> FloatArray:
     return np.array(edge.center) + edge.radius * np.array([[-1.0, -1.0], [1.0, 1.0]])
 
 
-def _farthest(edge: Edge) -> FloatArray:
+def _extreme_points(edge: Edge) -> FloatArray:
     """Return points of an edge (n, 2) [m] that its box is around: its own, and of an arc those along both axes."""
     if not isinstance(edge, Arc):
         return _corners(edge)
@@ -435,12 +434,12 @@ def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list
     chosen = [contour for contour in contours if contour.closed and contour.layer == layer]
     rings = []
     for contour in chosen:
-        chain = np.concatenate([_few_points_of(edge, points) for edge in contour.edges])
+        chain = np.concatenate([_points_for_picture(edge, points) for edge in contour.edges])
         rings.append(chain if (signed_area(chain) > 0.0) != contour.hole else chain[::-1])
     return rings
 
 
-def _few_points_of(edge: Edge, most_of_smooth: int) -> FloatArray:
+def _points_for_picture(edge: Edge, most_of_smooth: int) -> FloatArray:
     """Return points along an edge, both ends included, (n, 2) [m]: 2 of a line, 73 of an arc."""
     if isinstance(edge, Smooth):
         chosen = distinct(np.linspace(0, len(edge.points) - 1, most_of_smooth).astype(int))

@@ -1,4 +1,4 @@
-"""Whether an outline is the part that was specified: area of its pieces, sections of its beams, and nothing joined.
+"""Check that an outline is the part that was specified: areas, sections of beams, nothing joined away from nodes.
 
 The outline is the union of all strips and blocks. At a node they are meant to be one piece; elsewhere strips that
 cross, touch or lie together are joined unasked, and the part is stiffer than its beams. Two places are apart if the way
@@ -117,7 +117,7 @@ def joined_away_from_nodes(
     candidates = [*look.find_close_strips(), *look.find_strips_close_to_blocks(blocks), *look.find_close_blocks(blocks)]
     if not candidates:
         return ()
-    whole = _material(contours, look.thinnest)
+    whole = _material_shape(contours, look.thinnest)
     shapely.prepare(whole)
     joins: dict[tuple[str, str], Join] = {}
     for first, second, starts, ends, gaps in candidates:
@@ -130,7 +130,7 @@ def joined_away_from_nodes(
     return tuple(joins.values())
 
 
-def _material(contours: Sequence[Contour], thinnest: float) -> Any:
+def _material_shape(contours: Sequence[Contour], thinnest: float) -> Any:
     """Return the area within outlines and outside of holes, a little larger for rounding."""
     from shapely import Polygon, union_all
 
@@ -278,7 +278,7 @@ def check_outline(
         owner += [number] * len(piece.areas)
     starts, ends = lines_of(rings)
     tree, different = STRtree([polygons(area) for area in areas]), []
-    for number, section in _measurable(pieces, fillet):
+    for number, section in _measurable_sections(pieces, fillet):
         cut = section.cut(starts, ends)
         if np.isfinite(cut).all():
             met = {owner[k] for k in tree.query(LineString(section.line(cut)), "intersects").tolist()}
@@ -294,11 +294,11 @@ def check_outline(
     enclosed = sum(
         (-1.0 if contour.hole else 1.0) * abs(signed_area(ring)) for contour, ring in zip(contours, rings, strict=True)
     )
-    _check_area(enclosed, *_areas(areas, holes, fillet, GRID_DISTANCE * thinnest))
+    _check_area(enclosed, *_area_bounds(areas, holes, fillet, GRID_DISTANCE * thinnest))
     return tuple(different)
 
 
-def _measurable(pieces: Sequence[SpecifiedPiece], fillet: float) -> Iterator[tuple[int, BeamSection]]:
+def _measurable_sections(pieces: Sequence[SpecifiedPiece], fillet: float) -> Iterator[tuple[int, BeamSection]]:
     """Yield the sections that fillets leave free, with the number of their piece: at least the longest of a beam."""
     sections = [(number, section) for number, piece in enumerate(pieces) for section in piece.sections]
     longest: dict[str, float] = {}
@@ -324,7 +324,7 @@ def _check_area(measured: float, least: float, largest: float) -> None:
     )
 
 
-def _areas(
+def _area_bounds(
     pieces: Sequence[FloatArray], holes: Sequence[FloatArray], fillet: float, grid: float
 ) -> tuple[float, float]:
     """Return the area of the union of polygons less holes [m2]: without fillets, and with all that they may fill.

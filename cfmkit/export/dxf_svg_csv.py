@@ -43,7 +43,7 @@ _EZDXF_LOCK = threading.Lock()
 def dxf_bytes(drawn: Sequence[Outline], labels: Sequence[EngravedText] = ()) -> bytes:
     """Return outlines and engraved texts as DXF."""
     layers = looks([*(outline.layer for outline in drawn), *(ENGRAVED_LAYER for _ in labels)])
-    with _EZDXF_LOCK, _same_bytes(_ezdxf()) as ezdxf:
+    with _EZDXF_LOCK, _fixed_dates(_import_ezdxf()) as ezdxf:
         document = ezdxf.new("R2010", units=_UNITS_MILLIMETRES)
         document.header["$MEASUREMENT"] = _MEASUREMENT_METRIC
         for name, look in layers.items():
@@ -108,7 +108,7 @@ def _encode(document: Any) -> bytes:
 
 
 @contextmanager
-def _same_bytes(ezdxf: ModuleType) -> Iterator[ModuleType]:
+def _fixed_dates(ezdxf: ModuleType) -> Iterator[ModuleType]:
     """Have ezdxf write fixed dates and identifiers."""
     before = ezdxf.options.write_fixed_meta_data_for_testing
     ezdxf.options.write_fixed_meta_data_for_testing = True
@@ -118,7 +118,7 @@ def _same_bytes(ezdxf: ModuleType) -> Iterator[ModuleType]:
         ezdxf.options.write_fixed_meta_data_for_testing = before
 
 
-def _ezdxf() -> ModuleType:
+def _import_ezdxf() -> ModuleType:
     """Import ezdxf without a scan of all fonts and a cache in the home folder.
 
     It does both on import, unless it finds that cache. We draw no text: an empty one will
@@ -130,7 +130,7 @@ def _ezdxf() -> ModuleType:
                 cache = Path(folder) / "ezdxf" / "font_manager_cache.json"
                 cache.parent.mkdir()
                 cache.write_text('{"version": 2, "font-faces": []}', encoding="utf-8")
-                with _environment("XDG_CACHE_HOME", folder):
+                with _with_environment("XDG_CACHE_HOME", folder):
                     import_module("ezdxf")
         except OSError as error:
             raise OutputError(f"DXF needs a temporary folder for a moment: {error}; set TMPDIR to one") from error
@@ -138,7 +138,7 @@ def _ezdxf() -> ModuleType:
 
 
 @contextmanager
-def _environment(name: str, value: str) -> Iterator[None]:
+def _with_environment(name: str, value: str) -> Iterator[None]:
     before = os.environ.get(name)
     os.environ[name] = value
     try:
@@ -157,8 +157,8 @@ _STROKE_WIDTH = 0.25  # width of every line [mm]
 def svg_bytes(name: str, drawn: Sequence[Outline], labels: Sequence[EngravedText] = ()) -> bytes:
     """Return outlines and engraved texts as SVG 1.1 at real size."""
     points = to_border(np.vstack([flat_points(outline.chain) for outline in drawn]), "length")
-    digits = _digits(float(np.ptp(points, axis=0).max()))
-    shape = partial(_shape, digits=digits)
+    digits = _coordinate_digits(float(np.ptp(points, axis=0).max()))
+    shape = partial(_svg_shape, digits=digits)
     (left, low), (right, high) = points.min(axis=0) - _DRAWING_MARGIN, points.max(axis=0) + _DRAWING_MARGIN
     width, height = _svg_text(right - left), _svg_text(high - low)
     head = (
@@ -169,20 +169,20 @@ def svg_bytes(name: str, drawn: Sequence[Outline], labels: Sequence[EngravedText
     layers = [
         line
         for layer, look in looks(outline.layer for outline in drawn).items()
-        for line in _group(layer, look, [shape(outline) for outline in drawn if outline.layer == layer])
+        for line in _svg_group(layer, look, [shape(outline) for outline in drawn if outline.layer == layer])
     ]
-    layers += _texts(labels)
+    layers += _svg_labels(labels)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', head, f"<title>{title}</title>", *layers, "</svg>", ""]
     return "\n".join(lines).encode()
 
 
-def _group(layer: str, look: LayerLook, members: Sequence[str]) -> list[str]:
+def _svg_group(layer: str, look: LayerLook, members: Sequence[str]) -> list[str]:
     dashes = f' stroke-dasharray="{" ".join(map(_svg_text, look.dashes))}"' if look.dashes else ""
     style = f'fill="none" stroke="{look.rgb}" stroke-width="{_svg_text(_STROKE_WIDTH)}" stroke-linejoin="round"{dashes}'
     return [f'<g id="{layer}" {style}>', *members, "</g>"] if members else []
 
 
-def _texts(labels: Sequence[EngravedText]) -> list[str]:
+def _svg_labels(labels: Sequence[EngravedText]) -> list[str]:
     """Return engraved texts, centred about their points; y is turned over, and with it the direction."""
     if not labels:
         return []
@@ -199,7 +199,7 @@ def _texts(labels: Sequence[EngravedText]) -> list[str]:
     return [*placed, "</g>"]
 
 
-def _shape(outline: Outline, digits: int) -> str:
+def _svg_shape(outline: Outline, digits: int) -> str:
     """Return one outline as a `circle` or a `path`; y is turned over, and with it the sense of every arc."""
     number = partial(_svg_text, digits=digits)
     if outline.circle:
@@ -219,7 +219,7 @@ def _shape(outline: Outline, digits: int) -> str:
     return f'<path d="{" ".join(steps)}"/>'
 
 
-def _digits(size: float) -> int:
+def _coordinate_digits(size: float) -> int:
     """Return with how many digits a drawing of a size [mm] is written: nanometres, finer below 10 mm."""
     return 6 + max(0, 1 - math.floor(math.log10(size))) if size > 0.0 else 6
 

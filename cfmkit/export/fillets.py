@@ -36,7 +36,7 @@ def round_inside_corners(
     if radius <= 0 or len(contour.edges) < 2:
         return contour, ()
     side = 1.0 if (signed_area(contour.points(1e-5)) > 0) != contour.hole else -1.0
-    edges = [edge for edge in contour.edges if not _used_up(edge)]
+    edges = [edge for edge in contour.edges if not _has_no_length(edge)]
     # before any corner is rounded: an arc may use up a whole line, which has no direction then
     turns = [float(np.angle(_direction(edges[k], 0) / _direction(edges[k - 1], -1))) for k in range(len(edges))]
     sharp, arcs = [], {}
@@ -49,10 +49,10 @@ def round_inside_corners(
         else:
             edges[k - 1], arcs[k], edges[k] = corner
     rounded = [piece for k, edge in enumerate(edges) for piece in ((arcs[k], edge) if k in arcs else (edge,))]
-    return replace(contour, edges=tuple(edge for edge in rounded if not _used_up(edge))), tuple(sharp)
+    return replace(contour, edges=tuple(edge for edge in rounded if not _has_no_length(edge))), tuple(sharp)
 
 
-def _used_up(edge: Edge) -> bool:
+def _has_no_length(edge: Edge) -> bool:
     """Return True if an edge is a line without a length."""
     return isinstance(edge, Line) and abs(edge.ends[1] - edge.ends[0]) <= 1e-12
 
@@ -70,7 +70,7 @@ def _direction(edge: Edge, end: int) -> complex:
 
 def _round_corner(before: Edge, after: Edge, radius: float, side: float) -> tuple[Edge, Arc, Edge] | None:
     """Return two edges, shortened, and the arc between them; None if it does not fit."""
-    if _used_up(before) or _used_up(after):
+    if _has_no_length(before) or _has_no_length(after):
         return None
     if isinstance(before, Line) and isinstance(after, Line):
         return _round_between_lines(before, after, radius, side)
@@ -117,7 +117,7 @@ def _round_onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -
         center = complex(cubic(*pair)[0]) - 1j * side * radius * along
         return center, along, ((center - start) / heading).imag + side * radius
 
-    share = _zero(lambda share: touching(share)[2])
+    share = _find_zero(lambda share: touching(share)[2])
     center, tangent, _ = touching(share)
     touch = start + heading * ((center - start) / heading).real
     if ((touch - start) / heading).real < 0:
@@ -131,7 +131,7 @@ def _round_onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -
     return Line(line.start, pair(first)), arc, Smooth(kept, np.vstack([pair(tangent), smooth.tangents[rest]]))
 
 
-def _zero(over: Callable[[float], float]) -> float:
+def _find_zero(over: Callable[[float], float]) -> float:
     """Return where a function changes its sign between 0 and 1, by halving.
 
     A straight line between the points of the edge would leave a corner beside the arc, as high as the chord's sagitta.

@@ -118,7 +118,7 @@ def _labels(drawing: Drawing, name: str) -> Iterator[EngravedText]:
             pads = pads or [polygon for polygon in marked if body.contains(polygon.centroid)]
         spots = sorted(pads, key=lambda polygon: -polygon.area)
         for spot in spots:
-            thick = _thickness(drawing.sheet, spot.centroid)
+            thick = _thickness_at(drawing.sheet, spot.centroid)
             text = name if thick is None else f"{name}, sheet {format_short(thick, 'length')}"
             if (label := _place_text(text, spot)) is not None and not any(
                 spot.intersection(hole).area > MIN_HOLE_AREA for hole in holes
@@ -127,7 +127,7 @@ def _labels(drawing: Drawing, name: str) -> Iterator[EngravedText]:
                 break
 
 
-def _thickness(sheet: Sheet, at: Any) -> float | None:
+def _thickness_at(sheet: Sheet, at: Any) -> float | None:
     from shapely import Polygon
 
     thicknesses = [region.thickness for region in sheet.regions if Polygon(region.polygon).contains(at)]

@@ -1,4 +1,4 @@
-"""Frame around a mechanism that is cut from one piece: a closed rectangle, joined by bars to everything that is held.
+"""Frame around a part cut from one piece: a rectangle with bars to everything that is held; areas that bodies sweep.
 
 The frame is a rectangle along the axes of the drawing, outside of all that the part covers at rest and as it moves,
 by a clearance. A bar leads from every held pad to that side of the frame to which it is shortest without coming near
@@ -57,18 +57,18 @@ def ground_frame(
     if not pads:
         raise GeometryError("a frame joins held pads, but no node is clamped; leave out 'mechanism.part.frame.ground'")
     low, high = _opening(pads, moving, covered, clearance) if inside is None else np.sort(np.array(inside), axis=0)
-    sides = _sides(low, high, thickness)
+    sides = _frame_sides(low, high, thickness)
     ring = union_all([Polygon(side) for side in sides])
     if (common := ring.intersection(moving)).area > ROOT_SIDE**2:
         raise GeometryError(
-            f"the frame is in the way of the moving parts at {_place(common)}; make "
+            f"the frame is in the way of the moving parts at {_place_in_words(common)}; make "
             f"'mechanism.part.frame.inside' larger"
         )
-    bars = [_bar(name, pad, low, high, thickness, moving, clearance) for name, pad in pads.items()]
+    bars = [_shortest_bar(name, pad, low, high, thickness, moving, clearance) for name, pad in pads.items()]
     return GroundFrame(sides, tuple(bars))
 
 
-def _place(shape: Any) -> str:
+def _place_in_words(shape: Any) -> str:
     at = shape.representative_point()
     return f"({format_short(at.x, 'length')}, {format_short(at.y, 'length')})"
 
@@ -84,7 +84,7 @@ def _opening(
     return low, np.maximum(loose.max(axis=0) + clearance, points.max(axis=0))
 
 
-def _sides(low: FloatArray, high: FloatArray, thickness: float) -> tuple[FloatArray, ...]:
+def _frame_sides(low: FloatArray, high: FloatArray, thickness: float) -> tuple[FloatArray, ...]:
     (x0, y0), (x1, y1), t = low.tolist(), high.tolist(), thickness
     boxes = (
         (x0 - t, y0 - t, x1 + t, y0),
@@ -95,7 +95,7 @@ def _sides(low: FloatArray, high: FloatArray, thickness: float) -> tuple[FloatAr
     return tuple(np.array([[a, b], [c, b], [c, d], [a, d]]) for a, b, c, d in boxes)
 
 
-def _bar(
+def _shortest_bar(
     name: str, pad: FloatArray, low: FloatArray, high: FloatArray, thickness: float, moving: Any, clearance: float
 ) -> FloatArray:
     """Return the shortest bar from the middle of a pad to the frame that is in nobody's way.
@@ -127,7 +127,7 @@ def _bar(
             beside = shape.difference(forbidden).intersection(free)
             if inside_way.area <= ROOT_SIDE**2 and beside.area <= ROOT_SIDE**2:
                 return bar
-            tried = tried or _place(inside_way if inside_way.area > beside.area else beside)
+            tried = tried or _place_in_words(inside_way if inside_way.area > beside.area else beside)
     raise GeometryError(
         f"no bar leads from the pad of {name} to the frame: moving parts are in the way (of the shortest bar, at "
         f"{tried}); leave out 'mechanism.part.frame.ground', or reduce 'mechanism.part.frame.clearance' "

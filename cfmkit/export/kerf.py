@@ -1,9 +1,8 @@
-"""Compensation for the width of the cut: every cut contour moved into the waste by half the kerf.
+"""Compensation for the width of the cut: every cut contour moved into the waste, as a parallel chain of arcs.
 
-Outer contours grow and holes shrink; corners that point into the waste become arcs
-about the corner, so that the cut stays half a kerf away from the part everywhere. Arcs
-stay arcs. Only where the moved contour has other pieces than the contour itself (a
-fillet that is sharper than half the kerf) it becomes a fine polyline.
+Outer contours grow and holes shrink; corners that point into the waste become arcs about the corner, so that the cut
+stays half a kerf away from the part everywhere. Arcs stay arcs. Only where the moved contour has other pieces than the
+contour itself (a fillet that is sharper than half the kerf) it becomes a fine polyline.
 
 The parallel curve of a closed chain of arcs: again a chain of arcs. An arc of curvature k, moved by d to its right,
 keeps its turn and scales by 1 + k d. Where the chain turns away from the parallel, an arc about the node fills the
@@ -57,7 +56,7 @@ def with_kerf(
 
 
 def _offset_outline(outline: Outline, half: float, name: str) -> Outline:
-    region = _region(outline, half, name)
+    region = _grown_region(outline, half, name)
     right = half if (outline.chain.area > 0) != outline.hole else -half
     chain = parallel(outline.chain, right)
     if chain is None or not _follows(chain, outline, half, region, _ARC_ERROR):
@@ -71,7 +70,7 @@ def _offset_outline(outline: Outline, half: float, name: str) -> Outline:
     return replace(outline, chain=chain, circle=circle)
 
 
-def _region(outline: Outline, half: float, name: str) -> Any:
+def _grown_region(outline: Outline, half: float, name: str) -> Any:
     """Return the part (or the hole) with half a kerf around it (or less), in one piece without gaps."""
     from shapely import Polygon
 
@@ -146,11 +145,11 @@ def parallel(chain: ArcChain, distance: float) -> ArcChain | None:
     ArcChain or None
         None if neighbours at a corner do not meet.
     """
-    pieces, breaks = _pieces(chain, distance)
+    pieces, breaks = _moved_pieces(chain, distance)
     kept = list(range(len(pieces)))
     for index in breaks:
         i, j = index % len(pieces), (index + 1) % len(pieces)
-        if i in kept and j in kept and not _trim(pieces, kept, i, j):
+        if i in kept and j in kept and not _trim_at_crossing(pieces, kept, i, j):
             return None
     if len(kept) < 2:
         return None
@@ -158,7 +157,7 @@ def parallel(chain: ArcChain, distance: float) -> ArcChain | None:
     return ArcChain(np.array([*nodes, nodes[0]]), np.array([pieces[index].bulge for index in kept]))
 
 
-def _pieces(chain: ArcChain, distance: float) -> tuple[list[_Piece], list[int]]:
+def _moved_pieces(chain: ArcChain, distance: float) -> tuple[list[_Piece], list[int]]:
     """Return the moved arcs with those that fill the gaps, and after which of them the next one does not follow on."""
     scale = 1 + chain.curvatures * distance
     into, out = chain.tangents
@@ -180,7 +179,7 @@ def _pieces(chain: ArcChain, distance: float) -> tuple[list[_Piece], list[int]]:
     return pieces, list(dict.fromkeys(breaks))
 
 
-def _trim(pieces: list[_Piece], kept: list[int], i: int, j: int) -> bool:
+def _trim_at_crossing(pieces: list[_Piece], kept: list[int], i: int, j: int) -> bool:
     """End piece i and begin piece j where they cross, and drop from `kept` what lies beyond; tell whether they do."""
     while i != j and len(kept) > 2:
         crossing = _crossing(pieces[i], pieces[j])

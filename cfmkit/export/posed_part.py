@@ -1,7 +1,7 @@
-"""Geometry of a mechanism in several poses, as named bodies of material that are held, driven, free or in contact.
+"""Geometry of a mechanism in poses, as named bodies that are held, driven, free or in contact; views of their area.
 
-A family returns these bodies once (`families/NAME/part.py`). Views are written once for all families: outlines, the
-bounding box, swept areas, pictures, animations, the frame around what moves, places for screws in a base plate.
+A family returns these bodies once (`families/NAME/part.py`). Views are written once for all families, also pictures,
+animations and the frame around what moves.
 """
 
 from __future__ import annotations

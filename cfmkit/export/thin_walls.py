@@ -1,4 +1,4 @@
-"""Check for parts thinner than their process can make: beams, frames, and what is left between a hole and an edge.
+"""Walls of a part thinner than their process can make: beams, frames, and what is left between a hole and an edge.
 
 From places all along the edges a ray runs into the material until it meets an edge that faces back: that is how thick
 the part is there. Tips of corners are thin as well, but no walls, and are left out.
@@ -132,10 +132,10 @@ def thin_walls(
     arc_met = edges.at[met] + np.hypot(*(ends - edges.starts[met]).T)
     apart, around = np.abs(arc_met - arc_of_ray), edges.around[edges.ring[met]]
     tip = (edges.ring[met] == edges.ring[line[ray]]) & (np.minimum(apart, around - apart) < MIN_WAY_AROUND * depth)
-    return tuple(_walls(places[ray][~tip], ends[~tip], depth[~tip], least))
+    return tuple(_merge_into_walls(places[ray][~tip], ends[~tip], depth[~tip], least))
 
 
-def _walls(starts: FloatArray, ends: FloatArray, thickness: FloatArray, least: float) -> Iterator[ThinWall]:
+def _merge_into_walls(starts: FloatArray, ends: FloatArray, thickness: FloatArray, least: float) -> Iterator[ThinWall]:
     """Yield walls from lines through them, (k, 2) each [m]: what lies side by side is one wall."""
     from shapely import STRtree, buffer, get_parts, linestrings, union_all
 

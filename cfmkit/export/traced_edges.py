@@ -1,4 +1,4 @@
-"""Edges over a parameter, to be cut where they meet: also beyond their ends a little, and moved to their right."""
+"""An edge as a curve over a parameter, extended a little or moved to its right, from which pieces are cut."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ class OutlinePiece:
     @classmethod
     def from_contour(cls, contour: Contour) -> OutlinePiece:
         """Return what is within a closed contour."""
-        if _encloses(contour.edges) > 0:
+        if _signed_ring_area(contour.edges) > 0:
             return cls(contour.edges)
         return cls(tuple(edge.reverse() for edge in reversed(contour.edges)))
 
@@ -85,7 +85,7 @@ class OutlinePiece:
 
     def to_polygons(self, size: float) -> tuple[FloatArray, ...]:
         """Return its polygons, arcs as fine as a size [m] of the thinnest piece needs them."""
-        return self.areas or (_corners(self.edges, size),)
+        return self.areas or (_ring_corners(self.edges, size),)
 
 
 def merge_pieces(
@@ -102,17 +102,19 @@ def merge_pieces(
     tolerance = MAX_GRID_DISTANCES * GRID_DISTANCE * size
     tracks = [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for piece in pieces for edge in piece.edges]
     whole = _unite([area for piece in pieces for area in piece.to_polygons(size)], size)
-    rings = [_recognise_edges(_ring(runs, tolerance), tolerance) for runs in _trace_rings(whole, tracks, size)]
+    rings = [_recognise_edges(_edges_of_runs(runs, tolerance), tolerance) for runs in _trace_rings(whole, tracks, size)]
     if fillet > 0:
         rings = _round_chains(rings, fillet, size)
     if holes:
         tracks = [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for ring in rings for edge in ring]
         tracks += [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for hole in holes for edge in hole.reverse_edges()]
-        left = _area(rings, size).difference(_unite([area for hole in holes for area in hole.to_polygons(size)], size))
-        rings = [_ring(runs, tolerance) for runs in _trace_rings(left, tracks, size)]
+        left = _ring_area_shape(rings, size).difference(
+            _unite([area for hole in holes for area in hole.to_polygons(size)], size)
+        )
+        rings = [_edges_of_runs(runs, tolerance) for runs in _trace_rings(left, tracks, size)]
     if not rings:
         raise GeometryError("the pieces of the part leave nothing to cut")
-    return tuple(Contour(tuple(ring), layer, closed=True, hole=_encloses(ring) < 0) for ring in rings)
+    return tuple(Contour(tuple(ring), layer, closed=True, hole=_signed_ring_area(ring) < 0) for ring in rings)
 
 
 def _unite(areas: Sequence[FloatArray], size: float, *others: Any) -> Any:
@@ -125,19 +127,19 @@ def _unite(areas: Sequence[FloatArray], size: float, *others: Any) -> Any:
     return union_all(shapes, grid_size=GRID_DISTANCE * size)
 
 
-def _area(rings: Sequence[Sequence[Edge]], size: float) -> Any:
+def _ring_area_shape(rings: Sequence[Sequence[Edge]], size: float) -> Any:
     """Return what closed chains of edges bound, holes left out, as a geometry of shapely."""
-    outer = [_corners(ring, size) for ring in rings if _encloses(ring) > 0]
-    inner = [_corners(ring, size) for ring in rings if _encloses(ring) < 0]
+    outer = [_ring_corners(ring, size) for ring in rings if _signed_ring_area(ring) > 0]
+    inner = [_ring_corners(ring, size) for ring in rings if _signed_ring_area(ring) < 0]
     whole = _unite(outer, size)
     return whole.difference(_unite(inner, size)) if inner else whole
 
 
-def _corners(ring: Sequence[Edge], size: float) -> FloatArray:
+def _ring_corners(ring: Sequence[Edge], size: float) -> FloatArray:
     return np.concatenate([TracedEdge.from_edge(edge, SAGITTA_RTOL * size).corners[:-1] for edge in ring])
 
 
-def _encloses(ring: Sequence[Edge]) -> float:
+def _signed_ring_area(ring: Sequence[Edge]) -> float:
     """Return the area of a closed chain of edges [m2], negative where it runs clockwise; of smooth ones by points."""
     area = 0.0
     for edge in ring:
@@ -179,13 +181,13 @@ def _trace_rings(whole: Any, tracks: Sequence[TracedEdge], size: float) -> Itera
     )
     for part in getattr(orient_polygons(whole), "geoms", [orient_polygons(whole)]):
         for ring in (part.exterior, *part.interiors) if part.geom_type == "Polygon" else ():
-            corners = _apart(np.asarray(ring.coords)[:-1] @ np.array([1, 1j]), sources.near)
+            corners = _drop_close_corners(np.asarray(ring.coords)[:-1] @ np.array([1, 1j]), sources.near)
             away = corners - corners[0]
             if 0.5 * abs((np.conj(away) * np.roll(away, -1)).imag.sum()) > (MIN_HOLE_SIDE * size) ** 2:
                 yield sources.runs(corners)
 
 
-def _apart(corners: NDArray[np.complex128], tolerance: float) -> NDArray[np.complex128]:
+def _drop_close_corners(corners: NDArray[np.complex128], tolerance: float) -> NDArray[np.complex128]:
     """Return the corners of a ring without those that are `tolerance` the one before."""
     while len(corners) > 2:
         close = np.abs(corners - np.roll(corners, 1)) <= tolerance
@@ -250,11 +252,11 @@ class _Sources:
         return run[0] is self.tracks[candidate[0]] and abs(run[2] - candidate[1]) < 0.01
 
 
-def _ring(runs: Sequence[_Run], tolerance: float) -> list[Edge]:
+def _edges_of_runs(runs: Sequence[_Run], tolerance: float) -> list[Edge]:
     """Return runs as edges that meet: each begins where the one before ends."""
     if len(runs) == 1:
         return [runs[0].whole]
-    meetings = [_meeting(first, second) for first, second in zip(runs, [*runs[1:], runs[0]], strict=True)]
+    meetings = [_find_meeting(first, second) for first, second in zip(runs, [*runs[1:], runs[0]], strict=True)]
     edges: list[Edge] = []
     for run, before, after in zip(runs, [meetings[-1], *meetings[:-1]], meetings, strict=True):
         if abs(after.at - before.at) > tolerance or abs(after.first - before.last) > 1.0:
@@ -271,7 +273,7 @@ class _Meeting:
     last: float
 
 
-def _meeting(before: _Run, after: _Run) -> _Meeting:
+def _find_meeting(before: _Run, after: _Run) -> _Meeting:
     """Return where the tracks of two runs meet, near the end of the first and the start of the second one.
 
     Tangent ones stay where the polygons have them; what they have in common is an end of one of them then.
@@ -300,11 +302,11 @@ def _meeting(before: _Run, after: _Run) -> _Meeting:
 def _recognise_edges(edges: Sequence[Edge], tolerance: float) -> list[Edge]:
     """Return a closed chain in which smooth edges that are lines or arcs are such."""
     return _straighten_chain(
-        [_simplest(edge, tolerance) if isinstance(edge, Smooth) else edge for edge in edges], tolerance
+        [_recognise_edge(edge, tolerance) if isinstance(edge, Smooth) else edge for edge in edges], tolerance
     )
 
 
-def _simplest(edge: Smooth, tolerance: float) -> Edge:
+def _recognise_edge(edge: Smooth, tolerance: float) -> Edge:
     """Return a smooth edge as the line or the arc that it is within `tolerance` [m]."""
     z = edge.points @ np.array([1, 1j])
     chord, middle = z[-1] - z[0], z[len(z) // 2]
@@ -327,14 +329,14 @@ def _straighten_chain(edges: Sequence[Edge], tolerance: float) -> list[Edge]:
     """Return a closed chain in which lines, and arcs about one centre, that go on as they are, are one edge."""
     chain: list[Edge] = []
     for edge in edges:
-        merged = _as_one(chain[-1], edge, tolerance) if chain else None
+        merged = _join_two_edges(chain[-1], edge, tolerance) if chain else None
         chain[len(chain) - (merged is not None) :] = [edge if merged is None else merged]
-    if len(chain) > 2 and (merged := _as_one(chain[-1], chain[0], tolerance)) is not None:
+    if len(chain) > 2 and (merged := _join_two_edges(chain[-1], chain[0], tolerance)) is not None:
         chain = [merged, *chain[1:-1]]
     return chain
 
 
-def _as_one(before: Edge, after: Edge, tolerance: float) -> Edge | None:
+def _join_two_edges(before: Edge, after: Edge, tolerance: float) -> Edge | None:
     """Return two edges as one; None if there is a corner between them, or they are of two kinds."""
     if isinstance(before, Line) and isinstance(after, Line):
         first, second = (edge.ends[1] - edge.ends[0] for edge in (before, after))
@@ -367,11 +369,11 @@ def _round_chains(rings: Sequence[Sequence[Edge]], radius: float, size: float) -
                 areas.append(np.concatenate([xy(track.z[-1:]), around.corners]))
             elif turn < -TANGENT_ANGLE:  # an inside corner: beside edges shorter than the radius only it is near enough
                 areas.append(TracedEdge.from_edge(Arc(pair(track.z[-1]), radius, 0.0, 2.0 * math.pi), fine).corners)
-    reach = _unite(areas, size, _area(rings, size))
+    reach = _unite(areas, size, _ring_area_shape(rings, size))
     tolerance = MAX_GRID_DISTANCES * GRID_DISTANCE * size
     touched = (_touch_edges(runs, radius, tolerance) for runs in _trace_rings(reach, ways, size))
     closed = (ring for ring in touched if ring and abs(ring[0].ends[0] - ring[-1].ends[1]) <= tolerance)
-    return [ring for ring in closed if abs(_encloses(ring)) > (MIN_HOLE_SIDE * size) ** 2]
+    return [ring for ring in closed if abs(_signed_ring_area(ring)) > (MIN_HOLE_SIDE * size) ** 2]
 
 
 def _bands(edge: NDArray[np.complex128], beside: NDArray[np.complex128]) -> Iterator[FloatArray]:
@@ -397,11 +399,15 @@ def _touch_edges(runs: Sequence[_Run], radius: float, tolerance: float) -> list[
     runs = [run for run in runs if run.track.moved or isinstance(run.track.edge, Arc)]
     if len(runs) < 2:
         return [run.whole for run in runs if run.track.moved]
-    meetings = [_meeting(first, second) for first, second in zip(runs, [*runs[1:], runs[0]], strict=True)]
+    meetings = [_find_meeting(first, second) for first, second in zip(runs, [*runs[1:], runs[0]], strict=True)]
     edges: list[Edge] = []
     around = zip(runs, [*runs[1:], runs[0]], [meetings[-1], *meetings[:-1]], meetings, strict=True)
     for run, following, before, after in around:
-        start, end, beyond = _foot(run, before.last), _foot(run, after.first), _foot(following, after.last)
+        start, end, beyond = (
+            _touch_point(run, before.last),
+            _touch_point(run, after.first),
+            _touch_point(following, after.last),
+        )
         if run.track.moved and (abs(end - start) > tolerance or after.first - before.last > 1.0):
             edges.append(run.track.part(before.last, after.first, start, end))
         if abs(beyond - end) > tolerance:
@@ -424,7 +430,7 @@ def _center_between(start: complex, end: complex, place: complex, radius: float)
     return min(middle + aside, middle - aside, key=lambda center: abs(center - place))
 
 
-def _foot(run: _Run, u: float) -> complex:
+def _touch_point(run: _Run, u: float) -> complex:
     """Return where a cutter touches the part whose centre is at a parameter of a run."""
     edge = run.track.edge
     return run.track.foot(u) if run.track.moved or not isinstance(edge, Arc) else complex(*edge.center)

@@ -1,4 +1,4 @@
-"""Numerical methods; no mechanism words here."""
+"""Numerical methods without a mechanism: interpolation, roots, quadrature, fits, optimisation, arcs, continuation."""
 
 from cfmkit.lazy_names import lazy_names
 

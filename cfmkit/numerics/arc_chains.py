@@ -1,4 +1,4 @@
-"""Chains of circular arcs and straight lines, and the chain that fits a smooth curve.
+"""Chains of circular arcs and straight lines (`ArcChain`), and the chain that fits a smooth curve (`fit_arcs`).
 
 A chain is stored by its nodes and bulges. The bulge of a piece is tan(turn / 4), positive when it turns left: zero is a
 straight line, one a half circle. Nodes and bulges stay well conditioned however flat a piece is, where centre and
@@ -185,10 +185,9 @@ def _speed(p0: ComplexArray, t0: ComplexArray, p1: ComplexArray, t1: ComplexArra
 def doubt(z: ComplexArray, t: ComplexArray) -> FloatArray:
     """Return how far the curve may be from its interpolant between each two samples.
 
-    The interpolant that skips a sample misses it by e = f'''' a^2 b^2 / 24, with a and b
-    the distances to its neighbours; the one that does not is off by f'''' a^4 / 384 at
-    most. It also misses the tangent there, by 2 e (1/a - 1/b); where it misses it by more,
-    the curve is no smooth one: a corner by the angle q leaves q a / 8. Of two samples
+    The interpolant that skips a sample misses it by e = f'''' a^2 b^2 / 24, with a and b the distances to its
+    neighbours; the one that does not is off by f'''' a^4 / 384 at most. It also misses the tangent there, by 2 e (1/a -
+    1/b); where it misses it by more, the curve is no smooth one: a corner by the angle q leaves q a / 8. Of two samples
     alone, the curve lies between the two arcs that touch it at one end.
     """
     step = np.abs(np.diff(z))

@@ -1,4 +1,4 @@
-"""Interpolation: cubics through four neighbours, monotone cubics, polynomials at nodes and on panels.
+"""Interpolation: cubics through neighbours with crossings and extremes, monotone cubics, polynomials at nodes, panels.
 
 - Between the samples of a smooth function: the cubic through the four nearest of them; its error goes with the fourth
   power of the spacing. The first argument increases; nothing here sorts or bridges a fold.
@@ -66,7 +66,7 @@ def values_at(x: FloatArray, y: FloatArray, places: FloatArray) -> FloatArray:
     count = min(4, len(x))
     first = np.clip(np.searchsorted(x, places) - 2, 0, len(x) - count)
     nodes = first[:, None] + np.arange(count)
-    return _cubics(x[nodes], y[nodes], places)
+    return _values_of_polynomials(x[nodes], y[nodes], places)
 
 
 EXTREME_RTOL = 1e-10
@@ -112,7 +112,7 @@ def inner_extremes_of_rows(rows: Sequence[tuple[FloatArray, FloatArray]]) -> lis
         inside = (places > 0.0) & (places < width[:, None])
     step, which = np.nonzero(inside)
     roots = x[left[step]] + places[step, which]
-    heights = _cubics(neighbours[step], values[step], roots)
+    heights = _values_of_polynomials(neighbours[step], values[step], roots)
     least = (EXTREME_RTOL * np.maximum.reduceat(np.abs(y), ends - counts))[row[step]]
     before, behind = y[left[step]], y[left[step] + 1]
     turns = (heights > np.maximum(before, behind) + least) | (heights < np.minimum(before, behind) - least)
@@ -121,7 +121,7 @@ def inner_extremes_of_rows(rows: Sequence[tuple[FloatArray, FloatArray]]) -> lis
     return [next(roots_of_rows) if len(x) >= 4 else np.zeros(0) for x, _ in rows]
 
 
-def _cubics(neighbours: FloatArray, values: FloatArray, places: FloatArray) -> FloatArray:
+def _values_of_polynomials(neighbours: FloatArray, values: FloatArray, places: FloatArray) -> FloatArray:
     """Return the polynomials through some samples each, (n, k), at one place each, (n,)."""
     total, count = np.zeros((len(places), *values.shape[2:])), neighbours.shape[1]
     for i in range(count):
@@ -224,7 +224,7 @@ class ThroughPoints:
         return np.array(self.places)
 
     @cached_property
-    def _terms(self) -> tuple[FloatArray, ...]:
+    def _coefficients(self) -> tuple[FloatArray, ...]:
         """Coefficients of 1, t, t^2, t^3 on each piece, t from its start, (n - 1,) each."""
         y, h = np.array(self.values), np.diff(self._knots)
         rise = np.diff(y) / h
@@ -238,9 +238,9 @@ class ThroughPoints:
         return y[:-1], slope[:-1], second, third
 
     @cached_property
-    def _before(self) -> FloatArray:
+    def _integrals_before(self) -> FloatArray:
         """Integral up to the start of each piece."""
-        h, (a, b, c, d) = np.diff(self._knots), self._terms
+        h, (a, b, c, d) = np.diff(self._knots), self._coefficients
         pieces = h * (a + h * (b / 2.0 + h * (c / 3.0 + h * d / 4.0)))
         return np.concatenate([[0.0], np.cumsum(pieces)])[:-1]
 
@@ -253,22 +253,22 @@ class ThroughPoints:
     def evaluate(self, x: Any) -> Any:
         """Return values at places, a number or an array."""
         piece, t = self._piece(x)
-        a, b, c, d = (term[piece] for term in self._terms)
+        a, b, c, d = (term[piece] for term in self._coefficients)
         return a + t * (b + t * (c + t * d))
 
     def slope(self, x: Any) -> Any:
         """Return derivatives at places; at and beyond the ends those of the first and the last piece."""
         piece, t = self._piece(x)
-        _, b, c, d = (term[piece] for term in self._terms)
+        _, b, c, d = (term[piece] for term in self._coefficients)
         return b + t * (2.0 * c + t * 3.0 * d)
 
     def integral(self, x: Any) -> Any:
         """Return integrals from the first place."""
         piece, t = self._piece(x)
-        a, b, c, d = (term[piece] for term in self._terms)
+        a, b, c, d = (term[piece] for term in self._coefficients)
         beyond = np.asarray(x) - np.clip(x, self._knots[0], self._knots[-1])
         areas = t * (a + t * (b / 2.0 + t * (c / 3.0 + t * d / 4.0)))
-        return self._before[piece] + areas + beyond * (a + t * (b + t * (c + t * d)))
+        return self._integrals_before[piece] + areas + beyond * (a + t * (b + t * (c + t * d)))
 
     def invert_integral(
         self,
@@ -286,9 +286,9 @@ class ThroughPoints:
         >>> ramp.invert_integral(np.array([0.0, 1.0, 4.0])).tolist()
         [0.0, 1.0, 2.0]
         """
-        starts, widths = self._before - less * self._knots[:-1], np.diff(self._knots)
+        starts, widths = self._integrals_before - less * self._knots[:-1], np.diff(self._knots)
         piece = np.clip(np.searchsorted(starts, values, side="right") - 1, 0, len(widths) - 1)
-        a, b, c, d = (term[piece] for term in self._terms)
+        a, b, c, d = (term[piece] for term in self._coefficients)
         a, left, width = a - less, np.maximum(values - starts[piece], 0.0), widths[piece]
         root = np.sqrt(np.maximum(a * a + 2.0 * b * left, 0.0))  # of a straight line it is this
         step = np.minimum(2.0 * left / np.maximum(a + root, 1e-300), width)
@@ -315,7 +315,7 @@ def interpolation(nodes: FloatArray, places: FloatArray) -> FloatArray:
     """
     gaps = places[:, None] - nodes
     hit = np.abs(gaps) < 1e-14
-    terms = _weights(nodes) / np.where(hit, 1.0, gaps)
+    terms = _barycentric_weights(nodes) / np.where(hit, 1.0, gaps)
     matrix: FloatArray = terms / terms.sum(axis=1, keepdims=True)
     exact = hit.any(axis=1)
     matrix[exact] = hit[exact]
@@ -330,7 +330,7 @@ def differentiation(nodes: FloatArray) -> FloatArray:
     >>> (differentiation(np.array([0.0, 1.0, 2.0])) @ [0.0, 1.0, 4.0]).round(12).tolist()
     [0.0, 2.0, 4.0]
     """
-    weights, gaps = _weights(nodes), nodes[:, None] - nodes
+    weights, gaps = _barycentric_weights(nodes), nodes[:, None] - nodes
     np.fill_diagonal(gaps, 1.0)
     matrix: FloatArray = weights / weights[:, None] / gaps
     np.fill_diagonal(matrix, 0.0)
@@ -338,7 +338,7 @@ def differentiation(nodes: FloatArray) -> FloatArray:
     return matrix
 
 
-def _weights(nodes: FloatArray) -> FloatArray:
+def _barycentric_weights(nodes: FloatArray) -> FloatArray:
     gaps = nodes[:, None] - nodes
     np.fill_diagonal(gaps, 1.0)
     return np.asarray(1.0 / gaps.prod(axis=1))

@@ -1,9 +1,8 @@
-"""Nonlinear least squares with what an honest fit must say: uncertainty, correlation, and what cannot be determined.
+"""Nonlinear least squares with uncertainty, correlation, parameters that cannot be determined, and lack of fit.
 
-Parameters are scaled by their sizes. Columns of the scaled Jacobian that vanish belong to
-parameters without effect; directions with a vanishing singular value to parameters that
-cannot be told apart. Residuals of a smooth misfit are not independent: the covariance is
-inflated by their correlation time, as if there were fewer of them.
+Parameters are scaled by their sizes. Columns of the scaled Jacobian that vanish belong to parameters without effect;
+directions with a vanishing singular value to parameters that cannot be told apart. Residuals of a smooth misfit are not
+independent: the covariance is inflated by their correlation time, as if there were fewer of them.
 """
 
 from __future__ import annotations
@@ -144,11 +143,11 @@ def solve(
     """
     if not np.isfinite(problem.residuals(problem.start)).all():
         raise NotFinite
-    best = _minimum(problem, problem.start, "linear", 1.0)
+    best = _minimise(problem, problem.start, "linear", 1.0)
     noise = 1.4826 * float(np.median(np.abs(best.fun)))
     if loss != "linear" and noise > 1e-12 * problem.level:
-        best = _minimum(problem, best.x * problem.size, loss, 2.0 * noise)
-    return _fit(problem, best, loss)
+        best = _minimise(problem, best.x * problem.size, loss, 2.0 * noise)
+    return _fitted_values(problem, best, loss)
 
 
 def evaluate_start(problem: LeastSquares) -> FittedValues:
@@ -160,7 +159,7 @@ def evaluate_start(problem: LeastSquares) -> FittedValues:
     return FittedValues(empty, np.zeros((0, 0)), residuals, rms, inflation, np.zeros(0, dtype=bool), freedom, True)
 
 
-def _minimum(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float) -> Any:
+def _minimise(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float) -> Any:
     from scipy.optimize import least_squares
 
     size = problem.size
@@ -181,7 +180,7 @@ def _minimum(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float)
     )
 
 
-def _fit(problem: LeastSquares, best: Any, loss: Loss) -> FittedValues:
+def _fitted_values(problem: LeastSquares, best: Any, loss: Loss) -> FittedValues:
     at_bound = best.active_mask != 0
     # the solver stays inside by a hair
     values = np.where(at_bound, np.where(best.active_mask < 0, problem.low, problem.high), best.x * problem.size)

@@ -19,7 +19,7 @@ FIRST_PANELS = 16
 
 
 @cache
-def _rule() -> tuple[FloatArray, FloatArray, FloatArray]:
+def _gauss_rule() -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the nodes on [-1, 1] and what turns values there into an antiderivative and a tail.
 
     Two matrices apply to values at the nodes: the first gives the coefficients (highest
@@ -36,10 +36,9 @@ def _rule() -> tuple[FloatArray, FloatArray, FloatArray]:
 class RunningIntegral:
     """The integral of a function from `start` to any point up to `stop`.
 
-    On each panel the function is interpolated at its Gauss nodes, and that polynomial is
-    integrated exactly. Panels whose last coefficients are not negligible are halved, so
-    that a singularity near an end costs a few more panels and no accuracy. A query
-    evaluates one polynomial: it does not call the function again.
+    On each panel the function is interpolated at its Gauss nodes, and that polynomial is integrated exactly. Panels
+    whose last coefficients are not negligible are halved, so that a singularity near an end costs a few more panels and
+    no accuracy. A query evaluates one polynomial: it does not call the function again.
 
     Examples
     --------
@@ -58,11 +57,11 @@ class RunningIntegral:
     ) -> None:
         edges = np.linspace(start, stop, FIRST_PANELS + 1)
         middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-        powers, rough = _panels(function, middle, half)
+        powers, rough = _panel_antiderivatives(function, middle, half)
         while (split := rough > tolerance * np.abs(powers[-1]).sum()).any() and len(middle) < max_panels:
             quarter = np.repeat(0.5 * half[split], 2)
             centers = np.repeat(middle[split], 2) + quarter * np.tile([-1.0, 1.0], int(split.sum()))
-            new_powers, new_rough = _panels(function, centers, quarter)
+            new_powers, new_rough = _panel_antiderivatives(function, centers, quarter)
             middle = np.concatenate([middle[~split], centers])
             half = np.concatenate([half[~split], quarter])
             powers = np.concatenate([powers[:, ~split], new_powers], axis=1)
@@ -102,11 +101,11 @@ class RunningIntegral:
         return result
 
 
-def _panels(
+def _panel_antiderivatives(
     function: Callable[[FloatArray], FloatArray], middle: FloatArray, half: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the antiderivative's coefficients on each panel (powers first), and what they neglect."""
-    nodes, to_powers, to_tail = _rule()
+    nodes, to_powers, to_tail = _gauss_rule()
     values = function(middle[:, None] + half[:, None] * nodes) * half[:, None]
     tail = np.abs(values @ to_tail)
     last, before = tail[:, 2] + tail[:, 3], tail[:, 0] + tail[:, 1]

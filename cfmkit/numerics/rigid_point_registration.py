@@ -1,10 +1,9 @@
-"""Robust registration of measured points to smooth curves by one rigid motion, with its uncertainty.
+"""Robust registration of measured points to smooth curves by one rigid motion, perhaps with a width; gaps of points.
 
-Iterative closest point: each point finds its foot on its curve by Newton's method, then a
-weighted point-to-line Gauss-Newton step moves all points at once by an angle and a shift.
-Weights are Tukey's biweight of the normal residuals, c = 4.685, in units of their robust
-standard deviation on their curve, 1.4826 MAD; the iteration starts without weights. Several curves are
-registered jointly: one motion each would hide how they stand to each other.
+Iterative closest point: each point finds its foot on its curve by Newton's method, then a weighted point-to-line
+Gauss-Newton step moves all points at once by an angle and a shift. Weights are Tukey's biweight of the normal
+residuals, c = 4.685, in units of their robust standard deviation on their curve, 1.4826 MAD; the iteration starts
+without weights. Several curves are registered jointly: one motion each would hide how they stand to each other.
 
 A part that is wider by the same amount along all normals can be registered with that width as a fourth
 unknown. Without it steep curves take the width for a shift along them, and where they are less
@@ -120,8 +119,8 @@ def feet(
         at = curve.frame(u)
         gap = points - at.points
         # Beyond the centre of curvature Newton's step would turn round.
-        bend = np.maximum(1.0 + at.curvature * _dot(gap, at.normals), 0.2)
-        new = np.clip(u + _dot(gap, at.tangents) / (at.speed * bend), low, high)
+        bend = np.maximum(1.0 + at.curvature * _row_dot(gap, at.normals), 0.2)
+        new = np.clip(u + _row_dot(gap, at.tangents) / (at.speed * bend), low, high)
         done = np.max(np.abs(new - u)) <= 1e-15 * (high - low)
         u = new
         if done:
@@ -147,7 +146,7 @@ def register(
             nearest = [feet(curve, item, u) for curve, item, u in zip(curves, moved, guess, strict=True)]
             guess = [*nearest]
             rows, residuals, weights = _equations(curves, moved, nearest, weighted, state[3])
-            step = _step(rows[:, : 4 if width else 3], residuals - state[3], weights, size)
+            step = _weighted_step(rows[:, : 4 if width else 3], residuals - state[3], weights, size)
             state[:3] = state[0] + step[0], *turn_points(state[None, 1:3], step[0], step[1:3])[0]
             state[3] += step[3] if width else 0.0
             if np.abs(step[:3] * [size, 1.0, 1.0]).max() <= 1e-14 * size:
@@ -188,17 +187,17 @@ def _equations(
     """
     frames = [curve.frame(u) for curve, u in zip(curves, parameters, strict=True)]
     points, normals = np.concatenate(moved), np.concatenate([item.normals for item in frames])
-    residuals = _dot(points - np.concatenate([item.points for item in frames]), normals)
+    residuals = _row_dot(points - np.concatenate([item.points for item in frames]), normals)
     lever = normals[:, 1] * points[:, 0] - normals[:, 0] * points[:, 1]
     rows = np.column_stack([lever, normals, -np.ones(len(normals))])
     inside = np.concatenate([_find_inside(curve, u) for curve, u in zip(curves, parameters, strict=True)])
     weights = inside.astype(float)
     if weighted:
-        weights *= _trust(residuals - width, inside, [len(item) for item in moved])
+        weights *= _weights_by_curve(residuals - width, inside, [len(item) for item in moved])
     return rows, residuals, weights
 
 
-def _trust(residuals: FloatArray, inside: Any, counts: Sequence[int]) -> FloatArray:
+def _weights_by_curve(residuals: FloatArray, inside: Any, counts: Sequence[int]) -> FloatArray:
     """Return Tukey's weights, each curve by its own spread: one that was made worse is no outlier as a whole."""
     cuts = np.cumsum(counts)[:-1]
     parts = zip(np.split(residuals, cuts), np.split(inside, cuts), strict=True)
@@ -211,7 +210,7 @@ def _find_inside(curve: SmoothCurve, u: FloatArray) -> Any:
     return (u > low + margin) & (u < high - margin)
 
 
-def _step(rows: FloatArray, residuals: FloatArray, weights: FloatArray, size: float) -> FloatArray:
+def _weighted_step(rows: FloatArray, residuals: FloatArray, weights: FloatArray, size: float) -> FloatArray:
     root = np.sqrt(weights)[:, None]
     scale = np.array([size, 1.0, 1.0, 1.0])[: rows.shape[1]]
     solution = np.linalg.lstsq(root * rows / scale, -root[:, 0] * residuals, rcond=None)[0]
@@ -235,7 +234,7 @@ def _registration(
     normal = rows.T @ (weights[:, None] * rows)
     covariance: FloatArray = variance * alike * np.asarray(np.linalg.pinv(normal, rcond=1e-18), dtype=float)
     size = float(np.ptp(np.concatenate(moved), axis=0).max())
-    answer = _step(rows, np.ones_like(residuals), weights, size)
+    answer = _weighted_step(rows, np.ones_like(residuals), weights, size)
     x, y = np.concatenate(moved).mean(axis=0)
     growth = answer[1:3] + answer[0] * np.array([-y, x])
     return Registration(
@@ -261,5 +260,5 @@ def gaps_across(
     return np.asarray(points[:, axis] - curve.frame(u).points[:, axis])
 
 
-def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
+def _row_dot(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.asarray((first * second).sum(axis=1))

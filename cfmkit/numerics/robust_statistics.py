@@ -1,4 +1,4 @@
-"""Robust statistics: scales and weights that a few outliers do not move."""
+"""Robust statistics: scales, weights, noise and spikes of samples, which a few outliers do not move."""
 
 from __future__ import annotations
 

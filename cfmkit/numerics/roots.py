@@ -1,4 +1,4 @@
-"""Root finding for many targets at once, and ends of conditions between places where they hold and where not.
+"""Root finding for many targets or functions at once, and the last places at which conditions hold.
 
 Roots are safeguarded: Newton inside a shrinking bracket.
 """

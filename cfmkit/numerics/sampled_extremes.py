@@ -1,4 +1,4 @@
-"""Extremes of sampled functions: turning points of curves with known slopes, largest values with derivatives.
+"""Extremes of sampled functions: turning points by known slopes, largest values with derivatives, smooth least values.
 
 With known slopes a curve is its Hermite cubic between two samples, and turning points are the roots of a quadratic: two
 that lie between the same samples are found, too. Along samples and turning points together every curve is monotonic
@@ -118,13 +118,13 @@ def _parabola(places: FloatArray, values: FloatArray) -> tuple[FloatArray, Float
     best = flat.argmax(axis=1)
     three = np.clip(best, 1, count - 2)[:, None] + np.array([-1, 0, 1])
     t, f = where[rows[:, None], three], flat[rows[:, None], three]
-    vertex = _vertex(t, f, where[rows, best])
+    vertex = _vertices(t, f, where[rows, best])
     away = vertex[:, None] - t
     weight = away[:, [1, 2, 0]] * away[:, [2, 0, 1]] / ((t - t[:, [1, 2, 0]]) * (t - t[:, [2, 0, 1]]))
     return (weight * f).sum(axis=1), vertex, three, weight
 
 
-def _vertex(t: FloatArray, f: FloatArray, otherwise: FloatArray) -> FloatArray:
+def _vertices(t: FloatArray, f: FloatArray, otherwise: FloatArray) -> FloatArray:
     """Return where the parabolas through three samples (n, 3) each are highest, `otherwise` where they have no top."""
     first = (f[:, 1] - f[:, 0]) / (t[:, 1] - t[:, 0])
     second = (f[:, 2] - f[:, 1]) / (t[:, 2] - t[:, 1])

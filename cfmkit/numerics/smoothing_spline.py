@@ -1,4 +1,4 @@
-"""Smoothing splines whose smoothness follows from the noise that is stated, not from the eye.
+"""Smoothing splines whose smoothness follows from the noise that is stated.
 
 Discrepancy principle: of all cubic splines that minimise sum (y - s)^2 + lambda integral s''^2
 the one is taken whose residuals are as large as the noise, sum (y - s)^2 = n sigma^2.

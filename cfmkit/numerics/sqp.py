@@ -81,7 +81,7 @@ class Optimum:
     @property
     def violation(self) -> float:
         """By how much the worst constraint is violated; infinite where the model has no answer."""
-        return _excess(self.constraints) if np.isfinite(self.objective) else np.inf
+        return _largest_violation(self.constraints) if np.isfinite(self.objective) else np.inf
 
     @property
     def feasible(self) -> bool:
@@ -89,7 +89,7 @@ class Optimum:
         return self.violation <= self.allowed
 
 
-def _excess(constraints: FloatArray) -> float:
+def _largest_violation(constraints: FloatArray) -> float:
     return max(0.0, -float(constraints.min(initial=np.inf)))
 
 
@@ -169,7 +169,7 @@ class _Memory:
         return self.answer
 
     def _keep(self, z: FloatArray, objective: float, constraints: FloatArray) -> None:
-        excess = _excess(constraints)
+        excess = _largest_violation(constraints)
         self._wait(excess)
         rank = (0.0, objective) if excess <= self.effort.violation else (excess, objective)
         if self.best is None or self._is_better(rank):

@@ -1,4 +1,4 @@
-"""Points that cover the unit cube evenly, drawn by scipy: which ways there are, by name."""
+"""Points that cover the unit cube evenly, and the ways to draw them by name (Latin hypercube, Sobol, ...)."""
 
 from __future__ import annotations
 

@@ -75,12 +75,12 @@ def assembly_figure(
         figure = new_figure(width, room[1] + list_box[3] + top + BOTTOM_ROOM)
     write_heading(figure, Heading(title, subject))
     ax = _blank_axes(figure, (0.0, size_mm(figure)[1] - top - room[1], *room))
-    _frame(ax, low, high)
+    _set_view(ax, low, high)
     made = {part.body for part in parts if part.source == "make"}
     for body, outline in drawn:
         fill = PLATE_COLOUR if body.name in made else SPRING_OCHRE if body.name.startswith("spring") else STEEL_COLOUR
         ax.fill(*outline.T, zorder=2, facecolor=fill, edgecolor=TEXT_INK, linewidth=0.6, alpha=0.85, gid=body.name)
-    _balloons(ax, drawn, parts, low, high)
+    _draw_balloons(ax, drawn, parts, low, high)
     _write_list(_blank_axes(figure, list_box), parts, list_box[2:])
     return figure
 
@@ -99,7 +99,7 @@ def _print_size(ax: Axes) -> tuple[float, float]:
     return width * box.width, height * box.height
 
 
-def _frame(ax: Axes, low: FloatArray, high: FloatArray) -> None:
+def _set_view(ax: Axes, low: FloatArray, high: FloatArray) -> None:
     """Set the limits of the axes: the parts to scale, with room for balloons."""
     width, height = _print_size(ax)
     scale = min((width - 2.0 * EDGE_MARGIN) / (high[0] - low[0]), (height - 2.0 * EDGE_MARGIN) / (high[1] - low[1]))
@@ -109,7 +109,7 @@ def _frame(ax: Axes, low: FloatArray, high: FloatArray) -> None:
     ax.set_aspect("equal")
 
 
-def _balloons(
+def _draw_balloons(
     ax: Axes,
     drawn: Sequence[tuple[PosedBody, FloatArray]],
     parts: Sequence[ListedPart],
@@ -131,11 +131,11 @@ def _balloons(
             others = [place for entry, place in anchors.items() if entry != number]
             if all(math.dist(anchors[number], place) > neighbours for place in others):
                 break
-    left, right = _sides(anchors, middle[0])
+    left, right = _split_in_sides(anchors, middle[0])
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     per_mm = (x1 - x0) / _print_size(ax)[0]
     for side, numbers in ((x0 + 1.5 * BALLOON_RADIUS * per_mm, left), (x1 - 1.5 * BALLOON_RADIUS * per_mm, right)):
-        heights = _spread([anchors[number][1] for number in numbers], 2.6 * BALLOON_RADIUS * per_mm, (y0, y1))
+        heights = _space_out([anchors[number][1] for number in numbers], 2.6 * BALLOON_RADIUS * per_mm, (y0, y1))
         for number, height in zip(numbers, heights, strict=True):
             x, y = anchors[number]
             ax.plot([x, side], [y, height], color=TEXT_GREY, linewidth=0.5, zorder=5)
@@ -153,7 +153,7 @@ def _anchor(outline: FloatArray, share: float) -> tuple[float, float]:
     return tuple((middle + share * (high - middle)).tolist())
 
 
-def _sides(anchors: dict[int, tuple[float, float]], middle: float) -> tuple[list[int], list[int]]:
+def _split_in_sides(anchors: dict[int, tuple[float, float]], middle: float) -> tuple[list[int], list[int]]:
     """Return the numbers that stand on the left and on the right, each from below up, as many on both sides."""
     across = sorted(anchors, key=lambda number: (anchors[number][0], number))
     half = sum(anchors[number][0] < middle for number in across)
@@ -162,7 +162,7 @@ def _sides(anchors: dict[int, tuple[float, float]], middle: float) -> tuple[list
     return sorted(left, key=lambda entry: anchors[entry][1]), sorted(right, key=lambda entry: anchors[entry][1])
 
 
-def _spread(heights: Sequence[float], gap: float, ends: tuple[float, float]) -> list[float]:
+def _space_out(heights: Sequence[float], gap: float, ends: tuple[float, float]) -> list[float]:
     """Return increasing heights at least a gap apart, near to the wanted ones."""
     placed: list[float] = []
     for height in heights:

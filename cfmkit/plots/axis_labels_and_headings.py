@@ -1,4 +1,4 @@
-"""Text and axes of a figure: labels with units, headings that fit, colour keys, second axes, ranges without poles."""
+"""Text and axes of a figure: units, headings that fit, colour keys, ticks, second axes, ranges without poles."""
 
 from __future__ import annotations
 

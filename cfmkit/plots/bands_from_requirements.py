@@ -1,9 +1,8 @@
-"""Requirements that bound the force, as bands of force over a window.
+"""Requirements on the force or a value of the family as bands and limits for figures.
 
-A requirement on the ripple says how wide the force may spread below its largest
-value, one on a deviation how far it may be from its mean or target: each is a band
-once the branch that it is judged on is known. Without a branch in its name that is
-the worst one, as in the metrics.
+A requirement that bounds the force is a band of force over a window. One on the ripple says how wide the force may
+spread below its largest value, one on a deviation how far it may be from its mean or target: each is a band once the
+branch that it is judged on is known. Without a branch in its name that is the worst one, as in the metrics.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ def bands_of(result: Result) -> tuple[Band, ...]:
     if not result.curves:
         return ()
     kind = result.curves[0].kind
-    wanted = [item for item in result.spec.requirements if _plain(item.metric, kind) in _BAND_LABELS]
+    wanted = [item for item in result.spec.requirements if _without_branch(item.metric, kind) in _BAND_LABELS]
     bands = (_band(outcome, result) for outcome in check(wanted, result))
     return tuple(band for band in bands if band is not None)
 
@@ -63,14 +62,14 @@ def limits_on(result: Result, metric: str) -> tuple[Limit, ...]:
     return tuple(limits)
 
 
-def _plain(metric: str, kind: str) -> str:
+def _without_branch(metric: str, kind: str) -> str:
     """Return ``ripple`` for ``force_ripple[load]``."""
     return split_name(metric)[0].removeprefix(f"{kind}_")
 
 
 def _band(outcome: Outcome, result: Result) -> Band | None:
     metric, branch = split_name(outcome.metric)
-    metric = _plain(metric, outcome.kind)
+    metric = _without_branch(metric, outcome.kind)
     window = Window(*outcome.over) if outcome.over else None
     subjects = survey(result.curves[0], frame_of(result), window).subject.branches
     chosen = {name: rows for name, rows in subjects.items() if branch in (None, name)}
@@ -85,7 +84,7 @@ def _band(outcome: Outcome, result: Result) -> Band | None:
     elif rule is None:
         bounds = _band_about_target(result.target, outcome.max)
     else:
-        bounds, worst = _worst(chosen, rule, outcome.max)
+        bounds, worst = _worst_branch(chosen, rule, outcome.max)
     if bounds is None:
         return None
     which = f" ({worst})" if worst and len(subjects) > 1 else ""
@@ -93,7 +92,7 @@ def _band(outcome: Outcome, result: Result) -> Band | None:
     return Band(*bounds, start, stop, _sentence(outcome, _BAND_LABELS[metric].format(outcome.kind) + which), outcome.ok)
 
 
-def _ripple(spread: OneSpread, limit: float) -> BandNeed:
+def _band_of_ripple(spread: OneSpread, limit: float) -> BandNeed:
     _, high, low = spread
     return (1.0 - limit) * high, high, (high - low) / high
 
@@ -117,11 +116,11 @@ _BAND_LABELS = {
     "deviation_from_mean": "deviation from mean",
     "deviation_from_target": "deviation from target",
 }  # metrics that are bands, and what they are called on a picture
-_BAND_RULES = {"ripple": _ripple, "half_band": _half_band, "deviation_from_mean": _band_about_mean}
+_BAND_RULES = {"ripple": _band_of_ripple, "half_band": _half_band, "deviation_from_mean": _band_about_mean}
 """Bounds of the band, and what ranks the branches."""
 
 
-def _worst(
+def _worst_branch(
     subjects: Mapping[str, RowsInWindow], rule: Callable[[OneSpread, float], BandNeed], limit: float
 ) -> tuple[Bounds | None, str]:
     """Return the band of the branch that needs most of it, and that branch's name."""

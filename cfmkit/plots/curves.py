@@ -1,9 +1,8 @@
-"""A force over a displacement, or a torque over an angle, on axes; the main figure; several models together.
+"""Diagrams of force over displacement or torque over angle; the main figure of a result; several models with gaps.
 
-Branches are drawn in the order of their path: a curve that folds back shows every
-force at one displacement, gaps stay gaps, and what is unstable is dashed. Names
-stand beside their lines; where the specification bounds the force, the band that it
-allows is shaded. Of several models, what lies between each and the finest one is drawn, too.
+Branches are drawn in the order of their path: a curve that folds back shows every force at one displacement, gaps stay
+gaps, and what is unstable is dashed. Names stand beside their lines; where the specification bounds the force, the band
+that it allows is shaded. Of several models, what lies between each and the finest one is drawn, too.
 
 The main figure of a result is the same for every family. If the whole curve, drawn from zero, leaves the ripple too
 small to see, a second panel below enlarges the range that is to be constant: that of the requirement bands, or of the
@@ -121,12 +120,12 @@ def plot_curve(
         bands = bands_of(source) if look.bands else ()
     for line in earlier:
         ax.plot(*line.points.T, color=line.color, linewidth=1.0, dashes=(3, 1.5), zorder=2.8, gid="earlier")
-    _limit(ax, [*lines, *earlier, *([] if wanted is None else [wanted])], bands, look, kind)
+    _set_limits(ax, [*lines, *earlier, *([] if wanted is None else [wanted])], bands, look, kind)
     if len(curves) > 1 and look.names and look.window is None:
         narrow = USUAL_AXES_WIDTH / (ax.get_position().width * size_mm(ax.figure)[0])
         room = NAME_ROOM * min(max(narrow, 1.0), 2.0)
         ax.set_xlim(right=ax.get_xlim()[1] + room * float(np.ptp(ax.get_xlim())))
-    region_names = [shade(ax, region, _motion(kind)) for region in look.regions]
+    region_names = [shade(ax, region, _motion_dimension(kind)) for region in look.regions]
     level_names = [level(ax, float(to_border(item.value, kind)), item.text) for item in look.levels]
     band_names = [_draw_band(ax, band, curves[0]) for band in bands]
     ax.set_xlabel(axis_label(curves[0].motion_name, curves[0].motion_dimension))
@@ -136,8 +135,8 @@ def plot_curve(
     if look.arrows and not _all_coincide(ax, lines):
         for line in lines:
             _draw_arrow(ax, line)
-    earlier_names = [_name(line, 0.3) for line in earlier[:1]]
-    target_names = [] if wanted is None else [_name(wanted, 0.85)]
+    earlier_names = [_label_of_line(line, 0.3) for line in earlier[:1]]
+    target_names = [] if wanted is None else [_label_of_line(wanted, 0.85)]
     if wanted is not None:
         ax.plot(*wanted.points.T, color=wanted.color, linewidth=1.0, dashes=(6, 3), zorder=3.5)
     if look.names:
@@ -221,13 +220,13 @@ def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int, bool]]:
     return [run if run[2] else (max(run[0] - 1, 0), min(run[1] + 1, len(stable)), False) for run in runs]
 
 
-def _motion(kind: str) -> str:
+def _motion_dimension(kind: str) -> str:
     return "length" if kind == "force" else "angle"
 
 
-def _limit(ax: Axes, lines: list[_Line], bands: Sequence[Band], look: CurveLook, kind: str) -> None:
+def _set_limits(ax: Axes, lines: list[_Line], bands: Sequence[Band], look: CurveLook, kind: str) -> None:
     """Set limits that show everything from zero on, or what the look asks for."""
-    motion = _motion(kind)
+    motion = _motion_dimension(kind)
     if look.window is not None:
         ax.set_xlim(*(float(to_border(value, motion)) for value in look.window[0]))
         ax.set_ylim(*(float(to_border(value, kind)) for value in look.window[1]))
@@ -288,7 +287,7 @@ def _earlier_lines(kind: Kind) -> list[_Line]:
     return [_Line(points, np.ones(len(points), dtype=np.bool_), TEXT_GREY, name) for points in earlier.branches]
 
 
-def _name(line: _Line, prefer: float) -> Label:
+def _label_of_line(line: _Line, prefer: float) -> Label:
     return Label(line.name, line.color, line.points, prefer)
 
 
@@ -299,12 +298,12 @@ def _name_lines(ax: Axes, lines: list[_Line]) -> list[Label]:
         return [Label(" and ".join(line.name for line in named), named[-1].color, named[0].points, prefer=0.6)]
     if len({line.color for line in lines}) < len(lines) or len(named) > 2:
         return [_name_at_end(line) for line in named]
-    return [_name(line, 0.6 - 0.2 * i) for i, line in enumerate(named)]
+    return [_label_of_line(line, 0.6 - 0.2 * i) for i, line in enumerate(named)]
 
 
 def _name_at_end(line: _Line) -> Label:
     if line.faint:
-        return _name(line, 0.5)
+        return _label_of_line(line, 0.5)
     finite = line.points[np.isfinite(line.points).all(axis=1)]
     return Label(line.name, line.color, finite[-max(len(finite) // 20, 1) :], prefer=1.0, toward=(1.0, 0.0))
 
@@ -438,7 +437,7 @@ def choose_enlarged_range(result: Result, look: CurveLook) -> tuple[Interval, In
     """Return the range of motion and of effort [SI] to enlarge; None if the whole curve shows it well."""
     curve = result.curve
     bands = bands_of(result)
-    spans = [(band.start, band.stop) for band in bands] or [_window(result)]
+    spans = [(band.start, band.stop) for band in bands] or [_window_without_bands(result)]
     efforts = [curve.effort[(curve.motion >= start) & (curve.motion <= stop)] for start, stop in spans]
     bounds = [value for band in bands for value in (band.low, band.high) if value is not None]
     levels = [level.value for level in look.levels]
@@ -454,7 +453,7 @@ def choose_enlarged_range(result: Result, look: CurveLook) -> tuple[Interval, In
     return motion, (middle - half, middle + half)
 
 
-def _window(result: Result) -> Interval:
+def _window_without_bands(result: Result) -> Interval:
     """Return the motion to enlarge if there are no requirement bands."""
     window = window_of(result)
     if window is not None:

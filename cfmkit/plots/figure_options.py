@@ -106,10 +106,10 @@ def form_of(
 
     earlier = None if overlay is None else read_earlier(overlay)
     looks = () if style is None else settings(style)
-    return FigureForm(names, None if width is None else _width(width), titles, plain, earlier, looks)
+    return FigureForm(names, None if width is None else _read_width(width), titles, plain, earlier, looks)
 
 
-def _width(text: str) -> float:
+def _read_width(text: str) -> float:
     from cfmkit.errors import QuantityError
     from cfmkit.specs.units import read_quantity
 

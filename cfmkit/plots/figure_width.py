@@ -81,7 +81,7 @@ def print_width(usual: float) -> float:
 
 
 @contextmanager
-def _apply(layout: FigureLayout) -> Iterator[None]:
+def _with_layout(layout: FigureLayout) -> Iterator[None]:
     mark = _ACTIVE_LAYOUT.set(layout)
     try:
         yield
@@ -92,13 +92,13 @@ def _apply(layout: FigureLayout) -> Iterator[None]:
 def draw_in_width(make: Callable[[], Figure], width: float | None, titles: bool) -> Figure:
     """Return a figure in a width [mm], by default its own; without titles their height is cut off."""
     first = layout = FigureLayout(width=width)
-    with _apply(first):
+    with _with_layout(first):
         figure = make()
     if not first.axes:
         return figure
     for _ in range(2):  # keys and notes that take more lines in the new width get their room in the second round
         layout = _fit(figure, layout.axes, first, first.size[0] if width is None else width, titles)
-        with _apply(layout):
+        with _with_layout(layout):
             figure = make()
         for number, ax in enumerate(figure.axes):
             if layout.own_numbers:
@@ -132,13 +132,13 @@ def _fit(figure: Figure, axes: Sequence[Axes], first: FigureLayout, width: float
         for ax in figure.axes:
             if _is_too_long(ax):
                 _break_label(ax)
-        around = height - _height_of_rows(placed, rows)
+        around = height - _row_height(placed, rows)
         factor = float(np.median(placed[:, 2] / boxes[:, 2]))
         if stacked:
             factor = min(1.0, (MAX_STACK_HEIGHT_MM - around) / rows.sizes.sum(), factor if to_scale else 1.0)
         elif not to_scale:
             factor = min(max(factor, MIN_HEIGHT_FACTOR), MAX_HEIGHT_FACTOR)
-        height = around + max(factor, 0.2) * _height_of_rows(boxes, rows)
+        height = around + max(factor, 0.2) * _row_height(boxes, rows)
     placed = lay_out(height)
     broken = tuple(number for number, ax in enumerate(figure.axes) if "\n[" in ax.get_ylabel())
     return FigureLayout((width, height), boxes=list(map(tuple, placed.tolist())), own_numbers=stacked, broken=broken)
@@ -159,12 +159,12 @@ class _Cells:
 
 def _cells(boxes: FloatArray) -> tuple[_Cells, _Cells]:
     """Return rows from the top and columns from the left, in the order in which boxes begin."""
-    columns = _find_cells(boxes[:, 0], boxes[:, 0] + boxes[:, 2])
-    rows = _find_cells(-(boxes[:, 1] + boxes[:, 3]), -boxes[:, 1])
+    columns = _cells_along(boxes[:, 0], boxes[:, 0] + boxes[:, 2])
+    rows = _cells_along(-(boxes[:, 1] + boxes[:, 3]), -boxes[:, 1])
     return rows, columns
 
 
-def _find_cells(starts: FloatArray, ends: FloatArray) -> _Cells:
+def _cells_along(starts: FloatArray, ends: FloatArray) -> _Cells:
     """Return the cells along one direction: a new one begins where a box begins that is beyond another one."""
     edges = [float(starts.min())]
     for start in np.sort(starts):
@@ -196,7 +196,7 @@ def _must_stack(boxes: FloatArray, size: float, width: float) -> bool:
     return share < MIN_SHARE_OF_WIDTH and columns.count > 1 and len(boxes) <= MAX_STACKED and boxes[:, 2].min() > KEY_MM
 
 
-def _height_of_rows(boxes: FloatArray, rows: _Cells) -> float:
+def _row_height(boxes: FloatArray, rows: _Cells) -> float:
     """Return the height of the rows of axes, without what is between them [mm]."""
     single = rows.first == rows.last
     heights = [float(boxes[single & (rows.first == row), 3].max(initial=0.0)) for row in range(rows.count)]

@@ -1,4 +1,4 @@
-"""Folder of matplotlib's list of fonts: in its own folder, or in a private one where that cannot be written."""
+"""Folder of matplotlib's list of fonts, a private one where its own cannot be written; the font of figures."""
 
 from __future__ import annotations
 

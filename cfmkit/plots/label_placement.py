@@ -1,9 +1,8 @@
-"""Labels placed beside the objects that they name, where no other line is drawn.
+"""Labels placed beside the objects that they name, where no other line is drawn: one pass, the same result every time.
 
-The axes are divided into cells of about half a millimetre. Every line, patch and
-text marks the cells it covers; a name goes to the place near its line where it
-covers fewest of them, and where no other name and if possible no other line lies
-between the two. One pass, no iteration, the same result every time.
+The axes are divided into cells of about half a millimetre. Every line, patch and text marks the cells it covers; a name
+goes to the place near its line where it covers fewest of them, and where no other name and if possible no other line
+lies between the two.
 """
 
 from __future__ import annotations
@@ -83,15 +82,15 @@ def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray])
         return None
     text = ground.ax.text(0, 0, label.text, size=size, color=label.color, ha="center", va="center", linespacing=1.15)
     box = ground.size_of(text)
-    together = _together(points, others)
-    center, cost = _best(ground, label, (points, together), box)
+    together = _near_other_lines(points, others)
+    center, cost = _cheapest_place(ground, label, (points, together), box)
     covered = float(ground.count_covered(center[None, :], box)[0])
     if covered > 0:
         chosen, cost = label.text, cost + 2.0 * COVERING_COST * covered
         for words in (label.text, _break_in_two(label.text)):
             text.set_text(words)
             size_of_label = ground.size_of(text)
-            place, price = _best(ground, label, (points, together), size_of_label, FINER_GAPS)
+            place, price = _cheapest_place(ground, label, (points, together), size_of_label, FINER_GAPS)
             if price < cost:
                 center, cost, box, chosen = place, price, size_of_label, words
         text.set_text(chosen)
@@ -99,11 +98,11 @@ def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray])
     text.set_position(tuple(center / ground.extent))
     text.set_zorder(6)
     if label.halo:
-        _clear(ground, center, box)
+        _clear_ground(ground, center, box)
     gap = np.hypot(*np.maximum(np.abs(points - center) - box / 2, 0.0).T)
     anchor = points[int(np.argmin(gap))]
     if gap.min() > MIN_LEADER_DISTANCE:
-        _lead(ground, (center, box, anchor), label.color)
+        _draw_leader(ground, (center, box, anchor), label.color)
     ground.occupy(center, box + 2.0)
     return text
 
@@ -130,7 +129,7 @@ def _thin_points(points: FloatArray, most: int = 80) -> FloatArray:
     return points if len(points) <= most else points[np.linspace(0, len(points) - 1, most).astype(int)]
 
 
-def _together(points: FloatArray, others: list[FloatArray]) -> NDArray[np.bool_]:
+def _near_other_lines(points: FloatArray, others: list[FloatArray]) -> NDArray[np.bool_]:
     """Return at which points [pt] another named line is so near that a name there would be taken for that of either."""
     is_near = np.zeros(len(points), dtype=bool)
     for line in others:
@@ -139,7 +138,7 @@ def _together(points: FloatArray, others: list[FloatArray]) -> NDArray[np.bool_]
     return is_near
 
 
-def _best(
+def _cheapest_place(
     ground: _Ground,
     label: Label,
     named: tuple[FloatArray, NDArray[np.bool_]],
@@ -148,7 +147,7 @@ def _best(
 ) -> tuple[FloatArray, float]:
     """Return the cheapest centre for a box [pt] beside points, some together with other lines, and what it costs."""
     points, together = named
-    sides, gaps = _ways(tried)
+    sides, gaps = _offset_directions(tried)
     offsets, away = sides * (box / 2 + gaps), gaps.max(axis=1)
     centers = (points[:, None, :] + offsets[None, :, :]).reshape(-1, 2)
     share = np.repeat(np.linspace(0.0, 1.0, len(points)) if len(points) > 1 else [label.prefer], len(offsets))
@@ -167,7 +166,7 @@ def _best(
     return centers[cheapest], float(cost[cheapest])
 
 
-def _ways(tried: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+def _offset_directions(tried: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
     """Return on which sides of a point a name may stand (n, 2), and how far away in both directions (n, 2) [pt].
 
     In a narrow figure a corner of the name may also stand above or below the point, not on a diagonal alone.
@@ -185,7 +184,7 @@ def _ways(tried: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
 
 def _cost_between(ground: _Ground, centers: FloatArray, box: FloatArray, anchors: FloatArray) -> FloatArray:
     """Return what it costs that something lies between boxes and their anchors (n, 2) [pt]."""
-    starts = _edges(centers, box, anchors)
+    starts = _nearest_box_points(centers, box, anchors)
     leaders = anchors - starts
     length = np.hypot(leaders[:, 0], leaders[:, 1])
     # the line that is named ends the way: its own cells are no obstacle
@@ -195,12 +194,12 @@ def _cost_between(ground: _Ground, centers: FloatArray, box: FloatArray, anchors
     return 15.0 * ground.any_at(places, ground.taken) + 60.0 * ground.any_at(places, ground.named)
 
 
-def _edges(centers: FloatArray, box: FloatArray, anchors: FloatArray) -> FloatArray:
+def _nearest_box_points(centers: FloatArray, box: FloatArray, anchors: FloatArray) -> FloatArray:
     """Return the point of each box that is nearest to its anchor."""
     return np.asarray(centers + np.clip(anchors - centers, -box / 2, box / 2))
 
 
-def _clear(ground: _Ground, center: FloatArray, box: FloatArray) -> None:
+def _clear_ground(ground: _Ground, center: FloatArray, box: FloatArray) -> None:
     """Clear grid and shades behind a name; lines, which lie above, stay whole."""
     from matplotlib.patches import Rectangle
 
@@ -209,10 +208,10 @@ def _clear(ground: _Ground, center: FloatArray, box: FloatArray) -> None:
     ground.ax.add_artist(Rectangle(tuple(low), *size, transform=ground.ax.transAxes, **look))
 
 
-def _lead(ground: _Ground, where: tuple[FloatArray, FloatArray, FloatArray], color: str) -> None:
+def _draw_leader(ground: _Ground, where: tuple[FloatArray, FloatArray, FloatArray], color: str) -> None:
     """Draw a thin line from the edge of a name's box to its anchor."""
     center, box, anchor = where
-    ends = np.array([_edges(center, box, anchor), anchor]) / ground.extent
+    ends = np.array([_nearest_box_points(center, box, anchor), anchor]) / ground.extent
     ground.ax.plot(*ends.T, transform=ground.ax.transAxes, color=color, linewidth=0.5, zorder=5, clip_on=False)
 
 
@@ -231,7 +230,7 @@ class _Ground:
         self.named = np.zeros(self.shape, dtype=np.int64)
         for line in self.ax.lines:
             if line.get_visible() and line.get_gid() != "no-obstacle":
-                self._mark(self._points(np.asarray(line.get_xydata(), dtype=float), line.get_transform()))
+                self._mark(self._in_points(np.asarray(line.get_xydata(), dtype=float), line.get_transform()))
         for patch in self.ax.patches:
             if patch.get_gid() != "no-obstacle":
                 outline = patch.get_path().to_polygons(patch.get_transform(), closed_only=False)
@@ -242,14 +241,14 @@ class _Ground:
                 box = text.get_window_extent()
                 low = (np.array([box.x0, box.y0]) - self.corner) * self.scale
                 self._fill(low, low + np.array([box.width, box.height]) * self.scale)
-        self._sum()
+        self._sum_taken()
 
-    def _points(self, values: FloatArray, transform: Transform) -> FloatArray:
+    def _in_points(self, values: FloatArray, transform: Transform) -> FloatArray:
         return np.asarray((np.asarray(transform.transform(values)) - self.corner) * self.scale)
 
     def to_points(self, data: FloatArray) -> FloatArray:
         """Return data coordinates in points."""
-        return self._points(data, self.ax.transData)
+        return self._in_points(data, self.ax.transData)
 
     def size_of(self, text: Text) -> FloatArray:
         """Return the width and height of a text [pt]."""
@@ -289,13 +288,13 @@ class _Ground:
         a, b = self._corners(low, high)
         self.taken[a[0] : b[0], a[1] : b[1]] = self.named[a[0] : b[0], a[1] : b[1]] = 1
 
-    def _sum(self) -> None:
+    def _sum_taken(self) -> None:
         self.total = np.pad(self.taken.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
 
     def occupy(self, center: FloatArray, box: FloatArray) -> None:
         """Mark a box as taken by a name, for the names that follow."""
         self._fill(center - box / 2, center + box / 2)
-        self._sum()
+        self._sum_taken()
 
     def count_covered(self, centers: FloatArray, box: FloatArray) -> FloatArray:
         """Return how many taken cells a box covers at each centre, in units of its own height."""

@@ -93,8 +93,8 @@ def _merge_poses(poses: Sequence[ElementTree.Element], title: str) -> str:
     """Return poses as one: runs of what differs between pieces that all of them have, in the order of drawing."""
     ElementTree.register_namespace("", _SVG_NAMESPACE)
     ElementTree.register_namespace("xlink", _XLINK_NAMESPACE)
-    elements = [[_plain(element) for element in _pieces(pose)] for pose in poses]
-    common = _common(elements)
+    elements = [[_comparable_text(element) for element in _pieces(pose)] for pose in poses]
+    common = _common_pieces(elements)
     body: list[str] = []
     at = [0] * len(elements)
     for anchor in [*common, None]:
@@ -107,7 +107,7 @@ def _merge_poses(poses: Sequence[ElementTree.Element], title: str) -> str:
         body += [] if anchor is None else [anchor]
     shared: dict[str, str] = {}
     for pose in poses:
-        shared |= {piece.get("id", ""): _plain(piece) for piece in pose.iter() if _is_shared(piece)}
+        shared |= {piece.get("id", ""): _comparable_text(piece) for piece in pose.iter() if _is_shared(piece)}
     box = poses[0].get("viewBox", "")
     return (
         f'<svg xmlns="{_SVG_NAMESPACE}" xmlns:xlink="{_XLINK_NAMESPACE}" viewBox="{box}" role="img" '
@@ -129,12 +129,12 @@ def _is_shared(piece: ElementTree.Element) -> bool:
     return bool(name) and (piece.tag == f"{_SVG_TAG}clipPath" or (piece.tag == f"{_SVG_TAG}path" and name[5:6] == "m"))
 
 
-def _plain(piece: ElementTree.Element) -> str:
+def _comparable_text(piece: ElementTree.Element) -> str:
     text = ElementTree.tostring(piece, encoding="unicode")
     return re.sub(r"\s+", " ", re.sub(r' xmlns(:\w+)?="[^"]*"', "", text)).replace(" />", "/>").strip()
 
 
-def _common(elements: Sequence[Sequence[str]]) -> list[str]:
+def _common_pieces(elements: Sequence[Sequence[str]]) -> list[str]:
     """Return what every pose has once, in the one order that all have it in."""
     once = [{piece for piece in pieces if pieces.count(piece) == 1} for pieces in elements]
     shared = set.intersection(*once)
@@ -204,7 +204,7 @@ def animation(
         require_ffmpeg()
     sweep = frames(result, moving)
     whole = [*sweep, *sweep[-2:0:-1]]
-    return _gif(whole) if kind == "gif" else _film(whole)
+    return _encode_gif(whole) if kind == "gif" else _encode_mp4(whole)
 
 
 def require_ffmpeg() -> str:
@@ -217,7 +217,7 @@ def require_ffmpeg() -> str:
     return program
 
 
-def _gif(whole: Sequence[NDArray[np.uint8]]) -> bytes:
+def _encode_gif(whole: Sequence[NDArray[np.uint8]]) -> bytes:
     from PIL import Image
 
     first, *more = (Image.fromarray(frame).quantize(64, dither=Image.Dither.NONE) for frame in whole)
@@ -226,7 +226,7 @@ def _gif(whole: Sequence[NDArray[np.uint8]]) -> bytes:
     return into.getvalue()
 
 
-def _film(whole: Sequence[NDArray[np.uint8]]) -> bytes:
+def _encode_mp4(whole: Sequence[NDArray[np.uint8]]) -> bytes:
     import tempfile
     from pathlib import Path
 

@@ -1,7 +1,6 @@
-"""Numbers in drawings: at ticks each is the whole value, and rounding noise is no motion of a line.
+"""Numbers in drawings: ticks with whole values, digits as needed, values that differ by rounding only drawn as level.
 
-No number at a tick has to be added to, or multiplied by, a number in a corner. A value that does not vary is level, a
-force that is not there is zero.
+No number at a tick has to be added to, or multiplied by, a number in a corner.
 """
 
 from __future__ import annotations

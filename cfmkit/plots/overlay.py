@@ -49,12 +49,12 @@ def read_earlier(folder: str) -> EarlierCurve:
     try:
         table = read_csv(file)
         kind: Kind = "force" if EFFORT_COLUMNS["force"] in table.headers else "torque"
-        return EarlierCurve(Path(folder).name or folder, kind, _branches(table, kind))
+        return EarlierCurve(Path(folder).name or folder, kind, _first_curve_branches(table, kind))
     except (CfmError, KeyError, ValueError) as error:
         raise UsageError(f"--overlay {visible(folder)}: curve.csv is not a curve of cfmkit: {error}") from None
 
 
-def _branches(table: Table, kind: Kind) -> tuple[FloatArray, ...]:
+def _first_curve_branches(table: Table, kind: Kind) -> tuple[FloatArray, ...]:
     """Return the branches of the first curve: of several, the varied values lead."""
     motion, effort, branch = (
         np.asarray(table[name]) for name in (MOTION_COLUMNS[kind], EFFORT_COLUMNS[kind], "branch")

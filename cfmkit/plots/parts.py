@@ -1,8 +1,7 @@
-"""Mechanical parts to scale: plates, rollers, links, springs, sliders, forces.
+"""Drawing mechanical parts to scale: plates, rollers, links, springs, forces, bodies in poses; panels for them.
 
-Positions and sizes are given in metres; the axes are in millimetres. Every artist
-that stands for a part carries its name as `gid`, so that a reader of the figure
-(or a test) finds it.
+Positions and sizes are given in metres; the axes are in millimetres. Every artist that stands for a part carries its
+name as `gid`, so that a reader of the figure (or a test) finds it.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ MOST_BINS = 40
 """Of a histogram: 1600 samples by the rule of the square root; with more bins a bar gets thinner than 2 mm of print."""
 
 
-def _head(figure: Figure, title: str) -> None:
+def _write_head(figure: Figure, title: str) -> None:
     """Write whose study it is and what the picture shows."""
     name, _, subject = title.rpartition(": ")
     write_heading(figure, Heading(name, subject) if name else Heading(subject, "all parameters"))
@@ -65,16 +65,16 @@ def draw_histogram(findings: Findings, number: int) -> Figure:
     finite = metric_values(drawn[np.isfinite(drawn)], metric.dimension)
     figure = new_figure(140, 84)
     axes = axes_mm(figure, (18, 14, 116, 56))
-    _head(figure, _title(findings, metric))
+    _write_head(figure, _metric_title(findings, metric))
     width, height = size_mm(figure)
     allowed = () if is_plain() else setup.limits(metric)
     if not is_plain():
         place = (LEFT_MARGIN / width, 1.0 - (7.6 if has_titles() else 1.6) / height)
         figure.text(*place, _summary(drawn, finite, allowed), va="top", size=SMALL_FONT, color=TEXT_INK)
     if len(finite):
-        axes.hist(finite, _edges(finite).tolist(), color=LINE_BLUE, alpha=0.85)
+        axes.hist(finite, _bin_borders(finite).tolist(), color=LINE_BLUE, alpha=0.85)
     axes.set_ylim(0, 1.22 * max(1.0, axes.get_ylim()[1]))
-    ends = [_ends(limits) for limits in allowed]
+    ends = [_ends_in_axis_unit(limits) for limits in allowed]
     nominal = float(metric_values(setup.nominal.values[number], metric.dimension))
     shown = [*finite.tolist(), *(end for pair in ends for end in pair if end is not None), nominal]
     low, high = min(shown), max(shown)
@@ -85,11 +85,11 @@ def draw_histogram(findings: Findings, number: int) -> Figure:
     axes.axvline(nominal, color=TEXT_INK, linewidth=1.0, linestyle="--")
     look: Look = {"xycoords": axes.get_xaxis_transform(), "textcoords": "offset points", "size": SMALL_FONT}
     axes.annotate("nominal", (nominal, 1.0), (2, -2), va="top", **look)
-    axes.set(xlabel=_unit(metric), ylabel="parts")
+    axes.set(xlabel=_label_with_unit(metric), ylabel="parts")
     return figure
 
 
-def _edges(values: FloatArray) -> FloatArray:
+def _bin_borders(values: FloatArray) -> FloatArray:
     """Return the borders of the bins: as many as the square root of the number of parts, but not too many."""
     low, high = float(values.min()), float(values.max())
     if is_level(values):
@@ -98,7 +98,7 @@ def _edges(values: FloatArray) -> FloatArray:
     return np.linspace(low, high, int(min(MOST_BINS, max(8, len(values) ** 0.5 + 1))) + 1)
 
 
-def _ends(limits: Bounds) -> list[float | None]:
+def _ends_in_axis_unit(limits: Bounds) -> list[float | None]:
     """Return the ends of what is allowed, in the unit of the axis."""
     return [None if end is None else float(metric_values(end, limits.dimension)) for end in (limits.min, limits.max)]
 
@@ -184,11 +184,11 @@ def short(path: str) -> str:
     return f"{plain} ({len(several)})" if len(several) > 1 else plain
 
 
-def _note(axes: Axes, place: tuple[float, float], text: str = "not stated") -> None:
+def _write_note(axes: Axes, place: tuple[float, float], text: str = "not stated") -> None:
     axes.annotate(text, place, (3, 0), textcoords="offset points", va="center", size=SMALL_FONT)
 
 
-def _wrap(path: str, width: int) -> str:
+def _wrap_path(path: str, width: int) -> str:
     return "\n".join(textwrap.wrap(short(path), width))
 
 
@@ -207,14 +207,14 @@ def _bar_axes(count: int, heading: str, legend: bool = False) -> tuple[Figure, A
     below, above = 14.0, 9.0 + 10.0 * legend
     figure = new_figure(150, below + above + _ROW_HEIGHT * count + 4.0)
     axes = axes_mm(figure, (_LEFT_MARGIN, below, 150 - _LEFT_MARGIN - 6, _ROW_HEIGHT * count + 4.0))
-    _head(figure, heading)
+    _write_head(figure, heading)
     axes.grid(visible=False, axis="y")
     axes.axvline(0.0, color=TEXT_GREY, linewidth=0.8)
     return figure, axes
 
 
-def _rows(axes: Axes, names: Sequence[str]) -> None:
-    axes.set_yticks(range(len(names)), [_wrap(name, 28) for name in names])
+def _name_rows(axes: Axes, names: Sequence[str]) -> None:
+    axes.set_yticks(range(len(names)), [_wrap_path(name, 28) for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.tick_params(axis="y", length=0)
 
@@ -227,7 +227,7 @@ def _draw_bars(
     for row, k in enumerate(order):
         line = lines[k]
         if line.value is None:
-            _note(axes, (0.0, row + shift))
+            _write_note(axes, (0.0, row + shift))
             continue
         axes.barh(row + shift, line.value, height, color=colour, label=words)
         words = ""
@@ -242,11 +242,11 @@ def draw_bars(findings: Findings, number: int) -> Figure:
     metric, kinds = findings.setup.study.metrics[number], BAR_CHARTS[findings.setup.method]
     lines_of_kinds = [_lines(findings, metric.label, kind.index) for kind in kinds]
     order = _rank_parameters(lines_of_kinds[0])
-    figure, axes = _bar_axes(len(order), _title(findings, metric), len(kinds) > 1)
+    figure, axes = _bar_axes(len(order), _metric_title(findings, metric), len(kinds) > 1)
     height = 0.7 / len(kinds)
     for k, (kind, lines) in enumerate(zip(kinds, lines_of_kinds, strict=True)):
         _draw_bars(axes, lines, order, (kind.colour, kind.words, (k - (len(kinds) - 1) / 2) * height, 0.9 * height))
-    _rows(axes, [lines_of_kinds[0][k].parameter for k in order])
+    _name_rows(axes, [lines_of_kinds[0][k].parameter for k in order])
     axes.set_xlabel("share of the variance [1]" if len(kinds) > 1 else f"{kinds[0].words} [1]")
     if len(kinds) > 1 and axes.get_legend_handles_labels()[1]:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=SMALL_FONT)
@@ -265,7 +265,7 @@ def draw_gains(findings: Findings) -> Figure:
         len(order), f"{findings.setup.study.spec.name}: {reported}; which tolerance to tighten first"
     )
     _draw_bars(axes, lines, order, (LINE_BLUE, "", 0.0, 0.6))
-    _rows(axes, [lines[k].parameter for k in order])
+    _name_rows(axes, [lines[k].parameter for k in order])
     from matplotlib.ticker import PercentFormatter
 
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, symbol=""))
@@ -273,7 +273,7 @@ def draw_gains(findings: Findings) -> Figure:
     return figure
 
 
-def _title(findings: Findings, metric: Metric) -> str:
+def _metric_title(findings: Findings, metric: Metric) -> str:
     return f"{findings.setup.study.spec.name}: {metric.label.replace('_', ' ')}"
 
 
@@ -286,7 +286,7 @@ def draw_oat(findings: Findings, number: int) -> Figure:
     room = max(60.0, _ROW_HEIGHT * len(order) + 10.0)
     figure = new_figure(190, room + 24)
     curves, bars = (axes_mm(figure, (left, 14, width, room)) for left, width in ((18, 72), (132, 52)))
-    _head(figure, _title(findings, metric))
+    _write_head(figure, _metric_title(findings, metric))
     every_output = np.empty((len(swings), 0)) if findings.outputs is None else findings.outputs[:, :, number]
     shown = remove_rounding(metric_values(np.append(setup.nominal.values[number], every_output), metric.dimension))
     nominal, outputs = float(shown[0]), shown[1:].reshape(every_output.shape)
@@ -296,29 +296,29 @@ def draw_oat(findings: Findings, number: int) -> Figure:
         where = np.linspace(0.0, 1.0, len(values))
         look: Look = {"color": LINE_COLOURS[row % len(LINE_COLOURS)], "marker": MARKER_SHAPES[row]}
         curves.plot(where, values, markersize=3, linewidth=1.0, markevery=max(1, len(values) // 10), **look)
-        _tornado(bars, row, swings[k], (nominal, float(values[0]), float(values[-1])))
+        _draw_tornado_row(bars, row, swings[k], (nominal, float(values[0]), float(values[-1])))
         bars.plot(-0.04, row, transform=bars.get_yaxis_transform(), clip_on=False, ms=4, **look)
-    _rows(bars, [swings[k].parameter for k in order])
+    _name_rows(bars, [swings[k].parameter for k in order])
     bars.tick_params(axis="y", pad=9)
     bars.grid(visible=False, axis="y")
-    curves.set(xlabel="place in the parameter's range, low ... high", ylabel=_unit(metric))
-    bars.set_xlabel(f"{_unit(metric)}\nat the low (blue) and high (orange) end")
+    curves.set(xlabel="place in the parameter's range, low ... high", ylabel=_label_with_unit(metric))
+    bars.set_xlabel(f"{_label_with_unit(metric)}\nat the low (blue) and high (orange) end")
     return figure
 
 
-def _tornado(axes: Axes, row: int, swing: IndexLine, ends: tuple[float, float, float]) -> None:
+def _draw_tornado_row(axes: Axes, row: int, swing: IndexLine, ends: tuple[float, float, float]) -> None:
     nominal, low, high = ends
     if swing.value is None:
-        _note(axes, (nominal, row))
+        _write_note(axes, (nominal, row))
         return
     for value, colour, shift in ((low, LINE_BLUE, -0.18), (high, LINE_VERMILLION, 0.18)):
         if np.isfinite(value):
             axes.barh(row + shift, value - nominal, 0.34, left=nominal, color=colour)
         else:
-            _note(axes, (nominal, row + shift), "no result there")
+            _write_note(axes, (nominal, row + shift), "no result there")
 
 
-def _unit(metric: Metric) -> str:
+def _label_with_unit(metric: Metric) -> str:
     return metric_label(metric.name, metric.dimension)
 
 
@@ -329,11 +329,11 @@ def draw_morris(findings: Findings, number: int) -> Figure:
     sizes, scatters = (_lines(findings, metric.label, name) for name in ("mu_star", "sigma"))
     figure = new_figure(160, 90)
     axes = axes_mm(figure, (20, 14, 84, 66))
-    _head(figure, _title(findings, metric))
+    _write_head(figure, _metric_title(findings, metric))
     top, factor = 0.0, 100.0 if metric.dimension == "ratio" else 1.0
     for row, k in enumerate(_rank_parameters(sizes)):
         size, scatter = sizes[k], scatters[k]
-        label = _wrap(size.parameter, 26)
+        label = _wrap_path(size.parameter, 26)
         if size.value is None or scatter.value is None:
             axes.plot([], [], linestyle="", label=f"{label}\n(not stated)")
             continue
@@ -347,7 +347,7 @@ def draw_morris(findings: Findings, number: int) -> Figure:
         axes.plot((0, top), (0, top), color=TEXT_GREY, linewidth=0.6, linestyle="--")
         axes.annotate("sigma = mu*", (0.5 * top, 0.5 * top), (-4, 2), **note)
     _legend_beside(axes)
-    unit = _unit(metric).rpartition(" ")[2]
+    unit = _label_with_unit(metric).rpartition(" ")[2]
     axes.set(xlabel=f"mu*: mean size of the effect of the whole range {unit}", ylabel=f"sigma: its scatter {unit}")
     axes.set(xlim=(0, None), ylim=(0, None))
     return figure
@@ -360,7 +360,7 @@ def draw_convergence(findings: Findings, number: int) -> Figure:
     mine = [line for line in findings.convergence if (line.metric, line.index) == (metric.label, "total_order")]
     figure = new_figure(160, 90)
     axes = axes_mm(figure, (18, 14, 86, 66))
-    _head(figure, f"{_title(findings, metric)}, convergence")
+    _write_head(figure, f"{_metric_title(findings, metric)}, convergence")
     order = [findings.setup.paths[k] for k in _rank_parameters(_lines(findings, metric.label, "total_order"))]
     for row, path in enumerate(order):
         points = np.array([_numbers(line) for line in mine if line.parameter == path and line.value is not None])
@@ -370,7 +370,7 @@ def draw_convergence(findings: Findings, number: int) -> Figure:
         sizes, values, low, high = points.T
         sizes = sizes * 1.03 ** (row - len(order) / 2)
         colour = LINE_COLOURS[row % len(LINE_COLOURS)]
-        axes.plot(sizes, values, color=colour, marker=MARKER_SHAPES[row], markersize=4, label=_wrap(path, 26))
+        axes.plot(sizes, values, color=colour, marker=MARKER_SHAPES[row], markersize=4, label=_wrap_path(path, 26))
         axes.vlines(sizes, low, high, color=colour, linewidth=1.0)
     stages = sorted({line.samples for line in mine})
     axes.set_xscale("log", base=2)

@@ -96,7 +96,7 @@ def draw_diagram(diagram: Diagram, ax: Axes) -> Axes:
         ax.plot(x, y, color=item.color, linewidth=1.4, linestyle="--" if item.dashed else "-", zorder=3)
         if item.name:
             names.append(Label(item.name, item.color, np.column_stack([x, y]), item.prefer))
-    _scale(diagram, ax)
+    _scale_axes(diagram, ax)
     for limit in diagram.limits:
         height = float(to_border(limit.value, diagram.y.dimension))
         names.append(level(ax, height, limit.text, TROUBLE_RED if limit.trouble else TEXT_GREY))
@@ -128,7 +128,7 @@ def diagram_figure(
     return figure
 
 
-def _scale(diagram: Diagram, ax: Axes) -> None:
+def _scale_axes(diagram: Diagram, ax: Axes) -> None:
     ends = [value for region in diagram.regions for value in (region.start, region.stop)]
     across = finite_range(to_border(np.concatenate([diagram.over, ends]), diagram.x.dimension)) or (0.0, 1.0)
     ax.set_xlim(*pad_limits(across, 0.0, 0.02))

@@ -47,14 +47,16 @@ class StressView:
     @property
     def moved(self) -> FloatArray:
         """Nodes where they are now (n, 2) [m]."""
-        return np.asarray(self.solved.problem.elements.mesh.nodes + self.solved.evaluate_displacements(self._balance))
+        return np.asarray(
+            self.solved.problem.elements.mesh.nodes + self.solved.evaluate_displacements(self._equilibrium)
+        )
 
     @property
     def stress(self) -> FloatArray:
         """Von Mises' equivalent stress at the nodes (n,) [Pa]."""
         from cfmkit.solid.elements import equivalent
 
-        return equivalent(self.solved.problem.elements.stress(self.solved.evaluate_displacements(self._balance))[0])
+        return equivalent(self.solved.problem.elements.stress(self.solved.evaluate_displacements(self._equilibrium))[0])
 
     @property
     def peak(self) -> float:
@@ -73,7 +75,7 @@ class StressView:
             yield parts.part_name(str(number), moved[nearest[0]], (turned.real, turned.imag))
 
     @property
-    def _balance(self) -> Any:
+    def _equilibrium(self) -> Any:
         return self.solved.course.poses[self.pose]
 
 

@@ -1,7 +1,7 @@
-"""Pictures of a study: curves and metrics over one parameter, maps over two in colours, parallel axes over more.
+"""Pictures of a study of many points: curves and metrics over one parameter, maps over two, parallel axes over more.
 
-The best point is marked; where a requirement is missed the ground is hatched, and
-where nothing was solved it stays grey.
+The best point is marked; where a requirement is missed the ground is hatched, and where nothing was solved it stays
+grey.
 """
 
 from __future__ import annotations
@@ -226,7 +226,7 @@ def draw_parallel(marks: StudyMarks) -> Figure:
     width = max(120.0, 26.0 * len(scales) + 30)
     figure = new_figure(width, 100 + HEAD_HEIGHT)
     axes = axes_mm(figure, (14, 22, width - 28, 66))
-    heights = np.column_stack([_share(scale) for scale in scales])
+    heights = np.column_stack([_relative_values(scale) for scale in scales])
     chosen = np.flatnonzero(np.isfinite(heights[:, len(marks.varied)]))
     if len(chosen) > MOST_LINES:
         chosen = chosen[np.linspace(0, len(chosen) - 1, MOST_LINES).astype(int)]
@@ -235,12 +235,12 @@ def draw_parallel(marks: StudyMarks) -> Figure:
         axes.plot(heights[k], color=colour, linewidth=0.6, alpha=0.7)
     if marks.best is not None:
         axes.plot(heights[marks.best], color=LINE_VERMILLION, linewidth=2.0)
-    _parallel_axes(axes, scales)
-    head(figure, marks, f"coloured by {marks.metrics[0].plain}", _parallel_key(marks))
+    _draw_parallel_axes(axes, scales)
+    head(figure, marks, f"coloured by {marks.metrics[0].plain}", _parallel_key_entries(marks))
     return figure
 
 
-def _parallel_key(marks: StudyMarks) -> list[Artist]:
+def _parallel_key_entries(marks: StudyMarks) -> list[Artist]:
     from matplotlib.lines import Line2D
 
     entries: list[Artist] = []
@@ -251,7 +251,7 @@ def _parallel_key(marks: StudyMarks) -> list[Artist]:
     return entries
 
 
-def _share(scale: DrawnScale) -> FloatArray:
+def _relative_values(scale: DrawnScale) -> FloatArray:
     """Return where the values lie between the smallest and the largest of them; in the middle if they are the same."""
     finite = scale.values[np.isfinite(scale.values)]
     if is_level(scale.values):
@@ -259,7 +259,7 @@ def _share(scale: DrawnScale) -> FloatArray:
     return np.asarray((scale.values - finite.min()) / (finite.max() - finite.min()))
 
 
-def _parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
+def _draw_parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
     for k, scale in enumerate(scales):
         axes.axvline(k, color=TEXT_INK, linewidth=0.8)
         finite = scale.values[np.isfinite(scale.values)]
@@ -289,7 +289,7 @@ def draw_map(marks: StudyMarks, metric: DrawnScale) -> Figure:
     figure = new_figure(140, 100 + HEAD_HEIGHT)
     axes = axes_mm(figure, (18, 14, 92, 80))
     down, across = marks.varied
-    up, along = _places(down, marks.shape[0], marks.shape[1]), _places(across, marks.shape[1], 1)
+    up, along = _map_places(down, marks.shape[0], marks.shape[1]), _map_places(across, marks.shape[1], 1)
     values = remove_rounding(metric.values).reshape(marks.shape)[np.ix_(up.order, along.order)]
     meets = marks.meets.reshape(marks.shape)[np.ix_(up.order, along.order)]
     x, y = along.borders, up.borders
@@ -297,10 +297,10 @@ def draw_map(marks: StudyMarks, metric: DrawnScale) -> Figure:
     axes.grid(False)
     box = (114, 14, 4, 80)
     if metric.words:
-        _classes(axes, (x, y, values), metric, axes_mm(figure, box))
+        _draw_words_map(axes, (x, y, values), metric, axes_mm(figure, box))
     else:
         mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(values), cmap=COLOUR_MAP, rasterized=True)
-        _level_lines(axes, up, along, values)
+        _draw_level_lines(axes, up, along, values)
         color_bar(mesh, axes_mm(figure, box), metric.label)
     if not meets.all() and not is_plain():
         _hatch_cells(axes, x, y, ~meets)
@@ -314,7 +314,7 @@ def draw_map(marks: StudyMarks, metric: DrawnScale) -> Figure:
     return figure
 
 
-def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric: DrawnScale, key: Axes) -> None:
+def _draw_words_map(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric: DrawnScale, key: Axes) -> None:
     """Colour a map by words; the key has those that occur, and each region its own name where it is large enough."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
@@ -380,13 +380,13 @@ class MapPlaces:
             axis.set_ticks([], minor=True)
 
 
-def _places(parameter: DrawnScale, count: int, stride: int) -> MapPlaces:
+def _map_places(parameter: DrawnScale, count: int, stride: int) -> MapPlaces:
     levels = parameter.values[: count * stride : stride]
     order = np.argsort(levels, kind="stable")
     return MapPlaces(parameter, levels[order], order)
 
 
-def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArray) -> None:
+def _draw_level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArray) -> None:
     """Draw lines of equal value; on a coarse grid along a smooth surface through its values."""
     finite = values[np.isfinite(values)]
     if min(values.shape) < 3 or up.words or across.words or not len(finite):
@@ -397,8 +397,8 @@ def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArra
         return
     x, y = across.positions, up.positions
     if len(finite) == values.size:
-        y, values = _finer(y, values, 0)
-        x, values = _finer(x, values, 1)
+        y, values = _refine(y, values, 0)
+        x, values = _refine(x, values, 1)
     from matplotlib import patheffects
 
     surface = across.value(x), up.value(y), np.ma.masked_invalid(values)
@@ -419,7 +419,7 @@ def _round_values_between(low: float, high: float) -> FloatArray:
     return np.asarray(levels[(levels > low + room) & (levels < high - room)])
 
 
-def _finer(places: FloatArray, values: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
+def _refine(places: FloatArray, values: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
     """Return a grid with more places along one axis, through the same values, without new ups and downs."""
     steps = N_LEVEL_LINE_PLACES // len(places)
     if steps < 2:

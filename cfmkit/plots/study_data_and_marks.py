@@ -1,4 +1,4 @@
-"""Common part of the pictures of studies: what is drawn, the best point, missed requirements, words on an axis.
+"""Data of the pictures of studies, and their common marks: heading, key, best point, missed requirements, words.
 
 The outcome of a study comes in border units: no specification, no journal.
 """
@@ -130,12 +130,12 @@ HEAD_HEIGHT = 12.0  # room at the top of a picture of a study for its heading an
 def head(figure: Figure, marks: StudyMarks, subject: str, key: Sequence[Artist] = ()) -> None:
     """Write above a picture whose study it is, what it shows, and what its marks mean."""
     write_heading(figure, Heading(marks.name, subject) if marks.name else Heading(subject, "all points"))
-    if not is_plain() and key and _key(figure, key, len(key)).get_window_extent().x1 > figure.bbox.x1:
+    if not is_plain() and key and _draw_key(figure, key, len(key)).get_window_extent().x1 > figure.bbox.x1:
         figure.legends[-1].remove()
-        _key(figure, key, 1)
+        _draw_key(figure, key, 1)
 
 
-def _key(figure: Figure, entries: Sequence[Artist], columns: int) -> Legend:
+def _draw_key(figure: Figure, entries: Sequence[Artist], columns: int) -> Legend:
     """Write the key below the heading, or at the top where there is none."""
     width, height = size_mm(figure)
     down = 6.0 if has_titles() else 1.0

@@ -1,4 +1,4 @@
-"""One look for every picture: sizes in print millimetres, colours, and PNG bytes that repeat.
+"""One look for every picture: sizes in print millimetres, colours, settings of matplotlib, and PNG bytes that repeat.
 
 Everything is drawn on a bare `Figure` with the Agg canvas. Settings apply inside
 `style()` only, and start from matplotlib's own defaults: what a user's matplotlibrc
@@ -94,7 +94,7 @@ _STYLE_SETTINGS: dict[str, Any] = {
 
 
 @cache
-def _parameters() -> Any:
+def _style_parameters() -> Any:
     """Return matplotlib's defaults with our settings on top; the backend is not ours to choose."""
     fixed = ("backend", "backend_fallback", "interactive")
     defaults = {name: value for name, value in matplotlib.rcParamsDefault.items() if name not in fixed}
@@ -116,7 +116,7 @@ def style() -> Iterator[None]:
         return
     mark = _INSIDE_STYLE.set(True)
     try:
-        with matplotlib.rc_context(_parameters() | dict(_SETTINGS_OF_USER.get())), warnings.catch_warnings():
+        with matplotlib.rc_context(_style_parameters() | dict(_SETTINGS_OF_USER.get())), warnings.catch_warnings():
             # a name in letters that the font lacks is drawn as boxes; that is no reason to alarm anyone
             warnings.filterwarnings("ignore", message="Glyph .* missing from font")
             yield
@@ -222,10 +222,10 @@ def _encode_png(rgb: NDArray[np.uint8], dpi: float) -> bytes:
         (b"IDAT", zlib.compress(rows.tobytes(), 3)),
         (b"IEND", b""),
     )
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*chunk) for chunk in chunks)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_png_chunk(*chunk) for chunk in chunks)
 
 
-def _chunk(name: bytes, data: bytes) -> bytes:
+def _png_chunk(name: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
 
 

@@ -31,7 +31,7 @@ _FONT_FALLBACKS = "'DejaVu Sans', Verdana, Geneva, sans-serif"
 @apply_style
 def svg(figure: Figure) -> bytes:
     """Return a figure as SVG, with its text as text."""
-    written = _write(figure, "svg", {"Date": None, "Creator": None, "Format": None, "Type": None})
+    written = _vector_bytes(figure, "svg", {"Date": None, "Creator": None, "Format": None, "Type": None})
     seen: set[str] = set()
 
     def keep_first(match: re.Match[str]) -> str:
@@ -47,7 +47,7 @@ def svg(figure: Figure) -> bytes:
 @apply_style
 def pdf(figure: Figure) -> bytes:
     """Return a figure as PDF, with its fonts embedded."""
-    return _write(figure, "pdf", {"CreationDate": None})
+    return _vector_bytes(figure, "pdf", {"CreationDate": None})
 
 
 def write_figure(figure: Figure, kind: str) -> bytes:
@@ -55,7 +55,7 @@ def write_figure(figure: Figure, kind: str) -> bytes:
     return {"png": png, "svg": svg, "pdf": pdf}[kind](figure)
 
 
-def _write(figure: Figure, kind: str, metadata: dict[str, None]) -> bytes:
+def _vector_bytes(figure: Figure, kind: str, metadata: dict[str, None]) -> bytes:
     into = io.BytesIO()
     with matplotlib.rc_context(_WRITER_SETTINGS):
         figure.savefig(into, format=kind, metadata=metadata)

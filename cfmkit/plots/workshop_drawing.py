@@ -90,14 +90,14 @@ def drawing_figure(
     decimals = block.decimals if block else TitleBlock.decimals
     figure = new_figure(*PAPER_SIZE)
     x0, y0, x1, y1 = mm(drawing.extents).tolist()
-    overall = _overall(drawing)
+    overall = _overall_dimensions(drawing)
     dimensions = [
-        dimension for dimension in drawing.dimensions if not any(_same(dimension, whole) for whole in overall)
+        dimension for dimension in drawing.dimensions if not any(_have_same_ends(dimension, whole) for whole in overall)
     ]
     dimensions += overall
     below, beside = (DIMENSION_STEP * (1 + sum(dimension.along == axis for dimension in dimensions)) for axis in "xy")
     room = PAPER_SIZE[0] - COLUMN_WIDTH - beside - 6.0, PAPER_SIZE[1] - below - 12.0
-    scale = _scale(min(room[0] / max(x1 - x0, 1e-9), room[1] / max(y1 - y0, 1e-9)))
+    scale = _paper_scale(min(room[0] / max(x1 - x0, 1e-9), room[1] / max(y1 - y0, 1e-9)))
     width, height = scale * (x1 - x0), scale * (y1 - y0)
     left = beside + 0.5 * (room[0] - width)
     bottom = below + 0.5 * (room[1] - height)
@@ -109,17 +109,17 @@ def drawing_figure(
     ax.axis("off")
     for contour in drawing.contours:
         if contour.layer != "reference":
-            _contour(ax, contour)
+            _draw_contour(ax, contour)
     drawn_holes = list(holes(drawing))
     for number, hole in enumerate(drawn_holes[:MOST_HOLES], start=1):
-        _hole(ax, hole, number, drawing, scale)
+        _draw_hole(ax, hole, number, drawing, scale)
     if drawn_holes:
         ax.plot(x0, y0, marker="+", markersize=9, color=LINE_VERMILLION, zorder=6, gid="datum")
-    _dimensions(ax, dimensions, (x0, y0, x1, y1), scale, decimals)
+    _draw_dimensions(ax, dimensions, (x0, y0, x1, y1), scale, decimals)
     for section in thicknesses(drawing):
-        _thickness(ax, section, scale, decimals)
+        _draw_thickness(ax, section, scale, decimals)
     ratio = f"{scale:g} : 1" if scale >= 1 else f"1 : {1 / scale:g}"
-    _words(figure, drawing, drawn_holes, (title, ratio), tolerances, block)
+    _write_column(figure, drawing, drawn_holes, (title, ratio), tolerances, block)
     return figure
 
 
@@ -146,7 +146,7 @@ def length_in_words(value: float, decimals: int) -> str:
     return f"{1e3 * value:.{decimals}f}".rstrip("0").rstrip(".") + " mm"
 
 
-def _thickness(ax: Axes, section: BeamSection, scale: float, decimals: int) -> None:
+def _draw_thickness(ax: Axes, section: BeamSection, scale: float, decimals: int) -> None:
     """Draw the thickness of a beam across it: arrows from both sides, and the text beyond one of them."""
     middle, across = mm(section.at), np.asarray(section.across)
     if across[1] < 0:
@@ -175,13 +175,13 @@ def holes(drawing: Drawing) -> Iterator[_Hole]:
     yield from sorted(round_holes, key=lambda hole: (round(hole.diameter, 9), round(hole.y, 9), round(hole.x, 9)))
 
 
-def _overall(drawing: Drawing) -> list[DrawnDimension]:
+def _overall_dimensions(drawing: Drawing) -> list[DrawnDimension]:
     """Return width and height over everything that is cut."""
     x0, y0, x1, y1 = drawing.extents
     return [DrawnDimension("overall", (x0, y0), (x1, y0), "x"), DrawnDimension("overall", (x0, y0), (x0, y1), "y")]
 
 
-def _same(first: DrawnDimension, second: DrawnDimension) -> bool:
+def _have_same_ends(first: DrawnDimension, second: DrawnDimension) -> bool:
     """Return whether two dimensions along the same axis have the same ends."""
     axis = "xy".find(first.along)
     if first.along != second.along or axis < 0:
@@ -190,13 +190,13 @@ def _same(first: DrawnDimension, second: DrawnDimension) -> bool:
     return bool(np.allclose(ends[0], ends[1], rtol=0.0, atol=1e-9))
 
 
-def _scale(largest: float) -> float:
+def _paper_scale(largest: float) -> float:
     """Return the largest scale of paper that fits [mm of print for 1 mm]."""
     fitting = [scale for scale in (*PAPER_SCALES, *(1.0 / scale for scale in PAPER_SCALES)) if scale <= largest]
     return max(fitting, default=largest)
 
 
-def _points(edge: Edge) -> FloatArray:
+def _edge_points(edge: Edge) -> FloatArray:
     if isinstance(edge, Smooth):
         return edge.points
     if isinstance(edge, Line):
@@ -205,14 +205,14 @@ def _points(edge: Edge) -> FloatArray:
     return np.array(edge.center) + edge.radius * np.column_stack([np.cos(share), np.sin(share)])
 
 
-def _chain(contour: Contour) -> FloatArray:
+def _contour_corners(contour: Contour) -> FloatArray:
     """Return the corners of a contour [mm], the first one again where it is closed."""
-    chain = mm(np.vstack([_points(edge) for edge in contour.edges]))
+    chain = mm(np.vstack([_edge_points(edge) for edge in contour.edges]))
     return np.vstack([chain, chain[:1]]) if contour.closed else chain
 
 
-def _contour(ax: Axes, contour: Contour) -> None:
-    chain = _chain(contour)
+def _draw_contour(ax: Axes, contour: Contour) -> None:
+    chain = _contour_corners(contour)
     if contour.layer == "path":
         ax.plot(*chain.T, color=TEXT_GREY, linewidth=0.6, dashes=(8, 2, 1, 2), zorder=2, gid="path")
     elif contour.layer in UNCUT_LAYERS:
@@ -223,7 +223,7 @@ def _contour(ax: Axes, contour: Contour) -> None:
         ax.plot(*chain.T, color=TEXT_INK, linewidth=0.9, zorder=3, solid_joinstyle="round", gid=contour.layer)
 
 
-def _hole(ax: Axes, hole: _Hole, number: int, drawing: Drawing, scale: float) -> None:
+def _draw_hole(ax: Axes, hole: _Hole, number: int, drawing: Drawing, scale: float) -> None:
     """Draw a hole's centre and number, the number where no line is cut."""
     corner = mm(drawing.extents).tolist()
     x, y, radius = corner[0] + hole.x * 1e3, corner[1] + hole.y * 1e3, 0.5e3 * hole.diameter
@@ -250,10 +250,10 @@ def _is_clear(
     end = [at + direction * size for at, direction, size in zip(begin, side, text, strict=True)]
     box = Bbox([begin, end])
     lines = (contour for contour in drawing.contours if contour.layer not in UNCUT_LAYERS)
-    return not any(Path(_chain(contour)).intersects_bbox(box, filled=False) for contour in lines)
+    return not any(Path(_contour_corners(contour)).intersects_bbox(box, filled=False) for contour in lines)
 
 
-def _dimensions(
+def _draw_dimensions(
     ax: Axes, dimensions: Sequence[DrawnDimension], box: tuple[float, float, float, float], scale: float, decimals: int
 ) -> None:
     """Draw dimensions: those along x below the part, those along y at its left, the short ones nearest to it."""
@@ -267,13 +267,15 @@ def _dimensions(
                 moved[:, 1 - axis] = box[1 - axis] - number * DIMENSION_STEP / scale
                 moved = moved[moved[:, axis].argsort()]
             text = f"{dimension.name} {length_in_words(dimension.value, decimals)}"
-            _line(ax, tuple(moved[0].tolist()), tuple(moved[1].tolist()), text, scale)
+            _draw_dimension_line(ax, tuple(moved[0].tolist()), tuple(moved[1].tolist()), text, scale)
             for end in ends if along != "line" else ():
                 foot = np.where(np.arange(2) == axis, end, moved[0])
                 ax.plot(*np.array([end, foot]).T, color=TEXT_GREY, linewidth=0.35, zorder=1)
 
 
-def _line(ax: Axes, start: tuple[float, float], end: tuple[float, float], text: str, scale: float) -> None:
+def _draw_dimension_line(
+    ax: Axes, start: tuple[float, float], end: tuple[float, float], text: str, scale: float
+) -> None:
     """Draw a dimension line with arrows, and its text above it, or beside it where it is short."""
     gap = np.subtract(end, start)
     length = float(np.hypot(*gap)) * scale
@@ -288,7 +290,7 @@ def _line(ax: Axes, start: tuple[float, float], end: tuple[float, float], text: 
     ax.text(x, y, text, ha="center", va="bottom", zorder=6, **look)
 
 
-def _words(
+def _write_column(
     figure: Figure,
     drawing: Drawing,
     drawn_holes: Sequence[_Hole],
@@ -305,8 +307,8 @@ def _words(
     decimals = block.decimals if block else TitleBlock.decimals
     floor = 0.0 if block is None else TITLE_BLOCK + 15.0
     if block is not None:
-        _title_block(ax, block, title, ratio)
-    rows = [*drawing.facts, ("sheet", _sheet(drawing, decimals)), ("scale", ratio)]
+        _draw_title_block(ax, block, title, ratio)
+    rows = [*drawing.facts, ("sheet", _describe_sheet(drawing, decimals)), ("scale", ratio)]
     y = PAPER_SIZE[1] - 10.0
     y = _write_text(ax, 4.0, y, title, NORMAL_FONT + 1.0, "bold") - 2.0
     for word, text in rows:
@@ -334,7 +336,7 @@ def _words(
                 y = _write_text(ax, 4.0, y, line)
 
 
-def _title_block(ax: Axes, block: TitleBlock, title: str, ratio: str) -> None:
+def _draw_title_block(ax: Axes, block: TitleBlock, title: str, ratio: str) -> None:
     """Draw the block at the foot of the column: name, revision, date to be filled in, weight, scale, projection."""
     left, right, low = 4.0, COLUMN_WIDTH - 3.0, 5.0
     rows = (("name", title), ("revision", block.revision), ("date", ""), ("weight", block.weight), ("scale", ratio))
@@ -358,7 +360,7 @@ def _title_block(ax: Axes, block: TitleBlock, title: str, ratio: str) -> None:
     ax.text(left + 33.0, y, "first angle", fontsize=SMALL_FONT, color=TEXT_INK, va="center")
 
 
-def _sheet(drawing: Drawing, decimals: int) -> str:
+def _describe_sheet(drawing: Drawing, decimals: int) -> str:
     sheet = drawing.sheet
     others = sorted({region.thickness for region in sheet.regions})
     if sheet.thickness is None:

@@ -80,7 +80,7 @@ class BatchWork:
     def _run_entry(self, entry: Entry) -> Entry:
         wanted = replace(self.common, spec=entry.spec, out=os.path.join(self.common.out, entry.folder))
         spec = read(wanted)[1]
-        verb = _verb(self.verb or _natural(spec), self.fresh)
+        verb = _verb_of_batch(self.verb or _verb_of_spec(spec), self.fresh)
         name = " ".join(spec.name.split())
         described = replace(
             entry, verb=verb.name, family=spec.family, name=name, data=_hash_input_files(spec, entry.spec)
@@ -92,7 +92,7 @@ class BatchWork:
         return _entry_of(described, outcome)
 
 
-def _natural(spec: Spec) -> str:
+def _verb_of_spec(spec: Spec) -> str:
     """Return the verb that a specification asks for."""
     from cfmkit.families import family
 
@@ -111,7 +111,7 @@ def _hash_input_files(spec: Spec, file: str) -> tuple[tuple[str, str | None], ..
     return (*bases, *((str(source), file_hash(source.path.resolve())) for source in list_data_files(spec.model_dump())))
 
 
-def _verb(name: str, fresh: bool) -> Verb:
+def _verb_of_batch(name: str, fresh: bool) -> Verb:
     if name == "design":
         # One process: the specifications of the batch share the cores already.
         return Verb("design", run_design, running=partial(long_run, 1, fresh))

@@ -1,8 +1,4 @@
-"""The files of a batch: those that it writes, and those of an earlier one.
-
-It writes tables, numbers and the page. The folder of an earlier batch is what it is compared with, or whose results it
-replaces.
-"""
+"""Files of a batch: those that it writes, and those of an earlier one to compare with or to replace the results of."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A mechanism beside its recording or its other models, fitted to a recording, or corrected by it: reports on runs.
+"""Reports on a mechanism beside its recording, beside its other models, fitted to a recording, or corrected by it.
 
 ``cfmkit correct`` changes a design so that the next part has the force that a measured part missed: its files are the
 corrected design, and a table of values before, after, and predicted for the next part.
@@ -197,8 +197,8 @@ def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: 
     rows = rows_of(correction)
     made = replace(correction.predicted, spec=correction.corrected)
     files = {
-        **dict(_specs(correction)),
-        "correction.csv": lambda: to_csv(_table(rows)),
+        **dict(_specs_of_parts(correction)),
+        "correction.csv": lambda: to_csv(_values_table(rows)),
         "residuals.csv": lambda: to_csv(add.residuals_table(calibration)),
     }
     if calibration.parameters:
@@ -207,7 +207,7 @@ def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: 
     shown = rows if correction.changes else rows[:1]  # else every value is as before
     table = PageTable("", tuple(map(GridColumn, heads)), tuple(row.cells for row in shown), N_ROWS_ON_PAGE)
     supplement = Supplement(
-        add.calibration_data(calibration) | {"correction": _data(correction, rows)},
+        add.calibration_data(calibration) | {"correction": _correction_data(correction, rows)},
         files,
         warnings=(*calibration.warnings, *correction.warnings),
         tables=(table,),
@@ -216,7 +216,9 @@ def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: 
     report = report_on(made, Design(correction.corrected, Status.COMPLETE))
     report = extend_by_recording(report, calibration.after, source, supplement, before)
     # how the file was read and the residuals are no news here
-    return replace(report, supplement=replace(report.supplement, lines=tuple(_lines(correction, zero_known))))
+    return replace(
+        report, supplement=replace(report.supplement, lines=tuple(_correction_notes(correction, zero_known)))
+    )
 
 
 def rows_of(correction: DesignCorrection) -> tuple[CorrectedValue, ...]:
@@ -229,10 +231,10 @@ def rows_of(correction: DesignCorrection) -> tuple[CorrectedValue, ...]:
     forces = correction.before, correction.after
     ends = [(force.low, force.high) for force in forces]
     mean = CorrectedValue(f"mean {kind}", kind, forces[0].value, forces[1].value, *ends)
-    return (*drawn, mean, *_metrics(correction, kind))
+    return (*drawn, mean, *_metric_rows(correction, kind))
 
 
-def _metrics(correction: DesignCorrection, kind: str) -> Iterator[CorrectedValue]:
+def _metric_rows(correction: DesignCorrection, kind: str) -> Iterator[CorrectedValue]:
     names = [f"{kind}_{name}" if name in ("ripple", "max") else name for name in SHOWN_METRICS]
     before, after = evaluate(correction.built), evaluate(correction.predicted)
     for name in names:
@@ -241,7 +243,7 @@ def _metrics(correction: DesignCorrection, kind: str) -> Iterator[CorrectedValue
             yield CorrectedValue(words(name), new.dimension, old.value, new.value)
 
 
-def _lines(correction: DesignCorrection, zero_known: bool) -> Iterator[tuple[str, str]]:
+def _correction_notes(correction: DesignCorrection, zero_known: bool) -> Iterator[tuple[str, str]]:
     """Yield what was correction in the part, and what is done about it."""
     calibration, kind = correction.explanation.calibration, correction.nominal.curve.kind
     for explanation in correction.explanations:
@@ -265,7 +267,7 @@ def _lines(correction: DesignCorrection, zero_known: bool) -> Iterator[tuple[str
         yield "made", "this page is of the part as it will be made: predicted.yaml; design.yaml is what is drawn"
 
 
-def _specs(correction: DesignCorrection) -> Iterator[tuple[str, Any]]:
+def _specs_of_parts(correction: DesignCorrection) -> Iterator[tuple[str, Any]]:
     """Yield the parts with their errors as specifications, where a specification can say so."""
     parts = {"calibrated.yaml": correction.made} | (
         {"predicted.yaml": correction.will_be_made} if correction.changes else {}
@@ -280,7 +282,7 @@ def _specs(correction: DesignCorrection) -> Iterator[tuple[str, Any]]:
             yield name, partial(str.encode, text)
 
 
-def _table(rows: tuple[CorrectedValue, ...]) -> Table:
+def _values_table(rows: tuple[CorrectedValue, ...]) -> Table:
     records = [row.numbers for row in rows]
     columns = []
     for name in records[0]:
@@ -289,7 +291,7 @@ def _table(rows: tuple[CorrectedValue, ...]) -> Table:
     return Table(tuple(columns))
 
 
-def _data(correction: DesignCorrection, rows: tuple[CorrectedValue, ...]) -> dict[str, Any]:
+def _correction_data(correction: DesignCorrection, rows: tuple[CorrectedValue, ...]) -> dict[str, Any]:
     """Return what metrics.json says of a correction."""
     return {
         "within_scatter": not correction.changes,

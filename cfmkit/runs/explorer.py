@@ -1,4 +1,4 @@
-"""A specification whose numbers are moved by sliders, with everything computed again as they move.
+"""A specification whose numbers are moved by sliders: the sliders, answers for the page on a changed one, saving.
 
 `Explorer` holds the file as it was written and answers changes of it as data for a page. Changes are those of
 ``--set``: a page can say no more than a command line.
@@ -110,10 +110,10 @@ class Explorer:
         keys_by_path = {key.path: key for key in keys(type(spec))}
         tree = read_document(api.dumps(spec, complete=True), "spec").tree
         sliders = []
-        for path, value in _leaves({key: tree[key] for key in tree if key not in LEFT_OUT}):
+        for path, value in _dotted_leaves({key: tree[key] for key in tree if key not in LEFT_OUT}):
             key = keys_by_path.get(re.sub(r"\.\d+", "[]", path)) or keys_by_path.get(re.sub(r"\.\d+$", "", path))
             about, whole = (key.description, key.kind == "whole number") if key else ("", False)
-            if (slider := _slider(path, value, about, whole)) is not None:
+            if (slider := _slider_of_value(path, value, about, whole)) is not None:
                 sliders.append(slider)
         return tuple(sliders)
 
@@ -143,7 +143,7 @@ class Explorer:
         step = 1.0 if slider.whole else RELATIVE_STEP * size
         written = f"{path}={slider.value + step:.12g} {slider.unit}".rstrip()
         try:
-            moved = _judge(api.analyze(self.spec([written])))
+            moved = _requirement_sizes(api.analyze(self.spec([written])))
             nominal = self._nominal
         except CfmError:
             return {"influence": 0.0}
@@ -154,7 +154,7 @@ class Explorer:
 
     @cached_property
     def _nominal(self) -> dict[str, tuple[float, float]]:
-        return _judge(api.analyze(self.spec()))
+        return _requirement_sizes(api.analyze(self.spec()))
 
     def command(self, changes: Sequence[str]) -> str:
         """Return the command that analyses the specification with changes."""
@@ -208,7 +208,7 @@ class Explorer:
         text: str = template("explorer.html.j2", "cfmkit.runs").render(
             title=spec.name,
             family=spec.family,
-            groups={name: (_legend(name, spec), sliders) for name, sliders in groups.items()},
+            groups={name: (_heading_of_group(name, spec), sliders) for name, sliders in groups.items()},
             data=escaped_json(data),
             nonce=nonce,
             style=part("report.css") + part("explorer.css", "cfmkit.runs"),
@@ -230,25 +230,25 @@ def suggested_name(stem: str) -> str:
     return f"{plain}-explored.yaml" if plain else "explored.yaml"
 
 
-def _legend(group: str, spec: Spec) -> str:
+def _heading_of_group(group: str, spec: Spec) -> str:
     """Return what stands above a group of sliders: its path; of a requirement, also which metric it is about."""
     match = re.match(r"requirements\.(\d+)", group)
     return f"{group}: {spec.requirements[int(match[1])].metric}" if match else group
 
 
-def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+def _dotted_leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     if isinstance(tree, dict):
         for key, value in tree.items():
             if "." not in key:
-                yield from _leaves(value, f"{path}.{key}" if path else key)
+                yield from _dotted_leaves(value, f"{path}.{key}" if path else key)
     elif isinstance(tree, tuple | list):
         for number, value in enumerate(tree):
-            yield from _leaves(value, f"{path}.{number}")
+            yield from _dotted_leaves(value, f"{path}.{number}")
     else:
         yield path, tree
 
 
-def _slider(path: str, value: Any, about: str, whole: bool) -> Slider | None:
+def _slider_of_value(path: str, value: Any, about: str, whole: bool) -> Slider | None:
     """Return the slider of a leaf; None if it is not a number."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
@@ -312,7 +312,7 @@ def _page_data(result: Result) -> dict[str, Any]:
     return page
 
 
-def _judge(result: AnalysisView) -> dict[str, tuple[float, float]]:
+def _requirement_sizes(result: AnalysisView) -> dict[str, tuple[float, float]]:
     """Return the value of each required metric with the size of its bound, and the mean effort with its own, in SI."""
     judged = {
         outcome.metric: (outcome.value, max(abs(end) for end in (outcome.min, outcome.max) if end is not None))
@@ -334,8 +334,8 @@ def _branches(curve: Curve) -> Iterator[tuple[str, list[list[float | None]]]]:
         on = on[np.unique(np.linspace(0, len(on) - 1, min(len(on), MOST_POINTS)).round().astype(int))]
         motion = to_border(curve.motion[on], curve.motion_dimension)
         effort = to_border(curve.effort[on], curve.kind)
-        yield name, [[_number(value) for value in side] for side in (motion, effort)]
+        yield name, [[_five_digits(value) for value in side] for side in (motion, effort)]
 
 
-def _number(value: float) -> float | None:
+def _five_digits(value: float) -> float | None:
     return float(f"{value:.5g}") if np.isfinite(value) else None

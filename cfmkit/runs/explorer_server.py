@@ -1,4 +1,4 @@
-"""The explorer of a specification on a port that only this computer reaches, and only with the explorer's token.
+"""The explorer's web server: on a port that only this computer reaches, and only with the explorer's token.
 
 The server of the standard library does: one person asks, one answer at a time. What is checked on every request: the
 name by which it was reached (a page elsewhere that lets its own name point here is refused), the page that sent it,
@@ -169,7 +169,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Answer with the page, to whoever has its whole address."""
         self.server.note_arrival(self.connection)
         path, _, query = self.path.partition("?")
-        if not self._is_local() or not self._knows(parse_qs(query).get("token", [""])[0]):
+        if not self._is_local() or not self._is_token(parse_qs(query).get("token", [""])[0]):
             self._send(403, b"this page needs the address that cfmkit explore printed", "text/plain")
         elif path != "/":
             self._send(404, b"there is no such page", "text/plain")
@@ -182,7 +182,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         """Answer what the page asks."""
-        if not self._is_local() or not self._knows(self.headers.get("X-Token", "")):
+        if not self._is_local() or not self._is_token(self.headers.get("X-Token", "")):
             self._send(403, b"{}")
             return
         try:
@@ -247,7 +247,7 @@ class _Handler(BaseHTTPRequestHandler):
             and all(origin in {f"http://{name}" for name in names} for origin in origins)
         )
 
-    def _knows(self, token: str) -> bool:
+    def _is_token(self, token: str) -> bool:
         return hmac.compare_digest(token.encode(), self.server.token.encode())
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:

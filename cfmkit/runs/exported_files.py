@@ -1,8 +1,8 @@
-"""Contents of the files that `export` makes, for the command and the Python API; nothing is written here.
+"""Contents of the files that `export` makes, and notes on the drawing: mass, printing, fastening, tolerances.
 
-Three kinds: files of the outlines to cut or print (DXF, SVG, CSV, and bodies), decks of the elastic parts for a
-finite-element solver, and the dimensioned drawing of the part on a sheet of paper (png, pdf), with what is stated or
-assumed of its tolerances. In the code, `outlines` is a `Drawing`: contours with notes and warnings.
+Nothing is written here. Three kinds: files of the outlines to cut or print (DXF, SVG, CSV, and bodies), decks of the
+elastic parts for a finite-element solver, and the dimensioned drawing of the part on a sheet of paper (png, pdf). In
+the code, `outlines` is a `Drawing`: contours with notes and warnings.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def stated_tolerances(spec: Spec) -> tuple[str, ...]:
     """Return a line for each tolerance that the specification's design states."""
     design = getattr(spec, "design", None)
     made = {} if design is None else design.tolerances_of(spec)[0]
-    return tuple(f"{path}: {_spread(stated)}" for path, stated in made.items())
+    return tuple(f"{path}: {_tolerance_in_words(stated)}" for path, stated in made.items())
 
 
 def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
@@ -125,7 +125,7 @@ def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
     )
 
 
-def _spread(stated: Any) -> str:
+def _tolerance_in_words(stated: Any) -> str:
     """Return a tolerance in words, in the units that it was given in."""
     if isinstance(stated, tuple):
         return " ... ".join(str(value) for value in stated)
@@ -157,7 +157,7 @@ def export_files(
     from cfmkit.export import DEFAULT_FORMATS, files
     from cfmkit.runs.values_with_units import read_length
 
-    wanted = _formats(formats, DEFAULT_FORMATS)
+    wanted = _split_formats(formats, DEFAULT_FORMATS)
     if kerf is not None and "dxf" not in wanted:
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
     kerf_width, max_deviation = read_length(kerf, "--kerf"), read_length(tolerance, "--tolerance")
@@ -169,7 +169,7 @@ def export_files(
             if name in DRAWING_FORMATS:
                 exported |= _drawing_on_paper(outlines, spec, name)
             else:
-                exported |= _decks(spec) if name == DECK_FORMAT else files(outlines, None, max_deviation, [name])
+                exported |= _deck_files(spec) if name == DECK_FORMAT else files(outlines, None, max_deviation, [name])
         except CfmError as error:
             failed[name] = error
     if failed and not exported:
@@ -227,7 +227,7 @@ def _drawing_on_paper(outlines: Drawing, spec: Spec, name: str) -> dict[str, byt
     return dict(form.files({"drawing": lambda: part_on_paper(outlines, spec)}))
 
 
-def _decks(spec: Spec) -> dict[str, bytes]:
+def _deck_files(spec: Spec) -> dict[str, bytes]:
     """Return the elastic parts as decks of a finite-element solver: meshed, and as beams."""
     record = family(spec.family)
     if record.elastic is None:
@@ -244,7 +244,7 @@ def _decks(spec: Spec) -> dict[str, bytes]:
     return decks
 
 
-def _formats(stated: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
+def _split_formats(stated: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
     """Return the formats that are requested; of a text those between commas."""
     from cfmkit.export import FILE_FORMATS as OUTLINE_FORMATS
 

@@ -1,4 +1,4 @@
-"""The functions of ``import cfmkit`` for recordings of a test rig: metrics, and models fitted to them."""
+"""Functions of ``import cfmkit`` for recordings: metrics, models fitted to them, designs corrected by them."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def measure(
     """
     from cfmkit.experiment.reading import Recording, read_recording
 
-    recording = data if isinstance(data, Recording) else read_recording(_file(data), units, group)
+    recording = data if isinstance(data, Recording) else read_recording(_require_path(data), units, group)
     options = MeasurementSettings(
         window, filter, target, tare, zero, _as_tuple(flip), as_recorded, one_branch, cycles, max_hole
     )
@@ -98,7 +98,9 @@ def measure_each(
     """Return what the measured curve of each specimen of a file says, by specimen."""
     from cfmkit.experiment.reading import read_recordings
 
-    return {name: how.report_on(recording) for name, recording in read_recordings(_file(data), units, group).items()}
+    return {
+        name: how.report_on(recording) for name, recording in read_recordings(_require_path(data), units, group).items()
+    }
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ class MeasurementSettings:
         return report_on(source, frame, place, largest)
 
 
-def _file(data: str | os.PathLike[str]) -> str:
+def _require_path(data: str | os.PathLike[str]) -> str:
     """Return the path of a file, if it is one."""
     if isinstance(data, str | os.PathLike):
         return str(os.fspath(data))
@@ -289,4 +291,4 @@ def _read_curves(
         return measure_recording(
             correct_recording(data, tare, zero, _as_tuple(flip)), None, LEFT_OUT, read_cycles(cycles)
         )
-    return read_measured(_file(data), units, tare, zero, _as_tuple(flip), cycles, group)
+    return read_measured(_require_path(data), units, tare, zero, _as_tuple(flip), cycles, group)

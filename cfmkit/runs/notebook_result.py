@@ -1,4 +1,4 @@
-"""Results of Python functions, which measure, draw and show themselves when they are asked to.
+"""Results of Python functions with metrics and requirements when they are read, a plot, and a view in notebooks.
 
 `cfmkit.analyze` returns an `AnalysisView`, which is a `Result`. A notebook shows it by the document that the command
 line prints.

@@ -1,7 +1,7 @@
-"""The numbers that the papers print, beside what cfmkit makes of them.
+"""Numbers that the papers print (`printed_numbers.yaml`), computed again and compared; the grammar of their questions.
 
-`printed_numbers.yaml` has a row for each number, or each few that belong together: where it stands, what it is, the
-verdict, and how to compute the same. `check` computes it again and says whether the verdict holds.
+A row is for each number, or each few that belong together: where it stands, what it is, the verdict, and how to compute
+the same. `check` computes it again and says whether the verdict holds.
 
 A row asks in a closed grammar, in SI: names of metrics (``force_mean[load]``), dotted paths of the specification
 (``mechanism.springs.stiffness[0]``), columns of the first curve at a place (``force("13.6 mm")``, a branch second),
@@ -89,17 +89,19 @@ def rows() -> tuple[PrintedRow, ...]:
 
     text = Path(__file__).with_name("printed_numbers.yaml").read_text(encoding="utf-8")
     papers: Mapping[str, Mapping[str, Any]] = read_trusted(text)
-    return tuple(_row(paper, item["family"], entry) for paper, item in papers.items() for entry in item["rows"])
+    return tuple(
+        _row_from_entry(paper, item["family"], entry) for paper, item in papers.items() for entry in item["rows"]
+    )
 
 
-def _row(paper: str, family: str, entry: Mapping[str, Any]) -> PrintedRow:
+def _row_from_entry(paper: str, family: str, entry: Mapping[str, Any]) -> PrintedRow:
     keys: dict[str, Any] = dict(entry)
     for name in ("printed", "ask", "here"):
-        keys[name] = _texts(keys.get(name, ()))
-    return PrintedRow(paper=paper, family=family, changes=_texts(keys.pop("set", ())), **keys)
+        keys[name] = _as_texts(keys.get(name, ()))
+    return PrintedRow(paper=paper, family=family, changes=_as_texts(keys.pop("set", ())), **keys)
 
 
-def _texts(value: Any) -> tuple[str, ...]:
+def _as_texts(value: Any) -> tuple[str, ...]:
     return tuple(map(str, value)) if isinstance(value, list | tuple) else (str(value),)
 
 
@@ -133,14 +135,14 @@ def check(some: Sequence[PrintedRow], everything: bool = False) -> Iterator[Comp
 
 def _check_row(row: PrintedRow) -> ComputedRow:
     try:
-        values = _values(row)
+        values = _compute_values(row)
     except (CfmError, ValueError, KeyError) as error:
         return ComputedRow(row, trouble=f"cannot be computed: {error.args[0] if error.args else error}")
     shown = tuple(_report_value(value, text) for value, text in zip(values, row.here or row.printed, strict=True))
-    return ComputedRow(row, shown, "; ".join(_faults(row, values)))
+    return ComputedRow(row, shown, "; ".join(_faults_of_verdict(row, values)))
 
 
-def _values(row: PrintedRow) -> tuple[float, ...]:
+def _compute_values(row: PrintedRow) -> tuple[float, ...]:
     scope = _Scope(row.spec, row.changes, row.verb)
     answers = [_evaluate(text, scope) for text in row.ask]
     values = tuple(
@@ -151,7 +153,7 @@ def _values(row: PrintedRow) -> tuple[float, ...]:
     return values
 
 
-def _faults(row: PrintedRow, values: Sequence[float]) -> Iterator[str]:
+def _faults_of_verdict(row: PrintedRow, values: Sequence[float]) -> Iterator[str]:
     """Yield what speaks against the verdict of a row."""
     if row.verdict == "agrees" and not all(map(_asks_model, row.ask)):
         yield "nothing is computed by a model: its verdict is 'arithmetic'"
@@ -304,28 +306,28 @@ def _evaluate(text: str, scope: _Scope) -> Any:
         tree = ast.parse(text.strip(), mode="eval").body
     except SyntaxError:
         raise ValueError(f"{text!r} is no question") from None
-    return _value(tree, scope)
+    return _value_of_node(tree, scope)
 
 
-def _value(node: ast.expr, scope: _Scope) -> Any:
+def _value_of_node(node: ast.expr, scope: _Scope) -> Any:
     match node:
         case ast.Constant(value=str(text)):
             return number(text).value
         case ast.Constant(value=int() | float() as value):
             return value
         case ast.UnaryOp(op=ast.USub(), operand=inner):
-            return -_value(inner, scope)
+            return -_value_of_node(inner, scope)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY_OPERATORS:
-            return _BINARY_OPERATORS[type(op)](_value(left, scope), _value(right, scope))
+            return _BINARY_OPERATORS[type(op)](_value_of_node(left, scope), _value_of_node(right, scope))
         case ast.Call(func=ast.Name(id="changed"), args=[ast.Constant(value=str(change)), inner]):
-            return _value(inner, scope._replace(changes=(*scope.changes, change)))
+            return _value_of_node(inner, scope._replace(changes=(*scope.changes, change)))
         case ast.Call(func=ast.Name(id="varied"), args=[ast.Constant(value=str(path))]):
             return _varied_values(_specification(scope), path)
         case ast.Call(func=ast.Name(id=name), args=args) if name in _MATH_FUNCTIONS:
-            return _MATH_FUNCTIONS[name](*(_value(argument, scope) for argument in args))
+            return _MATH_FUNCTIONS[name](*(_value_of_node(argument, scope) for argument in args))
         case ast.Call(func=ast.Name(id=column), args=[place, *branch]):
             return _value_on_curve(
-                _result(scope).curves[0], column, _value(place, scope), *map(ast.literal_eval, branch)
+                _result(scope).curves[0], column, _value_of_node(place, scope), *map(ast.literal_eval, branch)
             )
         case ast.Name() | ast.Attribute() | ast.Subscript():
             return _value_named(ast.unparse(node), scope)

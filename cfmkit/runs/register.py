@@ -1,4 +1,4 @@
-"""Registration of a program's own metrics and families: functions of a result, and records."""
+"""Registration of a program's own metrics, which are functions of a result, and of its own families of mechanisms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run over one specification: read it, compute, and write a folder of files.
+"""A run over one specification: read it, compute the analysis or design, and write a folder of files.
 
 `files` yields them, with curve, figures and geometry, by name below the output folder. It touches no disk, and nothing
 depends on the time: the same result gives the same bytes.
@@ -221,7 +221,7 @@ def carry_out(
     with RunFolder(wanted.out) as folder:
         folder.check(*COMMON_FILES, *(["report.html"] if wanted.page else []))
         with verb.running(folder, Run(wanted.seed, progress, wanted.time_budget)) as run:
-            report = _options_judged(_compute(verb, spec, run, document), spec, document)
+            report = _warn_of_replaced_options(_compute(verb, spec, run, document), spec, document)
         command = shlex.join(["cfmkit", *arguments])
         started = RunCommand(verb.name, wanted.spec, wanted.all_changes, verb.words, wanted.out)
         for name, data in files(report, wanted.plots, wanted.page, command, wanted.form, wanted.animate, started):
@@ -275,7 +275,7 @@ def _compute(verb: Verb, spec: Spec, run: Run, document: YamlDocument) -> Report
     return report
 
 
-def _options_judged(report: Report, requested: Spec, document: YamlDocument) -> Report:
+def _warn_of_replaced_options(report: Report, requested: Spec, document: YamlDocument) -> Report:
     """Return a report that warns of values of ``--set`` that a design has replaced."""
     made = report.design.spec if report.design else None
     if made is None:
@@ -342,7 +342,7 @@ def run_design(spec: Spec, run: Run) -> Report:
     many = isinstance(block, DesignKeys) and is_made(spec, block)
     design = api.design(spec, run.part(0.0, 0.6) if many else run)
     result = api.analyze(design.spec, run) if design.spec is not None else run_outcome.empty_result(spec, design)
-    tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
+    tables = {f"{stem}.csv": partial(_csv_bytes, table) for stem, table in design.tables.items()}
     report = run_outcome.report_on(result, design)
     drawn = warnings_of_part(result.spec) if design.spec is not None and result.status.usable else ()
     names = {finding.name for finding in result.warnings}
@@ -380,7 +380,7 @@ def _with_yield(report: Report, nominal: Result, spec: Spec, run: Run) -> Report
     return report.extend(yields.quantities(), more).judge_yields()
 
 
-def _csv(table: Callable[[], Table]) -> bytes:
+def _csv_bytes(table: Callable[[], Table]) -> bytes:
     from cfmkit.tables import to_csv
 
     return to_csv(table())

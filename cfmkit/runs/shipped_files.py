@@ -1,4 +1,4 @@
-"""Files that come with the package: examples, and drawings of families with their dimensions named.
+"""Files that come with the package: examples, listed and copied, and drawings of families with their dimensions named.
 
 In the tree the examples, published designs, starting points and studies with their data, are the folder `configs`; a
 wheel has the same files as the package `cfmkit.configs`. A dimension drawing comes with the package of its family: each
@@ -125,7 +125,7 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
     target = Path(out) / chosen.path.name
     data = sorted({str(source): source.path for source in list_data_files(api.load(chosen.path).model_dump())}.items())
     # what is there already and says the same stays: two examples may name the same data
-    missing = [(text, path) for text, path in data if not _same(target.parent / text, path)]
+    missing = [(text, path) for text, path in data if not _is_same_file(target.parent / text, path)]
     wanted = {target: chosen.path, **{target.parent / text: path for text, path in missing}}
     _refuse_taken(wanted)
     written: list[Path] = []
@@ -134,7 +134,7 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
         for place, source in wanted.items():
             with reporting(place):
                 made += make_folders(place.absolute().parent)
-                write_new(place, source.read_bytes() if place != target else _text(chosen, schema))
+                write_new(place, source.read_bytes() if place != target else _example_text(chosen, schema))
             written.append(place)
         if schema:
             written.append(write_schema(target, family(chosen.family)))
@@ -146,7 +146,7 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
     return tuple(written)
 
 
-def _text(chosen: Example, schema: bool) -> bytes:
+def _example_text(chosen: Example, schema: bool) -> bytes:
     """Return an example's text for the folder it is copied to, with the line for editors where that is requested."""
     from cfmkit.families import family
     from cfmkit.runs.editor_schema import with_line
@@ -157,7 +157,7 @@ def _text(chosen: Example, schema: bool) -> bytes:
     return (with_line(text, family(chosen.family)) if schema else text).encode()
 
 
-def _same(place: Path, source: Path) -> bool:
+def _is_same_file(place: Path, source: Path) -> bool:
     """Return whether a file is there already with the same content, but for its comments if it is a specification."""
     if not place.is_file():
         return False

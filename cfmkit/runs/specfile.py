@@ -1,4 +1,4 @@
-"""Specifications on their way in: from a file or standard input to a checked one of the right family."""
+"""Specifications on their way in: read from a file or standard input, changed by options, checked by their family."""
 
 from __future__ import annotations
 
@@ -115,11 +115,11 @@ def content(name: str) -> bytes:
         raise UsageError(f"{name!r} is not the name of a file")
     try:
         if Path(name).is_dir():
-            raise UsageError(f"{visible(name)} is a folder; name the specification in it{_path_inside(name)}")
+            raise UsageError(f"{visible(name)} is a folder; name the specification in it{_hint_of_file_inside(name)}")
         with open(name, "rb") as file:
             return file.read(MAX_FILE_BYTES + 1)
     except FileNotFoundError:
-        raise UsageError(f"{visible(name)}: there is no such file{_similar(name)}") from None
+        raise UsageError(f"{visible(name)}: there is no such file{_hint_of_similar_names(name)}") from None
     except OSError as error:
         raise UsageError(f"{visible(name)} cannot be read: {reason_of(error)}") from None
 
@@ -134,7 +134,7 @@ def bind(document: YamlDocument) -> Spec:
         spec = document.bind(family.spec_type)
     except SpecError as error:
         reported = {problem.path for problem in error.problems}
-        raw = _entries(document.tree)
+        raw = _readable_requirements(document.tree)
         more = [fault for fault in _requirement_faults(document, family, raw) if not _is_below(fault.path, reported)]
         faults = sorted([*error.problems, *more], key=lambda fault: (fault.line == 0, fault.line, fault.column))
         raise SpecError(faults) from None
@@ -224,7 +224,7 @@ def place_problem(document: YamlDocument, path: str, message: str) -> Problem:
     return fault if fault.line or fault.source.startswith("--set") else Problem("--set", 0, 0, path, message)
 
 
-def _entries(tree: Any) -> Iterator[tuple[int, Requirement]]:
+def _readable_requirements(tree: Any) -> Iterator[tuple[int, Requirement]]:
     """Yield those requirements of an unchecked tree that can be read."""
     from cfmkit.specs.spec import readable_requirement
 
@@ -250,7 +250,7 @@ def rename_source(error: SpecError, old: str, new: str) -> SpecError:
     )
 
 
-def _similar(name: str) -> str:
+def _hint_of_similar_names(name: str) -> str:
     """Return a hint with the names in that folder that look alike."""
     folder, base = os.path.split(name)
     if folder and not os.path.isdir(folder):
@@ -272,7 +272,7 @@ def _shipped_hint(base: str) -> str:
     return f"; `cfmkit examples {shipped.stem}` copies the one that is shipped" if shipped is not None else ""
 
 
-def _path_inside(folder: str) -> str:
+def _hint_of_file_inside(folder: str) -> str:
     files = _yaml_files(folder)
     return f", e.g. {visible(os.path.join(folder, files[0]))}" if files else ""
 

@@ -1,4 +1,4 @@
-"""Search of `suggest` as Python and the command line have it: the function, its record, its files.
+"""Search of `suggest` as Python and the command line have it: the function, its record for metrics.json, its files.
 
 `cfmkit.suggest` takes requirements from keywords or a file and returns ranked proposals. The record is what
 metrics.json, ``--json`` and notebooks say of a search, with its exit code. Files are a folder for each proposal, table,
@@ -84,29 +84,29 @@ def as_json(suggestions: Suggestions, block: SuggestBlock) -> dict[str, Any]:
         "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
         "order": list(block.prefer),
         "proposals": [
-            _record(suggestions, proposal, number) for number, proposal in enumerate(suggestions.proposals, 1)
+            _proposal_record(suggestions, proposal, number) for number, proposal in enumerate(suggestions.proposals, 1)
         ],
         "unjudged": [
-            _record(suggestions, proposal, number)
+            _proposal_record(suggestions, proposal, number)
             for number, proposal in enumerate(suggestions.unjudged, len(suggestions.proposals) + 1)
         ],
-        "near_misses": [_record(suggestions, proposal) for proposal in suggestions.near],
+        "near_misses": [_proposal_record(suggestions, proposal) for proposal in suggestions.near],
         "families": [
             {
                 "family": answer.family,
                 "candidates": len(answer.offer.candidates),
                 "made": answer.made,
                 "proposals": sum(proposal.family == answer.family for proposal in suggestions.proposals),
-                "reason": _reason(suggestions, answer.family, answer.offer.reason),
+                "reason": _reason_without_proposal(suggestions, answer.family, answer.offer.reason),
                 "nearest": dict(answer.nearest),
             }
             for answer in suggestions.answers
         ],
-        "warnings": list(_warnings(suggestions)),
+        "warnings": list(_search_warnings(suggestions)),
     }
 
 
-def _reason(suggestions: Suggestions, name: str, out_of_reach: str) -> str:
+def _reason_without_proposal(suggestions: Suggestions, name: str, out_of_reach: str) -> str:
     if out_of_reach or any(proposal.family == name for proposal in suggestions.listed):
         return out_of_reach
     untried = sum(
@@ -118,7 +118,7 @@ def _reason(suggestions: Suggestions, name: str, out_of_reach: str) -> str:
     return (misses or list(suggestions.failed.get(name, ())) or [""])[0]
 
 
-def _warnings(suggestions: Suggestions) -> Iterator[dict[str, str]]:
+def _search_warnings(suggestions: Suggestions) -> Iterator[dict[str, str]]:
     if suggestions.late and suggestions.listed:
         yield {
             "name": "search_cut_short",
@@ -126,7 +126,7 @@ def _warnings(suggestions: Suggestions) -> Iterator[dict[str, str]]:
         }
 
 
-def _record(suggestions: Suggestions, proposal: Proposal, number: int | None = None) -> dict[str, Any]:
+def _proposal_record(suggestions: Suggestions, proposal: Proposal, number: int | None = None) -> dict[str, Any]:
     about = {"family": proposal.family, "variant": proposal.variant, **numbers_in_border_units(suggestions, proposal)}
     place = {} if number is None else {"folder": folder_name(number, proposal)}
     judged = {
@@ -444,7 +444,7 @@ def _list_in_words(pairs: Mapping[str, Any]) -> str:
     >>> _list_in_words({"material": [{"name": "pla"}, {"name": "pom"}], "prefer": ["size", "ripple"]})
     'material pla or pom, prefer size, ripple'
     """
-    return ", ".join(f"{key.replace('_', ' ')} {_words(key, value)}" for key, value in pairs.items())
+    return ", ".join(f"{key.replace('_', ' ')} {_in_words(key, value)}" for key, value in pairs.items())
 
 
 SHARE_COLUMNS = ("ripple", "hysteresis", "yield")  # numbers of a proposal that are shares
@@ -452,9 +452,9 @@ LIST_SEPARATORS = {"envelope": " x ", "material": " or ", "prefer": ", "}
 """What stands between the values of a key that has several; else they are the two ends of a band."""
 
 
-def _words(key: str, value: Any) -> str:
+def _in_words(key: str, value: Any) -> str:
     if isinstance(value, list | tuple):
-        return LIST_SEPARATORS.get(key, " to ").join(_words(key, item) for item in value)
+        return LIST_SEPARATORS.get(key, " to ").join(_in_words(key, item) for item in value)
     if isinstance(value, dict):
         return str(value.get("name") or _list_in_words(value))
     return format_short(value, "ratio", 3) if key in SHARE_COLUMNS and isinstance(value, float | int) else str(value)

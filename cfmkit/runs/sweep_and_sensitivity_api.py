@@ -1,4 +1,4 @@
-"""Sweeps and sensitivity studies as Python asks for them, and their outcome: all of it in memory.
+"""Sweeps and sensitivity studies as Python asks for them, and their outcome in memory: tables, summary, figures.
 
 Blocks of a file, or arrays of NumPy, go in; the same tables and the same summary as in a study's files come out.
 """
@@ -176,10 +176,10 @@ def sweep(
     )
     if block:
         spec = spec.replace({"sweep": block})
-    work = prepare(spec, SweepRequest(seed=_seed(seed)))
-    records = run(work, _executor(jobs))
+    work = prepare(spec, SweepRequest(seed=_require_seed(seed)))
+    records = run(work, _choose_executor(jobs))
     summary = summary_of(records)
-    result = _read(outputs(records, summary, spec.sweep is not None and spec.sweep.curves))
+    result = _read_result(outputs(records, summary, spec.sweep is not None and spec.sweep.curves))
     dimensions = {metric.name: metric.dimension for metric in work.study.metrics}
     document = sweep_document(spec, result.summary, dimensions, summary.exit_code())
     varied = tuple(result.table.headers[: len(work.plan.variables)])
@@ -267,9 +267,9 @@ def sensitivity(
     )
     if block:
         spec = spec.replace({"sensitivity": with_options(spec.sensitivity, block)})
-    findings = carry_out(prepare(spec), partial(_run_work, _executor(jobs)))
+    findings = carry_out(prepare(spec), partial(_run_work, _choose_executor(jobs)))
     return replace(
-        _read(outputs(findings)),
+        _read_result(outputs(findings)),
         spec=findings.setup.study.spec,
         findings=findings,
         document=sensitivity_document(findings),
@@ -326,13 +326,13 @@ def _dimension(spec: Spec, path: str) -> str | None:
     return quantity.dimensions[0] if quantity else None
 
 
-def _seed(seed: Any) -> int:
+def _require_seed(seed: Any) -> int:
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise UsageError(f"seed: {seed!r} is not allowed: must be a whole number >= 0")
     return seed
 
 
-def _executor(jobs: int) -> Executor:
+def _choose_executor(jobs: int) -> Executor:
     if jobs < 1:
         raise UsageError(f"jobs: {jobs} is not allowed: must be >= 1")
     from cfmkit.studies.pool import Pool
@@ -340,7 +340,7 @@ def _executor(jobs: int) -> Executor:
     return serial if jobs == 1 else Pool(jobs)
 
 
-def _read(files: Any) -> StudyResult:
+def _read_result(files: Any) -> StudyResult:
     """Return what the files of a study would say."""
     import json
 

@@ -1,4 +1,4 @@
-"""A part on meshes that are refined until its force is known as closely as requested, and how closely it is known.
+"""A part on meshes that are refined until its force is known as closely as requested; errors of force and stress.
 
 The part is followed on a coarse mesh, then on the same mesh with every triangle split in four. What the two differ by
 in an element says how much of the error was there, and how much is left follows from the order of convergence that it

@@ -138,7 +138,7 @@ class Sizes:
     largest: float  # [m]
 
     @cached_property
-    def _tree(self) -> cKDTree:
+    def _place_tree(self) -> cKDTree:
         return cKDTree(self.places)
 
     def __call__(self, points: FloatArray) -> FloatArray:
@@ -147,7 +147,7 @@ class Sizes:
 
     def looked_up(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the sizes (k,) at points (k, 2), and how far the boundary's nearest place is (k,) [m]."""
-        distance, nearest = self._tree.query(points)
+        distance, nearest = self._place_tree.query(points)
         return np.minimum(self.sizes[nearest] + SIZE_GRADING * distance, self.largest), np.asarray(distance)
 
 
@@ -194,7 +194,7 @@ def _wanted_sizes(
     rings: tuple[Ring, ...], step: float, largest: float, share: float, across: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return places along the boundary (m, 2) no farther apart than a step, and what is wanted there (m,) [m]."""
-    pairs = [(ring, _dense(ring, step)) for ring in rings]
+    pairs = [(ring, _dense_arc_lengths(ring, step)) for ring in rings]
     places = np.concatenate([ring.locate(arc) for ring, arc in pairs])
     wanted = np.concatenate([np.minimum(share * _radius_at(ring, arc), largest) for ring, arc in pairs])
     for behind in (False, True):
@@ -203,7 +203,7 @@ def _wanted_sizes(
     return places, wanted
 
 
-def _dense(ring: Ring, step: float) -> FloatArray:
+def _dense_arc_lengths(ring: Ring, step: float) -> FloatArray:
     """Return arc lengths (k,) [m] along a ring: all vertices, and between them places no farther apart than `step`."""
     pieces = np.maximum(1, np.ceil(ring.lengths / step)).astype(int)
     return np.concatenate(

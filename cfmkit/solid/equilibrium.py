@@ -179,8 +179,10 @@ class SolidProblem:
                 if not self._is_credible(linear.forces, step):
                     return None
                 left = float(np.abs(linear.residual).max(initial=0.0) / np.abs(linear.forces).max())
-                rounded = 0.5 * least < left <= ROUGH_RESIDUAL and self._still(step, ROUGH_CORRECTION)
-                if on_border and (self._is_balanced(linear.residual, linear.forces) or self._still(step) or rounded):
+                rounded = 0.5 * least < left <= ROUGH_RESIDUAL and self._is_negligible(step, ROUGH_CORRECTION)
+                if on_border and (
+                    self._is_balanced(linear.residual, linear.forces) or self._is_negligible(step) or rounded
+                ):
                     return self._balance(place, linear.factors)
                 place, least, on_border = place - step, min(least, left), True
                 for _ in range(MAX_CORRECTIONS):
@@ -189,7 +191,7 @@ class SolidProblem:
                     if self._is_balanced(residual, forces):
                         return self._balance(place, linear.factors)
                     more = correct(residual, place)
-                    if self._still(more):
+                    if self._is_negligible(more):
                         return self._balance(place, linear.factors)
                     if not np.abs(more[:-1]).max() <= CORRECTION_RATIO * np.abs(step[:-1]).max():
                         break
@@ -199,7 +201,7 @@ class SolidProblem:
     def _is_balanced(self, residual: FloatArray, forces: FloatArray) -> bool:
         return bool(np.abs(residual).max(initial=0.0) <= RESIDUAL_RTOL * np.abs(forces).max())
 
-    def _still(self, step: FloatArray, part: float = CORRECTION_RTOL) -> bool:
+    def _is_negligible(self, step: FloatArray, part: float = CORRECTION_RTOL) -> bool:
         return bool(np.abs(step[:-1]).max(initial=0.0) <= part * self.size)
 
     def _is_credible(self, forces: FloatArray, step: FloatArray) -> bool:

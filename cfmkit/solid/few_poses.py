@@ -2,8 +2,8 @@
 
 What two meshes differ by changes much more slowly along the path than the poses themselves. It is known at poses that
 are solved on both, with its slope, and between them by cubics. Poses are solved in the middle of intervals where such a
-cubic may be off most, until it predicts their force: as for the curve between poses (`meshed_part.refined`), of which
-this is the curve of the difference. Every pose that is not solved says so (`Balance.solved`).
+cubic may be off most, until it predicts their force: as for the curve between poses (`meshed_part.refine_path`), of
+which this is the curve of the difference. Every pose that is not solved says so (`Balance.solved`).
 """
 
 from __future__ import annotations
@@ -118,16 +118,16 @@ class Correction:
         poses = self.differences
         values = np.array([np.append(pose.unknowns, pose.effort) for pose in poses])
         slopes = np.array([np.append(pose.slope, pose.stiffness) for pose in poses])
-        return CubicHermiteSpline([self._sense * pose.travel for pose in poses], values, self._sense * slopes)
+        return CubicHermiteSpline([self._path_sense * pose.travel for pose in poses], values, self._path_sense * slopes)
 
     @property
-    def _sense(self) -> float:
+    def _path_sense(self) -> float:
         return float(np.sign(self.solved[-1].travel - self.solved[0].travel))
 
     def pose_at(self, travel: float) -> Balance:
         """Return the pose on the fine mesh at a travel of the coarse one [m or rad], by what they differ by there."""
-        coarse, at = self.guide.interpolate(travel), self._sense * travel
-        more, slope = self._cubics(at), self._sense * self._cubics(at, 1)
+        coarse, at = self.guide.interpolate(travel), self._path_sense * travel
+        more, slope = self._cubics(at), self._path_sense * self._cubics(at, 1)
         return replace(
             coarse,
             unknowns=coarse.unknowns + more[:-1],
@@ -142,15 +142,15 @@ class Correction:
         First where cubics through the coarse poses at the same travels miss the coarse curve: it has no shape there
         that the solved poses do not see. Then in the middle of the interval where those of the difference may be off.
         """
-        places = np.array([self._sense * pose.travel for pose in self.solved])
+        places = np.array([self._path_sense * pose.travel for pose in self.solved])
         missed = self._measure_coarse_error(travels)
         if missed.max() > MAX_CURVE_ERROR:
             return travels[int(missed.argmax())]
         for k in np.argsort(-missed_by_cubics(self.differences), kind="stable"):
-            inside = [travel for travel in travels if places[k] < self._sense * travel < places[k + 1]]
+            inside = [travel for travel in travels if places[k] < self._path_sense * travel < places[k + 1]]
             if inside:
                 middle = 0.5 * (places[k] + places[k + 1])
-                return min(inside, key=lambda travel: abs(self._sense * travel - middle))
+                return min(inside, key=lambda travel: abs(self._path_sense * travel - middle))
         return None
 
     def _measure_coarse_error(self, travels: Sequence[float]) -> FloatArray:

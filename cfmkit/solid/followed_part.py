@@ -1,6 +1,6 @@
-"""A part as a problem of `cfmkit.numerics.continuation`: its unknowns in parts of its size, turns in radians.
+"""A part as a problem of `cfmkit.numerics.continuation`: scaled unknowns, residual, tangent, modes.
 
-The drive is the travel, or the share of the constant loads.
+Unknowns are in parts of the part's size, turns in radians. The drive is the travel, or the share of the constant loads.
 """
 
 from __future__ import annotations

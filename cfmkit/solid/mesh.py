@@ -1,4 +1,4 @@
-"""Six-node triangles on the outline of a part.
+"""A mesh of six-node triangles on the outline of a part, made from its boundary, wanted element sizes and seams.
 
 Boundary nodes are laid along the true edges at the wanted sizes, points inside are thrown on a lattice, thinned to the
 wanted density and relaxed as a truss whose bars push [PS]; Delaunay's triangulation joins them. Where a boundary piece
@@ -82,9 +82,9 @@ def mesh(
     Raises GeometryError if the boundary crosses itself, the part is thinner somewhere than elements can resolve, or the
     mesh would have more than `MOST_NODES`.
     """
-    region = _region(rings)
+    region = _part_polygon(rings)
     if (around := sum(float(ring.places[-1]) for ring in rings)) > size * MOST_NODES:
-        raise _too_many(int(around / size))
+        raise _too_many_nodes(int(around / size))
     field = sizes(rings, size, share, across)
     laid = [_boundary_nodes(ring, field, _crossings(ring, seams, field, seam_distance)) for ring in rings]
     fixed = np.concatenate([ring.locate(arc) for ring, arc in zip(rings, laid, strict=True)])
@@ -93,13 +93,13 @@ def mesh(
     kept_from = Spacing(field, sewn)
     inside = kept_from(_sample_interior(region, field, np.random.default_rng(seed)))
     if 4 * (len(inside) + len(fixed)) > MOST_NODES:  # a node in the middle of each side: three to a corner
-        raise _too_many(4 * (len(inside) + len(fixed)))
+        raise _too_many_nodes(4 * (len(inside) + len(fixed)))
     inside = _relax_points(region, kept_from, np.concatenate([fixed, sewn]), inside)
     for _ in range(MAX_HALVINGS):
         fixed = np.concatenate([ring.locate(arc) for ring, arc in zip(rings, laid, strict=True)])
         points = np.concatenate([fixed, *on_seams, inside])
         corners = _triangles(region, points)
-        missing = _missing(corners, laid)
+        missing = _missing_pieces(corners, laid)
         crossed = [_crossed_pieces(region, corners, points, seam, seam_distance) for seam in seams]
         if not any(len(pieces) for pieces in (*missing, *crossed)):
             return _six_nodes(points, corners, rings, laid)
@@ -113,7 +113,7 @@ def mesh(
     raise GeometryError(f"the outline cannot be meshed at {place_text(first)}: {reason}")
 
 
-def _region(rings: tuple[Ring, ...]) -> Any:
+def _part_polygon(rings: tuple[Ring, ...]) -> Any:
     """Return the part as a polygon of shapely, prepared for questions."""
     from shapely import MultiPolygon, Polygon, prepare
     from shapely.geometry.polygon import signed_area
@@ -167,7 +167,7 @@ def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, tolerance:
         slack = max(1e-6, tolerance / float(np.hypot(*seam)))  # ends of seams are on edges as closely as they are drawn
         met = steep & (share >= 0) & (share < 1) & (on_seam >= -slack) & (on_seam <= 1 + slack)
         crossings.append(ring.places[:-1][met] + share[met] * ring.lengths[met])
-        crossings.append(ring.places[:-1][_leaving(ring, start, end, tolerance)])
+        crossings.append(ring.places[:-1][_leaves_seam(ring, start, end, tolerance)])
     arcs = np.unique(np.concatenate([np.zeros(0), *crossings]))
     if not len(arcs):
         return arcs
@@ -178,7 +178,7 @@ def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, tolerance:
     return np.asarray(arcs[(away > 0.2 * field(places)) & apart])
 
 
-def _leaving(ring: Ring, start: FloatArray, end: FloatArray, tolerance: float) -> NDArray[np.bool_]:
+def _leaves_seam(ring: Ring, start: FloatArray, end: FloatArray, tolerance: float) -> NDArray[np.bool_]:
     """Return at which vertices (n,) of a ring it is within `tolerance` [m] of a seam, but not at one of its neighbours.
 
     A side of an element across such a place, where a fillet runs out on the face of a clamp, would be held at one end
@@ -243,7 +243,7 @@ def _sample_interior(region: Any, field: Sizes, random: np.random.Generator) -> 
         kept = (wanted >= size) & (wanted < 2 * size) & (random.random(len(points)) < (size / wanted) ** 2)
         interior.append(points[kept])
         if 4 * sum(map(len, interior)) > MOST_NODES:
-            raise _too_many(4 * sum(map(len, interior)))
+            raise _too_many_nodes(4 * sum(map(len, interior)))
     return np.concatenate(interior)
 
 
@@ -265,7 +265,7 @@ def _lattice(bounds: tuple[float, float, float, float], field: Sizes, size: floa
         sizes = field(middles) - SIZE_GRADING * times * side  # sizes change by that within half a diagonal
         cells = cells[sizes < 2 * size]
         if CELL_SIZE**2 * len(cells) > 20 * MOST_NODES:  # of them a few lie in the part
-            raise _too_many(CELL_SIZE**2 * len(cells))
+            raise _too_many_nodes(CELL_SIZE**2 * len(cells))
         if times == 1:
             break
         times //= 2
@@ -279,7 +279,7 @@ def _lattice(bounds: tuple[float, float, float, float], field: Sizes, size: floa
     return np.asarray((corner[:, None] + inner).reshape(-1, 2))
 
 
-def _too_many(nodes: int) -> GeometryError:
+def _too_many_nodes(nodes: int) -> GeometryError:
     return GeometryError(f"the mesh would have more than {MOST_NODES} nodes ({nodes:.2g}): allow larger elements")
 
 
@@ -367,7 +367,7 @@ def _triangles(region: Any, points: FloatArray) -> IntArray:
     return np.asarray(triangles[~flat])
 
 
-def _pieces(laid: list[FloatArray]) -> list[IntArray]:
+def _boundary_pieces(laid: list[FloatArray]) -> list[IntArray]:
     """Return the boundary pieces of each ring as pairs (k, 2) of points."""
     pieces_by_ring, first = [], 0
     for arc in laid:
@@ -377,12 +377,12 @@ def _pieces(laid: list[FloatArray]) -> list[IntArray]:
     return pieces_by_ring
 
 
-def _missing(corners: IntArray, laid: list[FloatArray]) -> list[IntArray]:
+def _missing_pieces(corners: IntArray, laid: list[FloatArray]) -> list[IntArray]:
     """Return, ring by ring, which pieces of the boundary are not the edge of exactly one triangle."""
     sides = corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = int(corners.max()) + 1
     keys, back = sides[:, 0] * size + sides[:, 1], sides[:, 1] * size + sides[:, 0]
-    wanted = [pieces[:, 0] * size + pieces[:, 1] for pieces in _pieces(laid)]
+    wanted = [pieces[:, 0] * size + pieces[:, 1] for pieces in _boundary_pieces(laid)]
     return [np.flatnonzero(~np.isin(key, keys) | np.isin(key, back)) for key in wanted]
 
 
@@ -433,7 +433,7 @@ def _six_nodes(points: FloatArray, corners: IntArray, rings: tuple[Ring, ...], l
     middles = points[unique].mean(axis=1)
     edges, owners, reaches = [], [], []
     keys = unique[:, 0] * len(points) + unique[:, 1]
-    for number, (ring, arc, pieces) in enumerate(zip(rings, laid, _pieces(laid), strict=True)):
+    for number, (ring, arc, pieces) in enumerate(zip(rings, laid, _boundary_pieces(laid), strict=True)):
         ends = np.append(arc[1:], arc[0] + ring.places[-1])
         a, b = place[pieces].T
         side = np.searchsorted(keys, np.minimum(a, b) * len(points) + np.maximum(a, b))

@@ -1,4 +1,4 @@
-"""A meshed part as an input deck of Abaqus and CalculiX: six-node plane-stress triangles, supports, one large step.
+"""A meshed part as an input deck of Abaqus and CalculiX: plane-stress triangles, supports, hubs, one large step.
 
 Units are mm, N, MPa. CalculiX expands plane elements to wedges, which at a width of many thicknesses cannot bend
 anticlastically: 13 % too stiff for Lan's part. The deck's width is therefore a small share of the part's, and its
@@ -48,11 +48,11 @@ def deck(
     part, stops = driven.part, driven.stops
     if any(place.load.any() for place in part.places):
         raise UsageError("--format inp: decks have no constant loads; leave out 'mechanism.loads'")
-    lines = _lines(name, part, part.create_mesh().refine()[0], stops[-1], len(stops))
+    lines = _deck_lines(name, part, part.create_mesh().refine()[0], stops[-1], len(stops))
     return ("\n".join(lines) + "\n").encode("ascii", "replace")
 
 
-def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> Iterator[str]:
+def _deck_lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> Iterator[str]:
     elements, groups = meshed.problem.elements, meshed.problem.supports.groups
     grid = elements.mesh
     widths = np.unique(elements.width)
@@ -73,28 +73,28 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
         yield from (f"{start + k}, {', '.join(map(str, row))}" for k, row in enumerate(of_width.tolist()))
         start += len(of_width)
     yield "*MATERIAL, NAME=MATERIAL"
-    yield from _elastic(part.law)
+    yield from _material_lines(part.law)
     for index, width in enumerate(widths, start=1):
         yield f"*SOLID SECTION, ELSET=WIDTH-{index}, MATERIAL=MATERIAL"
         yield f"{share * to_border(float(width), 'length'):.10g}"
     held = [
-        (f"{_word(group.name)}-{k}", group, used[group.nodes])
+        (f"{_set_name(group.name)}-{k}", group, used[group.nodes])
         for k, group in enumerate(groups, start=1)
         if used[group.nodes].any()
     ]
     spare, moves, turns = int(number[-1]) + 1, list[str](), list[str]()
     for word, group, seen in held:
         nodes = number[group.nodes[seen]].tolist()
-        if _turns(group):
+        if _is_turned(group):
             places = dict(zip(nodes, grid.nodes[group.nodes[seen]], strict=True))
             hub = Hub.from_nodes(places, group.center, spare)
-            yield from _stiff(word, hub, start, share * to_border(part.width, "length"), part.law.youngs_modulus)
+            yield from _hub_lines(word, hub, start, share * to_border(part.width, "length"), part.law.youngs_modulus)
             nodes, start, spare = list(dict.fromkeys([*nodes, hub.center])), start + len(hub.triangles), hub.spare
             made = _guide_lines(group, travel, hub.center, spare)
             turned = _turn_lines(word, hub, travel * float(group.driven[2]), spare + MAX_GUIDE_NODES, poses)
             spare += MAX_GUIDE_NODES + 2
         elif group.free.shape[1]:
-            made, turned = _rigid(word, group, travel, spare), Lines()
+            made, turned = _rigid_body_lines(word, group, travel, spare), Lines()
             spare += 2 + MAX_GUIDE_NODES
         else:
             ends = to_border(travel * group.driven[:2], "length").tolist()
@@ -106,10 +106,10 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
         yield from (*made.model, *turned.model)
         moves, turns = moves + made.moves, turns + turned.moves
     turned_arms = [f"{word}-ARM" for word, group, _ in held if travel * group.driven[2] != 0]
-    yield from _step([word for word, _, _ in held], turned_arms, [*moves, *turns], poses)
+    yield from _step_lines([word for word, _, _ in held], turned_arms, [*moves, *turns], poses)
 
 
-def _step(sets: list[str], nodes: list[str], moves: list[str], poses: int) -> Iterator[str]:
+def _step_lines(sets: list[str], nodes: list[str], moves: list[str], poses: int) -> Iterator[str]:
     """Yield the step: prescribed motions, even increments, total forces on sets, and those on single nodes."""
     yield f"*STEP, NLGEOM, INC={100 * poses}"
     yield "*STATIC"
@@ -122,7 +122,7 @@ def _step(sets: list[str], nodes: list[str], moves: list[str], poses: int) -> It
     yield from ("*NODE FILE", "U, RF", "*EL FILE", "S", "*END STEP")
 
 
-def _elastic(law: Law) -> Iterator[str]:
+def _material_lines(law: Law) -> Iterator[str]:
     """Yield a material's law."""
     from cfmkit.solid.plane_stress_law import NeoHookean
 
@@ -137,7 +137,7 @@ def _elastic(law: Law) -> Iterator[str]:
     yield f"{young:.10g}, {poisson:.10g}"
 
 
-def _word(name: str) -> str:
+def _set_name(name: str) -> str:
     """Return a name that every solver takes as that of a set."""
     return "".join(char if char.isalnum() or char == "-" else "-" for char in name.upper())[:60].strip("-") or "SET"
 
@@ -150,7 +150,7 @@ class Lines:
     moves: list[str] = field(default_factory=list)
 
 
-def _turns(group: Group) -> bool:
+def _is_turned(group: Group) -> bool:
     """Return True if a group turns, freely or by the drive: then it is joined by a hub."""
     return bool(np.any(np.abs(group.free[2]) > 0.5) or group.driven[2] != 0)
 
@@ -194,9 +194,9 @@ class Hub:
         return cls(middle, (int(every[far]), at[far] - center), added, max([spare, *added]) + 1, every[triangles])
 
 
-def _stiff(word: str, hub: Hub, start: int, width: float, modulus: float) -> Iterator[str]:
+def _hub_lines(word: str, hub: Hub, start: int, width: float, modulus: float) -> Iterator[str]:
     """Yield a hub's nodes, elements and material; `width` in mm, `modulus` that of the part [Pa]."""
-    yield from _nodes(hub.added)
+    yield from _node_lines(hub.added)
     yield f"*ELEMENT, TYPE=CPS3, ELSET=HUB-{word}"
     yield from (f"{start + k}, {', '.join(map(str, row))}" for k, row in enumerate(hub.triangles.tolist()))
     yield f"*MATERIAL, NAME=STIFF-{word}"
@@ -206,34 +206,34 @@ def _stiff(word: str, hub: Hub, start: int, width: float, modulus: float) -> Ite
     yield f"{width:.10g}"
 
 
-def _nodes(places: dict[int, FloatArray]) -> list[str]:
+def _node_lines(places: dict[int, FloatArray]) -> list[str]:
     """Return the lines of nodes at places [m]."""
     rows = [(node, to_border(at, "length").tolist()) for node, at in places.items()]
     return ["*NODE", *(f"{node}, {x:.10g}, {y:.10g}, 0" for node, (x, y) in rows)] if rows else []
 
 
-def _rigid(word: str, group: Group, travel: float, spare: int) -> Lines:
+def _rigid_body_lines(word: str, group: Group, travel: float, spare: int) -> Lines:
     """Return a rigid body that does not turn, with its guides: a centre, a node that turns with it, and carriers."""
     guided = _guide_lines(group, travel, spare, spare + 2)
     body = f"*RIGID BODY, NSET={word}, REF NODE={spare}, ROT NODE={spare + 1}"
-    model = [*_nodes(dict.fromkeys((spare, spare + 1), group.center)), body, *guided.model]
+    model = [*_node_lines(dict.fromkeys((spare, spare + 1), group.center)), body, *guided.model]
     return Lines(model, [f"{spare}, 3, 3, 0", f"{spare + 1}, 1, 3, 0", *guided.moves])
 
 
 def _guide_lines(group: Group, travel: float, center: int, carrier: int) -> Lines:
     """Return what moves a centre along every direction that is not free, by nodes from `carrier` on."""
-    model, moves = _nodes(dict.fromkeys(range(carrier, carrier + MAX_GUIDE_NODES), group.center)), []
+    model, moves = _node_lines(dict.fromkeys(range(carrier, carrier + MAX_GUIDE_NODES), group.center)), []
     for direction in _prescribed_directions(group.free):
         terms = [(center, 1 + k, float(direction[k])) for k in (0, 1) if abs(direction[k]) > 1e-12]
         terms.sort(key=lambda term: -abs(term[2]))  # the first is eliminated: it must not vanish
-        model += _equation(*terms, (carrier, 1, -1.0))
+        model += _equation_lines(*terms, (carrier, 1, -1.0))
         moves += [f"{carrier}, 1, 1, {to_border(travel * float(direction @ group.driven[:2]), 'length'):.10g}"]
         moves += [f"{carrier}, 2, 3, 0"]
         carrier += 1
     return Lines(model, moves)
 
 
-def _equation(*terms: tuple[int, int, float]) -> list[str]:
+def _equation_lines(*terms: tuple[int, int, float]) -> list[str]:
     """Return that terms (node, axis, factor) add up to nothing."""
     reported = ", ".join(f"{node}, {axis}, {factor:.12g}" for node, axis, factor in terms)
     return ["*EQUATION", str(len(terms)), reported]
@@ -251,11 +251,11 @@ def _turn_lines(word: str, hub: Hub, angle: float, carrier: int, poses: int) -> 
     c, s = np.cos(angle * time), np.sin(angle * time)
     model = [f"** torque on {word}: x Fy - y Fx, with the force on node {hub.arm[0]}"]
     model += [f"** and (x, y) = ({x:.9g}, {y:.9g}) mm turned by {angle:.9g} rad times the time"]
-    model += _nodes(dict.fromkeys((carrier, carrier + 1), hub.arm[1]))
+    model += _node_lines(dict.fromkeys((carrier, carrier + 1), hub.arm[1]))
     moves = []
     for axis, arm in ((1, x * (c - 1) - y * s), (2, x * s + y * (c - 1))):
         node = carrier + axis - 1
-        model += _equation((hub.arm[0], axis, 1.0), (hub.center, axis, -1.0), (node, axis, -1.0))
+        model += _equation_lines((hub.arm[0], axis, 1.0), (hub.center, axis, -1.0), (node, axis, -1.0))
         model += [f"*AMPLITUDE, NAME={word}-{axis}", *(f"{t:.10g}, {u:.10g}" for t, u in zip(time, arm, strict=True))]
         moves += [f"*BOUNDARY, AMPLITUDE={word}-{axis}", f"{node}, {axis}, {axis}, 1"]
         moves += ["*BOUNDARY", f"{node}, {3 - axis}, {3 - axis}, 0", f"{node}, 3, 3, 0"]

@@ -1,9 +1,8 @@
-"""A part as it is drawn: outline, widths, material and what is held or driven; meshed, and followed over a travel.
+"""A part as it is drawn (outline, widths, material, what is held or driven): meshed, checked, followed over a travel.
 
-How far a curve between solved poses can be trusted, by poses in between; more poses where it cannot. Between poses
-the effort is a cubic through efforts and stiffnesses. Where such a cubic over two neighbouring intervals misses the
-pose between them most, a pose is solved in the middle of an interval and the cubic compared with it, until that
-difference is small. Halving an interval reduces a smooth curve's error sixteen times [deBoor, ch. IV].
+Between poses the effort is a cubic through efforts and stiffnesses. Where such a cubic over two neighbouring intervals
+misses the pose between them most, a pose is solved in the middle of an interval and the cubic compared with it, until
+that difference is small. Halving an interval reduces a smooth curve's error sixteen times [deBoor, ch. IV].
 
 Whether the mesh is the part that was specified, its area and the section moduli of its beams say.
 
@@ -58,13 +57,13 @@ def check_mesh(grid: TriangleMesh, area: float, sections: Sequence[BeamSection])
     """
     if abs(grid.area - area) > SECTION_RTOL * area:
         raise GeometryError(f"the mesh covers {1e6 * grid.area:.6g} mm2 of the part's {1e6 * area:.6g} mm2")
-    starts, ends = _edges(grid)
+    starts, ends = _boundary_lines(grid)
     for section in sections:
         if section.length >= section.thickness:
             section.check(sum(section.cut(starts, ends)), "mesh", "check mechanism.part")
 
 
-def _edges(grid: TriangleMesh) -> tuple[FloatArray, FloatArray]:
+def _boundary_lines(grid: TriangleMesh) -> tuple[FloatArray, FloatArray]:
     """Return the boundary of a mesh as short lines: starts and ends (n, 2) [m]."""
     a, b, middle = (grid.nodes[grid.edges[:, k], None] for k in range(3))
     s = np.linspace(0.0, 1.0, LINES_PER_EDGE + 1)[:, None]
@@ -314,7 +313,9 @@ class MeshSolution:
         _, places, places_of_coarse = np.intersect1d(self.course.travel, coarse.course.travel, return_indices=True)
         force = np.array([self.course.poses[k].effort for k in places])
         efforts = np.array([coarse.course.poses[k].effort for k in places_of_coarse])
-        return _apart(force, efforts), _apart(self.peaks[0][places], coarse.peaks[0][places_of_coarse])
+        return _relative_difference(force, efforts), _relative_difference(
+            self.peaks[0][places], coarse.peaks[0][places_of_coarse]
+        )
 
     def evaluate_displacements(self, pose: Any) -> FloatArray:
         """Return the displacements of all nodes at a pose (n, 2) [m]."""
@@ -327,13 +328,13 @@ class MeshSolution:
         return carried.moves(np.append(pose.slope, 1.0))
 
 
-def _apart(values: FloatArray, others: FloatArray) -> float:
+def _relative_difference(values: FloatArray, others: FloatArray) -> float:
     """Return the largest difference of values, in parts of the largest of the first; 0 where that is 0."""
     largest = float(np.abs(values).max(initial=0.0))
     return float(np.abs(values - others).max()) / largest if largest else 0.0
 
 
-def largest_in(rings: Sequence[Ring], thinnest: float) -> float:
+def largest_element_size(rings: Sequence[Ring], thinnest: float) -> float:
     """Return how large elements may be where a part of beams is thick, in those of its thinnest place [m]."""
     area = sum(ring.area for ring in rings)
     around = sum(float(ring.places[-1]) for ring in rings)

@@ -1,4 +1,4 @@
-"""Poses of a part along its path, as `cfmkit.numerics.continuation` follows it.
+"""Poses of a part along its path: with corners at bifurcations, up to its end or to where it touches something.
 
 Where stability is lost the path goes on along another branch, and the curve of effort over travel has a corner: two
 poses, one with the stiffness before it and one with that behind it. A mesh is an imperfection: where the path goes
@@ -117,7 +117,7 @@ def follow(
 ) -> PosePath:
     """Return the poses of a part at some travels, on its stable branch."""
     part = FollowedPart(problem, guide=guide)
-    start = _start(part, stops[0])
+    start = _first_equilibrium(part, stops[0])
     if start is None:
         return PosePath((), PathEnd.OVERLOADED if problem.supports.loaded else PathEnd.NO_START)
     span = abs(stops[-1] - stops[0])
@@ -128,12 +128,14 @@ def follow(
     for item in follow_path(part, start, np.array(stops[1:]), options):
         if isinstance(item, PathEvent):
             if item.before == item.after:
-                path = replace(path, bifurcations=(*path.bifurcations, _meet(part, path, item, path.poses[-1])[0]))
+                path = replace(
+                    path, bifurcations=(*path.bifurcations, _meeting_of_curves(part, path, item, path.poses[-1])[0])
+                )
             else:
                 event = item
             continue
         if isinstance(item, PathStop):
-            return _end(part, path, item, event)
+            return _with_ending(part, path, item, event)
         passed = abs(path.poses[-1].travel - stops[0]) if path.poses else -1.0
         if not passed < abs(item.at.drive - stops[0]) <= span * (1.0 + 1e-12):  # behind the last stop a branch begins
             continue
@@ -150,7 +152,7 @@ def follow(
     return path
 
 
-def _start(part: FollowedPart, travel: float) -> PathEquilibrium | None:
+def _first_equilibrium(part: FollowedPart, travel: float) -> PathEquilibrium | None:
     """Return the first equilibrium, under the constant loads; None if they are too large.
 
     They grow from nothing: from afar Newton's method may come to a form that the part snaps into later, if at all.
@@ -170,7 +172,7 @@ def _start(part: FollowedPart, travel: float) -> PathEquilibrium | None:
     return None
 
 
-def _end(part: FollowedPart, path: PosePath, stop: PathStop, event: PathEvent | None) -> PosePath:
+def _with_ending(part: FollowedPart, path: PosePath, stop: PathStop, event: PathEvent | None) -> PosePath:
     """Return a path with its ending, up to where stability is lost if it is."""
     ending = PATH_ENDS.get(stop.end, PathEnd.LOST)
     if ending is PathEnd.UNSTABLE and event is not None and event.within is not None and len(path.poses) > 1:
@@ -226,7 +228,7 @@ def _add_corner(part: FollowedPart, path: PosePath, event: PathEvent, pose: Bala
     place, width = event.drive, CORNER_WIDTH * (pose.travel - path.poses[0].travel)
     first, last = (part.pose(at) for at in event.within)
     if event.near is None:  # the mesh rounds it
-        place, effort, before, behind = _meet(part, path, event, pose)
+        place, effort, before, behind = _meeting_of_curves(part, path, event, pose)
         unknowns = first.unknowns + (place - first.travel) * first.slope
     else:
         corner, onto = part.pose(event.near), event.before < event.after
@@ -252,7 +254,9 @@ def _add_corner(part: FollowedPart, path: PosePath, event: PathEvent, pose: Bala
     return replace(path, poses=tuple(poses))
 
 
-def _meet(part: FollowedPart, path: PosePath, event: PathEvent, later: Balance) -> tuple[float, float, float, float]:
+def _meeting_of_curves(
+    part: FollowedPart, path: PosePath, event: PathEvent, later: Balance
+) -> tuple[float, float, float, float]:
     """Return travel and effort where the curves before and behind a rounded corner meet, and their stiffnesses."""
     assert event.within is not None
     first, last = (part.pose(at) for at in event.within)

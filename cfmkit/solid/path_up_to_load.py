@@ -1,8 +1,8 @@
-"""A part under a force or a moment that grows: read off its path under a growing travel.
+"""A part under a force or a moment that grows: its pose at the load, read off its path under a growing travel.
 
 On a path that is followed by its travel the effort is known everywhere, so the travel at a load is where the effort
 first reaches it. Up to there the effort rises: from its first maximum on the part would jump. The pose at the end is
-solved for, between poses efforts are those of the path's cubics, whose error is known (`meshed_part.refined`).
+solved for, between poses efforts are those of the path's cubics, whose error is known (`meshed_part.refine_path`).
 """
 
 from __future__ import annotations

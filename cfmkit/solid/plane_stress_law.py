@@ -1,4 +1,4 @@
-"""Plane-stress laws of isotropic elastic materials under large strain: stress and tangent from the deformation.
+"""Plane-stress laws of isotropic elastic materials under large strain: Saint Venant-Kirchhoff and neo-Hookean.
 
 Green's strain E = (F'F - 1)/2 and the second Piola-Kirchhoff stress S, in the order 11, 22, 12 with 2 E12. The stress
 across the plane is zero: the strain there is condensed out.

@@ -1,8 +1,7 @@
 """Supports and drives of a part: groups of nodes that move as one rigid piece each.
 
-A group's three motions, two displacements and a turn about its centre, are a part that is driven times the travel,
-plus directions in which it is free. A clamp has neither; a guide is driven along and nothing else; a pin is free to
-turn.
+A group's three motions, two displacements and a turn about its centre, are a part that is driven times the travel, plus
+directions in which it is free. A clamp has neither; a guide is driven along and nothing else; a pin is free to turn.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Stress fillet by fillet: where the rounded inside corners of a solved part are, and how large the stress in each is.
+"""Fillets of a solved part, its rounded inside corners: where they are, and the largest stress in each at every pose.
 
 Fillets are read off the boundary that is meshed: arcs of the cutter's radius that turn towards the waste. Whole circles
 are holes, not fillets.

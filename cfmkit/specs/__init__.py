@@ -1,4 +1,6 @@
-"""From text to a specification and back: YAML with places, quantities with units, the models of what may be said."""
+"""From text to a specification and back: YAML with places, quantities with units, the blocks that all families have,
+target curves, and metrics of the user.
+"""
 
 from typing import TYPE_CHECKING
 

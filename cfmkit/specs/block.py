@@ -1,4 +1,4 @@
-"""The base of every block of a specification, and values within bounds that many blocks have."""
+"""Base of every block of a specification, lengths and forces within bounds, and the keys that a block states."""
 
 from __future__ import annotations
 

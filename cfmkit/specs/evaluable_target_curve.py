@@ -1,4 +1,4 @@
-"""A target curve as a function of the motion: values, range, extremes."""
+"""A target curve as a function of the motion: its values, range and extremes, and its points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Formulas of one variable x as text, read by a closed grammar: numbers, x, pi, + - * / **, a few functions."""
+"""Formulas of one variable x as text, read by a closed grammar, and their derivatives, exact but for rounding."""
 
 from __future__ import annotations
 

@@ -1,9 +1,7 @@
-"""Metrics that cfmkit computes of no single analysis: those of many parts, and those of the user.
+"""Metrics that no single analysis gives: shares of many parts, and functions of a user that a program registers.
 
-What a design with tolerances knows are shares of parts. Metrics of the user are Python functions of a result, by the
-names under which requirements and studies ask for them: their table is empty unless a program fills it. Whoever lists
-metrics or values of a family adds what is in it (`cfmkit.families.family`), so that a metric of the user is in every
-place where one of cfmkit is.
+The table of the user's metrics is empty unless a program fills it. Whoever lists metrics or values of a family adds
+what is in it (`cfmkit.families.family`), so that a metric of the user is in every place where one of cfmkit is.
 """
 
 from __future__ import annotations

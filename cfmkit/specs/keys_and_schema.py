@@ -1,4 +1,4 @@
-"""Keys of a specification, read off the models: a JSON schema, for editors, and a list of the keys.
+"""Keys of a specification, read off its models: the JSON schema for editors, and a list with bounds and defaults.
 
 Defaults and bounds are as they are written in YAML: text with units.
 """
@@ -171,16 +171,16 @@ def _key(path: str, node: dict[str, Any], blocks: dict[str, Any], required: bool
     default = node.get("default", _NO_VALUE)
     return Key(
         path,
-        " or ".join(dict.fromkeys(_kind(member, blocks) for member in members)),
+        " or ".join(dict.fromkeys(_kind_in_words(member, blocks) for member in members)),
         next((quantity["examples"][0] for quantity in quantities if quantity.get("examples")), ""),
         "; ".join(dict.fromkeys(filter(None, map(_describe_allowed, members)))),
-        _default(default) if default not in (_NO_VALUE, None, "", []) else "",
+        _default_text(default) if default not in (_NO_VALUE, None, "", []) else "",
         required,
         node.get("description") or next((member["description"] for member in members if "description" in member), ""),
     )
 
 
-def _kind(node: dict[str, Any], blocks: dict[str, Any]) -> str:
+def _kind_in_words(node: dict[str, Any], blocks: dict[str, Any]) -> str:
     if "x-dimension" in node:
         return str(node["x-dimension"]).replace("_", " ")
     if "enum" in node or "const" in node:
@@ -188,14 +188,14 @@ def _kind(node: dict[str, Any], blocks: dict[str, Any]) -> str:
     if "properties" in node:
         return "block"
     if node.get("type") == "array":
-        return f"list of {_items(node, blocks)}"
+        return f"list of {_items_in_words(node, blocks)}"
     kind = node.get("type", "value")
     return "number or text" if isinstance(kind, list) else _KIND_WORDS.get(kind, "value")
 
 
-def _items(node: dict[str, Any], blocks: dict[str, Any]) -> str:
+def _items_in_words(node: dict[str, Any], blocks: dict[str, Any]) -> str:
     inner = node.get("prefixItems") or [node.get("items", {})]
-    kinds = dict.fromkeys(_kind(member, blocks) for item in inner for member in _members(item, blocks))
+    kinds = dict.fromkeys(_kind_in_words(member, blocks) for item in inner for member in _members(item, blocks))
     count = f"{len(inner)} x " if "prefixItems" in node else ""
     return count + " or ".join(kinds)
 
@@ -209,9 +209,9 @@ def _describe_allowed(node: dict[str, Any]) -> str:
     return " and ".join(f"{sign} {node[word]:g}" for word, sign in signs.items() if word in node)
 
 
-def _default(value: Any) -> str:
+def _default_text(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list):
-        return f"[{', '.join(map(_default, value))}]"
+        return f"[{', '.join(map(_default_text, value))}]"
     return f"{value:g}" if isinstance(value, float) else str(value)

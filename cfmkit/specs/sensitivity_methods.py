@@ -1,4 +1,4 @@
-"""Methods of a sensitivity study by name: what a specification and the command line need to know of them.
+"""Methods of a sensitivity study by name, for specifications, commands and messages: what each is and counts.
 
 What a method does is `SENSITIVITY_METHOD` in the module of its name, which studies look up.
 """

@@ -1,8 +1,7 @@
-"""Specifications: frozen, strict models of what a user says about a mechanism.
+"""Specifications as frozen, strict models: the blocks of all families, and values read, listed, replaced by path.
 
-A family subclasses `Spec` with its own `mechanism`, `design` and `analysis`
-blocks. Numbers are SI floats inside; text with units exists only at the border
-(`cfmkit.specs.yamlio`, `cfmkit.specs.units`).
+A family subclasses `Spec` with its own `mechanism`, `design` and `analysis` blocks. Numbers are SI floats inside; text
+with units exists only at the border (`cfmkit.specs.yamlio`, `cfmkit.specs.units`).
 """
 
 from __future__ import annotations
@@ -293,7 +292,7 @@ class Spec(Model):
         """
         value: Any = self
         for part in path.split("."):
-            value = _child(value, part, path)
+            value = _value_below(value, part, path)
         return value
 
     def replace(self, changes: Mapping[str, Any], as_made: bool = False) -> Self:
@@ -352,7 +351,7 @@ def refuse(title: str, faults: Mapping[tuple[str | int, ...], str]) -> None:
         raise ValidationError.from_exception_data(title, lines)  # type: ignore[arg-type]
 
 
-def _child(value: Any, part: str, path: str) -> Any:
+def _value_below(value: Any, part: str, path: str) -> Any:
     if isinstance(value, tuple) and part.isdigit() and int(part) < len(value):
         return value[int(part)]
     if isinstance(value, Mapping) and part in value:
@@ -389,19 +388,19 @@ def _contains(data: Any, parts: list[str]) -> bool:
 
 def _stated_leaves(everything: Mapping[str, Any], stated: Mapping[str, Any]) -> Iterator[tuple[str, float | int]]:
     """Yield every numeric leaf as (dotted path, value), but for those of laws that a material has by its name alone."""
-    for path, value in _leaves(everything, ""):
+    for path, value in _numeric_leaves(everything, ""):
         law = ASSUMED_LAW.match(path)
         if law is None or _contains(stated, law[0].split(".")):
             yield path, value
 
 
-def _leaves(value: Any, path: str) -> Iterator[tuple[str, float | int]]:
+def _numeric_leaves(value: Any, path: str) -> Iterator[tuple[str, float | int]]:
     if isinstance(value, Mapping):
         for key, item in value.items():
-            yield from _leaves(item, f"{path}.{key}" if path else key)
+            yield from _numeric_leaves(item, f"{path}.{key}" if path else key)
     elif isinstance(value, tuple | list):
         for index, item in enumerate(value):
-            yield from _leaves(item, f"{path}.{index}")
+            yield from _numeric_leaves(item, f"{path}.{index}")
     elif isinstance(value, int | float) and not isinstance(value, bool):
         yield path, value
 

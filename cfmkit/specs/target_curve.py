@@ -1,6 +1,6 @@
-"""A curve that the force or torque is to follow where it is not to be constant, as a specification says it.
+"""A curve that force or torque are to follow, as a specification says it: points, a CSV file or a stiffness.
 
-``design.target`` and ``analysis.target`` take points, a CSV file or a stiffness. What drives the mechanism decides
+These are ``design.target`` and ``analysis.target``. What drives the mechanism decides
 whether these are forces over displacements or torques over angles; the units say which.
 """
 
@@ -63,43 +63,43 @@ class Target(Model):
         if value is None:
             return None
         source = DataSource(handler(value), folder)
-        _from_file(source)
+        _read_points(source)
         return source
 
     @model_validator(mode="after")
-    def _said_once(self) -> Self:
+    def _require_one_source(self) -> Self:
         if sum(source is not None for source in (self.points, self.file, self.stiffness)) != 1:
             raise ValueError("give one of 'points', 'file' and 'stiffness'")
         if self.start is not None and self.stiffness is None:
             raise ValueError("'start' belongs to 'stiffness': points say where they start")
         if self.points is not None:
-            _check(self.points)
+            _require_increasing_points(self.points)
         if (
             self.start
             and self.stiffness
-            and EFFORT_DIMENSIONS.index(_dim(self.start)) != SLOPE_DIMENSIONS.index(_dim(self.stiffness))
+            and EFFORT_DIMENSIONS.index(_dimension(self.start)) != SLOPE_DIMENSIONS.index(_dimension(self.stiffness))
         ):
             raise ValueError("'stiffness' and 'start' must both be of a force, or both of a torque")
         return self
 
     @property
     def all_points(self) -> tuple[tuple[float, float], ...] | None:
-        """The points, those of the file included [m or rad, N or N m]; None of a straight line."""
-        return _from_file(self.file) if isinstance(self.file, DataSource) else self.points
+        """The points, those of a file included [m or rad, N or N m]; None for a straight line."""
+        return _read_points(self.file) if isinstance(self.file, DataSource) else self.points
 
     @property
     def kind(self) -> str | None:
         """Force or torque; None if all numbers are zero."""
         if (points := self.all_points) is not None:
-            said = {_dim(effort) for _, effort in points if effort}
-            said |= {"torque" for place, _ in points if place and _dim(place) == "angle"}
+            said = {_dimension(effort) for _, effort in points if effort}
+            said |= {"torque" for place, _ in points if place and _dimension(place) == "angle"}
             return said.pop() if said else None
         if self.stiffness:
-            return EFFORT_DIMENSIONS[SLOPE_DIMENSIONS.index(_dim(self.stiffness))]
-        return _dim(self.start) if self.start else None
+            return EFFORT_DIMENSIONS[SLOPE_DIMENSIONS.index(_dimension(self.stiffness))]
+        return _dimension(self.start) if self.start else None
 
     def curve(self, level: float | None = None) -> TargetCurve:
-        """Return it as a function; a line without `start` has a level at zero [N or N m]."""
+        """Return the curve as a function; a line without `start` has a level at zero [N or N m]."""
         from cfmkit.numerics.interpolation import (
             ThroughPoints,  # numpy, which reading a specification does not need
         )
@@ -113,32 +113,34 @@ class Target(Model):
         return TargetCurve(ThroughPoints(places, efforts, self.interpolation == "smooth"), self.kind)
 
     def written_out(self, level: float | None = None) -> Target:
-        """Return it without a file, which other folders do not have, and a line with its level [N or N m]."""
+        """Return the target without a file, which other folders do not have, and a line with its level [N or N m]."""
         if isinstance(self.file, DataSource):
-            return Target(points=_from_file(self.file), interpolation=self.interpolation)
+            return Target(points=_read_points(self.file), interpolation=self.interpolation)
         if self.stiffness is not None and self.start is None and level:
             return self.model_copy(
                 update={
-                    "start": DimensionedFloat(level, EFFORT_DIMENSIONS[SLOPE_DIMENSIONS.index(_dim(self.stiffness))])
+                    "start": DimensionedFloat(
+                        level, EFFORT_DIMENSIONS[SLOPE_DIMENSIONS.index(_dimension(self.stiffness))]
+                    )
                 }
             )
         return self
 
 
-def _dim(number: float) -> str:
+def _dimension(number: float) -> str:
     return str(getattr(number, "dimension", ""))
 
 
-def _check(points: tuple[tuple[float, float], ...]) -> None:
+def _require_increasing_points(points: tuple[tuple[float, float], ...]) -> None:
     """Raise if points do not increase, or mix forces and torques."""
     for (before, _), (after, _) in itertools.pairwise(points):
         if not after > before:
-            pair = [format_short(float(place), _dim(place) or "length") for place in (before, after)]
+            pair = [format_short(float(place), _dimension(place) or "length") for place in (before, after)]
             raise ValueError(
                 f"points must increase: {pair[1]} comes after {pair[0]}; a step needs a little travel between its ends"
             )
-    efforts = {_dim(effort) for _, effort in points if effort} or {_dim(effort) for _, effort in points}
-    motions = {_dim(place) for place, _ in points if place}
+    efforts = {_dimension(effort) for _, effort in points if effort} or {_dimension(effort) for _, effort in points}
+    motions = {_dimension(place) for place, _ in points if place}
     if len(efforts) > 1 or len(motions) > 1 or (efforts and motions - {MOTION_OF[effort] for effort in efforts}):
         raise ValueError("points are forces over displacements, or torques over angles; these are mixed")
 
@@ -147,7 +149,7 @@ _HEADER_PATTERN = re.compile(r"\s*(?P<name>[a-z_]+)\s*\[(?P<unit>[^\[\]]+)\]\s*"
 _COLUMN_DIMENSIONS = {"displacement": "length", "force": "force", "angle": "angle", "torque": "torque"}
 
 
-def _from_file(source: DataSource) -> tuple[tuple[Place, DimensionedFloat], ...]:
+def _read_points(source: DataSource) -> tuple[tuple[Place, DimensionedFloat], ...]:
     """Return the points of a CSV.
 
     Raises ValueError if its columns or numbers are not those of a curve; the message names the line.
@@ -186,7 +188,7 @@ def _from_file(source: DataSource) -> tuple[tuple[Place, DimensionedFloat], ...]
     if not 2 <= len(points) <= MOST_POINTS:
         raise ValueError(f"{source}: a curve has 2 to {MOST_POINTS} points, not {len(points)}")
     try:
-        _check(tuple(points))
+        _require_increasing_points(tuple(points))
     except ValueError as problem:
         raise ValueError(f"{source}: {problem}") from None
     return tuple(points)

@@ -22,10 +22,9 @@ What a user can rely on
 While a run lives, ``.cfmkit.lock`` and ``.cfmkit-run/`` stand in the folder; both
 are gone after it, and after a kill both are cleared by the next run.
 
-`safe_disk_changes` makes changes and turns their errors into sentences, `file_names_and_overwrite_checks` says what may
-be written, `lock` keeps other runs out, `transaction` changes many files as one,
-`run_folder` is the list of what a run wrote, `run_folder` is what a run works with, and
-`content_hashes_and_versions` gives content its name.
+`run_folder` is what a run works with, and its manifest; `transaction` changes many files as one, `lock` keeps other
+runs out, `file_names_and_overwrite_checks` says what may be written, `safe_disk_changes` makes changes and turns their
+errors into sentences, `content_hashes_and_versions` gives content its hash.
 """
 
 from cfmkit.store.content_hashes_and_versions import code_stamp, file_hash, origin, stable_hash

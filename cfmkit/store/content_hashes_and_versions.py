@@ -1,4 +1,4 @@
-"""Names for content: two things with the same hash are the same thing."""
+"""SHA-256 hashes of files, folders and values, and the versions of code and libraries that compute a result."""
 
 from __future__ import annotations
 

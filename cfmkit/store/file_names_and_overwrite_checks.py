@@ -1,4 +1,4 @@
-"""Which names a run may write to inside its folder."""
+"""Files that a run may write in its folder: plain names, not reserved, none in the place of somebody else's file."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def checked_name(name: str) -> str:
     Raises OutputError if it is absolute, leads upwards, holds control characters or backslashes, or is one of the names
     that the folder keeps for itself.
     """
-    if problem := _problem(name):
+    if problem := _name_problem(name):
         raise OutputError(f"{name!a} is not a name for a file in the output folder: {problem}")
     return name
 
 
-def _problem(name: str) -> str | None:
+def _name_problem(name: str) -> str | None:
     parts = name.split("/")
     if name.startswith("/"):
         return "it is absolute"
@@ -56,13 +56,13 @@ def refuse_in_the_way(root: Path, name: str, *, ours: bool) -> None:
         mode = mode_of(place)
         if mode is not None and not stat.S_ISDIR(mode):
             raise OutputError(
-                f"{quote_path(place)} is in the way: it is {_what(mode)}, not a folder; {OVERWRITE_REMEDY}"
+                f"{quote_path(place)} is in the way: it is {_kind(mode)}, not a folder; {OVERWRITE_REMEDY}"
             )
     mode = mode_of(root / name)
     if mode is None or (ours and stat.S_ISREG(mode)):
         return
     raise OutputError(
-        f"{quote_path(root / name)} is in the way: it is {_what(mode)} that no earlier run wrote; {OVERWRITE_REMEDY}"
+        f"{quote_path(root / name)} is in the way: it is {_kind(mode)} that no earlier run wrote; {OVERWRITE_REMEDY}"
     )
 
 
@@ -84,7 +84,7 @@ def mode_of(path: Path) -> int | None:
         return None
 
 
-def _what(mode: int) -> str:
+def _kind(mode: int) -> str:
     if stat.S_ISLNK(mode):
         return "a link"
     if stat.S_ISDIR(mode):

@@ -1,4 +1,4 @@
-"""One live run per output folder.
+"""One live run per output folder: a lock on a file in it, or a file that marks the run where no locks exist.
 
 The lock is one of the operating system on the open file ``.cfmkit.lock``, which `filelock` takes: `flock`, or
 `LockFileEx` on Windows. It dies with its process. A forked worker closes its copy of the file at once, so that it

@@ -1,4 +1,5 @@
-"""The output folder of one run, and ``manifest.json``, its last file and the only one with a time in it."""
+"""The output folder of one run: files written all together, and ``manifest.json``, their list with times and versions.
+"""
 
 from __future__ import annotations
 
@@ -85,8 +86,8 @@ class Manifest:
             **info,
             "cfmkit": __version__,
             "versions": imported_versions(),
-            "started": _text(started),
-            "finished": _text(started + duration),
+            "started": _utc_text(started),
+            "finished": _utc_text(started + duration),
             "duration_s": round(duration.total_seconds(), 3),
             "files": {name: record._asdict() for name, record in files.items()},
         }
@@ -159,7 +160,7 @@ def imported_versions() -> dict[str, str]:
     return versions
 
 
-def _text(time: datetime) -> str:
+def _utc_text(time: datetime) -> str:
     return time.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
@@ -241,7 +242,7 @@ class RunFolder:
         self._require_open()
         self.check(name)
         self._staged.pop(name, None)
-        self._staged[name] = self._stage(name, data)
+        self._staged[name] = self._stage_file(name, data)
         return self._staged[name]
 
     @property
@@ -271,8 +272,8 @@ class RunFolder:
         with reporting(self.path):
             removed, kept = self._list_outdated()
             new = {name: record.sha256 for name, record in self._staged.items()}
-            new |= {spare: self._keep(name, spare) for name, spare in kept.items()}
-            new[MANIFEST_NAME] = self._stage(MANIFEST_NAME, manifest.to_json()).sha256
+            new |= {spare: self._stage_edited(name, spare) for name, spare in kept.items()}
+            new[MANIFEST_NAME] = self._stage_file(MANIFEST_NAME, manifest.to_json()).sha256
             self._lock.check()
             transaction.execute(self.path, transaction.plan_for(self.path, new, removed))
         self.previous, self.kept = manifest, MappingProxyType(kept)
@@ -305,7 +306,7 @@ class RunFolder:
             if match and not _alive(int(match[1])):
                 safe_disk_changes.discard(Path(entry.path))
 
-    def _stage(self, name: str, data: Data) -> FileRecord:
+    def _stage_file(self, name: str, data: Data) -> FileRecord:
         place = self.path / TRANSACTION_FOLDER / NEW_FOLDER / name
         with reporting(self.path / name):
             safe_disk_changes.make_folders(place.parent)
@@ -313,7 +314,7 @@ class RunFolder:
                 safe_disk_changes.system.unlink(place)
             return safe_disk_changes.write_new(place, data)
 
-    def _keep(self, name: str, spare: str) -> str:
+    def _stage_edited(self, name: str, spare: str) -> str:
         """Stage an edited file under its spare name; return its hash."""
         place = self.path / TRANSACTION_FOLDER / NEW_FOLDER / spare
         safe_disk_changes.make_folders(place.parent)
@@ -329,11 +330,11 @@ class RunFolder:
             if digest == record.sha256 and name not in self._staged:
                 removed.append(name)
             elif name in self._staged and digest not in (None, record.sha256, self._staged[name].sha256):
-                spare = self._spare(name, digest)
+                spare = self._spare_name(name, digest)
                 kept |= {name: spare} if spare else {}
         return removed, kept
 
-    def _spare(self, name: str, digest: str | None) -> str | None:
+    def _spare_name(self, name: str, digest: str | None) -> str | None:
         """Return a free name for an edited file, or None if the same content is kept already."""
         stem, dot, suffix = name.rpartition(".") if "." in name.rpartition("/")[2] else (name, "", "")
         count = 1

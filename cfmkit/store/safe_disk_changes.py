@@ -1,4 +1,4 @@
-"""The only place that changes the disk, and the sentences for when that fails."""
+"""All changes of the disk: files written whole or linked, folders made and cleared; their errors as sentences."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def write_new(path: Path, data: Data) -> FileRecord:
     descriptor = system.open(path, flags, 0o666)
     try:
         try:
-            record = _pour(descriptor, [data] if isinstance(data, bytes | bytearray | memoryview) else data)
+            record = _write_pieces(descriptor, [data] if isinstance(data, bytes | bytearray | memoryview) else data)
             system.fsync(descriptor)
         finally:
             system.close(descriptor)
@@ -126,7 +126,7 @@ def write_new(path: Path, data: Data) -> FileRecord:
     return record
 
 
-def _pour(descriptor: int, pieces: Iterable[bytes | bytearray | memoryview]) -> FileRecord:
+def _write_pieces(descriptor: int, pieces: Iterable[bytes | bytearray | memoryview]) -> FileRecord:
     size, digest = 0, sha256()
     for piece in pieces:
         rest = memoryview(piece).cast("B")

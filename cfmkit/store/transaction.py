@@ -8,11 +8,10 @@ system, so that each step is a rename::
     .cfmkit-run/plan.json   what is to be done, written when all of that is there
     .cfmkit-run/undo.json   the same file, renamed: what is to be undone
 
-The moment at which ``plan.json`` takes its name is the commit: before it, the
-folder is untouched; after it, `recover` in the next run does what is left. A
-failure within the commit renames the plan to ``undo.json`` (which needs no space
-on a full disk) and puts the old files back; dying there is repaired likewise.
-The manifest is replaced last, and the plan is removed after that.
+The moment at which ``plan.json`` takes its name is the commit: before it, the folder is untouched; after it, `recover`
+in the next run does what is left. A failure within the commit renames the plan to ``undo.json`` (which needs no space
+on a full disk) and puts the old files back; dying there is repaired likewise. The manifest is replaced last, and the
+plan is removed after that.
 """
 
 from __future__ import annotations
@@ -76,7 +75,7 @@ def execute(root: Path, plan: CommitPlan) -> None:
     then the message says so, and the next run puts it right.
     """
     try:
-        _keep_old(root, plan)
+        _link_old_files(root, plan)
         safe_disk_changes.atomic_write(
             root / TRANSACTION_FOLDER / PLAN_NAME, json.dumps(asdict(plan), indent=1).encode()
         )
@@ -120,7 +119,7 @@ def _pending(root: Path) -> bool:
     return any(mode_of(root / TRANSACTION_FOLDER / name) is not None for name in (PLAN_NAME, UNDO_NAME))
 
 
-def _keep_old(root: Path, plan: CommitPlan) -> None:
+def _link_old_files(root: Path, plan: CommitPlan) -> None:
     """Give every file that will go a second name, and bring all names down to the disk."""
     for change in plan.changes:
         if change.old is not None:
@@ -138,10 +137,10 @@ def _roll_forward(root: Path, plan: CommitPlan) -> None:
     touched = {root}
     for change in plan.changes:
         if change.name == MANIFEST_NAME:
-            _sync(touched)
+            _sync_folders(touched)
         _apply(root, change)
         touched |= {root / parent for parent in _parents(change.name)}
-    _sync(touched)
+    _sync_folders(touched)
     # Only now: undoing this would need new folders, which a full disk may refuse.
     remove_empty(root / parent for change in plan.changes if change.new is None for parent in _parents(change.name))
     safe_disk_changes.system.unlink(root / TRANSACTION_FOLDER / PLAN_NAME)
@@ -192,7 +191,7 @@ def _roll_back(root: Path, plan: CommitPlan) -> None:
         _restore(root, change)
     remove_empty(root / name for name in plan.folders)
     with suppress(OSError):
-        _sync({root, *(root / parent for change in plan.changes for parent in _parents(change.name))})
+        _sync_folders({root, *(root / parent for change in plan.changes for parent in _parents(change.name))})
     safe_disk_changes.system.unlink(root / TRANSACTION_FOLDER / UNDO_NAME)
 
 
@@ -207,7 +206,7 @@ def _restore(root: Path, change: Change) -> None:
         safe_disk_changes.system.replace(kept, place)
 
 
-def _sync(folders: Iterable[Path]) -> None:
+def _sync_folders(folders: Iterable[Path]) -> None:
     for folder in sorted(folders):
         if folder.is_dir():
             sync_folder(folder)

@@ -1,8 +1,7 @@
 """Tidy tables: named columns with units, and the one kind of CSV that cfmkit writes.
 
-A table has one row per observation and one column per quantity. Numbers stand in
-the units of the border (mm, N, N*mm, MPa, deg, kg, s, and ``1`` for ratios);
-columns without a unit hold names, states and counts. What is missing (None, NaN
+A table has one row per observation and one column per quantity. Numbers stand in the units of the border (mm, N, N*mm,
+MPa, deg, kg, s, and ``1`` for ratios); columns without a unit hold names, states and counts. What is missing (None, NaN
 or an empty text) is an empty cell.
 """
 

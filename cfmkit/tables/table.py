@@ -1,4 +1,4 @@
-"""A tidy table as a value: columns in order, read-only, each with a name and perhaps a unit; tables of curves.
+"""A tidy table as a value: read-only columns with names and units; the table of a run's curves; Parquet.
 
 As Parquet, for studies with more points than a spreadsheet opens, it takes a tenth of the bytes, and types are kept;
 that needs pyarrow (``pip install pyarrow``). Libraries that only some users need are imported when they are used, and
@@ -159,9 +159,8 @@ def curve_table(
 ) -> Table:
     """Return the curves of one run as one tidy table in border units, stacked in their order.
 
-    The values that tell the curves apart lead, then come ``branch``, displacement
-    or angle, force or torque, ``stable``, and the extras. A column that a curve
-    does not have is empty in its rows.
+    The values that tell the curves apart lead, then come ``branch``, displacement or angle, force or torque,
+    ``stable``, and the extras. A column that a curve does not have is empty in its rows.
     """
     labels: list[Part] = [
         ({name: Column(np.full(len(curve), value), kind) for name, (value, kind) in curve.label.items()}, len(curve))
@@ -255,13 +254,13 @@ def parquet(table: Table) -> bytes:
     import pyarrow
     from pyarrow import parquet as writer
 
-    columns: dict[str, Any] = {column.header: _cells(column.cells()) for column in table.columns}
+    columns: dict[str, Any] = {column.header: _null_or_cells(column.cells()) for column in table.columns}
     into = io.BytesIO()
     writer.write_table(pyarrow.table(columns), into, compression="zstd")
     return into.getvalue()
 
 
-def _cells(cells: Any) -> list[Any]:
+def _null_or_cells(cells: Any) -> list[Any]:
     """Return the cells of a column, numbers that are not there as null; a column of texts and numbers as texts."""
     values = [None if isinstance(cell, float) and cell != cell else cell for cell in cells]
     kinds = {type(value) for value in values if value is not None}

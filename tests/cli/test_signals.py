@@ -107,7 +107,7 @@ def interrupted(count, version):
             signal.raise_signal(number)
         return trace
     where = []
-    main._listen()
+    main._catch_signals()
     sys.settrace(trace)
     try:
         write(version)
@@ -257,7 +257,7 @@ class Compiler:
     def __del__(self):
         signal.raise_signal(signal.SIGTERM)
 
-main._listen()
+main._catch_signals()
 try:
     Compiler()
     print("went on", flush=True)

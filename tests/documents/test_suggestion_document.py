@@ -1,7 +1,7 @@
 """The page of `suggest`: what its notes say of several proposals."""
 
 from cfmkit.documents.document import Written
-from cfmkit.documents.suggestion_document import _remarks, document_of
+from cfmkit.documents.suggestion_document import _common_notes, document_of
 from cfmkit.documents.terminal import page, print_blocks
 from cfmkit.errors import ExitCode
 
@@ -11,7 +11,7 @@ def test_a_warning_of_several_proposals_is_one_note_with_a_command_that_exists()
     warned = (("run_in: from 1 mm",), ("run_in: from 2 mm", "wide_beam +2 %"), ("wide_beam +2 %",))
     stops = ((), ("end stop, rigid: it carries 50 N", "friction assumed"), ())
     shown = zip(warned, stops, strict=True)
-    notes = list(_remarks([{"unjudged": ("yield",), "warnings": texts, "notes": more} for texts, more in shown]))
+    notes = list(_common_notes([{"unjudged": ("yield",), "warnings": texts, "notes": more} for texts, more in shown]))
     assert [(note.word, note.text) for note in notes] == [
         ("no. 1-3", "yield"),
         ("no. 2", "end stop, rigid: it carries 50 N"),

@@ -221,4 +221,4 @@ def test_the_name_of_a_file_that_cannot_be_read_keeps_its_capitals(tmp_path, mon
     (tmp_path / "MyData.CSV").touch()
     monkeypatch.setattr(Path, "open", broken)
     with pytest.raises(UsageError, match=r"MyData\.CSV cannot be read: (input/output error|no Device of this Kind)"):
-        reading._content(tmp_path / "MyData.CSV")
+        reading._read_bytes(tmp_path / "MyData.CSV")

@@ -154,7 +154,7 @@ def test_an_exception_of_the_cad_kernel_is_one_line(monkeypatch):
         Edge = Vector = Location = None
 
     Kernel.Edge = Kernel
-    monkeypatch.setattr(import_module("cfmkit.export.bodies_stl_3mf_step"), "_kernel", Kernel)
+    monkeypatch.setattr(import_module("cfmkit.export.bodies_stl_3mf_step"), "_import_build123d", Kernel)
     with pytest.raises(
         GeometryError, match=r"cannot make a body from the outline \(RuntimeError: StdFail_NotDone: BRep"
     ):

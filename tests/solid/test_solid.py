@@ -140,7 +140,7 @@ def test_a_hole_that_is_cut_beside_the_part_is_named(height, said):
 
 def test_triangles_that_never_meet_the_outline_end_in_a_sentence(monkeypatch):
     """Whatever the reason: halving pieces of the boundary ends, and what is reported is no mesh."""
-    monkeypatch.setattr("cfmkit.solid.mesh._missing", lambda _, laid: [np.zeros(1, int) for _ in laid])
+    monkeypatch.setattr("cfmkit.solid.mesh._missing_pieces", lambda _, laid: [np.zeros(1, int) for _ in laid])
     with pytest.raises(GeometryError, match=r"the outline cannot be meshed at \(0 mm, 0 mm\): it touches itself"):
         mesh((Ring.from_points(box(0, 0, 10e-3, 2e-3), False),), 1e-3)
 

@@ -95,7 +95,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
             junit=options.junit,
             summary=options.summary,
             compare=options.compare,
-            compare_tolerance=_tolerance(options),
+            compare_tolerance=_read_tolerance(options),
             accept=options.accept,
             page=options.report,
             form=options.form,
@@ -116,7 +116,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
         | ({"accepted": result.accepted} if result.accepted else {}),
         notes=(*document.notes, *named),
         complaints=(
-            *_complaints(result, options, terminal),
+            *_batch_complaints(result, options, terminal),
             *list_unreached_options(result.entries, options.changes),
             *(_annotations(result) if options.annotations else ()),
         ),
@@ -125,7 +125,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
     )
 
 
-def _tolerance(options: BatchOptions) -> float | None:
+def _read_tolerance(options: BatchOptions) -> float | None:
     from cfmkit.errors import QuantityError, UsageError
     from cfmkit.specs.units import read_quantity
 
@@ -157,7 +157,7 @@ def _place_of(name: str, number: int) -> tuple[int, int]:
     return line or 0, column or 0
 
 
-def _complaints(result: BatchResult, options: BatchOptions, terminal: Terminal) -> Iterator[str]:
+def _batch_complaints(result: BatchResult, options: BatchOptions, terminal: Terminal) -> Iterator[str]:
     from cfmkit.cli.failures import go_on
     from cfmkit.runs.batch import complaints
 

@@ -1,4 +1,4 @@
-"""``cfmkit check``: are specs valid, without computing anything."""
+"""``cfmkit check``: whether specs are valid, and every problem with its line; nothing is computed."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def run(options: CheckOptions, terminal: Terminal) -> Document:
 
     return Document(
         {"files": [_record(item) for item in checked_files], "message": message},
-        _lines(checked_files, terminal.verbose > 0),
+        _outcome_lines(checked_files, terminal.verbose > 0),
         _code([item.failure.exit_code for item in checked_files]),
         complaints=tuple(line for item in checked_files for line in item.failure.complaints),
         errors=tuple(entry for item in checked_files for entry in item.failure.errors),
@@ -85,7 +85,7 @@ def _record(item: Checked) -> dict[str, Any]:
     return {"file": item.file, "ok": item.spec is not None, **about, "errors": list(item.failure.errors)}
 
 
-def _lines(checked_files: list[Checked], everything: bool) -> Iterator[TextLine]:
+def _outcome_lines(checked_files: list[Checked], everything: bool) -> Iterator[TextLine]:
     """Yield one line per file, names whole whatever the width; and all of its requirements."""
     wide = max(len(visible(item.file)) for item in checked_files)
     for item in checked_files:

@@ -1,4 +1,4 @@
-"""``cfmkit design``: from targets to a mechanism, and the analysis of that mechanism."""
+"""``cfmkit design``: from targets to a mechanism, the analysis of that mechanism, and its drawings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``cfmkit doctor``: what this installation has, and what is wrong with it."""
+"""``cfmkit doctor``: versions, packages, folders, locks, fonts and engine of this installation, and its faults."""
 
 from __future__ import annotations
 
@@ -38,24 +38,24 @@ def run(options: DoctorOptions, terminal: Terminal) -> Document:
     """
     report = {
         "versions": {"cfmkit": __version__, "python": platform.python_version(), "system": platform.platform()},
-        "packages": list(_packages()),
+        "packages": list(_package_records()),
         "folders": [
             {"name": what, "path": str(path), "writable": _writable(path)} for what, path in _folders().items()
         ],
-        "locks": _locks(),
-        "solver": _solver(),
-        "fonts": _fonts(),
-        "caches": list(_caches()),
-        "families": list(_families()),
+        "locks": _lock_record(),
+        "solver": _solver_record(),
+        "fonts": _font_record(),
+        "caches": list(_cache_records()),
+        "families": list(_family_records()),
     }
     troubles = tuple(_troubles(report))
     data = {"message": "; ".join(troubles) or "nothing is wrong", **report}
     warnings = [{"name": "doctor", "message": trouble} for trouble in troubles]
 
-    return Document({**data, "warnings": warnings}, _page(report, troubles))
+    return Document({**data, "warnings": warnings}, _page_blocks(report, troubles))
 
 
-def _packages() -> Iterator[Record]:
+def _package_records() -> Iterator[Record]:
     """Yield what cfmkit uses, with the version that is there, None if it is missing, and the versions allowed."""
     from importlib.metadata import PackageNotFoundError, requires, version
 
@@ -94,7 +94,7 @@ def _writable(path: Path) -> bool:
     return path.is_dir() and os.access(path, os.W_OK | os.X_OK)
 
 
-def _locks() -> Record:
+def _lock_record() -> Record:
     """Return whether the current folder has file locks; None if it cannot be written to."""
     from cfmkit.store.lock import has_native_locks
 
@@ -105,7 +105,7 @@ def _locks() -> Record:
         return {"folder": str(folder), "native": None}
 
 
-def _solver() -> Record:
+def _solver_record() -> Record:
     """Return what the beam engine runs on: "C" or "numpy"."""
     from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE
     from cfmkit.elastica.mechanics.march import engine
@@ -113,7 +113,7 @@ def _solver() -> Record:
     return {"engine": engine(), "switched_off": WITHOUT_C_VARIABLE in os.environ}
 
 
-def _fonts() -> Record:
+def _font_record() -> Record:
     """Return the font of all figures and where it is: it comes with matplotlib, and another one changes their bytes."""
     from cfmkit.plots.font_cache import font_of_figures
 
@@ -121,7 +121,7 @@ def _fonts() -> Record:
     return {"name": name, "path": path}
 
 
-def _caches() -> Iterator[Record]:
+def _cache_records() -> Iterator[Record]:
     """Yield what cfmkit and its libraries keep between runs: everything there can be deleted and is made again."""
     from cfmkit.plots.font_cache import kept_lists
 
@@ -131,7 +131,7 @@ def _caches() -> Iterator[Record]:
         yield {"name": what, "path": str(path), "files": len(files), "megabytes": round(size / 1e6, 2)}
 
 
-def _families() -> Iterator[Record]:
+def _family_records() -> Iterator[Record]:
     """Yield every family that is offered, with what is wrong with it."""
     from cfmkit import families
 
@@ -163,18 +163,20 @@ def _troubles(report: Mapping[str, Any]) -> Iterator[str]:
             yield record["reason"]
 
 
-def _page(report: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
+def _page_blocks(report: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     yield TextLine((Span("cfmkit doctor", Tone.LABEL), Span("  what this installation has")))
     versions = [{"name": name, "version": version} for name, version in report["versions"].items()]
     yield from record_table("versions", versions, (field("name"), field("version", wraps=True)))
-    yield from record_table("packages", report["packages"], (field("name"), Field("version", _version)))
+    yield from record_table("packages", report["packages"], (field("name"), Field("version", _version_or_missing)))
     access = Field("", lambda folder: "writable" if folder["writable"] else "cannot be written to")
     yield from record_table("folders", report["folders"], (field("name"), access, field("path", wraps=True)))
     locks = {True: "by the operating system", False: f"none: the file {SOFT_LOCK} marks a live run", None: "not tried"}
     yield from record_table(
         "file locks here", [{"locks": locks[report["locks"]["native"]]}], (field("locks", wraps=True),)
     )
-    yield from record_table("beam engine", [{"engine": _engine(report["solver"])}], (field("engine", wraps=True),))
+    yield from record_table(
+        "beam engine", [{"engine": _describe_engine(report["solver"])}], (field("engine", wraps=True),)
+    )
     fonts = {"name": report["fonts"]["name"], "path": report["fonts"]["path"] or "not found: matplotlib is incomplete"}
     yield from record_table("font of the figures", [fonts], (field("name"), field("path", wraps=True)))
     size = Field("size", lambda folder: f"{folder['files']} files, {folder['megabytes']} MB")
@@ -187,7 +189,7 @@ def _page(report: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]
     yield Verbatim("\n".join(["", *reported, ""]))
 
 
-def _engine(solver: Mapping[str, Any]) -> str:
+def _describe_engine(solver: Mapping[str, Any]) -> str:
     if solver["engine"] == "C":
         return "runs on compiled C"
     installed = "it was installed without a C compiler, or for another version"
@@ -195,6 +197,6 @@ def _engine(solver: Mapping[str, Any]) -> str:
     return f"runs on numpy, about 30 times slower: {why}"
 
 
-def _version(package: Mapping[str, Any]) -> str:
+def _version_or_missing(package: Mapping[str, Any]) -> str:
     wanted = f"not installed; only for the extra {package['extra']}" if package["extra"] else "missing"
     return str(package["version"] or wanted)

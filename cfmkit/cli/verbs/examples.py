@@ -1,4 +1,4 @@
-"""``cfmkit examples``: the specs that come with the package."""
+"""``cfmkit examples``: the specs that come with the package, listed, copied, or run to check an installation."""
 
 from __future__ import annotations
 

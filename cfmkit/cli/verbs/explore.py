@@ -1,4 +1,4 @@
-"""``cfmkit explore``: a spec with sliders, in the browser."""
+"""``cfmkit explore``: a spec with sliders for its numbers, in the browser."""
 
 from __future__ import annotations
 

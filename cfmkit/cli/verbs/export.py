@@ -1,4 +1,4 @@
-"""``cfmkit export``: the parts of a spec as files to cut or print."""
+"""``cfmkit export``: the parts of a spec as files to cut or print, finite-element decks or a dimensioned drawing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``cfmkit measure``: what a measured force curve says."""
+"""``cfmkit measure``: metrics of a recorded force curve, raw and filtered."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``cfmkit new``: a spec to start from."""
+"""``cfmkit new``: the template of a family, a spec to start from, with optional keys as comments."""
 
 from __future__ import annotations
 

@@ -71,14 +71,14 @@ def run(options: PapersOptions, terminal: Terminal) -> Document:
     )
     return Document(
         data,
-        _page(records, counts, reported, bool(terminal.verbose)),
+        _page_blocks(records, counts, reported, bool(terminal.verbose)),
         ExitCode.REQUIREMENT_MISSED if wrong else ExitCode.OK,
         complaints=tuple(f"error    {error['message']}" for error in errors),
         errors=errors,
     )
 
 
-def _page(records: Sequence[Record], counts: Mapping[str, int], reported: str, verbose: bool) -> Iterator[Block]:
+def _page_blocks(records: Sequence[Record], counts: Mapping[str, int], reported: str, verbose: bool) -> Iterator[Block]:
     from cfmkit.cli.show_topics import references
 
     titles = {reference["name"]: reference["reference"] for reference in references()}

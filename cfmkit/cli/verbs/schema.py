@@ -1,4 +1,4 @@
-"""``cfmkit schema``: what editors need to complete and check specs."""
+"""``cfmkit schema``: the JSON schema with which editors complete and check specs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``cfmkit sensitivity``: the influence of values, and the yield."""
+"""``cfmkit sensitivity``: the influence of values on metrics, and the yield."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
         study.write_pages(page, setup.study, findings.setup.paths, tables, partial(_pictures, findings))
         data, pieces = as_json(findings), [piece.records for piece in findings.evaluator.pieces]
         finished = study.commit(page, setup.study, setup.seed, pieces, data)
-    return replace(finished, quiet_complaints=tuple(_quiet(findings, data, page.exit_code)))
+    return replace(finished, quiet_complaints=tuple(_essential_complaints(findings, data, page.exit_code)))
 
 
 def _pictures(findings: Findings) -> Mapping[str, Callable[[], Figure]]:
@@ -128,7 +128,7 @@ def spread(option: str) -> tuple[str, Any]:
     return path, {first: second} if first in ("normal", "uniform") else (first, second)
 
 
-def _quiet(findings: Findings, data: Mapping[str, Any], code: ExitCode) -> Iterator[str]:
+def _essential_complaints(findings: Findings, data: Mapping[str, Any], code: ExitCode) -> Iterator[str]:
     """Yield what a user must hear who has asked to hear nothing else."""
     from cfmkit.studies.sensitivity.run_and_files import message
 

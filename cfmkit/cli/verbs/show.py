@@ -1,4 +1,4 @@
-"""``cfmkit show``: what the program knows."""
+"""``cfmkit show``: pages on families, units, metrics, materials, stock, papers or one word; drawings of families."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``cfmkit suggest``: from a request to mechanisms of every family that does it."""
+"""``cfmkit suggest``: from a request to mechanisms of every family that meets it."""
 
 from __future__ import annotations
 
@@ -146,13 +146,13 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     document = replace(
         suggestion_document.document_of(data, code, written),
         data=data,
-        complaints=tuple(_bugs(suggestions.bugs, terminal.tracebacks)),
+        complaints=tuple(_bug_complaints(suggestions.bugs, terminal.tracebacks)),
         quiet_complaints=complaints,
     )
     return with_skipped_families(families.list_skipped(), document)
 
 
-def _bugs(bugs: Sequence[str], shown: bool) -> Iterator[str]:
+def _bug_complaints(bugs: Sequence[str], shown: bool) -> Iterator[str]:
     """Yield how many candidates a bug ended, and the first traceback if it is to be shown."""
     if bugs:
         yield f"error    {len(bugs)} of the families and candidates hit a bug in cfmkit; -vv shows the first"

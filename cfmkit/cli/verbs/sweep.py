@@ -85,7 +85,7 @@ def request(options: SweepOptions) -> SweepRequest:
 
     if options.zip and options.sample:
         raise UsageError("--zip and --sample exclude each other")
-    method, samples = _sample(options.sample) if options.sample else ("zip" if options.zip else None, None)
+    method, samples = _read_sample(options.sample) if options.sample else ("zip" if options.zip else None, None)
     return SweepRequest(
         vary=tuple(parse_variation(option) for option in options.vary or ()),
         combine=method,
@@ -99,7 +99,7 @@ def request(options: SweepOptions) -> SweepRequest:
     )
 
 
-def _sample(text: str) -> tuple[str, int]:
+def _read_sample(text: str) -> tuple[str, int]:
     method, _, count = text.partition(":")
     if method not in SAMPLE_KINDS or not (count.isascii() and count.isdigit()) or not 0 < len(count) < 19:
         kinds = " or ".join(f"{kind}:N" for kind in SAMPLE_KINDS)
@@ -120,13 +120,13 @@ def _complaints(records: Records, code: ExitCode, options: SweepOptions, documen
     from cfmkit.cli.failures import go_on
 
     if code is ExitCode.INVALID:
-        yield from _refusal(records, document)
+        yield from _first_refusal(records, document)
     if code is ExitCode.INTERRUPTED:
         missing = len(records) - records.finished
         yield f"interrupted  {missing} of {len(records)} points were not computed; {go_on(options.fresh)}"
 
 
-def _refusal(records: Records, document: YamlDocument) -> tuple[str, ...]:
+def _first_refusal(records: Records, document: YamlDocument) -> tuple[str, ...]:
     """Return why the first point is invalid: the table has the message, and the file knows its place."""
     from cfmkit.runs.run import placing
 

@@ -1,4 +1,4 @@
-"""Angles and curvatures of the lines of beams, at their ends and inside, in states of a network."""
+"""Angles and changes of curvature of the middle lines of beams, at ends and inside; their curvature before any load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Conditions under which contacts stay as they are: numbers along a path, none of which may become negative.
+"""Conditions under which contacts stay as they are: numbers along a path, by kind, none of which may become negative.
 
 Where one passes zero, a piece of the path ends and the contact changes (`first_change`, `side_changes`):
 

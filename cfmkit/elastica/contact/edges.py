@@ -1,4 +1,4 @@
-"""Edges that the side of a beam may touch, in states of a network: of obstacles, of pads, of other beams."""
+"""Edges that the side of a beam may touch, of obstacles, pads or other beams: distances from them, what moves them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Equilibrium equations of a network of beams with contacts, for Newton's method and for the path-following solver.
+"""Equilibrium equations of a network with pads and stops of nodes, whose contact forces are unknowns.
 
 They are the equations of the network without contacts (`ContactEquations.plain`), with the force of each contact as a
 further unknown and its gap as a further equation. A discretised network and values of its unknowns go in; gradient and

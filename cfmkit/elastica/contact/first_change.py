@@ -1,4 +1,4 @@
-"""First change of a contact within a step: where a gap, contact force or other margin along it becomes negative.
+"""First change of a contact within a step of a path: the first condition that becomes negative, located.
 
 Along a piece of a path the same contacts are closed. It ends where a gap becomes zero (a contact begins), a contact
 force becomes zero (it ends), or friction is exceeded or holds again (it slips or sticks). Each of these is a condition,

@@ -1,4 +1,4 @@
-"""A path with contact: followed with one set of closed contacts at a time, between located changes of that set.
+"""A path with contact: pieces with one set of closed contacts each, located changes between, friction behind each.
 
 On each piece the path is smooth and `cfmkit.numerics.continuation` follows it. Where a gap or a force becomes negative
 the change is solved for by its own equations: gap and force of that contact are both zero there. Then a contact begins

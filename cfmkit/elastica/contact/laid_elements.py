@@ -1,4 +1,4 @@
-"""Equations of an element whose side lies on an obstacle: its curvature is known, tension and both ends are not."""
+"""Equations of an element that lies on an obstacle: its curvature is known, tension and both ends are not."""
 
 from __future__ import annotations
 

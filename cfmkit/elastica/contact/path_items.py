@@ -1,8 +1,7 @@
-"""Items of a path with contacts: points, events, changes of contacts; and its pieces as states of one network.
+"""Items of a path with contacts (points, events, changes of contacts), and its pieces joined as states of one network.
 
-Sides of beams touch at different places in each piece. The elements of all pieces end where any of them has a contact.
-Where a contact is open its place is anywhere between its neighbours: it moves evenly from where it last was closed to
-where it is next, so that states may be interpolated.
+The elements of all pieces end where any of them has a contact. Where a contact is open its place is anywhere between
+its neighbours: it moves evenly from where it last was closed to where it is next, so that states may be interpolated.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""One piece of a path with contact, whose set of closed contacts stays the same, and where that set changes.
+"""A piece of a path, on which the set of closed contacts stays: its problem, its unknowns among all, its conditions.
 
-Between two points of the piece gaps and forces are looked at along the cubic through them, so densely that no obstacle
+Between two points gaps and forces are looked at along the cubic through them, so densely that no obstacle
 is passed. Where one becomes negative, the change is solved for: gap and force of that contact are both zero there.
 """
 

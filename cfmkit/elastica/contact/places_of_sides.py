@@ -1,7 +1,4 @@
-"""Places at which sides of beams touch: those that are new, that remain, that a pad takes over, or that spread.
-
-A place may spread to a length on which the side lies on an obstacle: whether it does, and a first guess of it.
-"""
+"""Places at which sides of beams touch: new, remaining, taken over by a pad, or spread to a length that lies there."""
 
 from __future__ import annotations
 

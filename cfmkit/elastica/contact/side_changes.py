@@ -1,4 +1,4 @@
-"""Changes of contacts of the sides of beams: they begin, end, move from and to the ends of beams, part and join.
+"""Changes of contacts of sides of beams (begin, end, move, part, join, lie down): located, and the piece behind each.
 
 Each change is located by its own equations: a contact that begins has no force and no gap; one that moves from the end
 of a beam into it, or back, is tangent there; one that parts has a gap whose curvature vanishes.

@@ -1,4 +1,4 @@
-"""Places along the sides of beams in many states: how near they are to obstacles."""
+"""Gaps between sides of beams and obstacles or pads, in many states: lines of elements, gaps along them, the least."""
 
 from __future__ import annotations
 

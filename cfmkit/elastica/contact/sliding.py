@@ -1,4 +1,4 @@
-"""Equations of a network whose beams touch obstacles with their sides: the places of these contacts are unknowns.
+"""Equations of a network whose beams touch something with their sides: places of contacts are unknowns.
 
 A contact at the parameter S of a beam ends an element there. Its rows are the gap g = 0 and the tangency n . t = 0 of
 the beam to the obstacle (beside a slope of the thickness: n . t = dr/ds; of beams that shear see `line_tangent.py`).

@@ -1,4 +1,4 @@
-"""The path between two points of a piece, along which gaps and forces are looked at."""
+"""The path between two points of a piece: sampled, and searched for where a condition is just met."""
 
 from __future__ import annotations
 

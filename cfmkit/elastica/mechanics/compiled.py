@@ -1,4 +1,4 @@
-"""The equations of a network in compiled code.
+"""The equations of a network in compiled code: energy, Newton's method, march, least gaps, errors of states.
 
 Sides of beams that touch at points are in `sides.c`; what lies on an obstacle is in numpy, and `SlidingEquations` is
 the specification of both (tests/elastica/test_elastica_march.py).

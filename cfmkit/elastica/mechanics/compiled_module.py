@@ -1,4 +1,4 @@
-"""The compiled module, the fields of its models, and rows of those that networks of one topology share.
+"""The compiled module and its models, each a row of counts and addresses; rows that networks of one topology share.
 
 C takes a model as a row of 8-byte counts and addresses, so that an array of rows is many designs; what the addresses
 point to is kept with the row.

@@ -1,10 +1,9 @@
-"""A network under a drive as arrays of mixed spectral elements; everything is dimensionless.
+"""A network under a drive as arrays of mixed spectral elements (`Discretisation`); the same with a higher degree.
 
-Lengths are counted in the mean beam length L0, forces in F0 = EI / L0^2 with EI of the first beam, the drive in L0
-(a displacement), rad (a rotation) or 1 (loads). Every node that no link moves is a body with three unknowns (x, y in
-the frame of its support, and a rotation). An attachment is where an element's end, a spring or a load acts on a body,
-by chance through a rigid arm, with a rotation of its own behind a pin. The ends of elements inside a beam are bodies,
-too.
+Lengths are counted in the mean beam length L0, forces in F0 = EI / L0^2 with EI of the first beam, the drive in L0 (a
+displacement), rad (a rotation) or 1 (loads). Every node that no link moves is a body with three unknowns (x, y in the
+frame of its support, and a rotation). An attachment is where an element's end, a spring or a load acts on a body, by
+chance through a rigid arm, with a rotation of its own behind a pin. The ends of elements inside a beam are bodies, too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Elements of beams: where beams are cut into them, and their properties at Gauss points, dimensionless.
+"""Elements of beams: where beams are cut, how cuts move with contacts, properties at Gauss points (dimensionless).
 
 Beams are cut at marks, at layers of taut ones, at places of contacts. Properties are angle, rigidity, compliances and
 arc length, (e, q) each. Most beams have a polynomial angle and one thickness: their tables are made together. The

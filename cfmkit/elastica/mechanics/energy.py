@@ -1,4 +1,4 @@
-"""Gradient and Hessian of the functional of a network, its inertia, and the drive's effort; all dimensionless.
+"""Gradient and Hessian of the functional of a network, section forces, unstable directions; all dimensionless.
 
 Every function takes z, the values of all unknowns, and two factors: `drive` multiplies what grows with the drive,
 `share` (0 to 1) what is constant: displaced supports, constant loads, free lengths, the gap of beams that are forced

@@ -1,7 +1,4 @@
-"""The equations of a network, compiled or in numpy where there is no compiler.
-
-Both give the same to rounding (tests/elastica/test_elastica_march.py).
-"""
+"""The equations of a network, compiled or in numpy where C has not all of it; both give the same to rounding."""
 
 from __future__ import annotations
 

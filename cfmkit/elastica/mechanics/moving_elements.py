@@ -1,4 +1,4 @@
-"""Elements whose ends are places of contacts on a beam: their tables at any of these places.
+"""Elements whose ends are places of contacts on a beam: their tables, ends and lengths at any of these places.
 
 The bending moment has a kink where a contact presses: there an element ends, so that polynomials keep their accuracy.
 """

@@ -1,4 +1,4 @@
-"""Numbers of networks of one topology as arrays with a leading axis: of one, of a batch, of complex steps of variables.
+"""Numbers of networks of one topology as arrays with a leading axis: tables of elements, attachments, held unknowns.
 
 Networks differ in places of nodes, offsets, shapes, sections, supports, springs and loads. Beams that are plain
 (`cfmkit.elastica.model.beam_fits`: a polynomial angle, one thickness) are set up together.

@@ -1,4 +1,4 @@
-"""Numbers of unknowns and attachments: what networks of one topology share, kept for the next of them.
+"""Numbers of unknowns and attachments, which networks of one topology share, and which unknowns are free.
 
 Every node that no link moves is a body with three unknowns; so are the ends of elements inside a beam. Motions of ends
 come first, then the bubbles of the elements, then their forces.

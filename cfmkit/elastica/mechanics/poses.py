@@ -1,4 +1,4 @@
-"""Positions of the attachments of a network of beams, from the values of its unknowns, with their derivatives.
+"""Positions of the attachments of a network from the values of its unknowns, with derivatives and forces along these.
 
 A body is a node and what rigid links fix to it. An attachment is a point of a body at which a beam ends or a spring, a
 load or a contact acts. Its position is

@@ -1,4 +1,4 @@
-"""A network of beams as a problem to be followed: along its drive, or along a share of what is constant."""
+"""A network as a problem of path following, along its drive or a share of constant loads: solutions, marches, modes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A beam between two nodes: its shape, its section, how it closes the gap between the nodes, how its ends are joined.
+"""A beam between two nodes (shape, section, joints, closure), and the fit of its shape between them (`Fit`).
 
 Closure: nodes and shapes that are given rounded do not fit exactly. "rotscale" turns each shape and scales it so
 that it does, and reports by how much; "raw" keeps shape and length and forces the beam into place, prestressed.

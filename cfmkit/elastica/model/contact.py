@@ -1,4 +1,4 @@
-"""One-sided contacts: stops, rigid obstacles that pads of nodes and sides of beams may touch, pads on sides of beams.
+"""One-sided contacts as values: stops, pads of nodes, sides of beams, friction; outlines of obstacles with distances.
 
 A contact has a gap g >= 0 and presses with a force f >= 0, of which one is zero. A gap is positive on the free side.
 An elastic contact yields by f / stiffness along the normal. Pads of nodes and stops of motions may have Coulomb

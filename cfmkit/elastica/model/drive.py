@@ -1,4 +1,4 @@
-"""Load cases of a network: one quantity that is taken through given values, and the node that it moves.
+"""Load cases: a motion of a node or a factor of loads taken through values (`Drive`); options of following (`Control`).
 
 Every drive has `points`, the values at which results are wanted, in the order in which they are passed, starting
 from rest (zero, which need not be among them). The values may turn round (up, and down again): what was passed is then

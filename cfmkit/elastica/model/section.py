@@ -1,4 +1,4 @@
-"""Rectangular cross-sections: constant or piecewise-linear thickness, and which deformations count.
+"""Rectangular cross-sections: their thickness along the beam, deformations that count, curling of wide strips.
 
 Bending always counts; stretching and shear by choice (theory of Reissner, 1972). A section that does not stretch
 is exactly inextensible, not merely stiff.

@@ -1,4 +1,4 @@
-"""A path under a load at every place of the driven node's motion: equilibria between its points.
+"""A path under loads at every place of a node's motion instead of the loads: equilibria between its points.
 
 The motion is held while the load is solved for, so that a force may have an extreme there.
 """

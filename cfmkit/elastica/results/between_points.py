@@ -1,4 +1,4 @@
-"""A traced path at every place of its drive: equilibria between its points, and the extremes that lie there.
+"""A traced path at every place of its drive: equilibria between points and corners, extremes of effort and stress.
 
 What is stated of a curve must not depend on how many points it has. An equilibrium between two points of the path is
 solved from the polynomial through the nearest four, on the branch that these are on. A stress is solved at its

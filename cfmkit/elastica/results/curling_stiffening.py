@@ -1,4 +1,4 @@
-"""By how much the curling of wide beams would stiffen a network that was solved without it.
+"""Share by which curling of wide beams would stiffen a network that was solved as if they were narrow.
 
 Assumes: curvatures are those of the solution, ends curl as freely as the middle does. The law, and its reference:
 `cfmkit.elastica.mechanics.wide_strip`.

@@ -1,4 +1,4 @@
-"""Error of the effort of a drive, and the contributions of single beams and springs to it along a path.
+"""Numerical error of the effort of a drive, and the contributions of single beams and springs to it along a path.
 
 The nodes do work on a member while the path goes on: on a beam with the forces on its two ends, on a spring by the
 change of its energy. Per unit of the drive's motion that is the member's effort; those of all members together, less

@@ -1,4 +1,4 @@
-"""Values of a path that others than the engine observe."""
+"""Protocol of what a family observes of a path: motion, effort and stresses at its points."""
 
 from __future__ import annotations
 

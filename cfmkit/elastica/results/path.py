@@ -1,4 +1,4 @@
-"""The path of a network under a drive: equilibria of the functional in order, and what can be requested about them."""
+"""The path of a network under a drive, `EquilibriumPath`: its events, motions, forces, stresses, contacts, energy."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Tracing a network on its functional: start, path, accuracy, imperfection."""
+"""Tracing: from networks and a drive to their paths, with a start, an accuracy, and perhaps an imperfection."""

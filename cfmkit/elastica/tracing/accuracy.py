@@ -1,7 +1,4 @@
-"""Accuracy of a path: its error by the same equilibria with a higher degree, and beams that need more elements.
-
-Those are beams so taut that they are straight but near their ends, where elements of their own are needed.
-"""
+"""Accuracy of a path: its error against a higher degree, Newton's method repeated, taut beams that need more pieces."""
 
 from __future__ import annotations
 

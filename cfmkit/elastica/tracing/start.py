@@ -1,4 +1,4 @@
-"""The equilibrium that a drive begins at: at rest, or under what is constant, which is applied by shares of it."""
+"""The equilibrium that a drive begins at, at rest or under constant loads applied by shares; the path from there."""
 
 from __future__ import annotations
 

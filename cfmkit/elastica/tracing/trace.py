@@ -1,4 +1,4 @@
-"""Tracing: from a network and a drive to its equilibria, with a degree that reaches the tolerance."""
+"""Tracing: from a network and a drive to its path, on elements and with a degree that reach the tolerance."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_in, rings_of
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_element_size, rings_of
     from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
 
     frame = standing_frame(spec)
@@ -46,7 +46,9 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
         for at in regions(spec)
     ]
     rings, thinnest = rings_of(cut, assembly.thinnest), assembly.thinnest
-    return Part(rings, thinnest, width, law, tuple(places), (), largest_in(rings, thinnest), frame, drawn.sections)
+    return Part(
+        rings, thinnest, width, law, tuple(places), (), largest_element_size(rings, thinnest), frame, drawn.sections
+    )
 
 
 def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:

@@ -1,4 +1,4 @@
-"""Steps by the arc length, where the drive does not lead [Ri]."""
+"""Steps by the arc length, where the drive does not lead [Ri]: a single step, and the iterator of accepted ones."""
 
 from __future__ import annotations
 

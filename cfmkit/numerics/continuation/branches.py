@@ -1,7 +1,4 @@
-"""Stable branches that begin where a path loses its stability: entered along one mode, or past several at once.
-
-A branch may end: it joins a path that becomes stable there.
-"""
+"""Stable branches from where a path loses its stability: entered, past several bifurcations at once, and their ends."""
 
 from __future__ import annotations
 

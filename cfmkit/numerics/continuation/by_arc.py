@@ -1,6 +1,4 @@
-"""A stretch followed by the arc length, where steps by the drive fail: until it leads again, or the path ends.
-
-Behind a limit point of the drive, too, the path is followed by its arc length until the drive leads on.
+"""A stretch followed by the arc length, where steps by the drive fail or behind a limit point, until the drive leads.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Corners of the curve of effort over drive: bifurcations that a small imperfection rounds, a mesh for instance.
+"""Corners of the curve of effort over drive that a small imperfection rounds, marked as bifurcations.
 
 Only for problems whose equilibria have a stiffness, and only if `Options.corner` is set.
 """

@@ -1,4 +1,4 @@
-"""The one location of events: a bisection for bifurcations, limit points and whatever has a sign."""
+"""The one location of events: a bisection for changes of stability, limit points, and whatever else has a sign."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The iterator of a path: predict, correct, accept; one short loop that hands over to policies where a step fails."""
+"""The iterator of a path's points and events: predict, correct, accept; policies take over where a step fails."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Policy at a loss of stability: locate it, yield it, and go on along a stable branch if there is one."""
+"""Policy at a loss of stability, also at the start: locate it, yield it, go on along a stable branch if one is there.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Data of path following: settings, points, events, reasons to stop, and the follower's state between two steps."""
+"""Data of path following: settings, points, events, batches of steps, reasons to stop, the follower's state `Walk`."""
 
 from __future__ import annotations
 

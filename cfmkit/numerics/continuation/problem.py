@@ -1,4 +1,4 @@
-"""The protocol of a structure whose equilibria are followed, and an equilibrium of it."""
+"""Protocol of a structure whose equilibria are followed; an equilibrium, a border, sizes of motions and forces."""
 
 from __future__ import annotations
 

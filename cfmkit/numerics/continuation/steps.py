@@ -1,4 +1,4 @@
-"""Newton's method from a guess to a point of a path, and one step by the drive, which is predicted by a cubic.
+"""Newton's method from a guess to a point of a path, and one step by the drive: predicted by a cubic, and judged.
 
 Either the drive is given, or a border: a linear condition between the unknowns and the drive, as across an arc [Ke]. A
 step is accepted only if it stays on its path.

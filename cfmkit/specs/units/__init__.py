@@ -3,9 +3,9 @@
 Inside cfmkit every number is SI (m, N, rad, Pa, kg, s). Text with units exists in
 specifications, options, tables and messages only, and passes through here.
 
-`strict_decimal_number` reads decimals strictly, `table` lists dimensions and units, `table`
-knows the exact size of a unit (pint, loaded on first use), `quantities` reads and
-writes text, `fields` holds the annotated types for specifications.
+`strict_decimal_number` reads decimals strictly, `table` lists dimensions and units with their exact sizes, `quantities`
+reads and writes text, `fields` holds the annotated types for specifications, `decimal_scaling_and_grids` moves decimal
+points.
 """
 
 from cfmkit.specs.units.fields import (

@@ -1,8 +1,7 @@
-"""Moving the decimal point of floats: metres to millimetres without 4.1000000000000005.
+"""Moving the decimal point of floats, metres to millimetres without 4.1000000000000005; even grids of decimals.
 
-``0.0041 * 1000`` is not the float nearest to 4.1, because 0.0041 is itself
-rounded and the product is rounded once more. What a reader means by 0.0041 is
-the decimal, so the decimal is what gets shifted:
+``0.0041 * 1000`` is not the float nearest to 4.1, because 0.0041 is itself rounded and the product is rounded once
+more. What a reader means by 0.0041 is the decimal, so the decimal is what gets shifted:
 
 - a float that is the nearest one to a decimal of at most 15 significant digits
   (every such decimal has a float of its own) becomes the float nearest to that
@@ -10,10 +9,9 @@ the decimal, so the decimal is what gets shifted:
 - any other float (a computed value that fills all its digits) becomes the
   nearest float to the exact product with the power of ten.
 
-Nothing is ever rounded to fewer digits than it has: the result is within two
-units in the last place of the exact product. Noise that a computation left in
-the last digits is therefore still there; `even_grid` is for places that should
-never have any.
+Nothing is ever rounded to fewer digits than it has: the result is within two units in the last place of the exact
+product. Noise that a computation left in the last digits is therefore still there; `even_grid` is for places that
+should never have any.
 """
 
 from __future__ import annotations
@@ -65,9 +63,8 @@ def even_grid(
 ) -> FloatArray:
     """Return evenly spaced places, each the float nearest to its decimal [m].
 
-    `numpy.linspace` rounds a step first and multiplies it: its 0.24 m in 480 steps
-    has 4.500000000000001 mm on the way. Here both ends are taken in whole
-    nanometres, where the arithmetic is exact up to one division.
+    `numpy.linspace` rounds a step first and multiplies it: its 0.24 m in 480 steps has 4.500000000000001 mm on the way.
+    Here both ends are taken in whole nanometres, where the arithmetic is exact up to one division.
 
     Examples
     --------

@@ -1,9 +1,8 @@
-"""Pydantic types of specification fields: SI floats read from text with units, and windows by place or travel share.
+"""Types of specification fields: SI floats read from text with units, windows by place or share, open bounds.
 
-A field ``width: Length = Field(gt=0)`` takes text with a unit, or a Python number
-that is SI already (so do defaults); inside it is a plain SI float. A number that
-comes from a file or an option is a `Bare` one and refused, unless it is zero.
-Bounds are SI. ``model_dump()`` gives SI, ``model_dump(mode="json")`` text with units.
+A field ``width: Length = Field(gt=0)`` takes text with a unit, or a Python number that is SI already (so do defaults);
+inside it is a plain SI float. A number that comes from a file or an option is a `Bare` one and refused, unless it is
+zero. Bounds are SI. ``model_dump()`` gives SI, ``model_dump(mode="json")`` text with units.
 
 Windows are between places, or between shares of a travel, which they follow wherever it goes.
 """

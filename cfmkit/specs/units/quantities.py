@@ -1,8 +1,7 @@
-"""Text with a unit to an SI float and back, both to the last bit.
+"""Text with a unit to an SI float and back, both to the last bit; faults of such text, with the unit that was meant.
 
-The number is read by `cfmkit.specs.units.strict_decimal_number`, never by pint. Sizes of units are
-exact fractions, so that the result is the correctly rounded float: "68 mm",
-"6.8 cm" and "0.068 m" are the same number.
+The number is read by `cfmkit.specs.units.strict_decimal_number`, never by pint. Sizes of units are exact fractions, so
+that the result is the correctly rounded float: "68 mm", "6.8 cm" and "0.068 m" are the same number.
 """
 
 from __future__ import annotations
@@ -67,7 +66,7 @@ def read_one_of(text: str, dimensions: tuple[str, ...]) -> tuple[float, str]:
     number, unit = _split_number(text, dimensions)
     value = read_number(number)
     if not unit:
-        return _bare(value, number, dimensions), dimensions[0]
+        return _number_without_unit(value, number, dimensions), dimensions[0]
     for name in dimensions:
         if (name, unit) in COMMON_UNIT_SIZES:
             return _scale_number(number, unit, COMMON_UNIT_SIZES[name, unit]), name
@@ -77,7 +76,7 @@ def read_one_of(text: str, dimensions: tuple[str, ...]) -> tuple[float, str]:
     for name in dimensions:
         if size.powers == border_size(name).powers:
             return _scale_number(number, unit, size.factor), name
-    problem = f"{quote(f'{number} {unit}')} is {_kind(size)}"
+    problem = f"{quote(f'{number} {unit}')} is {_measured_by(size)}"
     raise QuantityError(f"{problem}; {describe_dimensions(dimensions)} is needed, e.g. {example(dimensions, number)}")
 
 
@@ -175,7 +174,7 @@ def _no_number(text: str, dimensions: tuple[str, ...]) -> str:
     return f"{quote(text)} is not {describe_dimensions(dimensions)}; write e.g. {example(dimensions)}"
 
 
-def _bare(value: float, number: str, dimensions: tuple[str, ...]) -> float:
+def _number_without_unit(value: float, number: str, dimensions: tuple[str, ...]) -> float:
     """Return a number without a unit, where that is enough."""
     if value == 0:
         return 0.0
@@ -184,7 +183,7 @@ def _bare(value: float, number: str, dimensions: tuple[str, ...]) -> float:
     return value
 
 
-def _kind(size: Size) -> str:
+def _measured_by(size: Size) -> str:
     """Return what a unit measures: ``a force``."""
     names = (name for name in DIMENSIONS_BY_NAME if name != "text" and border_size(name).powers == size.powers)
     return next((DIMENSIONS_BY_NAME[name].phrase for name in names), "of another kind")
@@ -207,9 +206,8 @@ def _scale_number(number: str, unit: str, factor: Fraction) -> float:
 def _shortest(value: float, factor: Fraction) -> str:
     """Return the shortest decimal number that, times `factor`, rounds to `value`.
 
-    Two decimals of 15 digits are never the same float, so one that fits is unique
-    and only its trailing zeros can go; 17 digits always fit. Below the normal
-    range floats are so coarse that fewer digits do.
+    Two decimals of 15 digits are never the same float, so one that fits is unique and only its trailing zeros can go;
+    17 digits always fit. Below the normal range floats are so coarse that fewer digits do.
     """
     if not math.isfinite(value):
         raise QuantityError(f"{value} cannot be written: it is not a finite number")
@@ -219,19 +217,19 @@ def _shortest(value: float, factor: Fraction) -> str:
     decimal = _PRECISE_CONTEXT.divide(Decimal(exact.numerator), Decimal(exact.denominator))
     for digits in (15, 16, 17) if abs(value) > sys.float_info.min * 16 else range(1, 18):
         rounded = Context(prec=digits).plus(decimal)
-        if _fits(rounded, factor, value):
+        if _rounds_to(rounded, factor, value):
             break
-    return _plain(rounded)
+    return _plain_decimal_text(rounded)
 
 
-def _fits(decimal: Decimal, factor: Fraction, value: float) -> bool:
+def _rounds_to(decimal: Decimal, factor: Fraction, value: float) -> bool:
     try:
         return float(Fraction(decimal) * factor) == value
     except OverflowError:
         return False
 
 
-def _plain(decimal: Decimal) -> str:
+def _plain_decimal_text(decimal: Decimal) -> str:
     """Return a decimal as people write it: ``0.05``, ``1200``, ``1e-9``."""
     short = decimal.normalize()
     if -4 <= short.adjusted() <= 15:

@@ -1,8 +1,7 @@
 """A strict reader for decimal numbers: what YAML 1.2 calls a number, and nothing else.
 
-Python's ``float()`` is too kind for a specification: it takes ``1_000``, ``nan``,
-Arabic digits and spaces. Here every text that is not plainly one finite decimal
-number is refused, with what is wrong and what to write instead.
+Python's ``float()`` is too kind for a specification: it takes ``1_000``, ``nan``, Arabic digits and spaces. Here every
+text that is not plainly one finite decimal number is refused, with what is wrong and what to write instead.
 """
 
 from __future__ import annotations
@@ -39,12 +38,12 @@ def odd_character(text: str) -> tuple[int, str] | None:
     if text.isascii() and text.isprintable():
         return None
     for index, char in enumerate(text):
-        if complaint := _oddity(char):
+        if complaint := _describe_odd(char):
             return index, complaint
     return None
 
 
-def _oddity(char: str) -> str | None:
+def _describe_odd(char: str) -> str | None:
     if " " <= char <= "~" or char in "\n\r\u200c\u200d":
         return None
     code = f"U+{ord(char):04X}"
@@ -73,13 +72,13 @@ def read_number(
     if len(text) > MAX_NUMBER_LENGTH:
         raise QuantityError(f"{quote(text)} is too long for a number: at most {MAX_NUMBER_LENGTH} characters")
     if not NUMBER_PATTERN.fullmatch(text):
-        raise QuantityError(_complaint(text))
+        raise QuantityError(_describe_not_a_number(text))
     if zeros := _LEADING_ZERO.fullmatch(text):
         raise QuantityError(f"{quote(text)} has a leading zero; write {zeros[1]}{zeros[2]}")
-    return _finite(text)
+    return _finite_number(text)
 
 
-def _finite(text: str) -> float:
+def _finite_number(text: str) -> float:
     value = float(text)
     if value in (float("inf"), float("-inf")):
         raise QuantityError(f"{quote(text)} is too large: at most 1.8e308")
@@ -88,7 +87,7 @@ def _finite(text: str) -> float:
     return value
 
 
-def _complaint(text: str) -> str:
+def _describe_not_a_number(text: str) -> str:
     if not text:
         return "there is no number"
     return number_complaint(text) or f"{quote(text)} is not a number; write e.g. 12, -0.5 or 1e-3"
@@ -107,34 +106,34 @@ def number_complaint(text: str, only_traps: bool = False) -> str | None:
     return None
 
 
-def _fixed_format(sentence: str) -> Callable[[str], str]:
+def _always(sentence: str) -> Callable[[str], str]:
     return lambda _text: sentence
 
 
 _TRAP_PATTERNS: tuple[tuple[bool, str, Callable[[str], str]], ...] = (
     (True, rf"[{_MINUS_SIGNS}][0-9.].*", lambda text: f"has a unicode minus (U+{ord(text[0]):04X}); write -{text[1:]}"),
-    (False, rf".*[0-9eE][{_MINUS_SIGNS}][0-9].*", _fixed_format("has a unicode minus or dash; write the ASCII '-'")),
+    (False, rf".*[0-9eE][{_MINUS_SIGNS}][0-9].*", _always("has a unicode minus or dash; write the ASCII '-'")),
     (
         True,
         "[-+]?[1-9][0-9]{0,2}(,[0-9]{3})+",
-        _fixed_format("has a comma; write decimals with a dot, thousands plainly"),
+        _always("has a comma; write decimals with a dot, thousands plainly"),
     ),
     (True, "[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]+)?", lambda text: f"has a decimal comma; write {text.replace(',', '.')}"),
-    (True, "[-+]?[0-9.]+,[0-9.,]*", _fixed_format("has a comma; write digits with one dot, e.g. 1234.5")),
+    (True, "[-+]?[0-9.]+,[0-9.,]*", _always("has a comma; write digits with one dot, e.g. 1234.5")),
     (
         True,
         "[-+]?[0-9]+(:[0-9.]+)+",
-        _fixed_format("has a colon (old YAML reads it in base 60); write one decimal number"),
+        _always("has a colon (old YAML reads it in base 60); write one decimal number"),
     ),
-    (True, "[-+]?0[xX][0-9a-fA-F_]+", _fixed_format("is hexadecimal; write it in decimal")),
-    (True, "[-+]?0[oO][0-7_]+", _fixed_format("is octal; write it in decimal")),
-    (True, "[-+]?0[bB][01_]+", _fixed_format("is binary; write it in decimal")),
+    (True, "[-+]?0[xX][0-9a-fA-F_]+", _always("is hexadecimal; write it in decimal")),
+    (True, "[-+]?0[oO][0-7_]+", _always("is octal; write it in decimal")),
+    (True, "[-+]?0[bB][01_]+", _always("is binary; write it in decimal")),
     (True, "[-+]?[0-9][0-9.]*_[0-9._]*", lambda text: f"has an underscore; write {text.replace('_', '')}"),
-    (True, "(?i)[-+]?\\.?(nan|inf(inity)?)", _fixed_format("is not a finite number")),
+    (True, "(?i)[-+]?\\.?(nan|inf(inity)?)", _always("is not a finite number")),
     (False, "[-+]?[0-9.]+( [0-9.]+)+", lambda text: f"has a space in it; write {text.replace(' ', '')}"),
-    (False, "[-+]?[0-9.][0-9.eE]*[-+*/^(]+[-+*/^() ]*[0-9].*", _fixed_format("is arithmetic; write its value")),
-    (False, r"[-+]?[0-9.]*(?![0-9])\d.*", _fixed_format("has digits that are not 0-9; write ASCII digits")),
-    (False, r"[-+]?[0-9]*(\.[0-9]*){2,}", _fixed_format("has more than one dot; write e.g. 1234.5")),
+    (False, "[-+]?[0-9.][0-9.eE]*[-+*/^(]+[-+*/^() ]*[0-9].*", _always("is arithmetic; write its value")),
+    (False, r"[-+]?[0-9.]*(?![0-9])\d.*", _always("has digits that are not 0-9; write ASCII digits")),
+    (False, r"[-+]?[0-9]*(\.[0-9]*){2,}", _always("has more than one dot; write e.g. 1234.5")),
 )
 _TRAP_REASONS = tuple((trap, re.compile(pattern), explain) for trap, pattern, explain in _TRAP_PATTERNS)
 """What people write instead of a number, in the order in which the explanations should be tried.

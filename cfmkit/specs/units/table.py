@@ -1,4 +1,4 @@
-"""The closed tables: which dimensions there are, in which unit they cross the border, which units exist, their sizes.
+"""The closed tables of dimensions and units: the unit of each dimension in files, and the exact size of each in SI.
 
 The tables are plain data and arithmetic on it: no import of pint, numpy or
 pydantic, so that whoever only prints millimetres pays for nothing.

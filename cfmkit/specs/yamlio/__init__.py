@@ -1,8 +1,7 @@
 """YAML to specifications and back, with the line and column of every fault.
 
-``read_document(text, "cam.yaml").set("design.force=60 N").bind(CamSpec)`` gives a
-specification or a `cfmkit.errors.SpecError` that lists everything wrong at once.
-`dump` writes one that reads back equal.
+``read_document(text, "cam.yaml").set("design.force=60 N").bind(CamSpec)`` gives a specification or a
+`cfmkit.errors.SpecError` that lists everything wrong at once. `dump` writes one that reads back equal.
 """
 
 from cfmkit.specs.yamlio.document import YamlDocument, read_document

@@ -1,6 +1,6 @@
-"""A specification as written: the tree, the position of every node, the problems, and single values that are set.
+"""A specification as written: tree, place of every node, problems, values set by options, check by a model.
 
-``--set mechanism.springs.0=2 N/mm``: one value of a specification from the command line. The value is read exactly as
+In ``--set mechanism.springs.0=2 N/mm`` the value is read exactly as
 in a file; lists and blocks in flow style only. A key that has dots itself stands in quotes: ``--set
 'sensitivity.parameters."mechanism.roller_radius"={normal: 0.1 mm}'``.
 """
@@ -68,7 +68,7 @@ class YamlDocument:
         path = self._path(path)
         if self._option_at(path):
             return 0, 0
-        return self._own_place(path if self._owner(path) is self else ("base",), at_key=False)
+        return self._own_place(path if self._document_of_value(path) is self else ("base",), at_key=False)
 
     def set(self, option: str) -> YamlDocument:
         """Return the document changed by an option such as ``a.b=1 mm``.
@@ -128,7 +128,7 @@ class YamlDocument:
         reported = to_dotted(path)
         if option := self._option_at(path):
             return Problem(option, 0, 0, reported, message)
-        owner = self._owner(path)
+        owner = self._document_of_value(path)
         line, column = owner._own_place(path, at_key)
         return Problem(owner.source, line, column, reported, message, owner._line(line))
 
@@ -149,7 +149,7 @@ class YamlDocument:
     def _is_written(self, path: Path) -> bool:
         return path in self._reading.values or (self.base is not None and self.base._is_written(path))
 
-    def _owner(self, path: Path) -> YamlDocument:
+    def _document_of_value(self, path: Path) -> YamlDocument:
         """Return the document that a value is from: the base, where this one neither has it nor replaces its block."""
         if self.base is None or not self.base._is_written(path):
             return self
@@ -158,7 +158,7 @@ class YamlDocument:
             if not isinstance(node, dict):
                 return self
             if part not in node:
-                return self.base._owner(path)
+                return self.base._document_of_value(path)
             node = node[part]
         return self
 
@@ -185,7 +185,7 @@ def read_document(
     reading = read_text(data)
     if not reading.broken and not isinstance(reading.tree, dict):
         reading.broken = True
-        reading.faults.append(_no_block(reading))
+        reading.faults.append(_fault_without_block(reading))
     lines = _lines_of(data)
     problems = tuple(
         Problem(
@@ -210,7 +210,7 @@ def _lines_of(data: bytes | str) -> tuple[str, ...]:
     return tuple(re.split("\r\n|[\r\n\x85\u2028\u2029]", text.removeprefix("\ufeff")))
 
 
-def _no_block(reading: ParsedYaml) -> Fault:
+def _fault_without_block(reading: ParsedYaml) -> Fault:
     what = "a list" if isinstance(reading.tree, tuple) else "a single value"
     reported = "the file is empty" if reading.tree is None else f"the file holds {what}, not keys"
     line, column = reading.values.get((), (1, 1))

@@ -1,4 +1,4 @@
-"""Errors of pydantic in the words of the person who wrote the specification.
+"""Errors of pydantic in the words of the person who wrote the specification, with what was probably meant.
 
 One fault gives one message: of a union only the member that the user can have
 meant is heard, and a missing key is not reported where a misspelt one explains it.
@@ -106,10 +106,10 @@ def _one_member(lines: list[_Error], depth: int) -> list[_Error]:
     ]
     if fitting:
         return min(fitting, key=len)
-    return lines[:1] if len(members) == 1 else [_nothing_fits(lines, place)]
+    return lines[:1] if len(members) == 1 else [_union_error(lines, place)]
 
 
-def _nothing_fits(lines: list[_Error], place: Path) -> _Error:
+def _union_error(lines: list[_Error], place: Path) -> _Error:
     allowed = tuple(slot for line in lines if line.trace.path == place for slot in line.trace.slots)
     first = lines[0].trace
     return _Error("union", Trace(place, first.node, allowed, first.parents, first.tags), {}, "")
@@ -117,7 +117,7 @@ def _nothing_fits(lines: list[_Error], place: Path) -> _Error:
 
 def _complaint(line: _Error) -> Complaint:
     if line.kind == "missing":
-        return _missing(line.trace)
+        return _describe_missing(line.trace)
     if line.kind == "extra_forbidden":
         return Complaint(line.trace.path, _unknown_key(line.trace), at_key=True)
     if line.kind.startswith("union_tag"):
@@ -126,7 +126,7 @@ def _complaint(line: _Error) -> Complaint:
     return Complaint(line.trace.path, " ".join(explainer(line).split()))
 
 
-def _missing(trace: Trace) -> Complaint:
+def _describe_missing(trace: Trace) -> Complaint:
     if not trace.path:
         return Complaint((), f"{describe_expected(trace.slots)} is missing")
     last = trace.path[-1]
@@ -203,7 +203,7 @@ def _drop_echoes(complaints: list[Complaint]) -> list[Complaint]:
     return kept
 
 
-def _needs(line: _Error) -> str:
+def _describe_needed(line: _Error) -> str:
     """Return what is needed in place of what is there, in words."""
     value = line.trace.node
     if value is None:
@@ -214,29 +214,29 @@ def _needs(line: _Error) -> str:
     return f"{describe_value(value)} does not fit here; {describe_expected(line.trace.slots)} is needed{hint}"
 
 
-def _no_text(line: _Error) -> str:
+def _describe_not_text(line: _Error) -> str:
     value = line.trace.node
     if isinstance(value, bool | int | float):
         return f"{describe_value(value)} is not text; quote it, if text is meant"
-    return _needs(line)
+    return _describe_needed(line)
 
 
-def _no_bool(line: _Error) -> str:
+def _describe_not_bool(line: _Error) -> str:
     value = line.trace.node
     hint = _OLD_BOOLS.get(value.lower()) if isinstance(value, str) else None
     return f"{describe_value(value)} is not true or false" + (f"; write {hint}" if hint else "")
 
 
-def _no_number(line: _Error) -> str:
+def _describe_not_number(line: _Error) -> str:
     value = line.trace.node
     kind = "a whole number" if line.kind.startswith("int") else "a number"
     if isinstance(value, str):
         unit = "; a plain number without a unit is needed" if re.match("[-+.0-9]", value) else ""
         return f"{describe_value(value)} is not {kind}{unit}"
-    return f"{describe_value(value)} is not {kind}" if isinstance(value, bool | float) else _needs(line)
+    return f"{describe_value(value)} is not {kind}" if isinstance(value, bool | float) else _describe_needed(line)
 
 
-def _no_choice(line: _Error) -> str:
+def _describe_not_a_choice(line: _Error) -> str:
     choices = [choice for slot in line.trace.slots for choice in slot.choices]
     if not choices:
         return f"{describe_value(line.trace.node)} is not allowed; allowed are {line.context.get('expected', '')}"
@@ -256,7 +256,7 @@ def _explain_bounds(line: _Error) -> str:
     return f"{describe_value(value).strip(chr(39))} is not allowed: must be {limits}"
 
 
-def _too_few_or_many(line: _Error) -> str:
+def _describe_length(line: _Error) -> str:
     least, most = line.context.get("min_length"), line.context.get("max_length")
     limit = f"at least {least} must be there" if least is not None else f"at most {most} may be there"
     value = line.trace.node
@@ -264,10 +264,10 @@ def _too_few_or_many(line: _Error) -> str:
         return f"the text has {len(value)} characters; {limit}" if value else "the text is empty"
     if isinstance(value, dict):
         return f"the block has {len(value)} entries; {limit}" if value else f"the block is empty; {limit}"
-    return f"the list has {len(value)} items; {limit}" if isinstance(value, tuple) else _needs(line)
+    return f"the list has {len(value)} items; {limit}" if isinstance(value, tuple) else _describe_needed(line)
 
 
-def _own_words(line: _Error) -> str:
+def _message_of_validator(line: _Error) -> str:
     return str(line.context.get("error", line.text)) or "is not allowed"
 
 
@@ -276,23 +276,23 @@ def _translate_pydantic_message(line: _Error) -> str:
 
 
 _EXPLAINER_BY_TYPE: dict[str, Callable[[_Error], str]] = {
-    "value_error": _own_words,
-    "assertion_error": _own_words,
-    "string_type": _no_text,
-    "bool_type": _no_bool,
-    "bool_parsing": _no_bool,
-    "int_type": _no_number,
-    "int_parsing": _no_number,
-    "int_from_float": _no_number,
-    "float_type": _no_number,
-    "float_parsing": _no_number,
-    "literal_error": _no_choice,
-    "enum": _no_choice,
-    "too_short": _too_few_or_many,
-    "too_long": _too_few_or_many,
-    "string_too_short": _too_few_or_many,
-    "string_too_long": _too_few_or_many,
+    "value_error": _message_of_validator,
+    "assertion_error": _message_of_validator,
+    "string_type": _describe_not_text,
+    "bool_type": _describe_not_bool,
+    "bool_parsing": _describe_not_bool,
+    "int_type": _describe_not_number,
+    "int_parsing": _describe_not_number,
+    "int_from_float": _describe_not_number,
+    "float_type": _describe_not_number,
+    "float_parsing": _describe_not_number,
+    "literal_error": _describe_not_a_choice,
+    "enum": _describe_not_a_choice,
+    "too_short": _describe_length,
+    "too_long": _describe_length,
+    "string_too_short": _describe_length,
+    "string_too_long": _describe_length,
     **dict.fromkeys(("greater_than", "greater_than_equal", "less_than", "less_than_equal"), _explain_bounds),
-    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type", "mapping_type"), _needs),
-    **dict.fromkeys(("tuple_type", "list_type", "union"), _needs),
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type", "mapping_type"), _describe_needed),
+    **dict.fromkeys(("tuple_type", "list_type", "union"), _describe_needed),
 }

@@ -1,8 +1,7 @@
-"""Paths into a specification: keys and indices, written ``requirements.0.max``, and what its type allows there.
+"""Paths into a specification (``requirements.0.max``): values set there, types allowed there, paths of errors.
 
-Values are set at a path; fields, choices and examples are those of the type. pydantic tells where an error is by `loc`,
-which mixes keys with the labels of union members. `trace` follows it through the types and the tree side by side, so
-that the user gets the path he wrote.
+pydantic says where an error is by `loc`, which mixes keys with the labels of union members. `trace` follows it through
+the types and the tree side by side, so that the user gets the path he wrote.
 """
 
 from __future__ import annotations
@@ -192,10 +191,10 @@ class Slot:
         if self.model is not None:
             return "a block with " + ", ".join(required_keys(self.model) or list(self.model.model_fields)[:6])
         if self.origin in (tuple, list):
-            return f"a list{self._length()}, each item {describe_expected(self.child(0), plain=True)}"
+            return f"a list{self._length_in_words()}, each item {describe_expected(self.child(0), plain=True)}"
         return _PRIMITIVE_WORDS.get(self.origin, "a value")
 
-    def _length(self) -> str:
+    def _length_in_words(self) -> str:
         arguments = get_args(self.kind)
         fixed = self.origin is tuple and arguments and arguments[-1] is not Ellipsis
         return f" of {len(arguments)}" if fixed else ""

@@ -97,11 +97,11 @@ def replace_odd_characters(text: str) -> tuple[str, list[Fault]]:
     """Return the text with a space for every character that is refused, and a fault for each kind of them."""
     kinds = {char: kind[1] for char in set(text) if (kind := odd_character(char))}
     first = sorted((text.index(char), char) for char in sorted(kinds)[:MOST_KINDS])
-    faults = [_odd(text, index, kinds[char], text.count(char)) for index, char in first]
+    faults = [_odd_character_fault(text, index, kinds[char], text.count(char)) for index, char in first]
     return text.translate(dict.fromkeys(map(ord, kinds), " ")), faults
 
 
-def _odd(text: str, index: int, what: str, count: int) -> Fault:
+def _odd_character_fault(text: str, index: int, what: str, count: int) -> Fault:
     more = f" ({count} in all)" if count > 1 else ""
     return Fault(*_position(text, index), (), f"here is {what}{more}")
 
@@ -125,9 +125,8 @@ _ZERO_PATTERNS, _WITH_UNIT = re.compile("[-+]?0+"), re.compile("(?>[0-9]+(?:[eE]
 class ParsedYaml:
     """Content of a YAML source, as far as it could be read.
 
-    `keys` and `values` hold (line, column) by path. `broken` says that the tree is
-    not complete, so that what is missing in it means nothing; `unparsed` that this is
-    because it is no YAML.
+    `keys` and `values` hold (line, column) by path. `broken` says that the tree is not complete, so that what is
+    missing in it means nothing; `unparsed` that this is because it is no YAML.
     """
 
     tree: Any = None
@@ -346,7 +345,7 @@ def read_plain(text: str) -> Any:
     if NUMBER_PATTERN.fullmatch(text):
         return _number(text)
     if len(text) <= MAX_NUMBER_LENGTH and (complaint := number_complaint(text, only_traps=True)):
-        raise QuantityError(_or_quote(complaint))
+        raise QuantityError(_advise_quoting(complaint))
     return text
 
 
@@ -364,11 +363,11 @@ def _number(text: str) -> int | float:
     try:
         value = read_number(text)
     except QuantityError as error:
-        raise QuantityError(_or_quote(str(error))) from None
+        raise QuantityError(_advise_quoting(str(error))) from None
     return int(text) if _INTEGER_PATTERN.fullmatch(text) else value
 
 
-def _or_quote(complaint: str) -> str:
+def _advise_quoting(complaint: str) -> str:
     return f"{complaint} (or quote it, if text is meant)"
 
 
