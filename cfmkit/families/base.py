@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit.arrays import LazyMapping
 from cfmkit.errors import CfmError, UsageError
+from cfmkit.families.findings import join_tables
 from cfmkit.families.run_control import Run  # noqa: TC001  packages of other families may import it from here
 from cfmkit.results import OVERWRITTEN_FINDING, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE, Quantity
 from cfmkit.specs.further_metrics import own_metrics
@@ -249,7 +250,9 @@ class Family:
         """Add the findings that every family has, and the values of those that know their box."""
         size = ENVELOPE_METRICS if self.part else {}
         outputs = self.outputs
-        outputs = replace(outputs, values={**outputs.values, **size}, findings={**outputs.findings, **SHARED_FINDINGS})
+        values = join_tables("value", outputs.values, size)
+        findings = join_tables("finding", outputs.findings, SHARED_FINDINGS)
+        outputs = replace(outputs, values=values, findings=findings)
         object.__setattr__(self, "outputs", outputs)
 
     def file(self, name: str) -> Traversable | None:

@@ -192,6 +192,7 @@ def _fault_of(record: Any, offer: InstalledFamily) -> str:
 def fault_of_record(record: Family, needs_interface: bool = True) -> str:
     """Return why a record cannot be used; empty if it can. A record that is made now need not state its interface."""
     from cfmkit.families.base import INTERFACE_VERSION
+    from cfmkit.metrics import definitions
 
     if record.interface is None and needs_interface:
         return f"its record does not state its interface; this cfmkit has 'interface={INTERFACE_VERSION}'"
@@ -202,6 +203,10 @@ def fault_of_record(record: Family, needs_interface: bool = True) -> str:
         )
     if fault := _fault_of_fields(record, ""):
         return fault
+    # the name of a metric of forces alone may be that of a value where torques drive
+    metrics = {metric.name for metric in definitions("force")} & {metric.name for metric in definitions("torque")}
+    if twice := [name for name in record.outputs.values if name.partition("[")[0] in metrics]:
+        return f"its value {twice[0]!r} has the name of a metric: it needs another one"
     if record.folder and not _is_folder(record.folder):
         return f"the field 'folder' of its record names no folder of a package: {record.folder!r}"
     return "" if record.papers or not record.bibtex else "its references.bib has no entry that can be read"

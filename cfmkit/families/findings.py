@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import wraps
-from typing import TYPE_CHECKING, ParamSpec
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-from cfmkit.errors import SolutionError
+from cfmkit.errors import SolutionError, UsageError
 from cfmkit.results import Design, Finding, Result, Status
 from cfmkit.specs.units import format_short
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 
 Given = ParamSpec("Given")
+Entry = TypeVar("Entry")
 
 
 class CannotBuild(SolutionError):
@@ -72,6 +73,16 @@ def no_design(reason: Finding, nearest: Mapping[str, str] | None = None) -> Desi
 TOO_SOFT = 0.01  # share of the energy of bending above which wide beams that are solved as narrow ones are reported
 MIN_PLANE_STRESS_RATIO = 3.0
 """Width over thickness up to which plane stress is within about 1 % of a solid in three dimensions (docs/solid.md)."""
+
+
+def join_tables(kind: str, *tables: Mapping[str, Entry]) -> dict[str, Entry]:
+    """Return tables by name as one; raises UsageError if one name has two entries, of a kind as "finding"."""
+    joined: dict[str, Entry] = {}
+    for table in tables:
+        if twice := [name for name, entry in table.items() if joined.get(name, entry) != entry]:
+            raise UsageError(f"two {kind}s are called {twice[0]!r}: one of them needs another name")
+        joined |= table
+    return joined
 
 
 @dataclass(frozen=True)

@@ -32,11 +32,21 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
 
 
-METRIC_TABLE = (
-    *window_metrics.IN_WINDOW,
-    *ranges.TRAVEL_METRICS,
-    *window_metrics.LOSS_AND_STRESS_METRICS,
-    *window_metrics.LONG_TERM,
+def refuse_namesakes(table: Sequence[Definition]) -> tuple[Definition, ...]:
+    """Return a table of metrics; raises UsageError if two of them have one name."""
+    names = [item.name for item in table]
+    if twice := next((name for name in names if names.count(name) > 1), ""):
+        raise UsageError(f"two metrics are called {twice!r}: one of them needs another name")
+    return tuple(table)
+
+
+METRIC_TABLE = refuse_namesakes(
+    (
+        *window_metrics.IN_WINDOW,
+        *ranges.TRAVEL_METRICS,
+        *window_metrics.LOSS_AND_STRESS_METRICS,
+        *window_metrics.LONG_TERM,
+    )
 )
 """Every metric of the contract, in the order in which they are shown."""
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from cfmkit.arrays import FloatArray
 
 
@@ -17,13 +19,14 @@ class SampleKind:
     name: str  # as users write it
     phrase: str  # what is drawn
     engine: str  # class of `scipy.stats.qmc`
+    is_balanced_at_powers_of_two: bool = False  # and less balanced, not wrong, at other numbers of points
 
 
 SAMPLE_KINDS: dict[str, SampleKind] = {
     kind.name: kind
     for kind in (
         SampleKind("lhs", "a Latin hypercube", "LatinHypercube"),
-        SampleKind("sobol", "a Sobol sequence", "Sobol"),
+        SampleKind("sobol", "a Sobol sequence", "Sobol", is_balanced_at_powers_of_two=True),
     )
 }  # every way to draw points, in the order of the documentation; a new one is its line here
 
@@ -39,15 +42,15 @@ def sample_unit_cube(
     # dimension, count: of the cube, and number of points
     dimension: int,
     count: int,
-    seed: int,  # of the permutations or the scrambling
+    # of the permutations or the scrambling; of a generator scipy takes a child, whose points are not those of its seed
+    seed: int | np.random.Generator,
 ) -> FloatArray:
     """Return points of the unit cube, (count, dimension)."""
-    import numpy as np
     from scipy.stats import qmc
 
-    engine: Any = getattr(qmc, SAMPLE_KINDS[name].engine)(dimension, seed=np.random.default_rng(seed))
+    engine: Any = getattr(qmc, SAMPLE_KINDS[name].engine)(dimension, seed=seed)
     with warnings.catch_warnings():
-        # A Sobol sequence that is not a power of two long is less balanced, not wrong.
+        # of a number of points that is not balanced
         warnings.simplefilter("ignore", UserWarning)
         points: FloatArray = engine.random(count)
     return points

@@ -194,6 +194,7 @@ def sensitivity(
     parameters: Mapping[str, Any] | None = None,
     correlated: Sequence[Mapping[str, Any]] | None = None,
     samples: int | None = None,
+    sampling: str | None = None,
     metrics: Iterable[Metric] | None = None,
     min_yield: str | float | None = None,
     costs: Mapping[str, float] | None = None,
@@ -217,6 +218,9 @@ def sensitivity(
         Parameters that deviate together: ``{"parameters": [...], "correlation": 1.0}``.
     samples : int, optional
         Points per parameter, trajectories, base samples or parts.
+    sampling : str, optional
+        How they are drawn, one of the words of `cfmkit.numerics.unit_cube_samples.SAMPLE_KINDS`; default: parts at
+        random, base samples from a Sobol sequence.
     metrics : iterable of str or callable, optional
         Names, or functions of a `Result` (see `metric`). Default: those of the requirements.
     min_yield : str or float, optional
@@ -259,6 +263,7 @@ def sensitivity(
         parameters=parameters,
         correlated=correlated,
         samples=samples,
+        sampling=sampling,
         metrics=names_of(metrics),
         min_yield=min_yield,
         costs=costs,

@@ -17,6 +17,8 @@ class MethodName:
     phrase: str  # what it is, in a few words
     samples: str  # what `sensitivity.samples` is the number of; empty: it chooses its own steps
     default_samples: int
+    # one of `SAMPLE_KINDS`, or "random": how it draws unless `sensitivity.sampling` says; empty: its points are its own
+    sampling: str = ""
 
 
 METHOD_NAMES: dict[str, MethodName] = {
@@ -25,9 +27,9 @@ METHOD_NAMES: dict[str, MethodName] = {
         MethodName("oat", "one at a time", "points per parameter", 11),
         MethodName("local", "gradients", "", 2),
         MethodName("morris", "screening", "trajectories", 20),
-        MethodName("sobol", "indices of variance", "base samples", 256),
-        MethodName("tolerance", "Monte Carlo over tolerances: the yield", "parts", 1000),
-        MethodName("inverse", "the tolerances that a yield needs", "parts", 200),
+        MethodName("sobol", "indices of variance", "base samples", 256, "sobol"),
+        MethodName("tolerance", "Monte Carlo over tolerances: the yield", "parts", 1000, "random"),
+        MethodName("inverse", "the tolerances that a yield needs", "parts", 200, "random"),
     )
 }
 """Every method, in the order of the documentation. A new one is its module and its line here."""

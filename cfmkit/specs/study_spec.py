@@ -8,14 +8,16 @@ from pydantic import Field, model_validator
 
 from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS, list_phrases
 from cfmkit.specs.block import Model
-from cfmkit.specs.sensitivity_methods import MethodWord, describe_methods, describe_samples
+from cfmkit.specs.sensitivity_methods import METHOD_NAMES, MethodWord, describe_methods, describe_samples
 from cfmkit.specs.units import MetricValue, Ratio
 
 SweepValue = str | int | float | bool
 
 if TYPE_CHECKING:
     Combine = str
+    SampleWord = str
 else:
+    SampleWord = Literal[tuple(SAMPLE_KINDS)]
     Combine = Literal["grid", "zip", *SAMPLE_KINDS]
 
 
@@ -86,6 +88,11 @@ class Sensitivity(Model):
     )
     correlated: tuple[Correlated, ...] = Field((), description="parameters that deviate together; for tolerances")
     samples: int | None = Field(None, ge=2, description=describe_samples())
+    sampling: SampleWord | None = Field(
+        None,
+        description=f"how samples are drawn: {list_phrases()}; default: "
+        + ", ".join(f"{method.name}: {method.sampling}" for method in METHOD_NAMES.values() if method.sampling),
+    )
     seed: int | None = Field(None, ge=0, description="seed of all random numbers; `--seed` takes precedence")
     metrics: tuple[str, ...] = Field((), description="default: those of the requirements, over their windows")
     min_yield: Ratio | None = Field(None, gt=0, le=1, description="share of parts that must meet all requirements")
@@ -94,3 +101,10 @@ class Sensitivity(Model):
         description="inverse: a tolerance costs this number over its width, in any unit: {path: 2.0}; default: 1 each",
     )
     design: bool = Field(False, description="redesign the mechanism at each point")
+
+    @model_validator(mode="after")
+    def _sampling_where_drawn(self) -> Self:
+        if self.sampling is not None and not METHOD_NAMES[self.method].sampling:
+            methods = ", ".join(method.name for method in METHOD_NAMES.values() if method.sampling)
+            raise ValueError(f"{self.method} has points of its own: 'sampling' is for {methods}")
+        return self

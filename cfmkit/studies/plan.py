@@ -155,7 +155,7 @@ def sample_axes(axes: Sequence[Axis], draw: Draw, most: int = MOST_POINTS) -> Pl
     Raises UsageError if there are more points than allowed.
     """
     refuse_too_many(draw.count, most)
-    unit = sample_unit_cube(draw.method, len(axes), draw.count, draw.seed)
+    unit = sample_unit_cube(draw.method, len(axes), draw.count, np.random.default_rng(draw.seed))
     return Plan(tuple(_drawn_variable(item, unit[:, k]) for k, item in enumerate(axes)), draw.count, joint=True)
 
 

@@ -239,6 +239,19 @@ def test_targets_that_cannot_be_met_are_refused_with_the_reason(mechanism, chang
     assert re.search(r"'(mechanism|design|analysis)\b", reason.message), "the key to change is not named"
 
 
+@pytest.mark.parametrize(("end_of_fall", "others"), [("121 mm", 0), ("200 mm", 2)])
+def test_a_refusal_of_the_best_springs_of_a_catalogue_offers_no_next_best(end_of_fall, others):
+    points = [["0 mm", "50 N"], ["120 mm", "49 N"], [end_of_fall, "5 N"], ["240 mm", "5 N"]]
+    offers = [{"name": rate, "stiffness": f"{rate} N/mm", "counts": [2]} for rate in ("0.4", "0.55", "0.69")]
+    found = design(
+        targets({"roller_radius": "10 mm"}, force=None, target={"points": points}, choose="catalogue", catalogue=offers)
+    )
+    assert len(found.next_best) == others
+    assert (found.status, "so quickly" in found.message) == (
+        (Status.COMPLETE, False) if others else (Status.INFEASIBLE, True)
+    )
+
+
 def test_a_refused_stroke_names_the_longest_that_is_feasible():
     for spec in (
         targets(stroke="1 m"),

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import ast
+from importlib import import_module
+
 import pytest
 from sources import PACKAGE as ROOT
+from sources import parsed
 
 from cfmkit import families
 from cfmkit.families import family
@@ -46,6 +50,28 @@ def test_every_family_has_the_same_rooms(name):
 
 
 every_family = pytest.mark.parametrize("name", families.names())
+
+
+def tables_of_modules():
+    """Yield (path, name, module, tree) of every table at the top of a module that takes entries of others."""
+    for path in sorted((ROOT / "families").rglob("*.py")):
+        for statement in parsed(path).body:
+            if not isinstance(statement, ast.Assign | ast.AnnAssign) or not isinstance(statement.value, ast.Dict):
+                continue
+            if None in statement.value.keys:
+                module = ".".join(("cfmkit", *path.relative_to(ROOT).with_suffix("").parts))
+                yield pytest.param(module, statement.value, id=f"{module}:{statement.lineno}")
+
+
+@pytest.mark.parametrize(("module", "table"), [*tables_of_modules()])
+def test_no_entry_of_a_table_takes_the_place_of_another(module, table):
+    names = []
+    for key, value in zip(table.keys, table.values, strict=True):
+        source = ast.unparse(value if key is None else key)
+        known = eval(source, vars(import_module(module)))
+        names += list(known) if key is None else [known]
+    assert len(names) > 3
+    assert [name for name in dict.fromkeys(names) if names.count(name) > 1] == []
 
 
 @pytest.mark.lists

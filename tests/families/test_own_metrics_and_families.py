@@ -146,6 +146,14 @@ def test_the_page_of_a_family_names_no_command_for_which_it_has_no_file(capsys):
             lambda: replace(spare_family.FAMILY_RECORD, outputs=ResultNames(branches=["load"])),
             "the field 'outputs.branches' of its record",
         ),
+        (
+            lambda: replace(spare_family.FAMILY_RECORD, outputs=ResultNames({"half_band": ("ratio", "of its own")})),
+            "its value 'half_band' has the name of a metric: it needs another one",
+        ),
+        (
+            lambda: replace(spare_family.FAMILY_RECORD, outputs=ResultNames(findings={"thin_wall": "of its own"})),
+            "two findings are called 'thin_wall': one of them needs another name",
+        ),
         (lambda: replace(spare_family.FAMILY_RECORD, interface=99), "is for interface 99"),
         (lambda: replace(spare_family.FAMILY_RECORD, name="other"), "'family' of its specifications is 'spare'"),
         (lambda: "cam", "a cfmkit.families.base.Family is needed, not str"),

@@ -6,8 +6,9 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import SpecError, UsageError
-from cfmkit.metrics import check, definitions, known_metrics, metrics_by_name, other_name
+from cfmkit.metrics import METRIC_TABLE, check, definitions, known_metrics, metrics_by_name, other_name
 from cfmkit.metrics.definition import Definition
+from cfmkit.metrics.metric_definitions import refuse_namesakes
 
 TORQUE = cfmkit.load("configs/slider_crank_li2019.yaml")
 CAM = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 41})
@@ -31,6 +32,11 @@ def test_a_force_name_on_a_torque_curve_means_the_torque(name):
     assert result.curve.kind == "torque"
     assert other[name] == other[other_name(name)]
     assert other[name].value is not None
+
+
+def test_two_metrics_of_one_name_are_refused():
+    with pytest.raises(UsageError, match="two metrics are called 'force_mean': one of them needs another name"):
+        refuse_namesakes((*METRIC_TABLE, Definition("force_mean", "effort", "another mean")))
 
 
 def test_other_names_are_not_listed_twice():

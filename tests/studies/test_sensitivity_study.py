@@ -14,9 +14,11 @@ import cfmkit
 from cfmkit import families
 from cfmkit.errors import ExitCode, SpecError, UsageError
 from cfmkit.families import family
+from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS
 from cfmkit.results import Status
 from cfmkit.studies.engine import ROW_MISSING, run
 from cfmkit.studies.parts.share import Share
+from cfmkit.studies.parts.uncertain_values import with_options
 from cfmkit.studies.sensitivity import METHOD_NAMES
 from cfmkit.studies.sensitivity.evaluation import Evaluator
 from cfmkit.studies.sensitivity.method import method_named
@@ -213,11 +215,31 @@ def test_the_parts_of_a_list_and_of_a_batch_are_tightened_together():
         ({"parameters": {"mechanism.brace_length": {"uniform": "1 mm", "normal": "1 mm"}}}, "either"),
         ({"parameters": {"mechanism.brace_length": {"uniform": "1 mm", "truncate": "1 mm"}}}, "tails"),
         ({"parameters": {"requirements.0.max": ("1 %", "2 %")}}, "nothing to vary"),
+        ({"method": "morris", "sampling": "lhs"}, "morris has points of its own: 'sampling' is for sobol, tolerance"),
     ],
 )
 def test_a_block_that_makes_no_sense_is_refused_with_the_reason(more, words):
     with pytest.raises(SpecError, match=words):
-        prepare(spec("tolerance", **more))
+        prepare(spec(**{"method": "tolerance"} | more))
+
+
+@pytest.mark.parametrize("kind", SAMPLE_KINDS)
+def test_every_way_to_draw_samples_draws_parts_and_base_samples_evenly(kind):
+    parts = prepare(spec("tolerance", samples=64, sampling=kind)).parts
+    base_samples = study("sobol", samples=64, sampling=kind).points[:, 0, 0]
+    low, high = 0.06795, 0.06805
+    for values in (parts.draw()[:, 0], base_samples):
+        counts = np.histogram(values, 16, (low, high))[0]
+        assert counts.sum() == 64
+        assert np.abs(counts - 4).max() <= 1  # at random some of the 16 bins would miss by four
+    assert np.array_equal(parts.draw(), prepare(spec("tolerance", samples=64, sampling=kind)).parts.draw())
+    scores = parts.unit(64, 0)
+    assert not np.array_equal(scores, prepare(spec("tolerance", samples=64)).parts.unit(64, 0))
+
+
+def test_another_method_chooses_its_own_way_to_draw():
+    block = with_options(spec("tolerance", sampling="lhs").sensitivity, {"method": "morris"})
+    assert spec().replace({"sensitivity": block}).sensitivity.sampling is None
 
 
 def test_three_springs_cannot_all_oppose_each_other():

@@ -135,6 +135,7 @@ class Parts:
     correlation: FloatArray  # (d, d) of the normal scores
     samples: int  # how many parts are drawn
     seed: int  # of the generator
+    sampling: str | None = None  # one of `SAMPLE_KINDS`; None: at random
 
     @classmethod
     def from_block(cls, spec: Spec, block: Sensitivity, samples: int, seed: int) -> Parts:
@@ -144,7 +145,7 @@ class Parts:
         """
         parameters = parameters_of(spec, block)
         paths = tuple(parameter.path for parameter in parameters)
-        return cls(spec, parameters, groups(block, paths), correlations(block, paths), samples, seed)
+        return cls(spec, parameters, groups(block, paths), correlations(block, paths), samples, seed, block.sampling)
 
     @classmethod
     def from_design(cls, spec: Spec, design: DesignBlock, seed: int) -> Parts | None:
@@ -199,7 +200,7 @@ class Parts:
 
     def unit(self, samples: int, seed: Seed) -> FloatArray:
         """Return the shares of all parts that lie below each value of drawn parts, (n, d)."""
-        return draw(self.correlation, samples, np.random.default_rng(seed))
+        return draw(self.correlation, samples, seed, self.sampling)
 
     def draw(self, samples: int | None = None, seed: Seed | None = None) -> FloatArray:
         """Return the values of drawn parts, (n, d) [SI]; of another seed those that no search has seen."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.errors import Problem, QuantityError, SpecError
+from cfmkit.numerics.unit_cube_samples import sample_unit_cube
 from cfmkit.specs.study_spec import Tolerance
 from cfmkit.specs.units import meant_as_percent, read_number, read_quantity
 from cfmkit.studies.plan import Plan, Variable
@@ -109,13 +110,21 @@ def correlation_matrix(count: int, groups: Iterable[tuple[Sequence[int], float]]
     return matrix
 
 
-def draw(matrix: FloatArray, count: int, generator: np.random.Generator) -> FloatArray:
-    """Return points in the unit cube, (count, d), whose normal scores have these correlations."""
-    from scipy.special import ndtr
+def draw(matrix: FloatArray, count: int, seed: int | list[int], kind: str | None = None) -> FloatArray:
+    """Return points in the unit cube, (count, d), whose normal scores have these correlations.
+
+    `kind`: one of `SAMPLE_KINDS`; None: at random.
+    """
+    from scipy.special import ndtr, ndtri
 
     values, vectors = np.linalg.eigh(matrix)
     root = vectors * np.sqrt(np.clip(values, 0.0, None))
-    scores = generator.standard_normal((count, len(matrix)))
+    generator = np.random.default_rng(seed)
+    if kind is None:
+        scores = generator.standard_normal((count, len(matrix)))
+    else:
+        unit = sample_unit_cube(kind, len(matrix), count, generator)
+        scores = ndtri(np.clip(unit, _FLOAT_TINY, 1.0 - _FLOAT_EPSNEG))
     # Without correlations the scores stay what was drawn, to the last bit.
     joined = scores if np.array_equal(matrix, np.eye(len(matrix))) else scores @ root.T
     return np.asarray(ndtr(joined))
@@ -314,11 +323,11 @@ def _read_value(place: Leaf, text: str, key: str = "") -> float:
 def with_options(block: Sensitivity | None, changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a block says once options have replaced some of it.
 
-    A number of samples is that of the block's own method: another method chooses its own.
+    Samples, their number and how they are drawn, are those of the block's own method: another method chooses its own.
     """
     reported = block.model_dump(exclude_unset=True) if block else {}
     if block is not None and changes.get("method", block.method) != block.method:
-        reported.pop("samples", None)
+        reported = {key: value for key, value in reported.items() if key not in ("samples", "sampling")}
     return reported | {key: value for key, value in changes.items() if value is not None}
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from cfmkit.errors import Problem, SolutionError, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.metrics.requirements import Bounds
+from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS
 from cfmkit.results import Finding
 from cfmkit.specs.sensitivity_methods import METHOD_NAMES
 from cfmkit.specs.units import TravelShare, border_unit, format_short, to_border
@@ -87,6 +88,11 @@ class Setup:
     def seed(self) -> int:
         """Seed of the samples."""
         return self.parts.seed
+
+    @property
+    def sampling(self) -> str:
+        """How samples are drawn: one of `SAMPLE_KINDS`, ``random``, or nothing of a method with points of its own."""
+        return self.block.sampling or METHOD_NAMES[self.block.method].sampling
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -240,7 +246,8 @@ def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...],
     if block.correlated and not method_named(block.method).draws_parts:
         reported = f"{block.method} varies every parameter by itself: 'correlated' is for the method tolerance"
         yield Finding("correlation_not_used", reported)
-    if block.method == "sobol" and samples & (samples - 1):
+    kind = SAMPLE_KINDS.get(block.sampling or METHOD_NAMES[block.method].sampling)
+    if kind and kind.is_balanced_at_powers_of_two and samples & (samples - 1):
         yield Finding("unbalanced", f"{samples} is not a power of two: Sobol sequences are balanced at 64, 128, 256")
     if method_named(block.method).draws_parts and not spec.part_requirements:
         yield Finding("no_requirements", "without requirements there is no yield, only distributions")

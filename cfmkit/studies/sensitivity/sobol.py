@@ -1,6 +1,6 @@
 """Sobol indices: the share of the variance that a parameter causes, alone and with others.
 
-SALib draws the points and estimates the indices; drawing and analysing are apart.
+SALib estimates the indices; drawing and analysing are apart.
 Nothing here decides what a missing value means: the outputs must be complete.
 
 Reference
@@ -10,11 +10,11 @@ Reference
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.numerics.unit_cube_samples import sample_unit_cube
 from cfmkit.studies.parts.uncertain_values import values_at
 from cfmkit.studies.sensitivity.method import Method
 from cfmkit.studies.sensitivity.result_types import (
@@ -46,19 +46,18 @@ def sample(
     count: int,
     parameters: int,  # dimension of the cube
     seed: int,  # of the scrambling
+    kind: str = "sobol",  # one of `SAMPLE_KINDS`
 ) -> FloatArray:
     """Return blocks of points of the unit cube, (count, parameters + 2, parameters).
 
-    A block is a point A, then A with one coordinate each of a point B, then B. Blocks
-    are those of one scrambled sequence: drawing more leaves the first ones as they are.
+    A block is a point A, then A with one coordinate each of a point B, then B [S, table 2, (b)]. Blocks of a sequence
+    stay as they are when more are drawn.
     """
-    from SALib.sample import sobol
-
-    with warnings.catch_warnings():
-        # A number of points that is not a power of two is less balanced; the caller says so once.
-        warnings.simplefilter("ignore", UserWarning)
-        points = sobol.sample(problem(parameters), start + count, calc_second_order=False, seed=seed)
-    blocks: FloatArray = np.asarray(points).reshape(start + count, parameters + 2, parameters)[start:]
+    points = sample_unit_cube(kind, 2 * parameters, start + count, seed)[start:]
+    blocks = np.repeat(points[:, None, :parameters], parameters + 2, axis=1)
+    for k in range(parameters):
+        blocks[:, 1 + k, k] = points[:, parameters + k]
+    blocks[:, -1] = points[:, parameters:]
     return blocks
 
 
@@ -115,7 +114,7 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     count, seed = len(setup.parameters), setup.seed
     spreads = [parameter.spread for parameter in setup.parameters]
 
-    unit = sample(0, setup.samples, count, seed)
+    unit = sample(0, setup.samples, count, seed, setup.sampling)
     points = values_at(spreads, unit.reshape(-1, count)).reshape(unit.shape)
     roles = ["A", *(f"A with {path} of B" for path in setup.paths), "B"]
     outputs = evaluator.outputs(points, roles)
