@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import gc
 import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,14 +27,6 @@ os.environ["COLUMNS"] = "110"  # as redirected output: no text depends on the te
 settings.register_profile("repeat", derandomize=True)
 settings.register_profile("search", derandomize=False)
 settings.load_profile("search" if os.environ.get("CFMKIT_TEST_SEARCH") else "repeat")
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Compile the beam engine beside the first tests, where several processes test: else all of them wait for one."""
-    if not hasattr(config, "workerinput") and getattr(config.option, "numprocesses", None):
-        command = [sys.executable, "-m", "cfmkit", "warm", "--quiet"]
-        warming = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        config.add_cleanup(warming.wait)
 
 
 gc.set_threshold(100_000, 20, 20)  # by default half the time of collecting tests is a search for garbage
