@@ -28,11 +28,11 @@ from cfmkit.elastica.mechanics.designs import set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations
 from cfmkit.elastica.mechanics.march import engine, equations
+from cfmkit.elastica.mechanics.problem import DEGREES_MORE
 from cfmkit.elastica.model.beam_fits import is_plain
 from cfmkit.elastica.results.path import load_displacement
 from cfmkit.elastica.tracing.accuracy import (
     CORRECTION_ERROR,
-    DEGREES_MORE,
     NEXT_CORRECTION,
     compare_states,
     pick_points,

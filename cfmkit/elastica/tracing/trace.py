@@ -15,13 +15,13 @@ from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOf
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise, embed, raise_degree
 from cfmkit.elastica.mechanics.equations import NaturalMarch
+from cfmkit.elastica.mechanics.problem import DEGREES_MORE
 from cfmkit.elastica.model.beam_fits import coils
 from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Control, Loading
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
 from cfmkit.elastica.tracing.accuracy import (
     CORRECTION_ERROR,
-    DEGREES_MORE,
     drop_locked_points,
     find_tension,
     pick_points,
