@@ -28,8 +28,17 @@ from cfmkit.elastica.mechanics.designs import set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations
 from cfmkit.elastica.mechanics.march import engine, equations
+from cfmkit.elastica.mechanics.problem import DEGREES_MORE
 from cfmkit.elastica.model.beam_fits import is_plain
-from cfmkit.elastica.tracing.accuracy import DEGREES_MORE, NEXT_CORRECTION, compare_states
+from cfmkit.elastica.results.path import load_displacement
+from cfmkit.elastica.tracing.accuracy import (
+    CORRECTION_ERROR,
+    NEXT_CORRECTION,
+    compare_states,
+    pick_points,
+    point_errors,
+)
+from cfmkit.elastica.tracing.trace import DegreeAndPieces, trace_on
 from cfmkit.elastica.tracing.trace_many import CompiledBatch
 from cfmkit.numerics.continuation import Border, PathBranch
 
@@ -340,6 +349,30 @@ def test_states_are_compared_with_a_higher_degree_in_c_as_in_numpy() -> None:
         for mine, its in pairs:
             assert mine == pytest.approx(its, abs=1e-10 * max(np.abs(its).max(), 1.0)), case["name"]
     assert compared > 12
+
+
+@needs_c
+def test_errors_and_works_of_loads_that_c_finds_are_those_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = loaded = 0
+    for case in list(read_cases())[::5]:
+        net, drive = (from_json(case[part]) for part in ("network", "drive"))
+        if net.contacts:
+            continue
+        attempt = trace_on(net, drive, el.Control(tolerance=1e-7, most_points=60), DegreeAndPieces(7))
+        path = attempt.path
+        if np.isfinite(path.error):
+            least = CORRECTION_ERROR * attempt.start.problem.next_correction
+            right = max(point_errors(path, pick_points(path, ())).max(), least)
+            assert path.error == pytest.approx(right, rel=1e-6, abs=1e-12), case["name"]
+            known += right > least
+        if isinstance(drive, el.Loading) and len(path):
+            with monkeypatch.context() as context:
+                context.setenv(WITHOUT_C_VARIABLE, "1")
+                right = load_displacement(path.at, drive)
+            assert load_displacement(path.at, drive) == pytest.approx(right, rel=1e-12, abs=1e-15), case["name"]
+            loaded += 1
+    assert known > 5
+    assert loaded > 10
 
 
 @needs_c

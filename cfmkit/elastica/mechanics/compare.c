@@ -1,6 +1,7 @@
 /* Tables of plain beams, and their equilibria beside those with a higher degree, by which the error of a path is estimated.
  *
  * numpy's way: `plain_tables` of element_tables.py; `raise_degree`, `embed` and `compare_states` of error_estimate.py. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +9,16 @@
 #include "march.h"
 
 #define N_COMPARED 7 /* numbers of a state, see `compare` */
+
+/* As in accuracy.py. */
+#define N_PICKED 6 /* points at which the error of a path is estimated */
+#define NEXT_CORRECTION 1e-10
+#define LARGEST_CHANGE 0.3
+#define ERROR_SAFETY 2.0
+#define ROUNDING_ERROR 1e-13
+#define ROUNDED_PLACES 4.0
+#define NO_FORCE 1e-6
+#define SMALL_MOTION 1e-3
 
 static Int n_ends(const Model *m) { return m->size - m->elements * (m->degree + 1); } /* unknowns that move ends */
 
@@ -165,4 +176,77 @@ int compare(const Model *models, Int designs, const Model *shapes, const double 
         if (!good) return 0;
     }
     return 1;
+}
+
+/* The largest of the last two coefficients of the rotation of any element. */
+static double last_coefficients(const Model *m, const double *z) {
+    const Int wide = m->degree + 9;
+    double largest = 0.0;
+    for (Int e = 0; e < m->elements; e++)
+        for (Int k = wide - 4; k < wide - 2; k++) largest = larger(largest, fabs(z[m->unknowns[e * wide + k]]));
+    return largest;
+}
+
+static Int largest_of(const double *values, const Int *at, Int first, Int end) {
+    Int best = first;
+    for (Int k = first + 1; k < end; k++) if (fabs(values[at[k]]) > fabs(values[at[best]])) best = k;
+    return at[best];
+}
+
+/* Put the points at which the error is estimated first in `at`, in order; return their number: `pick_points` of accuracy.py. */
+static Int pick(const double *effort, const double *last, Int *at, Int count, char *chosen) {
+    Int kept = 0;
+    chosen[at[count - 1]] = chosen[largest_of(effort, at, 0, count)] = 1;
+    for (Int k = 0; count > N_PICKED && k < N_PICKED - 2; k++)
+        chosen[largest_of(last, at, count * k / (N_PICKED - 2), count * (k + 1) / (N_PICKED - 2))] = 1;
+    for (Int k = 0; k < count; k++) if (count <= N_PICKED || chosen[at[k]]) at[kept++] = at[k];
+    return kept;
+}
+
+/* Estimated error of a path on which all is stable: its start and points as rows of `march`, free unknowns, slopes, drive,
+ * effort, stability, target. Not a number if that is not certain. `point_errors` of accuracy.py is the specification. */
+double path_error(const Model *m, const Model *shapes, const double *laws, Int powers, const double *start, const double *rows,
+                  Int count) {
+    const Int n = m->free, wide = 2 * n + 4, total = count + 1, same = n_ends(m), size = m->size;
+    double *z = malloc((size_t)(total * (size + 3) + N_PICKED * (size + 1 + same + N_COMPARED)) * sizeof(double));
+    Int *at = calloc((size_t)(2 * total), sizeof(Int)), targets = 0;
+    if (!z || !at) { free(z); free(at); return NAN; }
+    double *effort = z + total * size, *last = effort + total, *drive = last + total, *picked = drive + total;
+    double *ways = picked + N_PICKED * size, *ends = ways + N_PICKED, *found = ends + N_PICKED * same;
+    double reach = 0.0, most = 0.0, largest = 0.0, error = 0.0;
+    int by_loads = 1;
+    for (Int i = 0; i < size; i++) by_loads = by_loads && m->rate[i] == 0.0;
+    for (Int p = 0; p < total; p++) {
+        const double *row = p ? rows + (p - 1) * wide : start;
+        double *own = z + p * size;
+        drive[p] = row[2 * n];
+        for (Int i = 0; i < size; i++) own[i] = m->slot[i] >= 0 ? row[m->slot[i]] : m->base[i] + drive[p] * m->rate[i];
+        effort[p] = by_loads ? load_work(m, own) : row[2 * n + 1];
+        last[p] = last_coefficients(m, own);
+        if (row[2 * n + 3] >= 0.0) at[targets++] = p;
+        most = larger(most, fabs(effort[p]));
+        for (Int i = 0; i < same; i++) reach = larger(reach, fabs(own[i]));
+    }
+    const Int chosen = targets ? pick(effort, last, at, targets, (char *)(at + total)) : 0;
+    for (Int k = 0; k < chosen; k++) {
+        memcpy(picked + k * size, z + at[k] * size, (size_t)size * sizeof(double));
+        ways[k] = drive[at[k]];
+    }
+    int good = chosen && compare(m, 1, shapes, laws, powers, picked, ways, chosen, NEXT_CORRECTION, ends, found);
+    for (Int k = 0; good && k < chosen; k++) largest = larger(largest, found[k * N_COMPARED + 5]);
+    const double load = larger(larger(largest, NO_FORCE * reach), ROUNDING_ERROR);
+    const double unit = larger(most, NO_FORCE * larger(load, reach));
+    for (Int k = 0; good && k < chosen; k++) {
+        const double *other = found + k * N_COMPARED;
+        double rise = 0.0, work = other[4];
+        good = other[0] == CONVERGED && other[1] == 0.0 && other[2] <= LARGEST_CHANGE;
+        for (Int p = larger(at[k], 1); p <= at[k] + 1 && p < total; p++)
+            if (drive[p] != drive[p - 1]) rise = larger(rise, fabs((effort[p] - effort[p - 1]) / (drive[p] - drive[p - 1])));
+        if (by_loads) { memcpy(picked, ends + k * same, (size_t)same * sizeof(double)); work = load_work(m, picked); }
+        const double bearing = larger(fabs(work - effort[at[k]]) / unit, other[3] / load) - ROUNDED_PLACES * DBL_EPSILON * rise / unit;
+        error = larger(error, ERROR_SAFETY * larger(bearing, other[6] / larger(reach, SMALL_MOTION)) + ROUNDING_ERROR);
+    }
+    free(z);
+    free(at);
+    return good && most <= DBL_MAX ? (larger(reach, largest) <= ROUNDING_ERROR ? ROUNDING_ERROR : error) : NAN;
 }

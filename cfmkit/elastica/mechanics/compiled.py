@@ -202,13 +202,27 @@ class CompiledEquations(NumpyEquations):
 
     def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
         """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""
+        laws = self._find_laws(degree)
+        if not len(laws):
+            return None
+        compared = compare_rows(self.row, self.mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+        return None if (compared.unstable < 0).any() else compared  # under loads that follow C may know a parity only
+
+    def _find_laws(self, degree: int) -> FloatArray:
+        """Return the laws by which tables of a higher degree are made, empty unless all beams are plain."""
         mesh, bundle = self.mesh, self.mesh.fits.bundle
         special = has_more_unknowns(mesh) or bundle.others or degree > MAX_DEGREE
         if special or np.count_nonzero(mesh.elements.line):
+            return NO_NUMBERS
+        return angle_laws(bundle.coefficients[mesh.fits.number], mesh)
+
+    def measure_load_work(self, z: FloatArray) -> FloatArray | None:
+        """Return the displacements that growing loads work on in states (n, size), (n,); None under line loads."""
+        work = np.empty(len(z))
+        if np.count_nonzero(self.mesh.elements.line):
             return None
-        laws = angle_laws(bundle.coefficients[mesh.fits.number], mesh)
-        compared = compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
-        return None if (compared.unstable < 0).any() else compared  # under loads that follow C may know a parity only
+        self.code.load_work(self.row, np.ascontiguousarray(z, float), work)
+        return work
 
     def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode."""
@@ -223,15 +237,22 @@ class CompiledEquations(NumpyEquations):
         plan_row = plan_row_of(plan, parity, False)
         before = plan.before
         previous_row = NO_NUMBERS if before is None else np.concatenate([before.x, before.rate, [before.drive]])
-        start_row = np.concatenate([start.x, start.rate, [start.drive]])
+        start_row = np.concatenate([start.x, start.rate, [start.drive, start.effort, parity, -1.0]])
         any_vector = NO_NUMBERS if plan.any_vector is None else plan.any_vector
-        code = self.code.march(self.row, plan_row, start_row, previous_row, goals, rows, stored, any_vector)
+        shapes, laws = NO_NUMBERS, NO_NUMBERS
+        if plan.finer_degree:
+            shapes, laws = shape_row(plan.finer_degree)[0], self._find_laws(plan.finer_degree)
+        states = start_row, previous_row, goals, rows, stored
+        code = self.code.march(self.row, plan_row, *states, any_vector, shapes, laws)
         rows = rows[: stored[0]].copy()
         drive, effort, told, target = rows[:, 2 * n :].T
         unstable, at_targets = told.astype(np.int64), target.astype(np.int64)
         x, rate, step = rows[:, :n], rows[:, n : 2 * n], float(plan_row[0])
-        ends = tuple(plan_row[-2:].tolist())
-        march = NaturalMarch(x, drive, rate, unstable, effort, at_targets, step, plan.branch, MarchCode(code), ends)
+        *ends, error = plan_row[-3:].tolist()
+        reason = MarchCode(code)
+        march = NaturalMarch(
+            x, drive, rate, unstable, effort, at_targets, step, plan.branch, reason, tuple(ends), error
+        )
         return self._cut_at_stability_change(march, start.unstable) if self.follows else march
 
     def _cut_at_stability_change(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
@@ -274,4 +295,4 @@ def plan_row_of(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
     """Return a `Plan` of march.h."""
     on_branch = plan.branch is not None
     numbers = plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, on_branch, start
-    return np.array((*numbers, N_POWERS, 0.0, 0.0), float)
+    return np.array((*numbers, N_POWERS, 0.0, 0.0, np.nan), float)

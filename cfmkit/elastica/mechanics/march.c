@@ -167,6 +167,20 @@ end:
     return code;
 }
 
+/* A march from a start, which is a row like those it stores, with the error of the path if there are laws of elements. */
+int march_whole(const Model *m, Plan *plan, double *start, const double *before, const double *targets, Int count, double *rows,
+                Int room, Int *stored, const double *any, const Model *shapes, const double *laws, Int powers) {
+    const Int n = m->free;
+    const size_t bytes = (size_t)(2 * n + 4) * sizeof(double);
+    double *first = malloc(bytes);
+    if (!first) return NO_START;
+    memcpy(first, start, bytes);
+    const int code = march(m, plan, start, start + n, start + 2 * n, before, targets, count, rows, room, stored, any);
+    if (laws && code == DONE) plan->error = path_error(m, shapes, laws, powers, first, rows, stored[0]);
+    free(first);
+    return code;
+}
+
 /* One path a design: efforts at the targets (designs, count), not a number from where a path does not simply go on, and
  * the states (designs, some, n) at some of the targets. */
 int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts, Int room,

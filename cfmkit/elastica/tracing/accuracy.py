@@ -13,7 +13,7 @@ from cfmkit.elastica.mechanics.discretise import Discretisation, embed, raise_de
 from cfmkit.elastica.mechanics.elements import TAUT_RATIO
 from cfmkit.elastica.mechanics.equations import ComparedStates
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.problem import NetworkProblem
+from cfmkit.elastica.mechanics.problem import DEGREES_MORE, NetworkProblem
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.path import Path, PathStatus, largest_force, load_displacement, work_with_drive
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-DEGREES_MORE = 4
 MAX_POINTS = 6  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
 ERROR_SAFETY = 2.0  # of a change: where forms converge slowly, four degrees more still miss as much again

@@ -14,13 +14,14 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise, embed, raise_degree
+from cfmkit.elastica.mechanics.equations import NaturalMarch
+from cfmkit.elastica.mechanics.problem import DEGREES_MORE
 from cfmkit.elastica.model.beam_fits import coils
 from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Control, Loading
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
 from cfmkit.elastica.tracing.accuracy import (
     CORRECTION_ERROR,
-    DEGREES_MORE,
     drop_locked_points,
     find_tension,
     pick_points,
@@ -158,7 +159,7 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             resolution = replace(resolution, tension={**(resolution.tension or {}), **taut}, degree=degree)
             best, attempt = attempt, None
             continue
-        attempt = _with_error(attempt)
+        attempt = attempt if math.isfinite(attempt.path.error) else _with_error(attempt)
         near = tolerance < attempt.path.error < NEAR_ERROR_FACTOR * tolerance
         if near and not (resolution.degree < MAX_DEGREE and _can_be_raised(attempt)):  # which corrects all its points
             attempt = _with_error(attempt._replace(path=polish(path)))
@@ -237,7 +238,8 @@ def raise_attempt(attempt: TraceAttempt, resolution: DegreeAndPieces, control: C
     )
     unit = path.mesh.scales.drive
     told = tuple(_tell(replace(event, drive=drive), unit) for event, drive in zip(attempt.events, drives, strict=True))
-    raised = replace(path, at=Equilibria(fine, z, path.at.drive), branch=_name_branches(branches, unit), events=told)
+    at, names = Equilibria(fine, z, path.at.drive), _name_branches(branches, unit)
+    raised = replace(path, at=at, branch=names, events=told, error=math.inf)
     lifted = tuple(_lift(event, drive, path.mesh, fine) for event, drive in zip(attempt.events, drives, strict=True))
     started = start._replace(problem=problem)
     return attempt._replace(path=raised, resolution=resolution, start=started, branches=branches, events=lifted)
@@ -356,6 +358,9 @@ def trace_on(
     _settle_events(columns, events, drive, unit)
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _path(network, drive, _states(start, meshes, columns), columns, told, status, message)
+    if len(points) == 2 and not events and isinstance(points[1], NaturalMarch):  # one march from the start to the end
+        least = CORRECTION_ERROR * start.problem.next_correction
+        object.__setattr__(path, "error", max(points[1].error, least))
     if changes:
         touched = tuple(
             ContactEvent(one.kind, one.contact, one.at.drive * unit, one.before, one.after, one.states)
