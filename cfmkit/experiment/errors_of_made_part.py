@@ -203,7 +203,7 @@ def explain(
     """
     _check_travel(analyze_part(spec).curve.motion, source, spec)
     candidates = errors_that_can_be_told(spec) if fit is None else parameters(spec, fit, None, source.recording)
-    spec, candidates = _with_friction(spec, candidates, source)
+    spec, candidates = _give_friction(spec, candidates, source)
     curves, result = ModelCurves(spec, as_made=True), analyze_part(spec)
     ends = Window(float(result.curve.motion.min()), float(result.curve.motion.max()))
     before = compare(result, source, ends)
@@ -221,9 +221,7 @@ def explain(
     explanations = _rank_explanations(fits, before, assume_errors(curves.spec))
     best = explanations[0]
     _check_best(best, before, source, float(np.median(np.abs(result.curve.effort[np.isfinite(result.curve.effort)]))))
-    return tuple(
-        _without_supersets([item for item in explanations if item.criterion <= best.criterion + STRONG_EVIDENCE])
-    )
+    return tuple(_drop_supersets([item for item in explanations if item.criterion <= best.criterion + STRONG_EVIDENCE]))
 
 
 def _check_travel(motion: FloatArray, source: MeasuredCurves, spec: Spec) -> None:
@@ -242,7 +240,7 @@ def _check_travel(motion: FloatArray, source: MeasuredCurves, spec: Spec) -> Non
     )
 
 
-def _with_friction(
+def _give_friction(
     spec: Spec, candidates: tuple[FitParameter, ...], source: MeasuredCurves
 ) -> tuple[Spec, tuple[FitParameter, ...]]:
     """Return a specification whose model has both branches of a loop, where friction can give it two."""
@@ -374,7 +372,7 @@ def _rank_explanations(fits: list[Calibration], before: Comparison, expected: As
     return sorted(ranked, key=lambda item: item.criterion)
 
 
-def _without_supersets(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
+def _drop_supersets(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
     """Yield the explanations of which no part explains as much."""
     for explanation in explanations:
         paths = {item.path for item in explanation.errors}

@@ -130,7 +130,7 @@ def _import_ezdxf() -> ModuleType:
                 cache = Path(folder) / "ezdxf" / "font_manager_cache.json"
                 cache.parent.mkdir()
                 cache.write_text('{"version": 2, "font-faces": []}', encoding="utf-8")
-                with _with_environment("XDG_CACHE_HOME", folder):
+                with _set_environment("XDG_CACHE_HOME", folder):
                     import_module("ezdxf")
         except OSError as error:
             raise OutputError(f"DXF needs a temporary folder for a moment: {error}; set TMPDIR to one") from error
@@ -138,7 +138,7 @@ def _import_ezdxf() -> ModuleType:
 
 
 @contextmanager
-def _with_environment(name: str, value: str) -> Iterator[None]:
+def _set_environment(name: str, value: str) -> Iterator[None]:
     before = os.environ.get(name)
     os.environ[name] = value
     try:

@@ -81,7 +81,7 @@ def print_width(usual: float) -> float:
 
 
 @contextmanager
-def _with_layout(layout: FigureLayout) -> Iterator[None]:
+def _apply_layout(layout: FigureLayout) -> Iterator[None]:
     mark = _ACTIVE_LAYOUT.set(layout)
     try:
         yield
@@ -92,13 +92,13 @@ def _with_layout(layout: FigureLayout) -> Iterator[None]:
 def draw_in_width(make: Callable[[], Figure], width: float | None, titles: bool) -> Figure:
     """Return a figure in a width [mm], by default its own; without titles their height is cut off."""
     first = layout = FigureLayout(width=width)
-    with _with_layout(first):
+    with _apply_layout(first):
         figure = make()
     if not first.axes:
         return figure
     for _ in range(2):  # keys and notes that take more lines in the new width get their room in the second round
         layout = _fit(figure, layout.axes, first, first.size[0] if width is None else width, titles)
-        with _with_layout(layout):
+        with _apply_layout(layout):
             figure = make()
         for number, ax in enumerate(figure.axes):
             if layout.own_numbers:

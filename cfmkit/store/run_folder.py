@@ -1,5 +1,4 @@
-"""The output folder of one run: files written all together, and ``manifest.json``, their list with times and versions.
-"""
+"""The output folder of one run: files written all together, and ``manifest.json``, their list with times and versions."""
 
 from __future__ import annotations
 
