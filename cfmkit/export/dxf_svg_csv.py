@@ -90,7 +90,7 @@ def _add_label(space: Any, label: EngravedText) -> None:
 
 
 def _show_all(document: Any, points: Any) -> None:
-    """Set the extents, and what a viewer shows first."""
+    """Set the extents of a DXF document and its first view to all points."""
     low, high = np.round(points.min(axis=0), _COORDINATE_DIGITS), np.round(points.max(axis=0), _COORDINATE_DIGITS)
     document.modelspace().reset_extents((*low.tolist(), 0.0), (*high.tolist(), 0.0))
     height = 1.1 * max(*(high - low).tolist(), 1.0)

@@ -44,7 +44,7 @@ BOX_DIGITS = 4
 
 @dataclass
 class FigureLayout:
-    """Size and boxes that a drawing asks for, and those that it gets; while `boxes` is empty these are the same."""
+    """Size and boxes that a drawing asks for, and the boxes that it gets; without `boxes` those it asks for."""
 
     size: tuple[float, float] = (0.0, 0.0)  # of the figure [mm]
     asked: list[Box] = field(default_factory=list)  # in the order of the drawing
@@ -221,7 +221,7 @@ def _free_margins(figure: Figure, new_width: float) -> Box:
 
 
 def _prepare(figure: Figure, own_numbers: bool) -> None:
-    """Let axes fill their boxes, and leave names within them out of the layout: they are placed anew."""
+    """Let axes fill their boxes, and leave names within them out of the layout."""
     for ax in figure.axes:
         ax.set_aspect("auto")
         if own_numbers:
@@ -291,6 +291,6 @@ def _keep_name_on_paper(ax: Axes) -> None:
 
 
 def _shrink(text: Text, width: float, room: float) -> None:
-    """Write a text in letters so small that it has the room, but not smaller than can be read."""
+    """Make the letters of a text smaller until it fits a width, down to a readable size."""
     if width > room > 0.0:
         text.set_fontsize(float(text.get_fontsize()) * max(room / width, MIN_FONT_FACTOR))

@@ -47,7 +47,7 @@ _SIDE_DIRECTIONS = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], 
 
 @dataclass(frozen=True)
 class Label:
-    """A name and what it belongs to."""
+    """A name, its colour, and the points beside which it may stand."""
 
     # text, color: what to write, and how
     text: str
@@ -145,7 +145,7 @@ def _cheapest_place(
     box: FloatArray,
     tried: tuple[float, ...] = LABEL_GAPS,
 ) -> tuple[FloatArray, float]:
-    """Return the cheapest centre for a box [pt] beside points, some together with other lines, and what it costs."""
+    """Return the cheapest centre for a box [pt] beside points, and its cost; where lines are together it costs more."""
     points, together = named
     sides, gaps = _offset_directions(tried)
     offsets, away = sides * (box / 2 + gaps), gaps.max(axis=1)
