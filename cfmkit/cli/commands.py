@@ -88,7 +88,7 @@ def _make_command(name: str) -> Any:
     app = typer.Typer(**_TYPER_OPTIONS)
     example = f"Example: {module.HELP_EXAMPLE}" if hasattr(module, "HELP_EXAMPLE") else None
     app.command(name, help=_unwrap_paragraphs(inspect.getdoc(module.run) or ""), epilog=example)(callback)
-    return _without_types(typer.main.get_command(app))
+    return _hide_types_in_help(typer.main.get_command(app))
 
 
 def _unwrap_paragraphs(text: str) -> str:
@@ -102,7 +102,7 @@ def _unwrap_paragraphs(text: str) -> str:
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 
 
-def _without_types(command: Any) -> Any:
+def _hide_types_in_help(command: Any) -> Any:
     """Return a command whose help names no types of Python: neither ``<bool>`` of a flag nor ``<str>`` of a file."""
     helped = command.get_help_option
 
@@ -177,7 +177,7 @@ def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
     Raises Exception of typer's kind, if it is malformed.
     """
     try:
-        call = _without_types(typer.main.get_command(app)).main(
+        call = _hide_types_in_help(typer.main.get_command(app)).main(
             _spell_out_empty_values(arguments), "cfmkit", standalone_mode=False
         )
     except SystemExit:

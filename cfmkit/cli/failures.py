@@ -27,7 +27,7 @@ ParserError: type[Exception] = typer.BadParameter.__mro__[1]
 
 
 class Stopped(StoppedBySignal):
-    """A signal asked the command to end: its exit code, and what is said of what it has finished."""
+    """The exception of a signal that ended the command, with its exit code and a message on what is finished."""
 
     # whether the command has opened a journal, in which it keeps what it has finished; the same for all signals
     began: ClassVar[bool] = False
@@ -70,7 +70,7 @@ def fail(error: BaseException, terminal: Terminal) -> ExitCode:
 
 
 def answer_to(error: BaseException, excerpts: bool = False) -> Document:
-    """Return the answer that an exception is; its lines with those of the file that they are about, if wanted."""
+    """Return the document of an exception: messages, and the faulty lines of the file if `excerpts`."""
     code, lines, entries = code_of(error), list(_lines(error, excerpts)), list(_json_entries(error))
     data = {"message": "; ".join(str(entry["message"]) for entry in entries)}
     return Document(data, exit_code=code, complaints=tuple(lines), errors=tuple(entries))

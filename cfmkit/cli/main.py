@@ -55,7 +55,7 @@ def entry() -> int:
 
 
 def _one_thread() -> None:
-    """Keep numerical libraries to one thread, unless the user says otherwise: they read this when they are imported.
+    """Set the environment so that numerical libraries use one thread, unless the user has set a number.
 
     Matrices here are small: threads cost more than they bring, five times as much where other programs run.
     """

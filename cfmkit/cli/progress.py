@@ -33,10 +33,10 @@ long processes take to start and to compile, and not how long a point takes."""
 
 
 class StudyProgress:
-    """A monitor of a study that tells the user, and listens to Ctrl-C."""
+    """A monitor of a study: shows its progress, and takes the first Ctrl-C as a request to stop."""
 
     def __init__(self, terminal: Terminal, things: str = "points") -> None:
-        """Know whom to tell, and what is counted."""
+        """Show progress as a bar on a terminal, else as lines; nothing with ``--json`` or ``--quiet``."""
         self._things = things
         self._tells = not (terminal.json or terminal.quiet)
         self._bar = Bar() if self._tells and sys.stderr is not None and sys.stderr.isatty() else None
@@ -47,11 +47,11 @@ class StudyProgress:
         self._marks: deque[tuple[float, int]] = deque()
 
     def total(self, points: int) -> None:
-        """Take how many points there are; a study that draws points again adds them to those that are done."""
+        """Set how many points are to be computed beside those that are done."""
         self._all = self._done + points
 
     def add_finished(self, points: int, failed: int, reused: bool) -> None:
-        """Take that more points are finished."""
+        """Add to the number of points that are finished, and show it."""
         self._done += points
         self._failed += failed
         self._reused += points if reused else 0

@@ -36,7 +36,7 @@ NOTHING_KEPT = "nothing that could be reused is finished yet: the same command s
 
 @contextmanager
 def open_journal(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
-    """Yield the open journal of a folder; a signal that ends the block says whether the same command goes on."""
+    """Yield the open journal of a folder; if a signal ends the block, its message says how the run can go on."""
     from cfmkit.cli.failures import Stopped, go_on
     from cfmkit.studies.journal import Journal
 
@@ -52,7 +52,7 @@ def open_journal(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
 
 @dataclass(frozen=True)
 class StudyFolder:
-    """The output folder of a study, with its journal and what the command line says of it."""
+    """The output folder of a study: its options, journal, progress and files."""
 
     verb: str
     options: StudyOptions
@@ -95,7 +95,7 @@ class StudyFolder:
         tables: Mapping[str, bytes],
         pictures: Callable[[], Mapping[str, Callable[[], Figure]]],
     ) -> None:
-        """Write the figures and the report, as far as they are wanted."""
+        """Write the figures and the report that the options ask for."""
         options, form = self.options, self.form
         makers = pictures() if options.report or not options.no_plots else {}
         drawn: dict[str, Figure] = {}
@@ -181,7 +181,7 @@ def split_names(text: str | None) -> tuple[str, ...]:
 
 
 def executor_for(work: Work, options: StudyOptions) -> Executor:
-    """Return what gets the points done: processes, a cluster, or this process; UsageError if options contradict."""
+    """Return the executor of a study: processes, a cluster, or this process; UsageError if options contradict."""
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import Cluster, cores, serial
 

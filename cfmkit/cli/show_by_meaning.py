@@ -59,7 +59,7 @@ def explain_by_meaning(word: str) -> Document | None:
 
 
 def _names(word: str, targets: Sequence[str]) -> list[NamedMeaning]:
-    """Return the names that the glossary gives for a word, then those that it is part of, then those of its meaning.
+    """Return the names that match a word: those of its glossary entry, then names with it, then meanings with it.
 
     Of keys that have one name and meaning in several blocks the shortest path stands for all.
     """

@@ -35,7 +35,7 @@ MIN_ROW_SLOPE = 1e-9
 
 @dataclass(frozen=True)
 class Missed:
-    """A limit that is missed: by how much at its worst, in its own scale, and what that row is about."""
+    """A limit that is missed: its name, by how much at the worst row (in its own scale), and that row's label."""
 
     name: str
     by: float
@@ -60,7 +60,7 @@ def list_missed_limits(rows: Iterable[LimitRows], allowed: float) -> list[Missed
 
 
 def list_active_rows(rows: Iterable[LimitRows], close: float) -> Iterator[str]:
-    """Yield what holds a design: the rows that are nearly zero and move with it, as ``limit: about``."""
+    """Yield the active rows, nearly zero and dependent on the variables, as ``limit: about``."""
     for row in rows:
         about = row.about()
         moves = row.values < 1 if row.slopes is None else abs(row.slopes).max(axis=1, initial=0.0) > MIN_ROW_SLOPE
@@ -77,7 +77,7 @@ class SeenPoint:
 
 
 class DesignProgram(ABC):
-    """A program of `cfmkit.numerics.sqp` from what a family sees of its design at a point."""
+    """A program of `cfmkit.numerics.sqp` whose objective and limits a family evaluates at a point."""
 
     elastic: tuple[str, ...] = ()  # limits that give way, by the last variable
 

@@ -205,7 +205,7 @@ class RobustProblem:
     about: NDArray[np.int64]  # (m,) which limit each row belongs to
     share: float  # of parts that are to be good
     late: Callable[[], bool]  # tells whether the time is up
-    tell: Callable[[float, int], None]  # takes the share estimated and the number of steps so far
+    report: Callable[[float, int], None]  # takes the share estimated and the number of steps so far
     slopes: SlopedPart  # exact derivatives of a part's numbers, where there are any
 
     @property
@@ -352,7 +352,7 @@ def with_margins(
         share = now.share(problem.errors)
         if share >= best_share:
             best, best_share = now, share
-        problem.tell(share, steps)
+        problem.report(share, steps)
     return RobustResult(best.x, best_share, began, steps, seen.count, best, best_share >= problem.share)
 
 
@@ -392,7 +392,7 @@ class _Parts:
         return None if any(part is None for part in parts) else np.array([self.seen.rows(part) for part in parts])  # type: ignore[arg-type]
 
     def differentiate_rows(self, x: FloatArray) -> FloatArray | None:
-        """Return the derivatives of those rows by the values, (k, m, n)."""
+        """Return the derivatives of the rows of all parts by the values of the design, (k, m, n)."""
         out = []
         for error in self.errors:
             slopes = _differentiate_by_values(self.problem, x, error, self.seen, self.problem.slopes(x, error))
@@ -437,7 +437,7 @@ def optimise_on_samples(
         small = risk - new_risk < SMALL_GAIN
         x, rows, risk, slopes, steps = moved, new, new_risk, None, steps + 1
         trust = min(MOST_TRUST, 1.6 * trust)
-        problem.tell(float((rows >= 0).all(axis=1).mean()), steps)
+        problem.report(float((rows >= 0).all(axis=1).mean()), steps)
         if small:
             break
     now = linear(problem, x, seen)

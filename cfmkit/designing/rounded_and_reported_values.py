@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def round_within_bounds(values: FloatArray, bounds: FloatArray, digits: int, unit: float = 1.0) -> FloatArray:
-    """Return numbers with so many decimals of a unit, kept within their bounds (n, 2).
+    """Return numbers rounded to `digits` decimals of a unit, kept within their bounds (n, 2).
 
     Examples
     --------

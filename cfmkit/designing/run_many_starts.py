@@ -48,13 +48,13 @@ class Means(Protocol):
 
 @dataclass(frozen=True)
 class Clock:
-    """When the time is up, in seconds of `time.time`, which is the same in every process; None: never."""
+    """A deadline in seconds of `time.time`, which is the same in every process; None: no deadline."""
 
     deadline: float | None = None
 
     @classmethod
     def from_budgets(cls, *budgets: float | None) -> Clock:
-        """Return the clock on which the shortest of some budgets [s] begins now."""
+        """Return the clock that runs out after the shortest of some budgets [s], counted from now."""
         limits = [budget for budget in budgets if budget is not None]
         return cls(time() + min(limits) if limits else None)
 
@@ -85,7 +85,7 @@ class OneStart:
 
 
 def to_record(outcome: Any) -> dict[str, Any]:
-    """Return a dataclass of numbers, words and arrays as it is noted: arrays as lists, enumerations by name."""
+    """Return a dataclass as plain data for a journal: arrays as lists, enumerations by name."""
 
     def plain(value: Any) -> Any:
         return value.tolist() if isinstance(value, np.ndarray) else value.name if isinstance(value, Enum) else value
@@ -94,7 +94,7 @@ def to_record(outcome: Any) -> dict[str, Any]:
 
 
 def from_record(kind: type[Anything], record: Mapping[str, Any]) -> Anything:
-    """Return the dataclass that was noted: lists are arrays again, names of members stay names."""
+    """Return the dataclass of such a record: lists become arrays, names of members stay names."""
     return kind(**{name: np.array(value) if isinstance(value, list) else value for name, value in record.items()})
 
 
@@ -123,13 +123,13 @@ def run_stage(
     means: Means,  # the processes, and where finished jobs are noted: a job that ran out of time is not
     clock: Clock,  # late, no more jobs are begun
     # takes the records so far, at the beginning and after each job
-    tell: Callable[[Mapping[int, dict[str, Any]]], None],
+    report: Callable[[Mapping[int, dict[str, Any]]], None],
 ) -> Done:
     """Return what the jobs of a stage led to, as far as the time allows."""
     keys = {job: hashlib.sha256(f"{stage.identity} {job}".encode()).hexdigest()[:KEY_DIGITS] for job in stage.jobs}
     records = {job: record for job, key in keys.items() if (record := means.notes.find(key)) is not None}
     reused, lost = len(records), list[str]()
-    tell(records)
+    report(records)
     left = [job for job in stage.jobs if job not in records]
     for job, record in means.executor(stage.work, iter(left), clock.late):
         if not isinstance(record, dict):
@@ -138,7 +138,7 @@ def run_stage(
         records[job] = record
         if not record["late"]:
             means.notes.add(keys[job], record)
-        tell(records)
+        report(records)
     return Done(records, reused, tuple(dict.fromkeys(lost)))
 
 

@@ -59,7 +59,7 @@ def _missed_notes(entries: Sequence[Entry]) -> Iterator[Note]:
 
 
 def _changes(compared: BatchComparison) -> Iterator[Note]:
-    """Yield what has changed since an earlier batch, those values first that changed beyond the tolerance."""
+    """Yield the values that changed since an earlier batch, those beyond the tolerance first."""
     beyond = compared.changes_beyond_tolerance
     text = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
     yield Note("compared", text, tone=Tone.BAD if beyond else Tone.GOOD, whole=True)

@@ -109,7 +109,7 @@ def whole_line(*spans: str | Span) -> TextLine:
 
 
 def verdict(ok: bool | None) -> Span:
-    """Return how a requirement ended: nothing where there was none."""
+    """Return the word for whether a requirement is met; empty for None, where there is no requirement."""
     return Span("") if ok is None else Span("ok", Tone.GOOD) if ok else Span("MISSED", Tone.BAD)
 
 
@@ -122,7 +122,7 @@ def format_bounds(bounds: Mapping[str, Any]) -> str:
 
 
 def name_in_words(name: str) -> str:
-    """Return a name of the files as people write it."""
+    """Return a name such as ``force_mean`` with spaces instead of underscores."""
     return name.replace("_", " ")
 
 
@@ -159,7 +159,7 @@ class Written(NamedTuple):
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for the JSON document."""
+        """Folder, files and duration for the JSON document."""
         return {"out": self.folder, "files": list(self.files)}
 
     @property
@@ -369,5 +369,5 @@ def envelope(document: Document) -> dict[str, Any]:
 
 
 def status_of(code: ExitCode) -> str:
-    """Return the status that goes with an exit code where no solver gave one."""
+    """Return the status word of an exit code, for commands without a solver."""
     return "complete" if code is ExitCode.OK else code.name.lower()

@@ -54,7 +54,7 @@ def page(
 
 
 def drawing(figure: Figure, name: str) -> str:
-    """Return a figure as SVG for a page."""
+    """Return a figure as SVG text for a page."""
     from cfmkit.plots.vector_formats import inline, svg
 
     return inline(svg(figure), identifier(name))
@@ -75,7 +75,7 @@ def _shown_in_page(value: Any) -> Any:
 
 
 def part(name: str, package: str = "cfmkit.documents") -> str:
-    """Return a file of a package: a template, a style or a script."""
+    """Return the text of a file of a package: a template, a style or a script."""
     return files(package).joinpath(name).read_text(encoding="utf-8")
 
 
@@ -85,7 +85,7 @@ def identifier(name: str) -> str:
 
 
 def references_of(name: str) -> dict[str, Any]:
-    """Return what stands at the end of every page: the papers of a family, and the versions that computed."""
+    """Return the papers of a family and the versions of the software, for the end of a page."""
     from cfmkit._version import __version__
     from cfmkit.families import family
     from cfmkit.store.run_folder import imported_versions

@@ -33,7 +33,7 @@ def show_html(document: Document, figures: Mapping[str, Callable[[], Figure]] = 
 
 
 def table_of(table: PageTable, most: int | None = None) -> str:
-    """Return a table as HTML, its first rows where their number is limited."""
+    """Return a table as HTML, with at most `most` rows."""
     rows = [tuple(cell if isinstance(cell, str) else cell.text for cell in row) for row in table.rows[:most]]
     rest = len(table.rows) - len(rows)
     heading = f"<p>{escape(table.heading)}</p>" if table.heading else ""
@@ -42,7 +42,7 @@ def table_of(table: PageTable, most: int | None = None) -> str:
 
 
 def text_of(document: Document) -> str:
-    """Return the text as HTML: as many rows as fit, requirements first."""
+    """Return the headline, notes and warnings as HTML, requirements first, in at most `MAX_CHARACTERS`."""
     verdict = f": {escape(document.verdict)}" if document.verdict else ""
     head = f"<strong>{escape(document.title)}</strong> {escape(document.summary)}{verdict}"
     marks = {True: "ok", False: "MISSED", None: ""}

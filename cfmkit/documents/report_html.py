@@ -207,7 +207,7 @@ def _fitting(
 
 
 def _short(text: str) -> str:
-    """Return a cell for reading: a number in a few digits."""
+    """Return the text of a cell with its number rounded to `PAGE_DIGITS`."""
     try:
         value = float(text)
     except ValueError:

@@ -122,7 +122,7 @@ def _all_met(count: int) -> str:
 
 
 def warning_of(item: Finding, command: RunCommand | None = None) -> WarningEntry:
-    """Return the entry of a finding."""
+    """Return a finding as a warning of the page, with its remedies as commands."""
     options = tuple(_option(cure, command) for cure in item.cures)
     commands = tuple(command.with_remedy(cure) if command else command_line(*_set_options(cure)) for cure in item.cures)
     short = shortened_to_clause(item.short or item.message, MAX_WARNING_LENGTH - len(item.name) - 2)
@@ -141,7 +141,7 @@ def _set_options(cure: str | tuple[str, ...]) -> list[str]:
 
 
 def _reasons(report: Report) -> list[Finding]:
-    """Return the warnings that say what the run's message says."""
+    """Return the findings whose text is the run's message."""
     return [item for item in report.warnings if item.message == report.result.message]
 
 
@@ -287,6 +287,7 @@ def metrics_table(metrics: Mapping[str, Quantity]) -> PageTable:
 
 
 def _long_value(quantity: Quantity) -> str:
+    """Return a value with six digits, or "none" with the reason."""
     if quantity.value is None:
         return f"none: {quantity.reason}" if quantity.reason else "none"
     return short_value(quantity, 6)
@@ -461,7 +462,7 @@ def _is_title(report: Report, window: Window) -> bool:
 
 
 def complaints_of(report: Report) -> tuple[str, ...]:
-    """Return what a user must hear who has asked to hear nothing else."""
+    """Return the lines that `--quiet` prints, too."""
     status = report.status
     if not status.usable:
         design = report.design

@@ -48,7 +48,7 @@ class Supplement:
     tables: tuple[PageTable, ...] = ()  # of the page
 
     def plus(self, more: Supplement) -> Supplement:
-        """Return both, this one first."""
+        """Return both supplements as one, this one's entries first."""
         return Supplement(
             {**self.data, **more.data},
             {**self.files, **more.files},
@@ -73,7 +73,7 @@ class Report:
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """Those of the design, of the analysis and of the supplement; none twice."""
+        """Findings of the design, of the analysis and of the supplement, each once."""
         designed = self.design.warnings if self.design else ()
         return tuple(dict.fromkeys((*designed, *self.result.warnings, *self.supplement.warnings)))
 
@@ -100,7 +100,7 @@ class Report:
         return worst([self.status.exit_code, *missed])
 
     def extend(self, metrics: Mapping[str, Quantity], supplement: Supplement) -> Report:
-        """Return the report with more to say."""
+        """Return the report with more metrics and with a supplement."""
         both = self.supplement.plus(supplement)
         return replace(self, metrics={**self.metrics, **metrics}, supplement=both)
 
@@ -136,7 +136,7 @@ class Report:
 
 
 def worst(codes: list[ExitCode]) -> ExitCode:
-    """Return the exit code that counts among several.
+    """Return the exit code of the highest severity among several.
 
     Examples
     --------

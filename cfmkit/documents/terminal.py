@@ -342,7 +342,7 @@ def _whole_page(document: Document) -> Iterator[Block]:
 
 
 def print_blocks(blocks: Iterable[Block], width: int, colours: bool = False, ascii_only: bool = False) -> str:
-    """Return blocks as a terminal of so many columns prints them."""
+    """Return blocks as the text of a terminal with `width` columns."""
     return "".join(_print_block(block, width, colours, ascii_only) for block in blocks)
 
 
@@ -365,7 +365,7 @@ def _print_block(block: Block, width: int, colours: bool, ascii_only: bool) -> s
 
 
 def _renderables(block: TextLine | Paragraph | CellGrid, width: int) -> Iterator[RenderableType]:
-    """Yield what rich prints of a block; of a paragraph line by line."""
+    """Yield what rich prints for a block; of a paragraph line by line."""
     if isinstance(block, CellGrid):
         yield _table(block, width)
     elif isinstance(block, Paragraph):

@@ -60,7 +60,7 @@ class Strokes:
 
     @cached_property
     def complete(self) -> tuple[tuple[Stroke, Stroke], ...]:
-        """The complete cycles, two strokes each, in their order; broken-off ones only where there is no other."""
+        """The complete cycles, two strokes each, in their order; incomplete ones only if there is no other."""
         strokes_by_cycle = [[item for item in self.strokes if item.cycle == number] for number in self._cycle_numbers]
         pairs = [
             (pair[0], pair[1])
@@ -146,7 +146,7 @@ def choose(strokes: Strokes, cycles: Cycles | None, name: str) -> Strokes:
 
 
 def covered_fraction(cycle: tuple[Stroke, Stroke]) -> float:
-    """Return which part of the longer stroke of a cycle the shorter one covers."""
+    """Return the travel of the shorter stroke of a cycle divided by that of the longer one."""
     ways = sorted(stroke.covered for stroke in cycle)
     return ways[0] / ways[1]
 

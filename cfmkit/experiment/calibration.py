@@ -91,13 +91,13 @@ class ModelCurves:
     """Curves of a specification with some of its values changed; each is solved once."""
 
     def __init__(self, spec: Spec, as_made: bool = False) -> None:
-        """Keep what is changed; `as_made`: values are those of one manufactured part, see `Spec.replace`."""
+        """Keep the specification to be changed; `as_made`: see `Spec.replace`."""
         self.spec = spec
         self.as_made = as_made
         self._solved: dict[tuple[tuple[str, float], ...], Curve] = {}
 
     def spec_with(self, parameters: Sequence[FitParameter], values: FloatArray) -> Spec:
-        """Return the specification with the values of parameters; those of the recording change nothing.
+        """Return the specification with the values of parameters; zeros of the recording change nothing in it.
 
         Raises SpecError if they are not valid together.
         """

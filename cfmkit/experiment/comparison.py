@@ -269,7 +269,7 @@ def _samples_of_branch(source: MeasuredCurves, branch: str, mine: str, window: W
 
 
 def _average_groups(columns: Sequence[FloatArray], size: int) -> Sequence[FloatArray]:
-    """Return averages over groups of so many neighbours."""
+    """Return averages over groups of `size` neighbours."""
     count = len(columns[0])
     if size == 1 or not count:
         return columns

@@ -120,8 +120,10 @@ def correct(
     aim = aim_of(nominal)
     made = best.part_of(spec)
     built = analyze_part(made)
-    told = tared or fit is not None or any(item.path.startswith(DATA_PREFIX) for item in best.calibration.parameters)
-    zero = 0.0 if told else UNKNOWN_ZERO * float(np.abs(source.recording.effort).max())
+    zero_known = (
+        tared or fit is not None or any(item.path.startswith(DATA_PREFIX) for item in best.calibration.parameters)
+    )
+    zero = 0.0 if zero_known else UNKNOWN_ZERO * float(np.abs(source.recording.effort).max())
     before = _predict_force(explanations, spec, aim, zero)
     off = _largest_departure(explanations, spec, aim)
     if any(not item.errors for item in explanations) or off <= LEAST_CORRECTION:
@@ -185,7 +187,7 @@ def _predict_interval(explanation: Explanation, drawn: Spec, aim: AimedCurve, ze
 
 
 def _state_modulus(corrected: Spec, best: Explanation) -> Spec:
-    """Return a corrected drawing with the fitted moduli: the other errors are those of the process."""
+    """Return a corrected drawing that states the fitted moduli; the other errors belong to the process."""
     changes: dict[str, float] = {}
     for item, value in zip(best.errors, best.values, strict=True):
         if item.path.endswith(".youngs_modulus"):

@@ -146,7 +146,7 @@ def read_measured(
 def _strokes_and_findings(
     recording: Recording, leave_out: Collection[str], cycles: Cycles | None
 ) -> tuple[Strokes, Window, float, tuple[Finding, ...]]:
-    """Return what counts of each stroke, what all branches reached, the longest passage, and what is said of both."""
+    """Return the strokes to measure, the range that all cover, the longest passage left out, and findings."""
     spiky = _spiky(recording) if "spikes" in leave_out else np.zeros(len(recording), dtype=bool)
     strokes = choose(_remove_points(recording, spiky), cycles, recording.name)
     reached, reported = _common_range(recording, strokes), spikes_left_out(recording, spiky)
@@ -309,7 +309,7 @@ def numbers_of(
 
 
 def _motion_definitions(kind: Kind) -> tuple[Definition, ...]:
-    """Return mean and standard deviation as they are of a recording."""
+    """Return the definitions of mean and standard deviation over the motion of a recording."""
     meanings = {f"{kind}_mean": "mean {effort}", f"{kind}_sd": "standard deviation of the {effort}"}
     definitions = metrics_by_name(kind)
     how = "over the {motion} in the window, each sample weighted by the way that it stands for (trapezoids)"
@@ -317,7 +317,7 @@ def _motion_definitions(kind: Kind) -> tuple[Definition, ...]:
 
 
 def _window_and_findings(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tuple[Finding, ...]]:
-    """Return where the numbers hold, and what is said where that is less than what was requested."""
+    """Return the window in which the numbers hold, and a finding if it is less than what was requested."""
     name, kind = source.recording.name, source.recording.kind
     try:
         common = common_window(source.raw)
@@ -341,7 +341,7 @@ def _window_and_findings(source: MeasuredCurves, wanted: Window | None) -> tuple
 
 
 def _warn_of_short_window(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
-    """Return what is said where one branch makes the window much shorter than the others would."""
+    """Return a finding if one branch makes the window much shorter than the others would."""
     kind = source.recording.kind
     extents = {
         (branch, number_of(curve)): (float(part.min()), float(part.max()))

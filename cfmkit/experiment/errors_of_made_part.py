@@ -81,7 +81,7 @@ class Explanation:
 
     @property
     def errors(self) -> tuple[FitParameter, ...]:
-        """Those of the part, without the zeros of the recording."""
+        """Fitted errors of the part, without the zeros of the recording."""
         return tuple(self.calibration.parameters[k] for k in self._places)
 
     @property
@@ -130,7 +130,7 @@ def is_thickness(item: FitParameter) -> bool:
 
 
 def name_of(item: FitParameter) -> str:
-    """Return what errs, in words."""
+    """Return the name of what is off, for sentences: a material, a thickness, friction or a rate."""
     if is_thickness(item):
         return "thickness"
     where, _, last = item.path.removeprefix("mechanism.").rpartition(".")
@@ -142,7 +142,7 @@ def name_of(item: FitParameter) -> str:
 
 
 def errors_that_can_be_told(spec: Spec) -> tuple[FitParameter, ...]:
-    """Return what may be off in a part of a specification: moduli, thickness, friction and rates, the likeliest first.
+    """Return the errors that are tried of a part: moduli, thickness, friction and rates, the likeliest first.
 
     Values that err together are one parameter: moduli of one size by a factor, all thicknesses by one amount, the
     rates of a list of springs by a factor.
@@ -192,7 +192,7 @@ def explain(
     # what errs, by the paths of `calibrate`; default: what the recording tells apart of `errors_that_can_be_told`
     fit: Sequence[str] | None = None,
     tared: bool = False,  # whether the zero of the force is known; else it is fitted
-    tell: Callable[[str], None] = lambda _: None,  # is called with a sentence on what is being fitted
+    report: Callable[[str], None] = lambda _: None,  # is called with a sentence on what is being fitted
 ) -> tuple[Explanation, ...]:
     """Return the errors with which the model fits a recording as well as with any others, the best first.
 
@@ -203,7 +203,7 @@ def explain(
     """
     _check_travel(analyze_part(spec).curve.motion, source, spec)
     candidates = errors_that_can_be_told(spec) if fit is None else parameters(spec, fit, None, source.recording)
-    spec, candidates = _with_friction(spec, candidates, source)
+    spec, candidates = _give_friction(spec, candidates, source)
     curves, result = ModelCurves(spec, as_made=True), analyze_part(spec)
     ends = Window(float(result.curve.motion.min()), float(result.curve.motion.max()))
     before = compare(result, source, ends)
@@ -214,16 +214,15 @@ def explain(
         fits = [fit_samples(before, curves, candidates, "linear", FIT_TOLERANCE)]
     else:
         zeros = () if tared else _force_zero(spec, source, before)
-        told = Distinction.estimate(curves, before, (*candidates, *zeros))
-        fits = list(_fit_sets(before, curves, candidates, zeros if told.zero_is_told(zeros) else (), told, tell))
+        distinction = Distinction.estimate(curves, before, (*candidates, *zeros))
+        fitted_zeros = zeros if distinction.separates_zero(zeros) else ()
+        fits = list(_fit_sets(before, curves, candidates, fitted_zeros, distinction, report))
     if not fits:
         raise SolutionError("the recording determines neither modulus nor thickness nor friction of this part")
     explanations = _rank_explanations(fits, before, assume_errors(curves.spec))
     best = explanations[0]
     _check_best(best, before, source, float(np.median(np.abs(result.curve.effort[np.isfinite(result.curve.effort)]))))
-    return tuple(
-        _without_supersets([item for item in explanations if item.criterion <= best.criterion + STRONG_EVIDENCE])
-    )
+    return tuple(_drop_supersets([item for item in explanations if item.criterion <= best.criterion + STRONG_EVIDENCE]))
 
 
 def _check_travel(motion: FloatArray, source: MeasuredCurves, spec: Spec) -> None:
@@ -242,7 +241,7 @@ def _check_travel(motion: FloatArray, source: MeasuredCurves, spec: Spec) -> Non
     )
 
 
-def _with_friction(
+def _give_friction(
     spec: Spec, candidates: tuple[FitParameter, ...], source: MeasuredCurves
 ) -> tuple[Spec, tuple[FitParameter, ...]]:
     """Return a specification whose model has both branches of a loop, where friction can give it two."""
@@ -270,7 +269,7 @@ class Distinction:
 
     @classmethod
     def estimate(cls, curves: ModelCurves, before: Comparison, parameters: tuple[FitParameter, ...]) -> Distinction:
-        """Return it for the samples of a recording beside the start.
+        """Return the distinction of parameters by the samples of a recording, beside the start.
 
         Raises SolutionError if the model has no value at some of the samples.
         """
@@ -286,15 +285,15 @@ class Distinction:
         deviations: FloatArray = self.noise * np.sqrt((right.T**2 / np.maximum(singular, least) ** 2).sum(axis=1))
         return deviations
 
-    def zero_is_told(self, zeros: Sequence[FitParameter]) -> bool:
-        """Return True if the zero of the force is told from all errors of a part that have an effect."""
+    def separates_zero(self, zeros: Sequence[FitParameter]) -> bool:
+        """Return True if the recording separates the zero of the force from the errors of a part that act."""
         if not zeros:
             return False
         having = [item for item, column in zip(self.parameters, self.jacobian.T, strict=True) if column.any()]
         uncertain = float(self.deviations(having)[-1]) * zeros[0].size
         return uncertain <= LARGEST_UNCERTAINTY_OF_ZERO * self.level
 
-    def are_told(self, errors: Sequence[FitParameter], zeros: Sequence[FitParameter]) -> bool:
+    def separates(self, errors: Sequence[FitParameter], zeros: Sequence[FitParameter]) -> bool:
         """Return True if the recording determines each of some errors beside the others and the zeros."""
         deviations = self.deviations((*errors, *zeros))[: len(errors)]
         return bool((2.0 * deviations <= POORLY_DETERMINED).all())
@@ -316,17 +315,17 @@ def _fit_sets(
     curves: ModelCurves,
     candidates: tuple[FitParameter, ...],
     zeros: tuple[FitParameter, ...],
-    told: Distinction,
-    tell: Callable[[str], None],
+    distinction: Distinction,
+    report: Callable[[str], None],
 ) -> Iterator[Calibration]:
-    """Yield the fits of the sets of errors that the recording determines; larger sets as long as they are better."""
+    """Yield the fits of the sets of errors that the recording determines; larger sets while they fit better."""
     best = np.inf
     for count in range(min(MOST_ERRORS, len(candidates)) + 1):
         level = best
         for chosen in combinations(candidates, count):
-            if chosen and not told.are_told(chosen, zeros):
+            if chosen and not distinction.separates(chosen, zeros):
                 continue
-            tell(" and ".join(name_of(item) for item in chosen) or "no error")
+            report(" and ".join(name_of(item) for item in chosen) or "no error")
             try:
                 fit = fit_samples(before, curves, (*chosen, *zeros), "linear", FIT_TOLERANCE)
             except CfmError:  # no such part exists, or none that could be measured so
@@ -374,7 +373,7 @@ def _rank_explanations(fits: list[Calibration], before: Comparison, expected: As
     return sorted(ranked, key=lambda item: item.criterion)
 
 
-def _without_supersets(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
+def _drop_supersets(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
     """Yield the explanations of which no part explains as much."""
     for explanation in explanations:
         paths = {item.path for item in explanation.errors}

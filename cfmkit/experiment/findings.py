@@ -35,7 +35,7 @@ RECORDING_FINDINGS = {
 
 
 def warnings_of(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
-    """Return what is said of strokes and of the sign of a recording."""
+    """Return findings on the strokes of a recording and the sign of its effort."""
     warnings = []
     cycles = strokes.cycles
     if not cycles:
@@ -61,7 +61,7 @@ def warnings_of(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
 
 
 def _shorter_cycles_finding(recording: Recording, strokes: Strokes) -> Finding:
-    """Return what is said of cycles that cover less than others."""
+    """Return the finding that some cycles cover less travel than others."""
     first = strokes.cycles[0][0].cycle
     numbers = [cycle[0].cycle for cycle in strokes.shorter]
     seating = max(numbers) < first
@@ -83,7 +83,7 @@ def _shorter_cycles_finding(recording: Recording, strokes: Strokes) -> Finding:
 
 
 def spikes_left_out(recording: Recording, spiky: NDArray[np.bool_]) -> tuple[Finding, ...]:
-    """Return what is said of spikes."""
+    """Return the finding on spikes that were left out; empty if there are none."""
     count = int(spiky.sum())
     if not count:
         return ()
@@ -91,7 +91,7 @@ def spikes_left_out(recording: Recording, spiky: NDArray[np.bool_]) -> tuple[Fin
 
 
 def passages_left_out(recording: Recording, settled: Settled) -> tuple[Finding, ...]:
-    """Return what is said of the points next to reversals."""
+    """Return the finding on points next to reversals that were left out; empty if there are none."""
     if not settled.length:
         return ()
     length = format_short(settled.length, recording.motion_dimension, 3)

@@ -70,7 +70,7 @@ class MeasureReport:
 
     @cached_property
     def data(self) -> dict[str, Any]:
-        """Content of metrics.json: the contract's keys for the raw curve, the filtered one, and what was decided."""
+        """Content of metrics.json: metrics of the raw and of the filtered curve, and how the file was read."""
         source, low_pass = self.source, self.source.low_pass
         return {
             "status": self.status.key,
@@ -245,7 +245,7 @@ def comparison_lines(comparison: Comparison, source: MeasuredCurves) -> tuple[tu
 
 
 def reading_line(decisions: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """Return the paragraph on how a file was read, its columns and what was subtracted first; nothing of arrays."""
+    """Return the paragraph on how a file was read, and what was subtracted; empty for arrays."""
     columns = next((k for k, text in enumerate(decisions) if " = " in text), 0)
     return (("read", ", ".join((*decisions[columns:], *decisions[:columns]))),) if decisions else ()
 
@@ -347,7 +347,7 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
 
 
 def _loss_lines(after: Comparison) -> list[tuple[str, str]]:
-    """Return what is said where the model has no losses and the measurement has."""
+    """Return the paragraph for a measurement with losses beside a model without any."""
     if not after.branches:
         return []
     loss = after.loss()

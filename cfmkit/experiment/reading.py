@@ -109,7 +109,7 @@ class Recording(ShortRepr):
 
     @property
     def lines(self) -> list[str]:
-        """Sentences on how the file was read and what was changed since."""
+        """Sentences on how the file was read and what was changed afterwards."""
         return [*(self.decisions.lines() if self.decisions else []), *self.notes]
 
 

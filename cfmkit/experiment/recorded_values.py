@@ -106,7 +106,7 @@ def holes_of(curves: Sequence[Curve], window: Window) -> tuple[UnrecordedInterva
 
 
 def share_covered(holes: Sequence[UnrecordedInterval], window: Window) -> float:
-    """Return which part of a window one branch of one cycle covers."""
+    """Return the recorded share of a window on one branch of one cycle."""
     return 1.0 - sum(hole.width for hole in holes) / (window.hi - window.lo)
 
 
@@ -116,7 +116,7 @@ def number_of(curve: Curve) -> int | None:
 
 
 def select_cycle(holes: Sequence[UnrecordedInterval], curve: Curve) -> list[UnrecordedInterval]:
-    """Return the holes of the cycle that is a curve."""
+    """Return the holes of the cycle that a curve belongs to."""
     return [hole for hole in holes if hole.cycle in (None, number_of(curve))]
 
 
@@ -131,7 +131,7 @@ def large_holes(
 
 
 def hole_finding(large: Sequence[UnrecordedInterval], window: Window, kind: Kind, cure: str = "") -> Finding:
-    """Return what is said of large holes in a window."""
+    """Return the finding on large holes in a window."""
     spans: dict[str, list[UnrecordedInterval]] = {}
     for hole in large:
         spans.setdefault(span_text(hole.low, hole.high, kind), []).append(hole)

@@ -135,7 +135,7 @@ class NotMakeable(SolutionError):
 
 @dataclass(frozen=True)
 class DrawnRange:
-    """Within which limits a drawn value may move, and what sets them."""
+    """Limits within which a drawn value may move, and what sets the lower one."""
 
     low: float
     high: float
@@ -284,7 +284,7 @@ class Redesign:
         return np.clip(self.start * self.aim.mean(curves) / self.aim.mean_effort, low, high)
 
     def _compensate(self) -> FloatArray:
-        """Return the values of leaves that are drawn thinner by as much as they are made thicker, (n,) [SI].
+        """Return values in which leaves are drawn thinner by the error that makes them thicker, (n,) [SI].
 
         As drawn where the recording may be explained without an error of the thickness.
         """

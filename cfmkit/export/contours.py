@@ -138,7 +138,7 @@ class Line:
         return complex(*self.start), complex(*self.end)
 
     def reverse(self) -> Line:
-        """Return the same edge, run the other way."""
+        """Return the same line from its end to its start."""
         return Line(self.end, self.start)
 
     def mirror(self) -> Line:
@@ -172,7 +172,7 @@ class Arc:
         return math.isclose(abs(self.end - self.start), 2 * math.pi, rel_tol=1e-12)
 
     def reverse(self) -> Arc:
-        """Return the same edge, run the other way."""
+        """Return the same arc from its end to its start."""
         return Arc(self.center, self.radius, self.end, self.start)
 
     def mirror(self) -> Arc:
@@ -199,7 +199,7 @@ class Smooth:
         return complex(*self.points[0]), complex(*self.points[-1])
 
     def reverse(self) -> Smooth:
-        """Return the same edge, run the other way."""
+        """Return the same edge from its last point to its first."""
         return Smooth(self.points[::-1], -self.tangents[::-1])
 
     def mirror(self) -> Smooth:
@@ -253,7 +253,7 @@ def _corners(edge: Edge) -> FloatArray:
 
 
 def _extreme_points(edge: Edge) -> FloatArray:
-    """Return points of an edge (n, 2) [m] that its box is around: its own, and of an arc those along both axes."""
+    """Return points (n, 2) [m] whose bounding box is that of an edge."""
     if not isinstance(edge, Arc):
         return _corners(edge)
     low, high = sorted((edge.start, edge.end))
@@ -320,7 +320,7 @@ def reference_square(
 
 @dataclass(frozen=True)
 class Curve2D:
-    """A named table of exact points along a curve, for CSV: x, y [m] and what goes with them."""
+    """A named table for CSV: exact points x, y [m] along a curve, and further columns."""
 
     name: str
     columns: dict[str, tuple[FloatArray, str]]

@@ -90,7 +90,7 @@ def _add_label(space: Any, label: EngravedText) -> None:
 
 
 def _show_all(document: Any, points: Any) -> None:
-    """Set the extents, and what a viewer shows first."""
+    """Set the extents of a DXF document and its first view to all points."""
     low, high = np.round(points.min(axis=0), _COORDINATE_DIGITS), np.round(points.max(axis=0), _COORDINATE_DIGITS)
     document.modelspace().reset_extents((*low.tolist(), 0.0), (*high.tolist(), 0.0))
     height = 1.1 * max(*(high - low).tolist(), 1.0)
@@ -130,7 +130,7 @@ def _import_ezdxf() -> ModuleType:
                 cache = Path(folder) / "ezdxf" / "font_manager_cache.json"
                 cache.parent.mkdir()
                 cache.write_text('{"version": 2, "font-faces": []}', encoding="utf-8")
-                with _with_environment("XDG_CACHE_HOME", folder):
+                with _set_environment("XDG_CACHE_HOME", folder):
                     import_module("ezdxf")
         except OSError as error:
             raise OutputError(f"DXF needs a temporary folder for a moment: {error}; set TMPDIR to one") from error
@@ -138,7 +138,7 @@ def _import_ezdxf() -> ModuleType:
 
 
 @contextmanager
-def _with_environment(name: str, value: str) -> Iterator[None]:
+def _set_environment(name: str, value: str) -> Iterator[None]:
     before = os.environ.get(name)
     os.environ[name] = value
     try:

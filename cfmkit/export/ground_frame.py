@@ -98,7 +98,7 @@ def _frame_sides(low: FloatArray, high: FloatArray, thickness: float) -> tuple[F
 def _shortest_bar(
     name: str, pad: FloatArray, low: FloatArray, high: FloatArray, thickness: float, moving: Any, clearance: float
 ) -> FloatArray:
-    """Return the shortest bar from the middle of a pad to the frame that is in nobody's way.
+    """Return the shortest bar from the middle of a pad to the frame that stays clear of what moves.
 
     It is as broad as the pad where the pad is narrowest, or half of that. Within a clearance of the pad it
     may be beside the beam that ends there, as the pad itself is.
@@ -146,7 +146,7 @@ def swept(lines: Sequence[FloatArray], half: float, shapes: Sequence[FloatArray]
 def find_outside(
     places: Sequence[tuple[float, float]], frame: Sequence[FloatArray], pads: Sequence[FloatArray]
 ) -> list[bool]:
-    """Return which places [m] do not lie in a frame; what is also in a pad does not count as in the frame."""
+    """Return which places [m] lie outside a frame; places in a pad count as outside."""
     from shapely import Point, Polygon, union_all
 
     ground = union_all([Polygon(ring) for ring in frame]).difference(union_all([Polygon(ring) for ring in pads]))

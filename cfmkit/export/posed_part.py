@@ -60,7 +60,7 @@ class PosedBody:
         return core
 
     def outline(self, pose: int = 0) -> FloatArray:
-        """Return its outline in a pose (n, 2) [m]."""
+        """Return the outline of the body in a pose (n, 2) [m]."""
         core = self.core_at(pose)
         if self.closed:
             return core
@@ -73,15 +73,15 @@ class PosedBody:
         return np.vstack([arc(core[-1], half, left - math.pi, math.pi), arc(core[0], half, left, math.pi)])
 
     def move(self, x: float, y: float) -> PosedBody:
-        """Return it moved by so much [m]."""
+        """Return the body moved by x and y [m]."""
         return replace(self, core=self.core + np.array([x, y]))
 
     def mirror(self) -> PosedBody:
-        """Return its mirror image about the y axis; a polygon runs in the same sense."""
+        """Return the mirror image of the body about the y axis; a polygon keeps its sense."""
         return replace(self, core=(self.core[:, ::-1] if self.closed else self.core) * MIRROR_FACTORS)
 
     def shape(self, pose: int) -> Any:
-        """Return what it covers in a pose, as a geometry of shapely; a line as far as it reaches anywhere."""
+        """Return the area covered in a pose as a geometry of shapely; a line with its largest half thickness."""
         from shapely import LineString, Point, Polygon
 
         core = self.core_at(pose)
@@ -126,7 +126,7 @@ def join_poses(poses: Sequence[Sequence[PosedBody]]) -> tuple[PosedBody, ...]:
 
 @dataclass(frozen=True, eq=False)
 class PosedPart:
-    """A mechanism over its motion: where its material is, and what its box says beside the sizes in the plane."""
+    """A mechanism over its motion: bodies in poses, direction, depth and further facts for its envelope."""
 
     bodies: tuple[PosedBody, ...]
     direction: float = 0.5 * math.pi  # of the travel [rad]

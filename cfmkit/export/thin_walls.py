@@ -77,7 +77,7 @@ class EdgeLines:
 
     @classmethod
     def from_contours(cls, contours: Sequence[Contour], sagitta: float) -> EdgeLines:
-        """Return those of closed contours that are cut, within `sagitta` [m] of their arcs."""
+        """Return the lines of closed contours that are cut, within `sagitta` [m] of their arcs."""
         starts, along, ring, at = [], [], [], []
         around: list[float] = []
         for contour in contours:

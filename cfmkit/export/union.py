@@ -128,7 +128,7 @@ def _unite(areas: Sequence[FloatArray], size: float, *others: Any) -> Any:
 
 
 def _ring_area_shape(rings: Sequence[Sequence[Edge]], size: float) -> Any:
-    """Return what closed chains of edges bound, holes left out, as a geometry of shapely."""
+    """Return the area that closed chains of edges bound, holes left out, as a geometry of shapely."""
     outer = [_ring_corners(ring, size) for ring in rings if _signed_ring_area(ring) > 0]
     inner = [_ring_corners(ring, size) for ring in rings if _signed_ring_area(ring) < 0]
     whole = _unite(outer, size)
@@ -188,7 +188,7 @@ def _trace_rings(whole: Any, tracks: Sequence[TracedEdge], size: float) -> Itera
 
 
 def _drop_close_corners(corners: NDArray[np.complex128], tolerance: float) -> NDArray[np.complex128]:
-    """Return the corners of a ring without those that are `tolerance` the one before."""
+    """Return the corners of a ring without those that are within `tolerance` of the one before."""
     while len(corners) > 2:
         close = np.abs(corners - np.roll(corners, 1)) <= tolerance
         if not close.any():
@@ -326,7 +326,7 @@ def _recognise_edge(edge: Smooth, tolerance: float) -> Edge:
 
 
 def _straighten_chain(edges: Sequence[Edge], tolerance: float) -> list[Edge]:
-    """Return a closed chain in which lines, and arcs about one centre, that go on as they are, are one edge."""
+    """Return a closed chain in which successive edges on one line or one circle are one edge."""
     chain: list[Edge] = []
     for edge in edges:
         merged = _join_two_edges(chain[-1], edge, tolerance) if chain else None

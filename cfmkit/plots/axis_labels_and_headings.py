@@ -85,7 +85,7 @@ def value_text(value: float, dimension: str) -> str:
 
 @dataclass(frozen=True)
 class Heading:
-    """Heading of a picture: whose it is, what it shows, and what is wrong."""
+    """Heading of a picture: the name of the mechanism, the subject, and a note on what is wrong."""
 
     name: str
     subject: str

@@ -45,7 +45,7 @@ def bands_of(result: Result) -> tuple[Band, ...]:
     if not result.curves:
         return ()
     kind = result.curves[0].kind
-    wanted = [item for item in result.spec.requirements if _without_branch(item.metric, kind) in _BAND_LABELS]
+    wanted = [item for item in result.spec.requirements if _quantity_of_metric(item.metric, kind) in _BAND_LABELS]
     bands = (_band(outcome, result) for outcome in check(wanted, result))
     return tuple(band for band in bands if band is not None)
 
@@ -62,14 +62,14 @@ def limits_on(result: Result, metric: str) -> tuple[Limit, ...]:
     return tuple(limits)
 
 
-def _without_branch(metric: str, kind: str) -> str:
+def _quantity_of_metric(metric: str, kind: str) -> str:
     """Return ``ripple`` for ``force_ripple[load]``."""
     return split_name(metric)[0].removeprefix(f"{kind}_")
 
 
 def _band(outcome: Outcome, result: Result) -> Band | None:
     metric, branch = split_name(outcome.metric)
-    metric = _without_branch(metric, outcome.kind)
+    metric = _quantity_of_metric(metric, outcome.kind)
     window = Window(*outcome.over) if outcome.over else None
     subjects = survey(result.curves[0], frame_of(result), window).subject.branches
     chosen = {name: rows for name, rows in subjects.items() if branch in (None, name)}

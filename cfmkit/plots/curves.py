@@ -292,7 +292,7 @@ def _label_of_line(line: _Line, prefer: float) -> Label:
 
 
 def _name_lines(ax: Axes, lines: list[_Line]) -> list[Label]:
-    """Return the names of the lines; lines that cannot be told apart share one."""
+    """Return labels for the lines; coinciding lines share one label."""
     named = [line for line in lines if line.name]
     if len(named) == len(lines) and _all_coincide(ax, lines):
         return [Label(" and ".join(line.name for line in named), named[-1].color, named[0].points, prefer=0.6)]

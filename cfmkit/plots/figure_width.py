@@ -44,7 +44,7 @@ BOX_DIGITS = 4
 
 @dataclass
 class FigureLayout:
-    """Size and boxes that a drawing asks for, and those that it gets; while `boxes` is empty these are the same."""
+    """Size and boxes that a drawing asks for, and the boxes that it gets; without `boxes` those it asks for."""
 
     size: tuple[float, float] = (0.0, 0.0)  # of the figure [mm]
     asked: list[Box] = field(default_factory=list)  # in the order of the drawing
@@ -81,7 +81,7 @@ def print_width(usual: float) -> float:
 
 
 @contextmanager
-def _with_layout(layout: FigureLayout) -> Iterator[None]:
+def _apply_layout(layout: FigureLayout) -> Iterator[None]:
     mark = _ACTIVE_LAYOUT.set(layout)
     try:
         yield
@@ -92,13 +92,13 @@ def _with_layout(layout: FigureLayout) -> Iterator[None]:
 def draw_in_width(make: Callable[[], Figure], width: float | None, titles: bool) -> Figure:
     """Return a figure in a width [mm], by default its own; without titles their height is cut off."""
     first = layout = FigureLayout(width=width)
-    with _with_layout(first):
+    with _apply_layout(first):
         figure = make()
     if not first.axes:
         return figure
     for _ in range(2):  # keys and notes that take more lines in the new width get their room in the second round
         layout = _fit(figure, layout.axes, first, first.size[0] if width is None else width, titles)
-        with _with_layout(layout):
+        with _apply_layout(layout):
             figure = make()
         for number, ax in enumerate(figure.axes):
             if layout.own_numbers:
@@ -221,7 +221,7 @@ def _free_margins(figure: Figure, new_width: float) -> Box:
 
 
 def _prepare(figure: Figure, own_numbers: bool) -> None:
-    """Let axes fill their boxes, and leave names within them out of the layout: they are placed anew."""
+    """Let axes fill their boxes, and leave names within them out of the layout."""
     for ax in figure.axes:
         ax.set_aspect("auto")
         if own_numbers:
@@ -291,6 +291,6 @@ def _keep_name_on_paper(ax: Axes) -> None:
 
 
 def _shrink(text: Text, width: float, room: float) -> None:
-    """Write a text in letters so small that it has the room, but not smaller than can be read."""
+    """Make the letters of a text smaller until it fits a width, down to a readable size."""
     if width > room > 0.0:
         text.set_fontsize(float(text.get_fontsize()) * max(room / width, MIN_FONT_FACTOR))

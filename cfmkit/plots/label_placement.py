@@ -47,7 +47,7 @@ _SIDE_DIRECTIONS = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], 
 
 @dataclass(frozen=True)
 class Label:
-    """A name and what it belongs to."""
+    """A name, its colour, and the points beside which it may stand."""
 
     # text, color: what to write, and how
     text: str
@@ -82,7 +82,7 @@ def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray])
         return None
     text = ground.ax.text(0, 0, label.text, size=size, color=label.color, ha="center", va="center", linespacing=1.15)
     box = ground.size_of(text)
-    together = _near_other_lines(points, others)
+    together = _find_near_other_lines(points, others)
     center, cost = _cheapest_place(ground, label, (points, together), box)
     covered = float(ground.count_covered(center[None, :], box)[0])
     if covered > 0:
@@ -129,7 +129,7 @@ def _thin_points(points: FloatArray, most: int = 80) -> FloatArray:
     return points if len(points) <= most else points[np.linspace(0, len(points) - 1, most).astype(int)]
 
 
-def _near_other_lines(points: FloatArray, others: list[FloatArray]) -> NDArray[np.bool_]:
+def _find_near_other_lines(points: FloatArray, others: list[FloatArray]) -> NDArray[np.bool_]:
     """Return at which points [pt] another named line is so near that a name there would be taken for that of either."""
     is_near = np.zeros(len(points), dtype=bool)
     for line in others:
@@ -145,7 +145,7 @@ def _cheapest_place(
     box: FloatArray,
     tried: tuple[float, ...] = LABEL_GAPS,
 ) -> tuple[FloatArray, float]:
-    """Return the cheapest centre for a box [pt] beside points, some together with other lines, and what it costs."""
+    """Return the cheapest centre for a box [pt] beside points, and its cost; where lines are together it costs more."""
     points, together = named
     sides, gaps = _offset_directions(tried)
     offsets, away = sides * (box / 2 + gaps), gaps.max(axis=1)
@@ -230,7 +230,7 @@ class _Ground:
         self.named = np.zeros(self.shape, dtype=np.int64)
         for line in self.ax.lines:
             if line.get_visible() and line.get_gid() != "no-obstacle":
-                self._mark(self._in_points(np.asarray(line.get_xydata(), dtype=float), line.get_transform()))
+                self._mark(self._convert_to_points(np.asarray(line.get_xydata(), dtype=float), line.get_transform()))
         for patch in self.ax.patches:
             if patch.get_gid() != "no-obstacle":
                 outline = patch.get_path().to_polygons(patch.get_transform(), closed_only=False)
@@ -243,12 +243,12 @@ class _Ground:
                 self._fill(low, low + np.array([box.width, box.height]) * self.scale)
         self._sum_taken()
 
-    def _in_points(self, values: FloatArray, transform: Transform) -> FloatArray:
+    def _convert_to_points(self, values: FloatArray, transform: Transform) -> FloatArray:
         return np.asarray((np.asarray(transform.transform(values)) - self.corner) * self.scale)
 
     def to_points(self, data: FloatArray) -> FloatArray:
         """Return data coordinates in points."""
-        return self._in_points(data, self.ax.transData)
+        return self._convert_to_points(data, self.ax.transData)
 
     def size_of(self, text: Text) -> FloatArray:
         """Return the width and height of a text [pt]."""

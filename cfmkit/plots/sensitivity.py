@@ -51,7 +51,7 @@ MOST_BINS = 40
 
 
 def _write_head(figure: Figure, title: str) -> None:
-    """Write whose study it is and what the picture shows."""
+    """Write the name of the study and what the picture shows."""
     name, _, subject = title.rpartition(": ")
     write_heading(figure, Heading(name, subject) if name else Heading(subject, "all parameters"))
 
@@ -198,7 +198,7 @@ def _lines(findings: Findings, metric: str, index: str) -> list[IndexLine]:
 
 
 def _rank_parameters(lines: Sequence[IndexLine]) -> list[int]:
-    """Return the numbers of the parameters to draw, those that do most first; unstated ones lead."""
+    """Return the numbers of the parameters to draw, those with most influence first; unstated ones lead."""
     sizes = [np.inf if line.value is None else abs(line.value) for line in lines]
     return sorted(range(len(lines)), key=lambda k: -sizes[k])[:MOST_SHOWN]
 
@@ -279,7 +279,7 @@ def _metric_title(findings: Findings, metric: Metric) -> str:
 
 @apply_style
 def draw_oat(findings: Findings, number: int) -> Figure:
-    """Return one metric over each parameter's range, and what the ends of the range do."""
+    """Return one metric over each parameter's range, and its values at the ends of the range."""
     metric, setup = findings.setup.study.metrics[number], findings.setup
     swings = _lines(findings, metric.label, "swing")
     order = _rank_parameters(swings)

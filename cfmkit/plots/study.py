@@ -59,8 +59,8 @@ MOST_PANELS = 8
 """More values of the first parameter than this are left to the maps: smaller panels have no room for their numbers."""
 
 
-def fit_panels(marks: StudyMarks, lines: Sequence[StudyCurve]) -> bool:
-    """Return whether the curves of a study can be told apart in panels."""
+def can_draw_panels(marks: StudyMarks, lines: Sequence[StudyCurve]) -> bool:
+    """Return True if the curves of a study are few enough to be drawn in panels."""
     panels, named = ({line.panel for line in lines}, {line.parameter for line in lines})
     return len(marks.shape) == 2 and 0 < len(panels) <= MOST_PANELS and len(named) <= len(LINE_COLOURS)
 
@@ -118,7 +118,7 @@ def figures(
         return {"parallel": partial(draw_parallel, marks)} if marks.metrics else {}
     pictures: dict[str, Callable[[], Figure]] = {}
     has_one_parameter = len(marks.varied) == 1
-    if lines and (has_one_parameter or fit_panels(marks, lines)):
+    if lines and (has_one_parameter or can_draw_panels(marks, lines)):
         pictures["curves"] = partial(draw_curves if has_one_parameter else draw_panels, marks, lines, labels)
     for metric in marks.metrics:
         stem = metric.name.replace("[", "_").replace("]", "")
@@ -252,7 +252,7 @@ def _parallel_key_entries(marks: StudyMarks) -> list[Artist]:
 
 
 def _relative_values(scale: DrawnScale) -> FloatArray:
-    """Return where the values lie between the smallest and the largest of them; in the middle if they are the same."""
+    """Return values as shares of their range, from 0 to 1; 0.5 if they are all the same."""
     finite = scale.values[np.isfinite(scale.values)]
     if is_level(scale.values):
         return np.where(np.isfinite(scale.values), 0.5, np.nan)
@@ -420,7 +420,7 @@ def _round_values_between(low: float, high: float) -> FloatArray:
 
 
 def _refine(places: FloatArray, values: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
-    """Return a grid with more places along one axis, through the same values, without new ups and downs."""
+    """Return a grid with more places along one axis, through the same values, without new extremes."""
     steps = N_LEVEL_LINE_PLACES // len(places)
     if steps < 2:
         return places, values

@@ -128,7 +128,7 @@ HEAD_HEIGHT = 12.0  # room at the top of a picture of a study for its heading an
 
 
 def head(figure: Figure, marks: StudyMarks, subject: str, key: Sequence[Artist] = ()) -> None:
-    """Write above a picture whose study it is, what it shows, and what its marks mean."""
+    """Write above a picture the name of the study, what it shows, and the meaning of its marks."""
     write_heading(figure, Heading(marks.name, subject) if marks.name else Heading(subject, "all points"))
     if not is_plain() and key and _draw_key(figure, key, len(key)).get_window_extent().x1 > figure.bbox.x1:
         figure.legends[-1].remove()
@@ -146,7 +146,7 @@ def _draw_key(figure: Figure, entries: Sequence[Artist], columns: int) -> Legend
 
 
 def key_of(marks: StudyMarks, starred: bool, hatched: bool, empty: bool = False) -> list[Artist]:
-    """Return what stands in the key: those marks that occur."""
+    """Return the entries of the key: those marks that occur."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

@@ -125,7 +125,7 @@ def style() -> Iterator[None]:
 
 
 def apply_style(function: Callable[Arguments, ReturnT]) -> Callable[Arguments, ReturnT]:
-    """Return a drawing function that works in our look, whoever calls it."""
+    """Return a drawing function that works inside `style()`."""
 
     @wraps(function)
     def call_styled(*args: Arguments.args, **kwargs: Arguments.kwargs) -> ReturnT:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BatchReference:
-    """Earlier results, and what is to be done with them."""
+    """Results of an earlier batch, to be compared with or replaced."""
 
     folder: str
     tolerance: float  # relative change up to which a metric counts as the same
@@ -68,10 +68,9 @@ class BatchReference:
         return BatchComparison(self.folder, self.tolerance, changed, list_gone(self.earlier, entries))
 
     def accept_results(self, out: str, entries: Sequence[Entry], arguments: Sequence[str]) -> bool:
-        """Replace its results by those of a batch if it is to get them: the files that a comparison reads.
+        """Replace the earlier results by those of a batch if that is requested; return True if they were.
 
-        Return True if it has them now. Raises OutputError if the folder cannot be written, or has a file of those names
-        that cfmkit did not write.
+        Raises OutputError if the folder cannot be written, or has a file of those names that cfmkit did not write.
         """
         if not self.accept:
             return False

@@ -169,7 +169,7 @@ class CorrectedValue:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """The same in border units; None where there is no interval."""
+        """Values and interval ends in border units, by name; None where there is no interval."""
         numbers: dict[str, float | None] = {"before": self.before, "after": self.after}
         for name, ends in (("before", self.before_ends), ("after", self.after_ends)):
             numbers |= {f"{name}_low_95": ends and ends[0], f"{name}_high_95": ends and ends[1]}
@@ -181,7 +181,7 @@ class CorrectedValue:
 
 
 def report_on_corrected(source: MeasuredCurves, fit: str | None, tared: bool, spec: Spec, run: Run) -> Report:
-    """Return the report on the corrected design: its metrics are those of the part that will be made of it."""
+    """Return the report on the corrected design: metrics of the part that will be made of it."""
     drawn = api.resolve(spec)
     try:
         correction = correct(drawn, source, None if fit is None else fit.split(","), tared, run)
@@ -222,7 +222,7 @@ def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: 
 
 
 def rows_of(correction: DesignCorrection) -> tuple[CorrectedValue, ...]:
-    """Return what is drawn anew, then forces and stress of the part that was made and of the one that will be."""
+    """Return the redrawn values, then forces and stress of the part that was made and of the next one."""
     drawn = [
         CorrectedValue(path.removeprefix("mechanism."), dimension_of(correction.drawn, path), before, now)
         for path, (before, now) in correction.changes.items()
@@ -244,7 +244,7 @@ def _metric_rows(correction: DesignCorrection, kind: str) -> Iterator[CorrectedV
 
 
 def _correction_notes(correction: DesignCorrection, zero_known: bool) -> Iterator[tuple[str, str]]:
-    """Yield what was correction in the part, and what is done about it."""
+    """Yield what differs in the part, and what is done about it."""
     calibration, kind = correction.explanation.calibration, correction.nominal.curve.kind
     for explanation in correction.explanations:
         word = "found" if explanation is correction.explanation else "or"

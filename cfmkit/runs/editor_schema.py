@@ -63,7 +63,7 @@ def metric_names(record: Family) -> Iterator[str]:
 
 
 def _close_names(node: dict[str, Any], names: list[str]) -> dict[str, Any]:
-    """Return the schema of a name: one of those that are known, or one with brackets, which may hold more."""
+    """Return the schema of a metric's name: one of the known names, or one with brackets."""
     kept = {key: value for key, value in node.items() if key != "type"}
     return kept | {"anyOf": [{"enum": names}, {"type": "string", "pattern": r"^[a-z0-9_]+\[.+\]$"}]}
 

@@ -199,7 +199,7 @@ class Explorer:
         return {"saved": name}
 
     def page(self, token: str, nonce: str = "") -> bytes:
-        """Return the page; its script reports with a token who it is, and runs only with the nonce of this answer."""
+        """Return the page of the explorer, with the token that its requests carry and the nonce of its script."""
         spec = self.spec()
         groups: dict[str, list[Slider]] = {}
         for slider in self.sliders:

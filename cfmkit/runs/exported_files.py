@@ -43,7 +43,7 @@ def part_on_paper(drawing: Drawing, spec: Spec) -> Figure:
 
 
 def how_to_print(drawing: Drawing, spec: Spec) -> tuple[str, ...]:
-    """Return how a part lies on the bed of a printer, and of how many strands its leaves are; nothing if it is cut."""
+    """Return notes on printing a part: its side on the bed, strands of its leaves; empty if it is cut."""
     from cfmkit.plots.workshop_drawing import thicknesses
     from cfmkit.stock.processes import strands_in_words
     from cfmkit.studies.parts.parts import accuracy_of
@@ -61,7 +61,7 @@ def how_to_print(drawing: Drawing, spec: Spec) -> tuple[str, ...]:
 
 
 def list_stops(spec: Spec) -> tuple[str, ...]:
-    """Return where rigid end stops have to stand, which are no part of what is cut."""
+    """Return notes on where rigid end stops have to stand, which are no part of what is cut."""
     stops: Any = getattr(getattr(spec, "mechanism", None), "stops", None) or {}
     if hasattr(stops, "upper"):
         ends = {"lower": stops.lower, "upper": stops.upper}
@@ -76,7 +76,7 @@ def list_stops(spec: Spec) -> tuple[str, ...]:
 
 
 def how_to_fasten(spec: Spec) -> tuple[str, ...]:
-    """Return how a part that bends is held if it has no holes for screws; nothing if it has some."""
+    """Return notes on how to hold a part that bends and has no holes for screws."""
     part: Any = getattr(getattr(spec, "mechanism", None), "part", None)
     if getattr(part, "screws", None) is not None or not spec.out_of_plane_widths:
         return ()
@@ -84,7 +84,7 @@ def how_to_fasten(spec: Spec) -> tuple[str, ...]:
 
 
 def weight_in_words(drawing: Drawing, spec: Spec) -> str:
-    """Return the mass of what is cut, by the density of its named material, or what is missing to know it."""
+    """Return the mass of what is cut, or what is missing to know it."""
     from cfmkit.export.bodies_stl_3mf_step import volume
     from cfmkit.stock import MATERIALS_BY_NAME
 
@@ -108,7 +108,7 @@ def stated_tolerances(spec: Spec) -> tuple[str, ...]:
 
 
 def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
-    """Return the process by which a part is usually made and what it is assumed to hold, where nothing is stated."""
+    """Return the usual process of a part and its assumed tolerances, where none are stated."""
     from cfmkit.studies.parts.parts import assume_errors
 
     assumed = assume_errors(spec)
@@ -245,7 +245,7 @@ def _deck_files(spec: Spec) -> dict[str, bytes]:
 
 
 def _split_formats(stated: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
-    """Return the formats that are requested; of a text those between commas."""
+    """Return the requested formats, split at commas; the usual ones for None."""
     from cfmkit.export import FILE_FORMATS as OUTLINE_FORMATS
 
     formats = (*OUTLINE_FORMATS, DECK_FORMAT, *DRAWING_FORMATS)

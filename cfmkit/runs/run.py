@@ -106,7 +106,7 @@ def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
 
 
 def part_of(spec: Spec) -> Drawing | None:
-    """Return what is to be cut or printed; None if there is no part, or none that can be cut."""
+    """Return the drawing of what is to be cut or printed; None if there is no part, or none that can be cut."""
     try:
         return _checked_part(spec)
     except (SolutionError, GeometryError):  # the analysis, or `warnings_of_part`, has a warning that says why
@@ -114,7 +114,7 @@ def part_of(spec: Spec) -> Drawing | None:
 
 
 def warnings_of_part(spec: Spec) -> tuple[Finding, ...]:
-    """Return what is wrong with the part as drawn, or why there is none."""
+    """Return findings on the part as drawn, or why it cannot be drawn."""
     try:
         drawing = _checked_part(spec)
     except SolutionError:  # the analysis has a warning
@@ -155,7 +155,7 @@ def journal_of(folder: RunFolder, fresh: bool) -> Journal:
 
 
 def _as_it_is(_folder: RunFolder, run: Run) -> AbstractContextManager[Run]:
-    """Leave a run as it is."""
+    """Return a context that yields a run unchanged."""
     return nullcontext(run)
 
 
@@ -173,7 +173,7 @@ class Verb:
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """Everything about a finished run that is shown."""
+    """A finished run: its report, command, manifest, kept files and duration."""
 
     report: Report
     command: RunCommand  # how it was started
@@ -233,7 +233,7 @@ def carry_out(
 
 
 def _make_ready(spec: Spec) -> None:
-    """Import what an analysis of a specification needs, so that nobody interrupts an import once there is a folder."""
+    """Import the modules that an analysis needs, so that no interrupt ends an import once there is a folder."""
     from cfmkit.families import family
 
     import_module("cfmkit.runs.notebook_result")
@@ -282,7 +282,7 @@ def _warn_of_replaced_options(report: Report, requested: Spec, document: YamlDoc
         return report
     before, after = dict(requested.leaves()), dict(made.leaves())
     stated, written = requested.model_dump(mode="json", exclude_unset=True), made.model_dump(mode="json")
-    told = " ".join(warning.message for warning in report.warnings)
+    messages = " ".join(warning.message for warning in report.warnings)
     warnings = [
         Finding(
             OVERWRITTEN_FINDING,
@@ -293,7 +293,7 @@ def _warn_of_replaced_options(report: Report, requested: Spec, document: YamlDoc
         if any(f"{path}.".startswith(f"{option}.") for option in document.set_by_options)
         and _text_at(stated, path)
         and not isclose(before[path], after.get(path, inf), rel_tol=1e-9)
-        and f"'{path}'" not in told
+        and f"'{path}'" not in messages
     ]
     return report.extend({}, run_outcome.Supplement(warnings=tuple(warnings))) if warnings else report
 

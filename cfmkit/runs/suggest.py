@@ -444,7 +444,7 @@ def _list_in_words(pairs: Mapping[str, Any]) -> str:
     >>> _list_in_words({"material": [{"name": "pla"}, {"name": "pom"}], "prefer": ["size", "ripple"]})
     'material pla or pom, prefer size, ripple'
     """
-    return ", ".join(f"{key.replace('_', ' ')} {_in_words(key, value)}" for key, value in pairs.items())
+    return ", ".join(f"{key.replace('_', ' ')} {_say_value(key, value)}" for key, value in pairs.items())
 
 
 SHARE_COLUMNS = ("ripple", "hysteresis", "yield")  # numbers of a proposal that are shares
@@ -452,9 +452,9 @@ LIST_SEPARATORS = {"envelope": " x ", "material": " or ", "prefer": ", "}
 """What stands between the values of a key that has several; else they are the two ends of a band."""
 
 
-def _in_words(key: str, value: Any) -> str:
+def _say_value(key: str, value: Any) -> str:
     if isinstance(value, list | tuple):
-        return LIST_SEPARATORS.get(key, " to ").join(_in_words(key, item) for item in value)
+        return LIST_SEPARATORS.get(key, " to ").join(_say_value(key, item) for item in value)
     if isinstance(value, dict):
         return str(value.get("name") or _list_in_words(value))
     return format_short(value, "ratio", 3) if key in SHARE_COLUMNS and isinstance(value, float | int) else str(value)

@@ -94,7 +94,7 @@ class MeshError:
         )
 
     def too_large(self) -> Iterator[tuple[str, str]]:
-        """Yield the name of a finding and what it says, if an error is larger than allowed."""
+        """Yield (finding, message) for each error that is larger than allowed."""
         if self.force > self.target or self.stress > STRESS_ALLOWED:
             yield (
                 "mesh_coarse",
@@ -145,7 +145,7 @@ class DrivenPart:
         Raises GeometryError if the outline cannot be meshed, or no node is where the part is held.
         """
         meshed = self.part.create_mesh()
-        coarse = meshed.densely(
+        coarse = meshed.follow_densely(
             self.stops, lambda share: report(FIRST_SHARE * share, "coarse mesh"), BETWEEN_SHARE * self.error
         )
         if len(coarse.course.poses) < 2:
@@ -216,7 +216,7 @@ def _largest_beside(solution: MeshSolution, guide: PoseGuide, trial: Sequence[fl
 
 
 def _critical_points(solution: MeshSolution, coarse: MeshSolution) -> tuple[CriticalPoint, ...]:
-    """Return the bifurcations on a mesh, with what they differ by on the coarser one as their error."""
+    """Return the bifurcations on a mesh; the error of each is its difference from the coarser mesh."""
     span = abs(solution.course.travel[-1] - solution.course.travel[0])
     points = []
     for travel in solution.course.bifurcations:
@@ -268,7 +268,7 @@ class MeshedPose:
 
 @dataclass(frozen=True)
 class Level:
-    """A mesh and what is left of the error in each of its triangles, at a few poses."""
+    """A mesh at a few poses, with the estimated error in each of its triangles."""
 
     meshed: Meshed
     states: tuple[MeshedPose, ...]

@@ -146,7 +146,7 @@ class Sizes:
         return self.looked_up(points)[0]
 
     def looked_up(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the sizes (k,) at points (k, 2), and how far the boundary's nearest place is (k,) [m]."""
+        """Return the sizes (k,) at points (k, 2), and their distances from the boundary (k,) [m]."""
         distance, nearest = self._place_tree.query(points)
         return np.minimum(self.sizes[nearest] + SIZE_GRADING * distance, self.largest), np.asarray(distance)
 
@@ -171,7 +171,7 @@ def sizes(
 
 
 def _resolve_sizes(places: FloatArray, wanted: FloatArray, largest: float) -> tuple[FloatArray, FloatArray]:
-    """Return the places and the sizes wanted there, if elements can be so small; GeometryError if they cannot."""
+    """Return the places and wanted sizes; GeometryError if elements would have to be too small."""
     least = int(wanted.argmin())
     if wanted[least] * MOST_REFINED < largest:
         raise GeometryError(
@@ -193,7 +193,7 @@ def place_text(place: Sequence[float] | FloatArray) -> str:
 def _wanted_sizes(
     rings: tuple[Ring, ...], step: float, largest: float, share: float, across: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return places along the boundary (m, 2) no farther apart than a step, and what is wanted there (m,) [m]."""
+    """Return places along the boundary (m, 2) no farther apart than a step, and element sizes there (m,) [m]."""
     pairs = [(ring, _dense_arc_lengths(ring, step)) for ring in rings]
     places = np.concatenate([ring.locate(arc) for ring, arc in pairs])
     wanted = np.concatenate([np.minimum(share * _radius_at(ring, arc), largest) for ring, arc in pairs])

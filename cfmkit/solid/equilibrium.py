@@ -59,7 +59,7 @@ class Balance:
     solved: bool = True  # false if it is put together from poses that are
 
     def drop_factors(self) -> Balance:
-        """Return the same without the factors, which take a hundred times the room of all the rest."""
+        """Return the equilibrium without the factors, which take most of its memory."""
         return replace(self, factors=None)
 
 
@@ -130,7 +130,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class SolidProblem:
-    """A part, its supports, and how to solve for it."""
+    """A part of finite elements with its supports and obstacles, solved for equilibria."""
 
     elements: Elements
     supports: Supports

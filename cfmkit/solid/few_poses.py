@@ -168,7 +168,7 @@ def _difference(pose: Balance, reference: Balance) -> Balance:
 
 
 def solve_some(guide: PoseGuide, travels: Sequence[float]) -> tuple[Balance, ...]:
-    """Return the poses on a fine mesh at some travels of the coarse one, as far as they are found and as stable."""
+    """Return the poses on a fine mesh at some travels of the coarse one, where they exist and are as stable."""
     poses: list[Balance] = []
     for travel in travels:
         coarse = guide.interpolate(travel)
@@ -187,7 +187,7 @@ def follow_some(
     allowed: float,
     report: Callable[[float], None],  # is given the share that is done
 ) -> MeshSolution | None:
-    """Return the path on a fine mesh at all travels of the coarse one; None if it has not the same course."""
+    """Return the path on a fine mesh at all travels of the coarse one; None if the courses differ."""
     course, travels = guide.coarse.course, guide.coarse.course.travel.tolist()
     if course.ending is not PathEnd.COMPLETE or course.bifurcations or len(poses) < 3:
         return None

@@ -317,7 +317,7 @@ class Spacing:
     sewn: FloatArray  # (k, 2) points on seams [m]
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """Return those of the points (k, 2) [m] that are far enough."""
+        """Return the points (k, 2) [m] that are far enough from the boundary and from seams."""
         sizes, clearance = self.field.looked_up(points)
         room = BOUNDARY_CLEARANCE * sizes
         far = clearance > room

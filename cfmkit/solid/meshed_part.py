@@ -271,8 +271,8 @@ class Meshed:
         """Return the poses at some travels, from rest on in one direction [m or rad]; `guide` predicts unknowns."""
         return MeshSolution(self.part, self.problem, follow(self.problem, stops, report, guide=guide), self.unjudged)
 
-    def densely(self, stops: Sequence[float], report: Callable[[float], None], allowed: float) -> MeshSolution:
-        """Return the same with poses in between, as many as the curve needs, and what it is off between poses."""
+    def follow_densely(self, stops: Sequence[float], report: Callable[[float], None], allowed: float) -> MeshSolution:
+        """Return the path with as many poses between the stops as the curve needs, and its error between poses."""
         course, off = refine_path(self.problem, follow(self.problem, stops, report), allowed)
         return MeshSolution(self.part, self.problem, course, self.unjudged, off)
 
@@ -334,8 +334,8 @@ def _relative_difference(values: FloatArray, others: FloatArray) -> float:
     return float(np.abs(values - others).max()) / largest if largest else 0.0
 
 
-def largest_element_size(rings: Sequence[Ring], thinnest: float) -> float:
-    """Return how large elements may be where a part of beams is thick, in those of its thinnest place [m]."""
+def largest_size_ratio(rings: Sequence[Ring], thinnest: float) -> float:
+    """Return the largest element size in those of the thinnest place: larger than 1 for a part with thick blocks."""
     area = sum(ring.area for ring in rings)
     around = sum(float(ring.places[-1]) for ring in rings)
     return BLOCK_ELEMENT_RATIO if area > BULKY_AREA_RATIO * 0.5 * around * thinnest else 1.0
@@ -413,7 +413,7 @@ def _check_interval(problem: SolidProblem, course: PosePath, skipped: set[float]
 
 
 def missed_by_cubics(poses: tuple[Balance, ...]) -> FloatArray:
-    """Return what the cubic of each interval may be off, (k - 1,) [N or N m]: the larger value of its two ends."""
+    """Return the estimated error of the cubic of each interval, (k - 1,) [N or N m]."""
     from scipy.interpolate import CubicHermiteSpline
 
     missed = np.zeros(len(poses))

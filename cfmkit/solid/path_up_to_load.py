@@ -35,7 +35,7 @@ MAX_HALVINGS = 60  # of an interval between two poses: beyond them a travel has 
 
 
 class LoadEnd(enum.Enum):
-    """Reach of a path under a load."""
+    """How far a path goes under a load."""
 
     REACHED = "the load is reached"
     MAXIMUM = "the load has a maximum before: the part jumps there"
@@ -94,7 +94,7 @@ def travel_for(
 
 
 def follow_to_load(solved: MeshSolution, load: float, through_maxima: bool) -> tuple[MeshSolution, LoadPath]:
-    """Return the part's path up to a load [N or N m] or to where it leads, with a pose there, and what that is."""
+    """Return the part's path up to a load [N or N m] or to where it ends before, and how it ended."""
     course = solved.course
     path = LoadPath.from_course(course, load, through_maxima)
     if path.how is LoadEnd.SHORT:
@@ -115,7 +115,7 @@ def follow_to_load(solved: MeshSolution, load: float, through_maxima: bool) -> t
 
 
 def with_poses(solved: MeshSolution, travels: Iterable[float]) -> MeshSolution:
-    """Return the part's path with poses at some travels inside it, too [m or rad]; without those that are not found."""
+    """Return the part's path with further poses at some travels [m or rad], as far as they are found."""
     poses = list(solved.course.poses)
     slack = 1e-9 * abs(poses[-1].travel)
     for travel in travels:

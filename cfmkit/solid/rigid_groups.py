@@ -115,7 +115,7 @@ class Supports:
         return any(group.load.any() for group in self.groups)
 
     def scale_loads(self, share: float) -> Supports:
-        """Return the same under a share of the constant loads."""
+        """Return the supports with their constant loads multiplied by a share."""
         return replace(self, groups=tuple(replace(group, load=share * group.load) for group in self.groups))
 
     def residual(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> FloatArray:
@@ -144,7 +144,7 @@ class Supports:
 
 @dataclass(frozen=True)
 class Carried:
-    """Motions of nodes by free motions of groups and by the travel behind them."""
+    """Derivatives of nodal displacements by free motions of groups and by the travel."""
 
     loose: NDArray[np.int64]  # (l,) as of `Supports`
     # (2n, f + 1) derivatives of the nodes' displacements with respect to f free motions and the travel

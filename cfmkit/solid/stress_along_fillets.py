@@ -110,7 +110,7 @@ def stressed_fillets(
     solved: MeshSolution,
     radius: float,  # of its fillets [m]; 0 if it has none
 ) -> tuple[FilletStress, ...]:
-    """Return the fillets of a solved part, as its boundary runs; without those of its rigid pieces."""
+    """Return the fillets of a solved part with their stresses, without those of rigid pieces."""
     grid, rising = solved.problem.elements.mesh, np.argsort(solved.course.travel)
     stress, nodes = solved.along_edges
     ring_of = np.zeros(len(grid.nodes), int)

@@ -33,7 +33,7 @@ class Model(BaseModel):
 
 
 def keys_of(block: Any) -> Mapping[str, Any]:
-    """Return what is given in a block, and what its validators set, by key; nothing if it is no block.
+    """Return the keys and values that a block states or its validators set; empty if it is no block.
 
     It need not be validated: for validators that run before, to which `Spec.replace` gives validated blocks beside what
     a file says.

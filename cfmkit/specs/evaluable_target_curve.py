@@ -31,13 +31,13 @@ class TargetCurve:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Between which ends of the motion it is known [m or rad]."""
+        """Ends of the motion between which the curve is known [m or rad]."""
         if isinstance(self.function, ThroughPoints):
             return self.function.places[0], self.function.places[-1]
         return -float("inf"), float("inf")
 
     def scale(self, factor: float) -> TargetCurve:
-        """Return it with all efforts multiplied by a factor."""
+        """Return the curve with all efforts multiplied by a factor."""
         if isinstance(self.function, ThroughPoints):
             values = tuple(factor * value for value in self.function.values)
             return replace(self, function=replace(self.function, values=values))
@@ -45,13 +45,13 @@ class TargetCurve:
         return replace(self, function=(factor * level, factor * slope))
 
     def covers(self, low: float, high: float) -> bool:
-        """Return whether it is known between two places [m or rad], but for rounding."""
+        """Return True if the curve is known between two places [m or rad], but for rounding."""
         first, last = self.extent
         slack = 1e-6 * (high - low)
         return first <= low + slack and high - slack <= last
 
     def to_points(self, low: float, high: float) -> ThroughPoints:
-        """Return it as a function through points, of which a line has two [m or rad]."""
+        """Return the curve as a function through points [m or rad]; a line has two."""
         if isinstance(self.function, ThroughPoints):
             return self.function
         return ThroughPoints((low, high), (float(self.evaluate(low)), float(self.evaluate(high))))

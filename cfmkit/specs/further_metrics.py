@@ -96,7 +96,7 @@ def enter(metric: OwnMetric) -> OwnMetric:
 
 
 def name_of(metric: Any) -> Any:
-    """Return the name of a metric that is given as a function, which is registered with this; others as they are.
+    """Return the name of a metric; a function is registered and named, anything else returned as it is.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def name_of(metric: Any) -> Any:
 
 
 def names_of(metrics: Any) -> Any:
-    """Return the names of several metrics, or of a single one; what is neither stays, for others to refuse."""
+    """Return the names of several metrics, or of one; anything else is returned for others to refuse."""
     if isinstance(metrics, str) or callable(metrics):
         return (name_of(metrics),)
     return tuple(map(name_of, metrics)) if isinstance(metrics, list | tuple | set | frozenset) else metrics

@@ -106,7 +106,7 @@ class SolidAnalysis(Model):
 
 
 class DesignKeys(Model):
-    """Common part of every family's `design` block: parts as they are made."""
+    """Common part of every family's `design` block: tolerances, process, and values free to reach a yield."""
 
     tolerances: dict[str, tuple[MetricValue, MetricValue] | Tolerance] | None = Field(
         None,
@@ -179,7 +179,7 @@ AS_MADE = "as_made"  # key of the context in which a manufactured part is valida
 
 
 def is_made(info: ValidationInfo) -> bool:
-    """Return True if the values are those of one manufactured part."""
+    """Return True if the values that are validated are those of one manufactured part."""
     return bool(info.context) and bool(info.context.get(AS_MADE))  # type: ignore[union-attr]
 
 

@@ -91,7 +91,7 @@ class FolderLock:
 
     @property
     def mine(self) -> bool:
-        """Whether this process holds the lock through this object; a forked copy does not."""
+        """True if this process took the lock through this object; False in a forked copy."""
         return self._owner == os.getpid()
 
     def check(self) -> None:
@@ -120,7 +120,7 @@ def locks_can_be_used(folder: Path) -> bool:
 
 
 def locks_wanted() -> bool:
-    """Return True unless the user said to lock nothing."""
+    """Return True unless ``--no-lock`` or `NO_LOCK` switches locks off."""
     return os.environ.get(NO_LOCK, "") in ("", "0")
 
 
@@ -218,7 +218,7 @@ def _same(descriptor: int, file: Path) -> bool:
 
 
 def _sign(descriptor: int, file: Path) -> None:
-    """Write into the lock file who holds it, behind its first byte: Windows lets nobody read the one that is locked."""
+    """Write process and computer into the lock file, behind its first byte, which Windows lets nobody read."""
     try:
         safe_disk_changes.system.ftruncate(descriptor, 0)
         safe_disk_changes.system.write(descriptor, f" {os.getpid()} {platform.node()}\n".encode())

@@ -1,5 +1,4 @@
-"""The output folder of one run: files written all together, and ``manifest.json``, their list with times and versions.
-"""
+"""The output folder of one run: files written all together, and ``manifest.json``, their list with times, versions."""
 
 from __future__ import annotations
 
@@ -390,8 +389,7 @@ def _defer_signals() -> Iterator[None]:
 
 
 def _alive(process: int) -> bool:
-    """Return whether a process lives; of Windows False, where a signal to find out would reach it, and where no file
-    is removed that a process has open."""
+    """Return whether a process lives; on Windows False, where a signal to find out would reach it."""
     if os.name == "nt":
         return False
     try:

@@ -113,7 +113,7 @@ class Table(ShortRepr):
         return tuple(column.header for column in self.columns)
 
     def as_dict(self) -> dict[str, list[Cell]]:
-        """Return header -> values as plain Python lists, None where a value is missing."""
+        """Return the columns by their headers as plain lists, None where a value is missing."""
         return {column.header: column.cells() for column in self.columns}
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cfmkit.plots.study import MOST_PANELS, draw_panels, figures, fit_panels
+from cfmkit.plots.study import MOST_PANELS, can_draw_panels, draw_panels, figures
 from cfmkit.plots.study_data_and_marks import DrawnScale, StudyCurve, StudyMarks
 
 
@@ -31,5 +31,5 @@ def test_every_value_of_the_first_parameter_has_a_panel_with_a_line_for_each_of_
 @pytest.mark.parametrize(("first", "second", "fit"), [(2, 3, True), (MOST_PANELS + 1, 2, False), (2, 9, False)])
 def test_what_cannot_be_told_apart_is_left_to_the_maps(first, second, fit):
     found, lines = study(first, second)
-    assert fit_panels(found, lines) is fit
+    assert can_draw_panels(found, lines) is fit
     assert ("curves" in figures(found, lines)) is fit

@@ -95,7 +95,7 @@ def changed_by(options: SensitivityOptions, spec: Spec) -> Spec:
 
 
 def _sets_samples(change: str) -> bool:
-    """Whether a ``--set`` says how many samples are drawn: then this is no number of another method."""
+    """Return True if a ``--set`` states the number of samples, which then does not follow from the method."""
     return change.partition("=")[0].rpartition(":")[2].strip() in ("sensitivity", "sensitivity.samples")
 
 

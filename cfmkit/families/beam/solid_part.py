@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_element_size, rings_of
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_size_ratio, rings_of
     from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
 
     frame = standing_frame(spec)
@@ -47,7 +47,7 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     ]
     rings, thinnest = rings_of(cut, assembly.thinnest), assembly.thinnest
     return Part(
-        rings, thinnest, width, law, tuple(places), (), largest_element_size(rings, thinnest), frame, drawn.sections
+        rings, thinnest, width, law, tuple(places), (), largest_size_ratio(rings, thinnest), frame, drawn.sections
     )
 
 

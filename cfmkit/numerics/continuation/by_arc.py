@@ -1,5 +1,4 @@
-"""A stretch followed by the arc length, where steps by the drive fail or behind a limit point, until the drive leads.
-"""
+"""A stretch followed by the arc length, where steps by the drive fail or behind a limit point, until it leads again."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Policy at a loss of stability, also at the start: locate it, yield it, go on along a stable branch if one is there.
-"""
+"""Policy at a loss of stability, also at the start: locate it, yield it, go on along a stable branch if possible."""
 
 from __future__ import annotations
 

@@ -49,11 +49,11 @@ _BOUND_OPERATORS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
 
 
 class BareInt(int):
-    """A whole number as it stands in a file or an option: nobody said in which unit."""
+    """A whole number of a file or an option, without a unit."""
 
 
 class BareFloat(float):
-    """A number as it stands in a file or an option: nobody said in which unit."""
+    """A number of a file or an option, without a unit."""
 
 
 Bare = BareInt | BareFloat

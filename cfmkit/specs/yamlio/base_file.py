@@ -57,7 +57,7 @@ def with_base(
 
 
 def _path_of(document: YamlDocument, named: Any, above: tuple[str, ...]) -> tuple[Path | None, str]:
-    """Return the path of a base; else None, and what is wrong with it."""
+    """Return the path of a base and "", or None and the fault."""
     if document.folder is None:
         return None, "a base is looked for beside the file that names it, and this text is in no file"
     if not isinstance(named, str) or not named.strip() or "\0" in named:
@@ -77,7 +77,7 @@ def _path_of(document: YamlDocument, named: Any, above: tuple[str, ...]) -> tupl
 
 
 def merge(base: Any, override: Any) -> Any:
-    """Return a tree with own values over those of a base.
+    """Return a tree with the values of `override` over those of its base.
 
     Examples
     --------

@@ -123,7 +123,7 @@ class YamlDocument:
         return spec
 
     def problem(self, path: str | Path, message: str, at_key: bool = False) -> Problem:
-        """Return a problem at a path, with its place in the file or the option that set it."""
+        """Return a problem at a path, with its line and column or the option that set the value."""
         path = self._path(path)
         reported = to_dotted(path)
         if option := self._option_at(path):
@@ -237,7 +237,7 @@ def _sort_problems(problems: Sequence[Problem]) -> list[Problem]:
 
 
 def _mark_numbers(tree: Any) -> Any:
-    """Return a tree whose numbers say that they came without a unit."""
+    """Return a tree whose numbers are `Bare` ones: they came without a unit."""
     if isinstance(tree, dict):
         return {key: _mark_numbers(value) for key, value in tree.items()}
     if isinstance(tree, tuple):

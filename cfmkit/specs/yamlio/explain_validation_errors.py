@@ -57,7 +57,7 @@ class _Error:
 
     @property
     def echo(self) -> bool:
-        """Whether something has too few items only because pydantic does not count those that are wrong themselves."""
+        """True if a list has too few items for pydantic only because it does not count faulty ones."""
         node = self.trace.node
         return self.kind == "too_short" and isinstance(node, tuple | dict) and len(node) >= self.context["min_length"]
 
@@ -84,7 +84,7 @@ def explain(
 
 
 def _drop_unmeant(lines: list[_Error], depth: int) -> list[_Error]:
-    """Return the errors without those of union members that cannot have been meant."""
+    """Return the errors without those of union members that the user cannot have meant."""
     kept = [line for line in lines if len(line.trace.tags) <= depth]
     inside = [line for line in lines if len(line.trace.tags) > depth]
     by_place = sorted(inside, key=lambda line: str(line.trace.tags[depth][0]))

@@ -174,7 +174,7 @@ class Slot:
         return ()
 
     def matches(self, tag: str) -> bool:
-        """Return whether pydantic may mean this one by a union member's label."""
+        """Return True if a union member's label of pydantic may mean this type."""
         if self.model is None:
             return str(getattr(self.origin, "__name__", self.origin)).lower() in tag.lower()
         fields = self.model.model_fields.values()
@@ -235,7 +235,7 @@ def slots_at(model: type[BaseModel], path: str) -> tuple[Slot, ...]:
 
 
 def _flat(extra: list[Any]) -> tuple[Any, ...]:
-    """Return annotations with those inside a ``Field(...)`` beside the others."""
+    """Return annotations in one row: those inside a ``Field(...)`` taken out of it."""
     return tuple(metadata for item in extra for metadata in (*getattr(item, "metadata", ()), item))
 
 
