@@ -34,7 +34,7 @@ def materials_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, lis
         field("name", "material", wraps=True),
         Field("E\n[GPa]", lambda item: f"{item['youngs_modulus'] / 1e9:.4g}"),
         Field("from ... to", lambda item: _range(item["scatter"]["youngs_modulus"], 1e9), wraps=True),
-        Field("yield_strength\n[MPa]", lambda item: _number(item["yield_strength"], 1e6)),
+        Field("yield_strength\n[MPa]", lambda item: _megapascals(item["yield_strength"])),
         Field("from ... to", lambda item: _range(item["scatter"]["yield_strength"], 1e6), wraps=True),
     )
     sources = (
@@ -108,8 +108,8 @@ def properties(item: Mapping[str, Any]) -> str:
     return ", ".join(reported)
 
 
-def _number(value: float | None, size: float) -> str:
-    return "" if value is None else f"{value / size:.4g}"
+def _megapascals(value: float | None) -> str:
+    return "" if value is None else f"{value / 1e6:.4g}"
 
 
 def _range(ends: Iterable[float] | None, size: float) -> str:

@@ -53,9 +53,9 @@ class Moving:
     draw_as_made: Callable[[Axes, int], Any] | None = None
 
 
-def choose_poses(count: int, poses: int = N_FILM_POSES) -> FloatArray:
+def choose_poses(count: int) -> FloatArray:
     """Return which of so many points of a curve are shown as poses: evenly, the ends included."""
-    return np.unique(np.linspace(0, count - 1, min(count, poses)).round().astype(int))
+    return np.unique(np.linspace(0, count - 1, min(count, N_FILM_POSES)).round().astype(int))
 
 
 def film(
