@@ -23,8 +23,8 @@ except ImportError:  # before setuptools 70.1, which a build has: this file is o
     bdist_wheel = object
 
 HERE = Path(__file__).parent
-ROOMS = ("", ".studies", ".synthetic")
-LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?:)([^)#\s]+)(#[^)\s]*)?\)")
+CONFIG_SUBFOLDERS = ("", ".studies", ".synthetic")
+README_LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?:)([^)#\s]+)(#[^)\s]*)?\)")
 
 
 MECHANICS = "cfmkit/elastica/mechanics"
@@ -69,24 +69,24 @@ class BuildPages(build_py):
 
     def find_package_modules(self, package, package_dir):
         """Return the modules of a package, as (package, name, file)."""
-        found = super().find_package_modules(package, package_dir)
-        return [] if package == "cfmkit.docs" else found
+        modules = super().find_package_modules(package, package_dir)
+        return [] if package == "cfmkit.docs" else modules
 
 
-def described(text, url):
+def describe_package(text, url):
     """Return the README with links that work outside of the tree."""
 
-    def linked(match):
-        picture, name, path, place = match.groups()
+    def replace_link(match):
+        picture, name, path, anchor = match.groups()
         if url:
-            way = "raw" if picture else "blob"
-            return f"{picture}[{name}]({url}/{way}/main/{path}{place or ''})"
+            view = "raw" if picture else "blob"
+            return f"{picture}[{name}]({url}/{view}/main/{path}{anchor or ''})"
         if picture:
             return f"*{name}*"
         page = re.fullmatch(r"docs/(\w+)\.md", path)
         return f"{name} (`cfmkit docs {page[1]}`)" if page else name
 
-    return LINK.sub(linked, text)
+    return README_LINK.sub(replace_link, text)
 
 
 URL = os.environ.get("CFMKIT_URL", "").rstrip("/")
@@ -94,7 +94,7 @@ URL = os.environ.get("CFMKIT_URL", "").rstrip("/")
 setup(
     packages=[
         *find_packages(include=["cfmkit*"]),
-        *(f"cfmkit.configs{room}" for room in ROOMS),
+        *(f"cfmkit.configs{subfolder}" for subfolder in CONFIG_SUBFOLDERS),
         "cfmkit.docs",
         "cfmkit.docs.images",
         "cfmkit.families.beam.shapes",  # data of the family, no module: setuptools wants every folder of data named
@@ -103,7 +103,7 @@ setup(
     ext_modules=[MARCH],
     cmdclass={"build_py": BuildPages} | ({} if bdist_wheel is object else {"bdist_wheel": WheelForEveryPython}),
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
-    long_description=described((HERE / "README.md").read_text(encoding="utf-8"), URL),
+    long_description=describe_package((HERE / "README.md").read_text(encoding="utf-8"), URL),
     long_description_content_type="text/markdown",
     project_urls={
         "Homepage": URL,

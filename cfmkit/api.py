@@ -378,8 +378,7 @@ def export(
 def resolve(spec: AnySpec) -> Spec:
     """Return the specification with every derived part written out."""
     spec = spec_of(spec)
-    record = family(spec.family)
-    resolved: Spec = record.resolve(spec) if record.resolve else spec
+    resolved: Spec = family(spec.family).resolve(spec)
     return resolved
 
 

@@ -34,7 +34,7 @@ def materials_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, lis
         field("name", "material", wraps=True),
         Field("E\n[GPa]", lambda item: f"{item['youngs_modulus'] / 1e9:.4g}"),
         Field("from ... to", lambda item: _format_range(item["scatter"]["youngs_modulus"], 1e9), wraps=True),
-        Field("yield_strength\n[MPa]", lambda item: _format_in_unit(item["yield_strength"], 1e6)),
+        Field("yield_strength\n[MPa]", lambda item: _format_megapascals(item["yield_strength"])),
         Field("from ... to", lambda item: _format_range(item["scatter"]["yield_strength"], 1e6), wraps=True),
     )
     sources = (
@@ -110,8 +110,8 @@ def properties(item: Mapping[str, Any]) -> str:
     return ", ".join(reported)
 
 
-def _format_in_unit(value: float | None, size: float) -> str:
-    return "" if value is None else f"{value / size:.4g}"
+def _format_megapascals(value: float | None) -> str:
+    return "" if value is None else f"{value / 1e6:.4g}"
 
 
 def _format_range(ends: Iterable[float] | None, size: float) -> str:

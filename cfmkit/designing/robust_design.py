@@ -164,6 +164,7 @@ SMALL_GAIN = 0.02
 
 With other 48 parts the risk of one normal limit at 90 % scatters by 0.27: less is not worth solving parts for.
 """
+MAX_STEPS_ON_SAMPLES = 25
 MIN_RELATIVE_DEVIATION = 1e-2
 """Least standard deviation of a row, as a share of the largest of its limit: what no error moves is kept strictly."""
 
@@ -407,7 +408,6 @@ def optimise_on_samples(
     result: RobustResult,  # where to begin
     count: int,  # parts that are drawn
     worst: bool = False,  # whether the worst of them counts, and not the mean of the worst share
-    most: int = 25,  # steps
 ) -> RobustResult:
     """Return values for which drawn parts, each solved itself, are good: from a design that first order led to."""
     asked = replace(problem, share=1.0) if worst else problem
@@ -419,7 +419,7 @@ def optimise_on_samples(
         return result
     risk, trust, steps = tail_risk(rows / scale, asked.share), 0.25 * FIRST_TRUST, 0
     slopes = None
-    for _ in range(most):
+    for _ in range(MAX_STEPS_ON_SAMPLES):
         if trust < LEAST_TRUST or problem.late():
             break
         slopes = parts.differentiate_rows(x) if slopes is None else slopes

@@ -189,9 +189,6 @@ def turning_points(
 
 def split(
     recording: Recording,  # in the order of time
-    # part of the range by which the motion must turn back to count as a reversal; at least eight standard deviations of
-    # the jitter
-    reversal: float = REVERSAL_SHARE,
 ) -> Strokes:
     """Return the strokes of a recording.
 
@@ -199,7 +196,8 @@ def split(
     """
     motion = recording.motion
     extent = float(np.ptp(motion))
-    turns = turning_points(motion, min(max(reversal * extent, _REVERSAL_JITTERS * jitter_of(motion)), 0.5 * extent))
+    reversal = max(REVERSAL_SHARE * extent, _REVERSAL_JITTERS * jitter_of(motion))
+    turns = turning_points(motion, min(reversal, 0.5 * extent))
     standing = pauses(motion, turns)
     pieces = []
     for number, (start, stop) in enumerate(pairwise(turns)):

@@ -80,13 +80,6 @@ class Calibration:
         return f"<Calibration of {self.spec.name!r}: {fitted} (SI, 95 %); warnings: {names}>"
 
 
-def resolve_spec(spec: Spec) -> Spec:
-    """Return a specification with its derived parts written out: the part that was built and measured."""
-    record = family(spec.family)
-    written: Spec = record.resolve(spec) if record.resolve else spec
-    return written
-
-
 class ModelCurves:
     """Curves of a specification with some of its values changed; each is solved once."""
 
@@ -386,7 +379,6 @@ __all__ = [
     "calibrate",
     "fit_samples",
     "has_no_loss",
-    "resolve_spec",
     "scaled_jacobian",
     "table",
 ]  # fmt: skip

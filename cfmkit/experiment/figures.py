@@ -130,15 +130,15 @@ def _note_window(source: MeasuredCurves, window: Window, ax: Axes) -> None:
         place_labels(ax, [Label(text, TEXT_GREY, points, prefer=0.05)])
 
 
-def thin_curve(curve: Curve, bins: int = MAX_DRAWN_BINS) -> Curve:
-    """Return a curve for a picture: of each branch no more than the extremes of `bins` equal parts."""
+def thin_curve(curve: Curve) -> Curve:
+    """Return a curve for a picture: of each branch no more than the extremes of `MAX_DRAWN_BINS` equal parts."""
     keep: list[NDArray[np.intp]] = []
     for name in curve.branches:
         index = np.flatnonzero(curve.branch == name)
-        if len(index) <= 4 * bins:
+        if len(index) <= 4 * MAX_DRAWN_BINS:
             keep.append(index)
             continue
-        parts = np.array_split(index, bins)
+        parts = np.array_split(index, MAX_DRAWN_BINS)
         kept_points = [
             part[[0, int(curve.effort[part].argmin()), int(curve.effort[part].argmax()), -1]] for part in parts
         ]

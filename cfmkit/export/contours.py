@@ -309,8 +309,11 @@ def mark(shape: FloatArray, driven: bool) -> Contour:
     return Contour((Line(*corners),), layer) if len(corners) == 2 else polygon(corners, layer)
 
 
+REFERENCE_SIZE = 0.05  # side of the reference square [m]
+
+
 def reference_square(
-    size: float = 0.05,  # length of a side [m]
+    size: float = REFERENCE_SIZE,  # length of a side [m]
     corner: tuple[float, float] = (0.0, 0.0),  # the lower left corner [m]
 ) -> Contour:
     """Return a square on layer `reference`, with which a user checks the scale of a print."""
@@ -399,13 +402,13 @@ class Drawing(ShortRepr):
         boxes = np.array([contour.box for contour in self.contours if contour.layer not in UNCUT_LAYERS])
         return (*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist())
 
-    def with_reference_square(self, size: float = 0.05) -> Drawing:
-        """Return the drawing with a reference square [m] to its right, unless it has a reference already."""
+    def with_reference_square(self) -> Drawing:
+        """Return the drawing with a reference square of 50 mm to its right, unless it has a reference already."""
         if not self.contours or any(contour.layer == "reference" for contour in self.contours):
             return self
         boxes = np.array([contour.extents for contour in self.contours])
-        corner = (float(boxes[:, 2].max()) + size / 5, float(boxes[:, 1].min()))
-        return replace(self, contours=(*self.contours, reference_square(size, corner)))
+        corner = (float(boxes[:, 2].max()) + REFERENCE_SIZE / 5, float(boxes[:, 1].min()))
+        return replace(self, contours=(*self.contours, reference_square(REFERENCE_SIZE, corner)))
 
 
 def signed_area(points: FloatArray) -> float:
@@ -414,15 +417,13 @@ def signed_area(points: FloatArray) -> float:
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
-def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list[FloatArray]:
-    """Return the closed contours of one layer as closed chains of points, for pictures only.
+def polygons(contours: Sequence[Contour], points: int = 240) -> list[FloatArray]:
+    """Return the closed contours that are cut as closed chains of points, for pictures only.
 
     Parameters
     ----------
     contours : sequence of Contour
         Of a drawing.
-    layer : str
-        Which of them.
     points : int
         Most points that are taken of a smooth edge, evenly by index; its ends are always among them.
 
@@ -431,7 +432,7 @@ def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list
     list of (n, 2) array
         Counter-clockwise, holes clockwise [m].
     """
-    chosen = [contour for contour in contours if contour.closed and contour.layer == layer]
+    chosen = [contour for contour in contours if contour.closed and contour.layer == "cut"]
     rings = []
     for contour in chosen:
         chain = np.concatenate([_points_for_picture(edge, points) for edge in contour.edges])

@@ -135,14 +135,6 @@ def _shortest_bar(
     )
 
 
-def swept(lines: Sequence[FloatArray], half: float, shapes: Sequence[FloatArray]) -> Any:
-    """Return what lines (n, 2) of a half thickness, and polygons, cover together [m]."""
-    from shapely import LineString, Polygon, union_all
-
-    strips = [LineString(line).buffer(half, cap_style="flat") for line in lines if len(line) > 1]
-    return union_all([*strips, *(Polygon(shape).buffer(0) for shape in shapes if len(shape) > 2)])
-
-
 def find_outside(
     places: Sequence[tuple[float, float]], frame: Sequence[FloatArray], pads: Sequence[FloatArray]
 ) -> list[bool]:

@@ -93,7 +93,6 @@ def merge_pieces(
     size: float,  # of the thinnest of them: what is much smaller is rounding [m]
     fillet: float = 0.0,  # radius of inside corners [m]: that of the cutter. Gaps narrower than twice of it are filled
     holes: Sequence[OutlinePiece] = (),  # cut out in the end
-    layer: str = "cut",  # of the contours
 ) -> tuple[Contour, ...]:
     """Return the contours of the union of some pieces, with rounded inside corners, less some holes.
 
@@ -114,7 +113,7 @@ def merge_pieces(
         rings = [_edges_of_runs(runs, tolerance) for runs in _trace_rings(left, tracks, size)]
     if not rings:
         raise GeometryError("the pieces of the part leave nothing to cut")
-    return tuple(Contour(tuple(ring), layer, closed=True, hole=_signed_ring_area(ring) < 0) for ring in rings)
+    return tuple(Contour(tuple(ring), "cut", closed=True, hole=_signed_ring_area(ring) < 0) for ring in rings)
 
 
 def _unite(areas: Sequence[FloatArray], size: float, *others: Any) -> Any:

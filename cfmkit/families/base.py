@@ -191,6 +191,11 @@ class ElasticParts:
     beams: Callable[[Any], tuple[DrivenNetwork, ...]]  # the same parts as networks of beams
 
 
+def leave_as_it_is(spec: Any) -> Any:
+    """Return a specification, of which no part is derived."""
+    return spec
+
+
 def no_values(*_specs: Any) -> dict[str, Any]:
     """Return that no value of a specification is known to move or to err."""
     return {}
@@ -215,7 +220,7 @@ class Family:
     # ``cfmkit new`` starts from; `references.bib`, the papers; `dimensions.svg`, the mechanism with its dimensions and
     # their keys named, also as PNG and PDF
     folder: str = ""
-    resolve: Callable[[Any], Any] | None = None  # ``resolve(spec) -> spec`` with every derived part written out
+    resolve: Callable[[Any], Any] = leave_as_it_is  # ``resolve(spec) -> spec`` with every derived part written out
     design: DesignMethod | None = None
     # ``rows(variants) -> iterator of (indices, SolvedRows)``: the mechanisms of closed form, those of one kind together
     # (`cfmkit.families.rows`)

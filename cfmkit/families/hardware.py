@@ -98,9 +98,9 @@ def with_faults(parts: Iterable[ListedPart], faults: Mapping[str, str]) -> tuple
     )
 
 
-def series_sizes(kind: str, system: System | None) -> tuple[float, ...]:
-    """Return the diameters of a series of pins or dowels [m], metric ones unless inches are requested."""
-    result = series_of("dowel" if kind == "dowel" else "pin", system or "metric")
+def pin_sizes(system: System | None) -> tuple[float, ...]:
+    """Return the diameters of the series of pins [m], metric ones unless inches are requested."""
+    result = series_of("pin", system or "metric")
     return () if result is None else tuple(size for size in result.sizes if size >= 1e-3)
 
 
@@ -108,7 +108,7 @@ def pin_for(
     force: float, arm: float, thickness: float, strength: PartStrength, system: System | None
 ) -> tuple[float, bool]:
     """Return the pin that bears a load at an arm [m], and whether there is one: where not, the thickest."""
-    sizes = series_sizes("pin", system)
+    sizes = pin_sizes(system)
     result = pin_that_bears(force, arm, thickness, strength.allowable, strength.pins, sizes)
     return (sizes[-1], False) if result is None else (result, True)
 
@@ -182,7 +182,7 @@ def guide_rods(
     length = bush if guide is None or guide.length is None else guide.length
     couple = 0.0 if guide is None else 2.0 * force * guide.offset / length  # at each end of the bushes
     load = max(across + couple, SIDE_SHARE * force)
-    span, sizes = travel + length, series_sizes("pin", system)
+    span, sizes = travel + length, pin_sizes(system)
     result = rod_that_guides(load / count, span, PIN_MODULUS, strength.pins, SAG_SHARE, sizes)
     diameter = sizes[-1] if result is None else result
     return GuideRods(count, diameter, span, length, load, load / (count * diameter * length))
@@ -208,15 +208,13 @@ def pin_part(place: str, count: int, diameter: float, length: float, load: float
     return ListedPart(place, "", count, f"{data}, of a rod", "make", mm(diameter, length), "", body)
 
 
-def screw_part(
-    place: str, count: int, screw: Screw, grip: float, body: str = "", countersunk: bool = False
-) -> ListedPart:
+def screw_part(place: str, count: int, screw: Screw, grip: float, countersunk: bool = False) -> ListedPart:
     """Return screws of the list that reach through a grip [m] and as deep as they are thick."""
     length = screw.length(grip + screw.diameter)
     kind, standard = ("countersunk", "ISO 10642") if countersunk else ("cap", "ISO 4762")
     return ListedPart(
         place, f"{screw.name} x {1e3 * length:g}", count, f"hexagon socket {kind} screw, hole {mm(screw.hole)}", "buy",
-        mm(screw.diameter, length), f"{standard}, holes ISO 273", body,
+        mm(screw.diameter, length), f"{standard}, holes ISO 273", "screw",
     )  # fmt: skip
 
 

@@ -37,7 +37,7 @@ from cfmkit.metrics.metric_values import (
     window_of,
     windows_judged,
 )
-from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
+from cfmkit.metrics.requirements import Outcome, check, requirement_problems
 from cfmkit.metrics.usable_interval_of_all_branches import CycleRows, metric_of_rows
 
 __all__ = [
@@ -75,7 +75,6 @@ __all__ = [
     "traces",
     "travel_of",
     "unknown_metric",
-    "validate_requirements",
     "values_of_family",
     "window_of",
     "windows_judged",

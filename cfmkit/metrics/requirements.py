@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.metrics.branches import Window
     from cfmkit.metrics.definition import Definition
     from cfmkit.results import Quantity, Result
-    from cfmkit.specs.spec import Requirement, Spec
+    from cfmkit.specs.spec import Requirement
 
 
 BOUND_RTOL = 1e-9
@@ -150,28 +150,6 @@ class Outcome(ShortRepr):
         return None if value is None else finite_border(value, dimension)
 
 
-def validate_requirements(spec: Spec, definitions: Iterable[Definition], kind: Kind | None = None) -> None:
-    """Check the requirements of a specification as far as that needs no curve.
-
-    Parameters
-    ----------
-    spec : Spec
-        Its ``requirements``.
-    definitions : iterable of Definition
-        Every metric there is: ``known_metrics(kind, family's)``.
-    kind : {"force", "torque"} or None
-        Of the curve, if it is known: then windows in the wrong dimension are found too.
-
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        One problem for each fault, at ``requirements.N.metric`` and so on.
-    """
-    problems = tuple(requirement_problems(spec.requirements, definitions, kind))
-    if problems:
-        raise SpecError(problems)
-
-
 def requirement_problems(
     requirements: Sequence[Requirement],
     definitions: Iterable[Definition],
@@ -256,18 +234,16 @@ def check(
     requirements: Sequence[Requirement],
     result: Result,
     extra_definitions: Iterable[Definition] = (),
-    surveys: Surveys | None = None,
 ) -> tuple[Outcome, ...]:
     """Return the outcome of every requirement on a result, in their order.
 
     Where no branch is named, all branches must meet it. A metric that has no
     value (the curve ends before the window does, there is no target) is missed.
-    `surveys` has what is known of this result already, and is where more is noted.
 
     Raises
     ------
     cfmkit.errors.SpecError
-        If a requirement is not well put: see `validate_requirements`.
+        If a requirement is not well put: see `requirement_problems`.
     """
     kind = kind_of(result)
     extra = tuple(extra_definitions)
@@ -281,7 +257,7 @@ def check(
     if problems:
         raise SpecError(problems)
     table = _group_by_name(definitions)
-    surveys = {} if surveys is None else surveys
+    surveys: Surveys = {}
     return tuple(_outcome(requirement, result, table, surveys) for requirement in requirements)
 
 

@@ -79,11 +79,6 @@ class RowsInWindow:
             raise Undefined(reason if isinstance(reason, str) else reason())
         return mask
 
-    def require_finite(self, values: FloatArray, reason: str | Callable[[], str]) -> FloatArray:
-        """Return values (d,) as they are; NaN of one row alone raises `Undefined`."""
-        self.require(~np.isnan(values), reason)
-        return values
-
     def require_straight(self) -> None:
         """Raise `Undefined` if it is one curve that turns back: a many-valued branch is never sorted."""
         name, kind = self.curves.name, self.curves.kind

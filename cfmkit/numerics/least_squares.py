@@ -96,11 +96,11 @@ class FittedValues:
         product = np.outer(spread, spread)
         return np.divide(self.covariance, product, out=np.zeros_like(product), where=product > 0)
 
-    def half_widths(self, confidence: float = 0.95) -> FloatArray:
-        """Return half the width of each value's confidence interval, by Student's t."""
+    def half_widths(self) -> FloatArray:
+        """Return half the width of each value's 95 % confidence interval, by Student's t."""
         from scipy.special import stdtrit
 
-        return float(stdtrit(self.freedom, 0.5 + 0.5 * confidence)) * self.deviations
+        return float(stdtrit(self.freedom, 0.975)) * self.deviations
 
 
 def unidentifiable(problem: LeastSquares, values: FloatArray) -> tuple[tuple[int, ...], ...]:

@@ -132,12 +132,10 @@ def register(
     points: Sequence[FloatArray],  # measured, (n, 2) for each curve
     curves: Sequence[SmoothCurve],  # where they belong
     robust: bool = True,  # whether outliers lose their weight
-    start: FloatArray | None = None,  # (3,): angle [rad] and shift to start from; None: none
     width: bool = False,  # whether the part may be larger or smaller by one amount along all normals
 ) -> Registration:
     """Return points registered jointly to their curves."""
     state = np.zeros(4)
-    state[:3] = 0.0 if start is None else start
     size = float(np.sqrt(np.mean(np.concatenate([(item - item.mean(axis=0)) ** 2 for item in points]).sum(axis=1))))
     guess: list[FloatArray | None] = [None] * len(points)
     for weighted in (False, True) if robust else (False,):
@@ -244,20 +242,17 @@ def _registration(
 
 
 def gaps_across(
-    curve: SmoothCurve,  # not parallel to the axis
+    curve: SmoothCurve,  # nowhere parallel to the x axis
     points: FloatArray,  # (n, 2): registered
     parameters: FloatArray,  # (n,): of their feet, to start from
-    axis: int = 0,  # 0 for the distance in x at the same y
 ) -> FloatArray:
-    """Return how far points are from a curve along one axis: point less curve, at the same other coordinate."""
+    """Return how far points are from a curve in x: point less curve, at the same y."""
     low, high = curve.ends
     u = np.array(parameters)
     for _ in range(_N_FOOT_STEPS):
         at = curve.frame(u)
-        u = np.clip(
-            u + (points[:, 1 - axis] - at.points[:, 1 - axis]) / (at.speed * at.tangents[:, 1 - axis]), low, high
-        )
-    return np.asarray(points[:, axis] - curve.frame(u).points[:, axis])
+        u = np.clip(u + (points[:, 1] - at.points[:, 1]) / (at.speed * at.tangents[:, 1]), low, high)
+    return np.asarray(points[:, 0] - curve.frame(u).points[:, 0])
 
 
 def _row_dot(first: FloatArray, second: FloatArray) -> FloatArray:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 FLOAT_EPS = float(np.finfo(float).eps)
+MAX_NEWTON_STEPS, MAX_BRACKETINGS = 80, 200
 
 
 def invert_increasing(
@@ -28,8 +29,6 @@ def invert_increasing(
     targets: FloatArray,
     bracket: tuple[float | FloatArray, float | FloatArray],
     guess: FloatArray,
-    iterations: int = 80,
-    before: FloatArray | None = None,
 ) -> FloatArray:
     """Return x in the bracket with value(x) = target for an increasing function, element by element.
 
@@ -46,10 +45,6 @@ def invert_increasing(
         Where to look.
     guess : (n,) array
         First estimates; clipped to the bracket.
-    iterations : int
-        At most so many steps.
-    before : (n,) array, optional
-        How far off the values were a step before the guess, where that step was at least one of Newton's.
 
     Returns
     -------
@@ -67,8 +62,8 @@ def invert_increasing(
     x = np.minimum(np.maximum(guess, bracket[0]), bracket[1])
     fine = 16.0 * FLOAT_EPS * np.maximum(np.abs(targets), np.abs(targets).max(initial=0.0))
     tolerance = 16.0 * FLOAT_EPS * np.maximum(np.abs(bracket[0]), np.abs(bracket[1]))
-    before = np.zeros(targets.shape) if before is None else before
-    for _ in range(iterations):
+    before = np.zeros(targets.shape)
+    for _ in range(MAX_NEWTON_STEPS):
         value, slope = evaluate(x)
         error = value - targets
         low, high = np.where(error <= 0, x, low), np.where(error >= 0, x, high)
@@ -85,7 +80,7 @@ def invert_increasing(
     return np.where(np.isnan(targets), np.nan, x)
 
 
-def bracketed_root(evaluate: Callable[[float], float], low: float, high: float, iterations: int = 200) -> float:
+def bracketed_root(evaluate: Callable[[float], float], low: float, high: float) -> float:
     """Return a root of a scalar function that changes sign between `low` and `high`.
 
     Chandrupatla's method: inverse quadratic interpolation where it is safe, else bisection;
@@ -109,7 +104,7 @@ def bracketed_root(evaluate: Callable[[float], float], low: float, high: float, 
     if (fa > 0) == (fb > 0) or math.isnan(fa) or math.isnan(fb):
         raise ValueError(f"no change of sign between {low} and {high}")
     share = 0.5
-    for _ in range(iterations):
+    for _ in range(MAX_BRACKETINGS):
         x = a + share * (b - a)
         fx = float(evaluate(x))
         if math.isnan(fx):
@@ -128,9 +123,7 @@ def bracketed_root(evaluate: Callable[[float], float], low: float, high: float, 
     return best
 
 
-def bracketed_roots(
-    evaluate: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray, iterations: int = 200
-) -> FloatArray:
+def bracketed_roots(evaluate: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
     """Return `bracketed_root` of many functions at once, element by element, with the same steps.
 
     NaN where a function does not change sign, or is NaN on the way.
@@ -144,7 +137,7 @@ def bracketed_roots(
         a, b, fa, fb = np.broadcast_arrays(high, low, evaluate(high), evaluate(low))
         root = np.where(fa == 0, a, np.where(fb == 0, b, np.nan))
         searched, share = np.isnan(root) & ((fa > 0) != (fb > 0)) & ~np.isnan(fa + fb), np.full(root.shape, 0.5)
-        for _ in range(iterations):
+        for _ in range(MAX_BRACKETINGS):
             x = a + share * (b - a)
             fx = evaluate(x)
             stays = (fx > 0) == (fa > 0)
@@ -193,7 +186,6 @@ def last_places(
     # (d, k) each: where it holds, and where it does not; equal where there is nothing to look for
     inside: FloatArray,
     outside: FloatArray,
-    rounds: int = 100,  # calls at most
 ) -> FloatArray:
     """Return the last places at which a condition still holds from places inside towards places outside, (d, k).
 
@@ -224,7 +216,7 @@ def last_places(
     heights[:, -1] = np.where(heights[:, -1] <= 0.0, _FLOAT_TINY, heights[:, -1])
     expected = _inverse(places, heights)
     places, heights = (np.concatenate([values[:, :1], values, values[:, -1:]], axis=1) for values in (places, heights))
-    for _ in range(rounds):
+    for _ in range(MAX_BRACKETINGS):
         # The last place that holds, the first that does not, and their neighbours outside of these.
         first = (~(heights <= 0.0)).argmax(axis=1)[:, None] + _NEIGHBOUR_OFFSETS
         places, heights = (np.take_along_axis(values, first, axis=1) for values in (places, heights))

@@ -53,9 +53,9 @@ class Moving:
     draw_as_made: Callable[[Axes, int], Any] | None = None
 
 
-def choose_poses(count: int, poses: int = N_FILM_POSES) -> FloatArray:
-    """Return the indices of `poses` evenly spread points of a curve with `count` points, ends included."""
-    return np.unique(np.linspace(0, count - 1, min(count, poses)).round().astype(int))
+def choose_poses(count: int) -> FloatArray:
+    """Return the indices of evenly spread points of a curve with `count` points that are shown as poses, ends included."""
+    return np.unique(np.linspace(0, count - 1, min(count, N_FILM_POSES)).round().astype(int))
 
 
 def film(

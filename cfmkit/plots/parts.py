@@ -42,6 +42,7 @@ Box = tuple[float, float, float, float]
 
 PLATE_COLOUR, STEEL_COLOUR, LINK_COLOUR = "#DADADA", "#F4F7FA", "#3D5A73"
 """Fill of what is cut from sheet, of rollers, and colour of links."""
+N_DRAWN_COILS = 12  # of a tension spring
 TITLE_HEIGHT = 10.0  # room for a title of two lines above a panel [mm]
 
 
@@ -95,26 +96,26 @@ def link(ax: Axes, start: Point, end: Point, gid: str = "link") -> None:
     )  # fmt: skip
 
 
-def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring", coils: int = 12) -> None:
+def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring") -> None:
     """Draw a tension spring as a zigzag of some width between two pins, straight at its ends."""
     a, b = np.array(start, dtype=float), np.array(end, dtype=float)
     along = b - a
     length = float(np.hypot(*along))
     across = np.array([-along[1], along[0]]) * (width / length if length else 0.0)
-    share = np.concatenate([[0.0, 0.12], np.linspace(0.12, 0.88, 2 * coils + 1)[1:-1], [0.88, 1.0]])
+    share = np.concatenate([[0.0, 0.12], np.linspace(0.12, 0.88, 2 * N_DRAWN_COILS + 1)[1:-1], [0.88, 1.0]])
     side = np.zeros(len(share))
     side[2:-2] = np.where(np.arange(len(share) - 4) % 2 == 0, 0.5, -0.5)
     points = a + np.outer(share, along) + np.outer(side, across)
     _line(ax, *mm(points).T, color=SPRING_OCHRE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
 
 
-def slider(ax: Axes, center: Point, size: float, gid: str = "slider") -> None:
+def slider(ax: Axes, center: Point, size: float) -> None:
     """Draw a square block that slides along a guide."""
     from matplotlib.patches import Rectangle
 
     (x, y), side = mm(center), float(mm(size))
     look: Look = {"facecolor": LINK_COLOUR, "edgecolor": TEXT_INK, "linewidth": 0.6}
-    ax.add_artist(Rectangle((x - side / 2, y - side / 2), side, side, zorder=3.4, gid=gid, **look))
+    ax.add_artist(Rectangle((x - side / 2, y - side / 2), side, side, zorder=3.4, gid="slider", **look))
 
 
 def axis_of_symmetry(ax: Axes, low: float, high: float) -> None:

@@ -75,7 +75,6 @@ def mesh(
     seams: Sequence[FloatArray] = (),
     # a node stands where a smooth edge that comes along a seam is farther from it than this [m]
     seam_distance: float = 0.0,
-    seed: int = 0,  # of the points that are thrown
 ) -> TriangleMesh:
     """Return a mesh of the part within some rings.
 
@@ -91,7 +90,7 @@ def mesh(
     on_seams = [_points_on_seam(region, field, seam) for seam in seams]
     sewn = np.concatenate([np.zeros((0, 2)), *on_seams])
     kept_from = Spacing(field, sewn)
-    inside = kept_from(_sample_interior(region, field, np.random.default_rng(seed)))
+    inside = kept_from(_sample_interior(region, field, np.random.default_rng(0)))
     if 4 * (len(inside) + len(fixed)) > MOST_NODES:  # a node in the middle of each side: three to a corner
         raise _too_many_nodes(4 * (len(inside) + len(fixed)))
     inside = _relax_points(region, kept_from, np.concatenate([fixed, sewn]), inside)

@@ -115,9 +115,7 @@ def outputs(records: Records, summary: Summary, curves: bool = False) -> Iterato
     if curves:
         yield "curves.csv", curves_csv(records)
     yield "metrics.json", json_bytes(summary.as_json(records) | {"drawn": _drawn_data(records, summary)})
-    resolve = family(study.spec.family).resolve
-    resolved = resolve(study.spec) if resolve else study.spec
-    yield "resolved.yaml", dump(resolved, complete=True).encode()
+    yield "resolved.yaml", dump(family(study.spec.family).resolve(study.spec), complete=True).encode()
 
 
 def _drawn_data(records: Records, summary: Summary) -> dict[str, Any]:

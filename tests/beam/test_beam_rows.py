@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from beam_support import config
 
+import cfmkit
 from cfmkit.families.beam.model import solve, solve_rows
+from cfmkit.specs.units import to_border
 
 
 def test_variants_whose_paths_have_events_are_no_rows():
@@ -24,3 +26,16 @@ def test_largest_stresses_of_many_paths_are_those_of_each():
         found = rows.solution.branches["load"].stress.largest(low, high)
         own = [law.largest_stress("", *ends) for law, *ends in zip(laws, low, high, strict=True)]
         assert found == pytest.approx(own, rel=1e-12)
+
+
+@pytest.mark.parametrize("switches", [(False, True, True), (True, False, False)])
+def test_wide_and_narrow_beams_of_one_network_are_looked_at_by_themselves(switches):
+    """Their elements have other arrays: the largest stresses of a sweep are those of each run."""
+    spec = config("studies/beam_rounding", "analysis.points=25").replace({"sweep": None, "sensitivity": None})
+    vary = {"mechanism.wide_beams": list(switches), "mechanism.thickness": ["0.9 mm", "1 mm", "1.1 mm"]}
+    swept = cfmkit.sweep(spec, vary=vary, combine="zip", metrics=["stress_max", "force_mean"]).table
+    variants = [dict(zip(vary, values, strict=True)) for values in zip(*vary.values(), strict=True)]
+    runs = [cfmkit.analyze(spec.replace(changes)) for changes in variants]
+    for name, dimension in (("stress_max", "stress"), ("force_mean", "force")):
+        own = [to_border(run.metrics[name].value, dimension) for run in runs]
+        assert list(swept[name]) == pytest.approx(own, rel=1e-12)

@@ -304,7 +304,7 @@ def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
         assert abs(last - first) < 1e-12
 
     def area(one):
-        x, y = polygons(one.contours[:1], "cut", 2000)[0].T
+        x, y = polygons(one.contours[:1], 2000)[0].T
         return 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
 
     assert area(rounded) - area(sharp) == pytest.approx(2 * (1 - np.pi / 4) * 0.003**2, rel=1e-3)
@@ -318,7 +318,7 @@ def test_a_roller_meets_the_fillet_of_a_corner_not_the_rest_of_its_circle():
     assert "parts_touch" not in {one.name for one in found.warnings}
     gap, states = nearest_pairs(found.state)[BESIDE_FLANKS_PAIR], found.state.states
     assert gap.min() > -1e-9
-    outline = polygons(cfmkit.drawing(found.spec).contours[:1], "cut", 4000)[0]
+    outline = polygons(cfmkit.drawing(found.spec).contours[:1], 4000)[0]
     for at in (0, len(gap) // 8):
         away = np.hypot(*(outline - [states.x[at], states.y[at]]).T).min() - 0.010
         assert gap[at] >= away - 1e-6  # the whole outline has the flank, too, which the roller touches

@@ -45,6 +45,7 @@ def test_the_keys_that_pages_name_are_those_of_the_program():
     """Those of the changes that are called new, too."""
     pages = [path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md")]
     pages.append((ROOT / "CHANGELOG.md").read_text(encoding="utf-8").partition("\n### New\n")[2])
+    pages += [path.read_text(encoding="utf-8") for path in (ROOT / "changes").glob("new_*.md")]
     named = set(re.findall(r"`((?:mechanism|design|analysis)\.[a-z_]+(?:\.[a-z_]+)*)(?=[`:=\[])", "".join(pages)))
     assert len(named) > 60
     kind = show_topics.TOPIC_KINDS["keys"]

@@ -8,8 +8,9 @@ from cam_support import analyze, cam, fixed
 from experiment_support import triangle
 
 import cfmkit
+from cfmkit import api
 from cfmkit.errors import DataError, SolutionError, UsageError
-from cfmkit.experiment.calibration import calibrate, resolve_spec
+from cfmkit.experiment.calibration import calibrate
 from cfmkit.experiment.comparison import compare
 from cfmkit.experiment.curves_and_metrics_of_recording import measure_recording
 from cfmkit.experiment.parameters_to_fit import parameters, read_bounds
@@ -22,7 +23,7 @@ STIFFNESS, CONSTANT = "mechanism.springs.stiffness", "mechanism.profile.force_co
 
 def built(friction=0.002, **changes):
     """The published cam as a finished part, measured from 5 to 230 mm."""
-    return resolve_spec(fixed(cam(analysis__window=("5 mm", "230 mm")), rolling_friction=friction, **changes))
+    return api.resolve(fixed(cam(analysis__window=("5 mm", "230 mm")), rolling_friction=friction, **changes))
 
 
 def recording(spec, noise=0.0, seed=0, shift=0.0, drift=0.0, moved=0.0):
@@ -112,7 +113,7 @@ def test_outliers_hardly_move_the_robust_fit():
 
 def test_the_built_cam_keeps_its_shape_while_the_rest_length_is_fitted():
     """Else the fit would cut a new cam for every trial, whose force does not depend on the rest length at all."""
-    start = resolve_spec(cam(analysis__window=("5 mm", "230 mm")))
+    start = api.resolve(cam(analysis__window=("5 mm", "230 mm")))
     source = recording(built(rest_half_width="68.25 mm", friction=0.0))
     found = calibrate(start, source, parameters(start, [REST]))
     assert found.fit.values == pytest.approx([0.06825], rel=1e-7)

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 import cfmkit
-from cfmkit.experiment.calibration import calibrate, resolve_spec
+from cfmkit import api
+from cfmkit.experiment.calibration import calibrate
 from cfmkit.experiment.curves_and_metrics_of_recording import measure_recording
 from cfmkit.experiment.parameters_to_fit import parameters
 from cfmkit.experiment.reading import read_recording
@@ -39,7 +40,7 @@ def test_every_file_says_in_its_first_line_that_it_is_synthetic(name):
 
 
 def test_friction_and_rest_length_that_were_put_in_are_calibrated_on_the_built_cam(script):
-    spec = resolve_spec(cfmkit.load(CONFIGS / "cam_as_built.yaml"))
+    spec = api.resolve(cfmkit.load(CONFIGS / "cam_as_built.yaml"))
     chosen = parameters(spec, ["mechanism.rolling_friction", "mechanism.rest_half_width"])
     found = calibrate(spec, measure_recording(read_recording(DATA / "cam_loop.csv"), None), chosen)
     truth = (script.FRICTION, 0.068 + script.LONGER)

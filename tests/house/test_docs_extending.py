@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 CHANGES = re.findall(r"^--- (\S+)\n(.*?)(?=^--- |^```)", PAGE, re.M | re.S)
@@ -47,3 +49,11 @@ def test_the_changes_on_the_page_do_what_they_say(tmp_path):
     assert place.startswith(str(tmp_path))
     assert float(damped) > float(without) > 10.0
     assert float(bar) == 2e5
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no clone")
+def test_the_commits_that_the_page_names_exist():
+    names = re.findall(r"`(?:git show )?([0-9a-f]{8})`", PAGE)
+    assert len(names) == 5
+    for name in names:
+        subprocess.check_call(["git", "-C", str(ROOT), "cat-file", "-e", f"{name}^{{commit}}"])

@@ -90,7 +90,7 @@ def test_the_outline_of_a_mirrored_pair_holds_every_part_twice():
 
     one, pair = (drawing(spec("strip", copies=copies)) for copies in ("single", "mirrored"))
     assert len(pair.contours) == 2 * len(one.contours)
-    first, second = polygons(pair.contours, "cut")[0], polygons(pair.contours[len(one.contours) :], "cut")[0]
+    first, second = polygons(pair.contours)[0], polygons(pair.contours[len(one.contours) :])[0]
     np.testing.assert_allclose(np.sort(first[:, 0]), np.sort(second[:, 0]), atol=1e-12)
     assert np.ptp(np.sort(first[:, 1]) + np.sort(second[:, 1])[::-1]) < 1e-12
     assert second[:, 1].max() < first[:, 1].min()

@@ -40,15 +40,14 @@ def mechanisms(count):
 
 
 @pytest.mark.parametrize(("link", "start", "place"), list(mechanisms(40)))
-def test_effort_stiffness_and_bend_are_derivatives_of_the_energy(link, start, place):
+def test_effort_and_stiffness_are_derivatives_of_the_energy(link, start, place):
     """Central differences over 1e-4 rad of q^2/2 of each joint."""
     step = 1e-4
-    before, here, after = (curves_along_crank(link, start, np.array([place + k * step]), bend=True) for k in (-1, 0, 1))
+    before, here, after = (curves_along_crank(link, start, np.array([place + k * step])) for k in (-1, 0, 1))
     scale = np.array([1.0, 1.0, 1.0, (link.crank + link.coupler) ** 2])[:, None]
     pairs = (
         ((after.turn**2 - before.turn**2) / (4 * step), here.effort),
         ((after.effort - before.effort) / (2 * step), here.stiffness),
-        ((after.stiffness - before.stiffness) / (2 * step), here.bend),
     )
     for difference, exact in pairs:
         np.testing.assert_allclose(difference / scale, exact / scale, rtol=2e-4, atol=2e-4)

@@ -251,14 +251,14 @@ class AlongMotion:
         return value if self.sense > 0 else 0.0 - value  # not -0
 
 
-def find_strict_start(x: FloatArray, force: FloatArray, end: float, band: float = RANGE_BAND) -> float:
-    """Return the smallest c with (max - min) <= band max of the force on c ... end."""
+def find_strict_start(x: FloatArray, force: FloatArray, end: float) -> float:
+    """Return the smallest c with (max - min) <= `RANGE_BAND` max of the force on c ... end."""
     before = x < end
     values = np.append(force[before], value_at(x, force, end))
     places = np.append(x[before], end)
     tops = np.maximum.accumulate(values[::-1])[::-1]
     bottoms = np.minimum.accumulate(values[::-1])[::-1]
-    bad = np.flatnonzero(tops - bottoms > band * tops)
+    bad = np.flatnonzero(tops - bottoms > RANGE_BAND * tops)
     if not len(bad):
         return float(places[0])
     last = int(bad[-1])
@@ -266,6 +266,6 @@ def find_strict_start(x: FloatArray, force: FloatArray, end: float, band: float 
 
     def is_inside_band(place: float) -> bool:
         force_there = value_at(x, force, place)
-        return max(top, force_there) - min(bottom, force_there) <= band * max(top, force_there)
+        return max(top, force_there) - min(bottom, force_there) <= RANGE_BAND * max(top, force_there)
 
     return bisect(is_inside_band, float(places[last]), float(places[last + 1]))

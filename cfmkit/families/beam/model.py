@@ -435,7 +435,9 @@ def _kind(solution: Solution) -> Hashable:
     """Return what mechanisms that are looked at together have in common."""
     path, analysis = solution.path, solution.spec.analysis
     stated = analysis.reference is None, solution.assembly.allowable_stress is None
-    arrays = path.mesh.degree, path.mesh.elements.unknowns.tobytes(), tuple(path.network.beams)
+    elements = path.mesh.elements
+    absent = tuple(table is None for table in elements)  # of beams that are not wide, or do not stretch
+    arrays = path.mesh.degree, elements.unknowns.tobytes(), tuple(path.network.beams), absent
     return *arrays, solution.spec.mechanism.drive.turns, solution.spec.stress, *stated
 
 

@@ -148,7 +148,7 @@ def hardware(solution: Solution) -> Hardware:
     screw = _screw(loads, len(holes), faults)
     parts = [*_parts(solution, loads, sizes), guide_part(rods, pin, mechanism.guide is None)]
     if holes:
-        parts.append(screw_part("plate to its base", len(holes), screw, loads.thickness, "screw"))
+        parts.append(screw_part("plate to its base", len(holes), screw, loads.thickness))
     standing = tuple(_standing(solution, rods, pin, holes, screw))
     drawn = tuple(_drawn_bodies(solution, standing, hooks, sizes))
     rubbing: dict[str, dict[str, float]] = {"pins": {"diameter": pin}, "guide": {}}

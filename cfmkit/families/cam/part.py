@@ -106,11 +106,11 @@ def _contact(solution: Solution, index: int) -> Point:
     return float(x), float(y)
 
 
-def surface(solution: Solution, points: int = 400) -> FloatArray:
+def surface(solution: Solution) -> FloatArray:
     """Return the right flank as the roller finds it, material left on it included, (n, 2) [m]."""
     profile = solution.assembly.track.profile  # with material missing: the flank cut for a larger roller
     offset = max(solution.mechanism.profile.offset, 0.0) - profile.roller_radius
-    share = np.linspace(0.0, 1.0, points)
+    share = np.linspace(0.0, 1.0, 400)
     u = profile.start + (profile.end - profile.start) * share**2
     return np.column_stack(profile.offset_points(u, offset))
 
@@ -131,7 +131,7 @@ def scene(solution: Solution) -> Scene:
     height = top - bottom
     half = max(1.06 * across, MIN_ASPECT_RATIO * height)
     view = (-half, bottom - 0.03 * height, half, top + 0.14 * height)
-    return Scene(polygons(cut_plate(solution), "cut"), surface(solution), solution.roller_path, view)
+    return Scene(polygons(cut_plate(solution)), surface(solution), solution.roller_path, view)
 
 
 def swallowtail(solution: Solution, points: int = 200) -> FloatArray:

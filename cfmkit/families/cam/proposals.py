@@ -28,7 +28,7 @@ from cfmkit.families.cam.part_sizes_and_clearances import BRACE_WIDTH, depth_of,
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
-from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, guide_rods, pin_for, series_sizes
+from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, guide_rods, pin_for, pin_sizes
 from cfmkit.families.proposals import Candidate, FamilyOffer, name_variant
 from cfmkit.families.run_control import Run
 from cfmkit.metrics import evaluate
@@ -246,7 +246,7 @@ class _Joints:
         pin, pin_bears = pin_for(pull, arm, thin, self.strength, None)
         shaft, shaft_bears = pin_for(self.press, 0.5 * (self.thick + self.brace), self.thick, self.strength, None)
         least, most = PIN_SHARE * 2.0 * size["roller"], SHAFT_IN_ROLLER * 2.0 * size["roller"]
-        handy = next((entry for entry in series_sizes("pin", None) if entry >= least), pin)
+        handy = next((entry for entry in pin_sizes(None) if entry >= least), pin)
         return max(pin, handy) if pin_bears and shaft_bears and max(pin, shaft) <= most else None
 
     def turn_on_bearings(self, roller: float, outer: float, pull: float) -> bool:

@@ -36,7 +36,7 @@ def drawing(spec: SliderCrankSpec, tolerance: float = OUTLINE_TOLERANCE) -> Draw
 
 def with_mirror_image(drawing: Drawing) -> Drawing:
     """Return a drawing with the mirror image of its parts below them, apart from them."""
-    heights = np.concatenate(polygons(drawing.contours, "cut"))[:, 1]
+    heights = np.concatenate(polygons(drawing.contours))[:, 1]
     low, high = float(heights.min()), float(heights.max())
     axis = low - 0.05 * (high - low) - 0.002
     mirrored = tuple(_mirror_contour(contour, axis) for contour in drawing.contours)

@@ -64,14 +64,12 @@ class UnitCurves(ShortRepr):
     turn: FloatArray  # (4, ..., n), q: how far each joint has turned, or the slider moved, from the unloaded position
     effort: FloatArray  # (4, ..., n), q q', the derivative of q^2/2 by the motion
     stiffness: FloatArray  # (4, ..., n), (q q')'
-    bend: FloatArray | None = None  # (4, ..., n), (q q')''; None if it was not requested
 
 
 def curves_along_crank(
     linkage: Linkage,  # must be assemblable
     unloaded: float,  # crank angle at which all springs are relaxed [rad]
     angle: FloatArray,  # (n,): crank angles [rad], any number of turns
-    bend: bool = False,  # whether the second derivative of the effort is wanted, too
     anchor: float = 0.0,  # how far the anchor of the slider's spring is moved beyond where that is relaxed [m]
 ) -> UnitCurves:
     """Return the unit curves over the crank angle: effort is a torque at the crank [LH, eq. 10].
@@ -89,14 +87,7 @@ def curves_along_crank(
         b2 = (r1 * sine / r2 + rise * b1**2) / level
         x2 = -r1 * cosine - r2 * (level * b1**2 + rise * b2)
         second = np.stack([np.zeros_like(b2), b2, b2, x2])
-        effort = turn * first
-        stiffness = first**2 + turn * second
-        if not bend:
-            return UnitCurves(angle, position, turn, effort, stiffness)
-        b3 = (r1 * cosine / r2 + level * b1**3 + 3.0 * rise * b1 * b2) / level
-        x3 = r1 * sine + r2 * (rise * b1**3 - 3.0 * level * b1 * b2 - rise * b3)
-        third = np.stack([np.zeros_like(b3), b3, b3, x3])
-        return UnitCurves(angle, position, turn, effort, stiffness, 3.0 * first * second + turn * third)
+        return UnitCurves(angle, position, turn, turn * first, first**2 + turn * second)
 
 
 def crank_efforts(linkage: Linkage, unloaded: float, angle: FloatArray, anchor: float = 0.0) -> FloatArray:

@@ -141,9 +141,9 @@ class Miss:
     reason: str
 
 
-def nearest(misses: Sequence[Miss], count: int = 3) -> str:
+def nearest(misses: Sequence[Miss]) -> str:
     """Return the choices that miss least, and what, in one line."""
-    best = sorted(misses, key=lambda miss: miss.share)[:count]
+    best = sorted(misses, key=lambda miss: miss.share)[:3]
     left = len(misses) - len(best)
     reported = "; ".join(f"{miss.label}: {miss.reason}" for miss in best)
     more = "1 other misses by more" if left == 1 else f"{left} others miss by more"

@@ -164,24 +164,24 @@ class Parts:
             ) from None
 
     @classmethod
-    def from_expected_errors(cls, spec: Spec, seed: int, process: str | None = None) -> tuple[Parts | None, str]:
+    def from_expected_errors(cls, spec: Spec, seed: int) -> tuple[Parts | None, str]:
         """Return the parts that a shop will make, by stated or else by assumed errors, and in words whose errors."""
         design = getattr(spec, "design", None)
         if not isinstance(design, DesignKeys):
             return None, ""
         if design.tolerances_of(spec)[0]:
             return cls.from_design(spec, design, seed), "within design.tolerances"
-        assumed = assume_errors(spec, process)
+        assumed = assume_errors(spec)
         if assumed is None:
             return None, ""
-        return cls.from_assumed_errors(spec, seed, process), f"made by {assumed.process.name} (assumed tolerances)"
+        return cls.from_assumed_errors(spec, seed), f"made by {assumed.process.name} (assumed tolerances)"
 
     @classmethod
-    def from_assumed_errors(cls, spec: Spec, seed: int, process: str | None = None) -> Parts:
+    def from_assumed_errors(cls, spec: Spec, seed: int) -> Parts:
         """Return the parts that a process is assumed to make, for a specification some of whose values err by it."""
         design = getattr(spec, "design", None)
         count_and_seed = _count_and_seed(spec, design, seed) if isinstance(design, DesignKeys) else (0, seed)
-        return cls.from_block(spec, _block(tolerances(spec, process)), *count_and_seed)
+        return cls.from_block(spec, _block(tolerances(spec)), *count_and_seed)
 
     @property
     def paths(self) -> tuple[str, ...]:

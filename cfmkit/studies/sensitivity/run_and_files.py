@@ -57,8 +57,7 @@ def outputs(findings: Findings) -> Iterator[tuple[str, Data]]:
     if findings.convergence:
         yield "convergence.csv", to_csv(lines_table(findings.convergence))
     yield "metrics.json", json_bytes(as_json(findings))
-    resolve = family(spec.family).resolve
-    yield "resolved.yaml", dump(resolve(spec) if resolve else spec, complete=True).encode()
+    yield "resolved.yaml", dump(family(spec.family).resolve(spec), complete=True).encode()
 
 
 def results_csv(findings: Findings) -> Iterator[bytes]:

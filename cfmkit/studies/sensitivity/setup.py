@@ -257,8 +257,6 @@ def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...],
 def _followers(spec: Spec, parameters: tuple[Parameter, ...]) -> Iterator[Finding]:
     """Yield what is derived from a parameter: not a deviation of one made part, but another part each time."""
     resolve = family(spec.family).resolve
-    if resolve is None:
-        return
     base = dict(resolve(spec).leaves())
     for parameter in parameters:
         low, high = parameter.spread.ends

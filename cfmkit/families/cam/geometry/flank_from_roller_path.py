@@ -183,9 +183,9 @@ class BuiltFlank:
         )
 
 
-def arc_lengths(flank: DesignFlank, count: int = 20_001) -> tuple[FloatArray, FloatArray]:
+def arc_lengths(flank: DesignFlank) -> tuple[FloatArray, FloatArray]:
     """Return path coordinates and arc lengths of a designed flank, by trapezoids of its speed [m]."""
-    parameter = np.linspace(*flank.ends, count)
+    parameter = np.linspace(*flank.ends, 20_001)
     speed = flank.frame(parameter).speed
     steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(parameter)
     return parameter, np.concatenate([[0.0], np.cumsum(steps)])

@@ -296,7 +296,7 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
             "ground",
         ),
         guide_part(rods, pin, mechanism.guide is None),
-        screw_part(GROUND_SCREWS, len(places), screw, sheet, "screw", countersunk=not reached),
+        screw_part(GROUND_SCREWS, len(places), screw, sheet, countersunk=not reached),
     )
     rubbing = {"pins": {"diameter": pin}, "guide": {}}
     heads, thicker = screw.head_height if reached else 0.0, max(rods.slider_thickness - sheet, 0.0)
