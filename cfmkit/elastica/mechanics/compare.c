@@ -205,9 +205,8 @@ static Int pick(const double *effort, const double *last, Int *at, Int count, ch
 
 /* Estimated error of a path on which all is stable: its start and points as rows of `march`, free unknowns, slopes, drive,
  * effort, stability, target. Not a number if that is not certain. `point_errors` of accuracy.py is the specification. */
-double path_error(const Model *m, const Model *shapes, const double *laws, Int powers, const double *start, const double *rows,
-                  Int count) {
-    const Int n = m->free, wide = 2 * n + 4, total = count + 1, same = n_ends(m), size = m->size;
+double path_error(const Model *m, const Model *shapes, const double *laws, Int powers, const double *rows, Int total) {
+    const Int n = m->free, wide = 2 * n + 4, same = n_ends(m), size = m->size;
     double *z = malloc((size_t)(total * (size + 3) + N_PICKED * (size + 1 + same + N_COMPARED)) * sizeof(double));
     Int *at = calloc((size_t)(2 * total), sizeof(Int)), targets = 0;
     if (!z || !at) { free(z); free(at); return NAN; }
@@ -217,7 +216,7 @@ double path_error(const Model *m, const Model *shapes, const double *laws, Int p
     int by_loads = 1;
     for (Int i = 0; i < size; i++) by_loads = by_loads && m->rate[i] == 0.0;
     for (Int p = 0; p < total; p++) {
-        const double *row = p ? rows + (p - 1) * wide : start;
+        const double *row = rows + p * wide;
         double *own = z + p * size;
         drive[p] = row[2 * n];
         for (Int i = 0; i < size; i++) own[i] = m->slot[i] >= 0 ? row[m->slot[i]] : m->base[i] + drive[p] * m->rate[i];

@@ -109,6 +109,13 @@ class CompiledEquations(NumpyEquations):
         vars(exchanged).update(mesh=mesh, unit=unit, arrays={**self.arrays, **arrays}, row=row)
         return exchanged
 
+    def exchange_axial(self, mesh: Discretisation) -> CompiledEquations:
+        """Return the equations of the same network with other compliances along its elements."""
+        arrays, exchanged = {"axial": np.ascontiguousarray(mesh.elements.axial)}, copy(self)
+        row = make_row(arrays, {}, self.row)
+        vars(exchanged).update(mesh=mesh, arrays={**self.arrays, **arrays}, row=row)
+        return exchanged
+
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
         gradient, hessian = np.empty(len(z)), np.empty((len(z), len(z)))
@@ -232,19 +239,19 @@ class CompiledEquations(NumpyEquations):
     def march(self, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
         n, goals = self.n, np.ascontiguousarray(targets, float)
-        rows, stored = np.empty((plan.room, 2 * n + 4)), np.zeros(2, np.int64)
+        rows, stored = np.empty((plan.room + 1, 2 * n + 4)), np.zeros(2, np.int64)
         parity = start.unstable % 2 if self.follows else start.unstable
+        rows[0, :n], rows[0, n : 2 * n] = start.x, start.rate
+        rows[0, 2 * n :] = start.drive, start.effort, parity, -1.0
         plan_row = plan_row_of(plan, parity, False)
         before = plan.before
         previous_row = NO_NUMBERS if before is None else np.concatenate([before.x, before.rate, [before.drive]])
-        start_row = np.concatenate([start.x, start.rate, [start.drive, start.effort, parity, -1.0]])
         any_vector = NO_NUMBERS if plan.any_vector is None else plan.any_vector
         shapes, laws = NO_NUMBERS, NO_NUMBERS
         if plan.finer_degree:
             shapes, laws = shape_row(plan.finer_degree)[0], self._find_laws(plan.finer_degree)
-        states = start_row, previous_row, goals, rows, stored
-        code = self.code.march(self.row, plan_row, *states, any_vector, shapes, laws)
-        rows = rows[: stored[0]].copy()
+        code = self.code.march(self.row, plan_row, previous_row, goals, rows, stored, any_vector, shapes, laws)
+        rows = rows[1 : 1 + stored[0]].copy()
         drive, effort, told, target = rows[:, 2 * n :].T
         unstable, at_targets = told.astype(np.int64), target.astype(np.int64)
         x, rate, step = rows[:, :n], rows[:, n : 2 * n], float(plan_row[0])

@@ -167,17 +167,16 @@ end:
     return code;
 }
 
-/* A march from a start, which is a row like those it stores, with the error of the path if there are laws of elements. */
-int march_whole(const Model *m, Plan *plan, double *start, const double *before, const double *targets, Int count, double *rows,
-                Int room, Int *stored, const double *any, const Model *shapes, const double *laws, Int powers) {
-    const Int n = m->free;
-    const size_t bytes = (size_t)(2 * n + 4) * sizeof(double);
-    double *first = malloc(bytes);
-    if (!first) return NO_START;
-    memcpy(first, start, bytes);
-    const int code = march(m, plan, start, start + n, start + 2 * n, before, targets, count, rows, room, stored, any);
-    if (laws && code == DONE) plan->error = path_error(m, shapes, laws, powers, first, rows, stored[0]);
-    free(first);
+/* A march from the first row to those behind it, with the error of the path if there are laws of elements. */
+int march_rows(const Model *m, Plan *plan, const double *before, const double *targets, Int count, double *rows, Int room,
+               Int *stored, const double *any, const Model *shapes, const double *laws, Int powers) {
+    const Int n = m->free, wide = 2 * n + 4;
+    double *here = malloc((size_t)wide * sizeof(double));
+    if (!here) return NO_START;
+    memcpy(here, rows, (size_t)wide * sizeof(double));
+    const int code = march(m, plan, here, here + n, here + 2 * n, before, targets, count, rows + wide, room - 1, stored, any);
+    if (laws && code == DONE) plan->error = path_error(m, shapes, laws, powers, rows, stored[0] + 1);
+    free(here);
     return code;
 }
 

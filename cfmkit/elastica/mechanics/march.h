@@ -163,8 +163,7 @@ int beam_tables(const Model *shapes, Int elements, const Int *row, const double 
                 double *tables, double *lengths);
 int compare(const Model *models, Int designs, const Model *shapes, const double *laws, Int powers, const double *z,
             const double *drive, Int count, double tolerance, double *ends, double *found);
-double path_error(const Model *m, const Model *shapes, const double *laws, Int powers, const double *start, const double *rows,
-                  Int count);
+double path_error(const Model *m, const Model *shapes, const double *laws, Int powers, const double *rows, Int count);
 
 /* Of a march: numbers of 8 bytes, too. */
 typedef struct {
@@ -175,8 +174,8 @@ typedef struct {
 
 int march(const Model *m, Plan *plan, double *x, double *rate, double *way, const double *before, const double *targets,
           Int count, double *rows, Int room, Int *stored, const double *any);
-int march_whole(const Model *m, Plan *plan, double *start, const double *before, const double *targets, Int count, double *rows,
-                Int room, Int *stored, const double *any, const Model *shapes, const double *laws, Int powers);
+int march_rows(const Model *m, Plan *plan, const double *before, const double *targets, Int count, double *rows, Int room,
+               Int *stored, const double *any, const Model *shapes, const double *laws, Int powers);
 int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts,
                Int room, Int *codes, const Int *chosen, Int some, double *states);
 

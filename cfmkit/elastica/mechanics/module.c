@@ -5,7 +5,7 @@
 
 #include "march.h"
 
-#define MAX_BUFFERS 10
+#define MAX_BUFFERS 9
 #define MAX_NUMBERS 3
 
 /* Arguments of a call: arrays in C order, NULL of an empty one, how many doubles each has, and numbers. */
@@ -59,9 +59,9 @@ FUNCTION(compare, 7, 1, compare(m, a->count[0] / N_FIELDS, a->at[1], a->at[2], a
 /* shapes, row, cuts, coefficients, length, rigidities, tables, lengths; units of length, force */
 FUNCTION(tables, 8, 2, beam_tables(m, a->count[1], a->at[1], a->at[2], a->at[3], a->count[3] / a->count[4], a->at[4], a->at[5],
                                    a->count[4], a->number[0], a->number[1], a->at[6], a->at[7]))
-/* model, plan, start, before, targets, rows, stored, any vector, shapes, laws -> code */
-FUNCTION(march, 10, 0, march_whole(m, a->at[1], a->at[2], a->at[3], a->at[4], a->count[4], a->at[5], a->count[5] / (2 * m->free + 4),
-                                   a->at[6], a->at[7], a->at[8], a->at[9], a->count[9] / m->elements - 2))
+/* model, plan, before, targets, rows, stored, any vector, shapes, laws -> code */
+FUNCTION(march, 9, 0, march_rows(m, a->at[1], a->at[2], a->at[3], a->count[3], a->at[4], a->count[4] / (2 * m->free + 4), a->at[5],
+                                 a->at[6], a->at[7], a->at[8], a->count[8] / m->elements - 2))
 /* model, states, works -> nothing */
 static double load_works(const Model *m, const Arguments *a) {
     for (Int k = 0; k < a->count[2]; k++) ((double *)a->at[2])[k] = load_work(m, (double *)a->at[1] + k * (a->count[1] / a->count[2]));

@@ -199,8 +199,13 @@ class NetworkProblem:
         e = self.mesh.elements
         last = np.array([number for number, (_, right) in enumerate(e.cuts) if right == 1.0])
         unknowns = e.unknowns[last][:, energy.rotation_columns(self.mesh.degree)]
-        _, slopes = shape_functions(self.mesh.degree, np.ones(1))
-        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
+        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], _end_slopes(self.mesh.degree), z[unknowns]))
+
+
+@lru_cache(maxsize=64)
+def _end_slopes(degree: int) -> FloatArray:
+    """Return the slopes of the shape functions at the end of an element, (degree + 1,)."""
+    return read_only(shape_functions(degree, np.ones(1))[1][0])
 
 
 @lru_cache(maxsize=64)

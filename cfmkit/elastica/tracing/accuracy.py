@@ -150,9 +150,10 @@ def find_tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     e, found = path.mesh.elements, dict[str, float]()
     if not len(path):
         return {}
-    whole = _tautness(path)
-    if not whole.max() > TAUT_RATIO:
+    force = np.abs(path.at.z[:, e.unknowns[:, -2:]])
+    if not _tautness(path, force.max(axis=0).max(axis=1)).max() > TAUT_RATIO:
         return {}
+    whole = _tautness(path, force.max(axis=2))
     resolved = np.where(whole < MAX_TENSION, whole, 0.0).max(axis=0)
     for number, (beam, (left, right)) in enumerate(zip(e.beam, e.cuts, strict=True)):
         if right - left > RECUT_SHARE and resolved[number] * (right - left) > TAUT_RATIO:
@@ -160,10 +161,9 @@ def find_tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value}
 
 
-def _tautness(path: Path) -> FloatArray:
-    """Return L sqrt(N/EI) at every point with the length of an element's beam, (n, e)."""
+def _tautness(path: Path, force: FloatArray) -> FloatArray:
+    """Return L sqrt(N/EI) of forces in elements, dimensionless, with the lengths of their beams, (..., e)."""
     e = path.mesh.elements
-    force = np.abs(path.at.z[:, e.unknowns[:, -2:]]).max(axis=2)
     bending = (e.rigidity * e.weight).sum(axis=-1) * e.length
     row = path.mesh.numbering.row
     return np.asarray(np.sqrt(force / bending) * np.bincount(row, e.length.reshape(-1, len(row))[0])[row])
@@ -176,5 +176,6 @@ def drop_locked_points(path: Path) -> Path:
     rigid = ~path.mesh.axial.any(axis=1)
     if not rigid.any():
         return path
-    locked = (_tautness(path)[:, rigid] > MAX_TENSION).any(axis=1)
+    force = np.abs(path.at.z[:, path.mesh.elements.unknowns[:, -2:]]).max(axis=2)
+    locked = (_tautness(path, force)[:, rigid] > MAX_TENSION).any(axis=1)
     return path.take(slice(0, int(locked.argmax()))) if locked.any() else path

@@ -410,7 +410,7 @@ def _path(
         unstable=read_only(points.unstable, np.int64), requested=read_only(points.target, np.int64),
         branch=_name_branches(points.branches, states.mesh.scales.drive),
         status=status, message=message, events=events, error=float("inf"),
-        accurate=read_only(np.ones(len(points.drive)), np.bool_),
+        accurate=read_only(np.ones(len(points.drive), np.bool_), np.bool_),
     )  # fmt: skip
     # the solver has them already
     if not (isinstance(drive, Loading) or np.count_nonzero(~np.isfinite(points.effort))):
@@ -435,6 +435,8 @@ def _settle_events(points: PointColumns, events: list[PathEvent], drive: Drive, 
 
 def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
     names = {branch: _name_branch(branch, unit) for branch in set(branches)}
+    if len(names) == 1:
+        return read_only(np.full(len(branches), *names.values()), np.str_)
     return read_only([names[branch] for branch in branches], np.str_)
 
 
