@@ -91,11 +91,13 @@ class CompiledEquations(NumpyEquations):
             self.arrays[name][elements] = values
         self.arrays["bend"][elements] = (tables["weight"] * tables["rigidity"]) @ slope_products(self.mesh.degree)
 
-    def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
-        """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
+    def exchange(self, mesh: Discretisation) -> CompiledEquations:
+        """Return those with other contacts closed, or other elements that stretch; free unknowns are among these."""
         slot, kept = number_free(mesh.free, mesh.size), np.searchsorted(self.mesh.free, mesh.free)
         unit, nodes = self.unit[kept], mesh.node_contacts
         arrays = {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
+        if mesh.moving is None:
+            arrays["axial"] = np.ascontiguousarray(mesh.elements.axial)
         for name, column, contacts in (
             ("contact_at", CLOSED_NODE, nodes),
             ("side_at", CLOSED_SIDE, mesh.side_contacts),
@@ -104,7 +106,8 @@ class CompiledEquations(NumpyEquations):
                 arrays[name] = self.arrays[name].copy()
                 arrays[name][:, column] = [-1 if contact.closed is None else contact.closed for contact in contacts]
         presses = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
-        row = make_row(arrays, {"free": len(mesh.free), "presses": presses}, self.row)
+        counts = {"free": len(mesh.free), "presses": presses, "contacts": len(nodes)}
+        row = make_row(arrays, counts, self.row)
         exchanged = copy(self)
         vars(exchanged).update(mesh=mesh, unit=unit, arrays={**self.arrays, **arrays}, row=row)
         return exchanged

@@ -139,8 +139,8 @@ class NumpyEquations:
         """Set the units."""
         object.__setattr__(self, "unit", force_units(self.mesh))
 
-    def exchange_contacts(self, mesh: Discretisation) -> NumpyEquations | None:
-        """Return the equations of the same network with other contacts closed; None if they must be made anew."""
+    def exchange(self, mesh: Discretisation) -> NumpyEquations | None:
+        """Return those with other contacts closed, or other elements that stretch; None if they must be made anew."""
         return None
 
     def refill(self, elements: Any, tables: Mapping[str, Any]) -> None:
