@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
     from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
-    from cfmkit.elastica.mechanics.equations import SideData
+    from cfmkit.elastica.mechanics.equations import NumpyEquations, SideData
     from cfmkit.elastica.model.contact import Contact, Distance, FrictionState
 
     Kind = Literal[
@@ -230,7 +230,7 @@ class Conditions:
         rows, sides = self._touching
         together = None if sides is None else search_sides(self.mesh, sides, z, stage, watch=True)
         known = {} if together is None else dict(zip(rows, together[:, :, 0].T, strict=True))
-        measured = equations(self.mesh).measure_nodes(z)
+        measured = self._equations.measure_nodes(z)
         if measured is not None:
             open_gaps = self.rows_of("gap")
             known |= {k: measured[k] + raise_pad(self.mesh, self.mesh.contacts[k], z) for k in open_gaps}
@@ -238,6 +238,10 @@ class Conditions:
         for row, condition in enumerate(self.all):
             values[row] = known[row] if row in known else self.value(condition, z, stage)
         return values
+
+    @cached_property
+    def _equations(self) -> NumpyEquations:
+        return equations(self.mesh)
 
     @cached_property
     def _touching(self) -> tuple[list[int], SideData | None]:

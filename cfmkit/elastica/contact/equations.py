@@ -22,6 +22,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.line_tangent import raise_pad
 from cfmkit.elastica.contact.terms import contact_contribution, measure
+from cfmkit.elastica.mechanics.discretise import keep_equations
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
 from cfmkit.elastica.mechanics.numbering import number_free
 from cfmkit.elastica.model.contact import FrictionState
@@ -47,20 +48,20 @@ def with_closed(
 
     `friction` says what closed contacts that rub do, by their numbers: nothing, if they are not in it.
     """
-    if not closed:
+    if closed:
+        states = friction or {}
+        contacts = tuple(
+            contact._replace(closed=number in closed, friction=states.get(number, NO_FRICTION))
+            for number, contact in enumerate(mesh.contacts)
+        )
+        held = [unknown for contact in contacts if not contact.closed for unknown in contact.own_unknowns]
+        held += [unknown for contact in contacts if contact.rub >= 0 for unknown in (contact.flag, contact.anchor)]
+        pressed = replace(mesh, contacts=contacts, free=np.delete(mesh.free, np.searchsorted(mesh.free, held)))
+    elif mesh.moving is None:
+        pressed = open_all_contacts(mesh)
+    else:
         return open_all_contacts(mesh)
-    states = friction or {}
-    contacts = tuple(
-        contact._replace(closed=number in closed, friction=states.get(number, NO_FRICTION))
-        for number, contact in enumerate(mesh.contacts)
-    )
-    held = [unknown for contact in contacts if not contact.closed for unknown in contact.own_unknowns]
-    held += [unknown for contact in contacts if contact.rub >= 0 for unknown in (contact.flag, contact.anchor)]
-    pressed = replace(mesh, contacts=contacts, free=np.delete(mesh.free, np.searchsorted(mesh.free, held)))
-    equations = ((key, made) for key, made in mesh.known.items() if isinstance(made, NumpyEquations))
-    exchanged = ((key, made.exchange_contacts(pressed)) for key, made in equations)
-    pressed.known.update((key, made) for key, made in exchanged if made is not None)
-    return pressed
+    return keep_equations(mesh, pressed)
 
 
 NO_FRICTION = FrictionState(2.0)

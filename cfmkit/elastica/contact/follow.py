@@ -315,9 +315,8 @@ def _follow_part(
                 return EndOfPiece(item, _pass_point(walk, last), previous or walk.here)
             at, step = None, item.drive
         else:
-            at, step = part.grow(item.at), item.at.drive
-            quiet = previous is None or part.own.is_quiet_before(item.at)
-            found = None if quiet or previous is None else find_change(part, previous, at)
+            (at, is_quiet), step = part.own.grow_watched(item.at), item.at.drive
+            found = None if is_quiet or previous is None else find_change(part, previous, at)
         if found is not None:
             assert previous is not None
             walk = _pass_point(walk, last)

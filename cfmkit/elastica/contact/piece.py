@@ -7,11 +7,12 @@ is passed. Where one becomes negative, the change is solved for: gap and force o
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.conditions import FORCE_ROUNDING, Conditions
 from cfmkit.elastica.contact.equations import with_closed
@@ -180,6 +181,13 @@ class PieceOfPath:
         """Return an equilibrium with the forces of all contacts."""
         return at._replace(x=self.expand_state(at.x), rate=self.expand(at.rate))
 
+    def grow_each(self, states: Sequence[PathEquilibrium]) -> list[PathEquilibrium]:
+        """Return what `grow` does of several equilibria."""
+        x, rate = np.zeros((2, len(states), len(self.own_mask)))
+        x[:, self.own_mask], rate[:, self.own_mask] = [at.x for at in states], [at.rate for at in states]
+        x += self._kept
+        return [PathEquilibrium(row, at.drive, slope, *at[3:]) for row, slope, at in zip(x, rate, states, strict=True)]
+
     def grow_event(self, event: PathEvent) -> PathEvent:
         """Return an event whose equilibria have the forces of all contacts."""
         within = None if event.within is None else (self.grow(event.within[0]), self.grow(event.within[1]))
@@ -203,9 +211,9 @@ class PieceOfPath:
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
         """Return True if forces are as large as where a structure locks, between two points that nearly coincide."""
-        forces = (np.abs(at.x) / self.whole.unit)[~self.whole.motions]
-        start = abs(at.drive - before.drive) <= LOCKED_STEP * self.options.span
-        return bool(start and forces.max(initial=0.0) > LOCKED_FORCE)
+        if abs(at.drive - before.drive) > LOCKED_STEP * self.options.span:
+            return False
+        return bool((np.abs(at.x) / self.whole.unit)[~self.whole.motions].max(initial=0.0) > LOCKED_FORCE)
 
     # -- gaps and forces -----------------------------------------------------------------------------------------------
     def values(self, x: FloatArray, drives: FloatArray) -> FloatArray:
@@ -250,10 +258,12 @@ class PieceOfPath:
         return FORCE_ROUNDING * max(1.0, *(abs(float(z[contact.unknown])) for contact in self.whole.mesh.contacts))
 
     def are_quiet(self, states: Sequence[PathEquilibrium]) -> Any:
-        """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together."""
-        x, rate = (self.expand(np.array(rows).T).T for rows in zip(*((at.x, at.rate) for at in states), strict=True))
-        steps = StepsOfPiece(self, x, np.array([at.drive for at in states]), rate)
-        values = steps.values(np.linspace(0.0, 1.0, FEWEST_SAMPLES + 1))
+        """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together.
+
+        The states have the forces of all contacts.
+        """
+        steps = StepsOfPiece.from_states(self, states)
+        values = steps.values(FEWEST_SAMPLES)
         calm: Any = (values[..., 1:] >= -self.conditions.roundings(values)[..., None]).all(axis=(0, 2))
         dense, suspect = steps.wanted_samples <= FEWEST_SAMPLES, int(calm.argmin())
         if not calm[suspect] and dense[suspect] and steps.are_smooth[suspect] and not self.conditions.rows_of("slip"):
@@ -291,6 +301,13 @@ class PieceOfPath:
         return int(np.searchsorted(self.own.mesh.free, contact.slide if slide else contact.unknown))
 
 
+@lru_cache(maxsize=64)
+def cubic_weights(count: int) -> FloatArray:
+    """Return the weights of start, chord and bends at both ends of a step at equal shares of it, (count + 1, 4)."""
+    s = np.linspace(0.0, 1.0, count + 1)
+    return read_only(np.stack([np.ones_like(s), s, s * (1 - s) ** 2, s * s * (1 - s)], axis=1))
+
+
 @dataclass(frozen=True, eq=False)
 class StepsOfPiece:
     """m steps between m + 1 points of a piece: cubics through their ends, or chords where slopes are steep."""
@@ -299,6 +316,12 @@ class StepsOfPiece:
     x: FloatArray  # (m + 1, free) of the whole
     drive: FloatArray  # (m + 1,)
     rate: FloatArray  # (m + 1, free)
+
+    @classmethod
+    def from_states(cls, piece: PieceOfPath, states: Sequence[PathEquilibrium]) -> StepsOfPiece:
+        """Return the steps between states with the forces of all contacts."""
+        x, drive, rate = (np.array(column) for column in list(zip(*states, strict=True))[:3])
+        return cls(piece, x, drive, rate)
 
     @cached_property
     def moved(self) -> FloatArray:
@@ -317,16 +340,15 @@ class StepsOfPiece:
         length = self.piece.whole.mesh.scales.length
         return SAMPLES_PER_RADIUS * self.moved * length / self.piece.smallest_radius
 
-    def values(self, shares: FloatArray) -> FloatArray:
-        """Return the values of all conditions at shares of each step, from 0 to 1, (rows, m, shares)."""
+    def values(self, count: int) -> FloatArray:
+        """Return the values of all conditions at the ends of equal parts of each step, (rows, m, count + 1)."""
         piece, x, rate, width = self.piece, self.x, self.rate, np.diff(self.drive)[:, None]
-        s, smooth = shares[:, None, None], self.are_smooth[:, None]
-        between = x[:-1] + np.where(smooth, s * s * (3 - 2 * s), s) * np.diff(x, axis=0)
-        between += smooth * width * (s * (1 - s) ** 2 * rate[:-1] + s * s * (s - 1) * rate[1:])
-        drives = self.drive[:-1] + s[:, :, 0] * width[:, 0]
-        between[-1], drives[-1] = x[1:], self.drive[1:]
-        values = piece.values(between.reshape(-1, between.shape[-1]), drives.ravel())
-        values = values.reshape(len(values), len(shares), -1).swapaxes(1, 2)
+        chord, smooth, weights = np.diff(x, axis=0), self.are_smooth[:, None], cubic_weights(count)
+        bends = smooth * (width * rate[:-1] - chord), smooth * (chord - width * rate[1:])
+        between = weights @ np.stack([x[:-1], chord, *bends], axis=1)
+        drives = self.drive[:-1, None] + weights[:, 1] * width
+        between[:, -1], drives[:, -1] = x[1:], self.drive[1:]
+        values = piece.values(between.reshape(-1, x.shape[1]), drives.ravel()).reshape(-1, *drives.shape)
         for row in piece.conditions.rows_of("slip"):
             number = piece.conditions.all[row].number
             ends = (PathEquilibrium(*end, 0) for end in zip(self.x[1:], self.drive[1:], self.rate[1:], strict=True))
@@ -350,16 +372,21 @@ class WatchedProblem(NetworkProblem):
             together = SIDES_TOGETHER if self.piece.conditions.rows_of("touch") else NODES_TOGETHER
             for first in range(0, len(states) - 1, together):
                 some = states[first : first + together + 1]
-                quiet = self.piece.are_quiet(some).tolist()
-                self._quiet.update((id(at), at) for at, calm in zip(some[1:], quiet, strict=True) if calm)
+                grown = self.piece.grow_each(some)
+                quiet = self.piece.are_quiet(grown).tolist()
+                watched = zip(some[1:], grown[1:], quiet, strict=True)
+                self._watched.update((id(at), (at, *state)) for at, *state in watched)
                 if not all(quiet):
                     break
         return marched
 
-    def is_quiet_before(self, at: PathEquilibrium) -> bool:
-        """Return True if no contact changes on the step of a march that ends at a state."""
-        return self._quiet.pop(id(at), None) is not None
+    def grow_watched(self, at: PathEquilibrium) -> tuple[PathEquilibrium, bool]:
+        """Return a state with the forces of all contacts, and whether surely none changes on the step before it."""
+        assert self.piece is not None
+        _, grown, is_quiet = self._watched.pop(id(at), (at, None, False))
+        return grown or self.piece.grow(at), is_quiet
 
     @cached_property
-    def _quiet(self) -> dict[int, PathEquilibrium]:
+    def _watched(self) -> dict[int, tuple[PathEquilibrium, PathEquilibrium, bool]]:
+        """States of marches by their identity, with the forces of all contacts, and whether the step is quiet."""
         return {}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.contact.piece import FEWEST_SAMPLES, StepsOfPiece
+from cfmkit.elastica.contact.piece import FEWEST_SAMPLES, StepsOfPiece, cubic_weights
 from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import correct, hermite
 
@@ -33,8 +33,7 @@ class StepBetween:
 
     @cached_property
     def _steps(self) -> StepsOfPiece:
-        x, rate = (np.array([getattr(at, name) for at in (self.first, self.last)]) for name in ("x", "rate"))
-        return StepsOfPiece(self.part, x, np.array([self.first.drive, self.last.drive]), rate)
+        return StepsOfPiece.from_states(self.part, (self.first, self.last))
 
     @property
     def moved(self) -> float:
@@ -45,7 +44,7 @@ class StepBetween:
     def shares(self) -> FloatArray:
         """Places at which gaps and forces are looked at, from 0 to 1: so dense that no obstacle is passed."""
         wanted = np.ceil(self._steps.wanted_samples[0])
-        return np.linspace(0.0, 1.0, int(np.clip(wanted, FEWEST_SAMPLES, MAX_SAMPLES)) + 1)
+        return cubic_weights(int(np.clip(wanted, FEWEST_SAMPLES, MAX_SAMPLES)))[:, 1]
 
     @cached_property
     def values(self) -> FloatArray:
@@ -53,7 +52,7 @@ class StepBetween:
         seen = self.part.seen_between.pop((self.first.drive, self.last.drive), None)
         if seen is not None and seen.shape[-1] == len(self.shares):
             return seen
-        return self._steps.values(self.shares)[:, 0]
+        return self._steps.values(len(self.shares) - 1)[:, 0]
 
     @cached_property
     def roundings(self) -> FloatArray:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.compiled_module import (
     MAX_DEGREE,
     N_LAW,
@@ -91,11 +92,13 @@ class CompiledEquations(NumpyEquations):
             self.arrays[name][elements] = values
         self.arrays["bend"][elements] = (tables["weight"] * tables["rigidity"]) @ slope_products(self.mesh.degree)
 
-    def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
-        """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
+    def exchange(self, mesh: Discretisation) -> CompiledEquations:
+        """Return those with other contacts closed, or other elements that stretch; free unknowns are among these."""
         slot, kept = number_free(mesh.free, mesh.size), np.searchsorted(self.mesh.free, mesh.free)
         unit, nodes = self.unit[kept], mesh.node_contacts
         arrays = {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
+        if mesh.moving is None:
+            arrays["axial"] = np.ascontiguousarray(mesh.elements.axial)
         for name, column, contacts in (
             ("contact_at", CLOSED_NODE, nodes),
             ("side_at", CLOSED_SIDE, mesh.side_contacts),
@@ -104,7 +107,8 @@ class CompiledEquations(NumpyEquations):
                 arrays[name] = self.arrays[name].copy()
                 arrays[name][:, column] = [-1 if contact.closed is None else contact.closed for contact in contacts]
         presses = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
-        row = make_row(arrays, {"free": len(mesh.free), "presses": presses}, self.row)
+        counts = {"free": len(mesh.free), "presses": presses, "contacts": len(nodes)}
+        row = make_row(arrays, counts, self.row)
         exchanged = copy(self)
         vars(exchanged).update(mesh=mesh, unit=unit, arrays={**self.arrays, **arrays}, row=row)
         return exchanged
@@ -172,11 +176,15 @@ class CompiledEquations(NumpyEquations):
         solutions, count = np.array(right, float, order="C"), np.zeros(1, np.int64)
         if self.code.resolve(self.row, np.ascontiguousarray(free, float), solutions, count, place):
             raise np.linalg.LinAlgError("the tangent is singular")
-        return solutions, self._unstable(free, place, int(count[0]))
+        return solutions, int(self._count_each(free[None], np.array([place]), count)[0])
 
-    def _unstable(self, free: FloatArray, place: float, told: int) -> int:
-        """Return the count of C; where loads follow and it knows only the parity, told < 0, eigenvalues are counted."""
-        return told if told >= 0 else self.count_unstable(self.linearise(free, place))
+    def _count_each(self, free: FloatArray, places: FloatArray, told: Any) -> Any:
+        """Return counts of C (k,); where it knows only the parity, told < 0, eigenvalues are counted."""
+        unknown = np.flatnonzero(told < 0)
+        if len(unknown):
+            tangents = [self.linearise(free[k], places[k]).tangent for k in unknown.tolist()]
+            told[unknown] = energy.count_divergent(self.mesh, np.array(tangents))
+        return told
 
     def solve(
         self, free: FloatArray, way: float, border: Border | None = None, tolerance: float = 1e-10, quick: bool = False
@@ -186,16 +194,16 @@ class CompiledEquations(NumpyEquations):
         x, at, rate, (code, told, effort) = (values[0] for values in solved)
         if code:
             return None
-        return PathEquilibrium(x, float(at), rate, self._unstable(x, float(at), int(told)), float(effort))
+        unstable = told if told >= 0 else self._count_each(x[None], solved[1], solved[3][:, 1])[0]
+        return PathEquilibrium(x, float(at), rate, int(unstable), float(effort))
 
     def solve_each(
         self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses."""
         x, ways, rate, outcomes = self._newton(free, way, None, tolerance, quick)
-        converged, unstable = outcomes[:, 0] == 0, outcomes[:, 1].astype(np.int64)
-        for k in np.flatnonzero(converged & (unstable < 0)):
-            unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
+        converged = outcomes[:, 0] == 0
+        unstable = self._count_each(x, ways, np.where(converged, outcomes[:, 1], 0.0).astype(np.int64))
         return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
 
     def _newton(self, free: Any, way: Any, border: Border | None, *numbers: float) -> tuple[FloatArray, ...]:
@@ -212,8 +220,7 @@ class CompiledEquations(NumpyEquations):
         laws = self._find_laws(degree)
         if not len(laws):
             return None
-        compared = compare_rows(self.row, self.mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
-        return None if (compared.unstable < 0).any() else compared  # under loads that follow C may know a parity only
+        return compare_rows(self.row, self.mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
 
     def _find_laws(self, degree: int) -> FloatArray:
         """Return the laws by which tables of a higher degree are made, empty unless all beams are plain."""
@@ -264,7 +271,7 @@ class CompiledEquations(NumpyEquations):
 
     def _cut_at_stability_change(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
         """Return a march with its unstable directions counted, as far as their number stays the same."""
-        counts = np.array([self._unstable(state.x, state.drive, state.unstable) for state in march.states], np.int64)
+        counts = self._count_each(march.x, march.drive, march.unstable)
         changed = np.flatnonzero(counts != unstable).tolist()
         names = ("x", "drive", "rate", "effort", "target")
         same: dict[str, Any] = {name: getattr(march, name)[: changed[0] if changed else None] for name in names}

@@ -404,4 +404,13 @@ def make_inextensible(mesh: Discretisation, elements: Any) -> Discretisation:
     """Return the same arrays with elements that do not stretch at all."""
     axial, floored = mesh.elements.axial.copy(), mesh.floored.copy()
     axial[elements], floored[elements] = 0.0, False
-    return replace(mesh, elements=mesh.elements._replace(axial=axial), floored=floored)
+    stiff = replace(mesh, elements=mesh.elements._replace(axial=axial), floored=floored)
+    return stiff if mesh.moving is not None else keep_equations(mesh, stiff)
+
+
+def keep_equations(mesh: Discretisation, changed: Discretisation) -> Discretisation:
+    """Return arrays that differ in closed contacts and stretching alone, with equations made from those of a mesh."""
+    equations = ((key, made) for key, made in mesh.known.items() if hasattr(made, "exchange"))
+    exchanged = ((key, made.exchange(changed)) for key, made in equations)
+    changed.known.update((key, made) for key, made in exchanged if made is not None)
+    return changed

@@ -241,7 +241,7 @@ def count_unstable(mesh: Discretisation, tangent: Any) -> int:
         return int(np.linalg.slogdet(tangent)[0] * (-1) ** odd < 0)
 
     if any(load.item.follows for load in mesh.loads):
-        return int((motion_eigenvalues(mesh, tangent) < 0).sum())
+        return int(count_divergent(mesh, tangent[None])[0])
 
     return count_negative_pivots(tangent) - int((mesh.free >= mesh.n_motions).sum())
 
@@ -263,13 +263,12 @@ def _slips(mesh: Discretisation, contact: ContactAt, tangent: Any) -> bool:
     return bool(tangent[both[1], both[0]] != 0)
 
 
-def motion_eigenvalues(mesh: Discretisation, tangent: Any) -> Any:
-    """Return the real eigenvalues of the stiffness of the motions, section forces condensed, ascending."""
+def count_divergent(mesh: Discretisation, tangents: Any) -> Any:
+    """Return the number of negative real eigenvalues of the motions' stiffness in tangents (k, n, n), (k,)."""
     moves = np.flatnonzero(mesh.free < mesh.n_motions)
     unit = np.zeros((len(mesh.free), len(moves)))
     unit[moves, np.arange(len(moves))] = 1.0
-    flexibility = np.linalg.solve(tangent, unit)[moves]
-    inverse = np.linalg.eigvals(flexibility)
+    inverse = np.linalg.eigvals(np.linalg.solve(tangents, unit)[:, moves])
     size = np.abs(inverse)
-    real = (np.abs(inverse.imag) < REAL_SHARE * size) & (size > FLEXIBLE_SHARE * size.max(initial=0.0))
-    return np.sort(1 / inverse[real].real)
+    flexible = size > FLEXIBLE_SHARE * size.max(axis=1, keepdims=True, initial=0.0)
+    return ((np.abs(inverse.imag) < REAL_SHARE * size) & flexible & (inverse.real < 0)).sum(axis=1)

@@ -91,13 +91,17 @@ class ComparedStates(NamedTuple):
     """p states beside the equilibria of a higher degree near them, or beside themselves where there is none."""
 
     converged: Any  # (p,)
-    unstable: Any  # (p,)
+    unstable: Any  # (p,) where loads follow C may know the parity alone: -1 is even, -2 odd
     moved: FloatArray  # (p,) largest change of a motion
     force: FloatArray  # (p,) largest change of a force on an end of an element
     effort: FloatArray  # (p,) of a drive by a motion, dimensionless
     largest: FloatArray  # (p,) force or moment in a beam
     motion: FloatArray  # (p,) largest change of the motion of an end of an element
     ends: FloatArray  # (p, ends) unknowns that move these, which come first
+
+    def is_as_stable(self, unstable: Any) -> Any:
+        """Return where the number of unstable directions is as given, or may be, (p,)."""
+        return np.where(self.unstable < 0, (self.unstable + unstable) % 2 == 1, self.unstable == unstable)
 
 
 @dataclass(frozen=True)
@@ -141,8 +145,8 @@ class NumpyEquations:
         """Set the units."""
         object.__setattr__(self, "unit", force_units(self.mesh))
 
-    def exchange_contacts(self, mesh: Discretisation) -> NumpyEquations | None:
-        """Return the equations of the same network with other contacts closed; None if they must be made anew."""
+    def exchange(self, mesh: Discretisation) -> NumpyEquations | None:
+        """Return those with other contacts closed, or other elements that stretch; None if they must be made anew."""
         return None
 
     def refill(self, elements: Any, tables: Mapping[str, Any]) -> None:

@@ -105,9 +105,9 @@ class CompiledSides(CompiledEquations):
     def _any_lies(self, z: FloatArray) -> bool:
         return bool(self._lies(z[:, self.mesh.free]).any())
 
-    def exchange_contacts(self, mesh: Discretisation) -> CompiledEquations:
-        """Return the equations of the same network with other contacts closed; its free unknowns are among these."""
-        exchanged = super().exchange_contacts(mesh)
+    def exchange(self, mesh: Discretisation) -> CompiledEquations:
+        """Return those with other contacts closed; their free unknowns are among these."""
+        exchanged = super().exchange(mesh)
         for name in ("reference", "_flags"):
             vars(exchanged).pop(name, None)
         return exchanged

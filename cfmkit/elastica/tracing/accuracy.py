@@ -56,7 +56,7 @@ def point_errors(path: Path, indices: Sequence[int]) -> FloatArray:
     else:
         effort_unit = mesh.scales.moment / mesh.scales.drive
     known = compared.converged & (compared.moved <= MAX_CHANGE)
-    for row in np.flatnonzero(known & (compared.unstable != path.unstable[chosen])):
+    for row in np.flatnonzero(known & ~compared.is_as_stable(path.unstable[chosen])):
         known[row] = _is_critical(mesh, z[row], float(drives[row]))
     efforts = np.abs(effort_unit * compared.effort - path.effort[chosen])
     reach = float(np.abs(own.z[:, : mesh.numbering.n_ends]).max())

@@ -99,7 +99,7 @@ def limit_points(items: Iterable[Any], most: int) -> Iterator[Any]:
             yield item
             most -= between
             continue
-        for single in each_point((item,)):
+        for single in item.each_point() if isinstance(item, MarchedSteps) else (item,):
             yield single
             most -= isinstance(single, Point) and single.target < 0
             if most < 0:
