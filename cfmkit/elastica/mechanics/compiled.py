@@ -179,9 +179,9 @@ class CompiledEquations(NumpyEquations):
         return solutions, int(self._count_each(free[None], np.array([place]), count)[0])
 
     def _count_each(self, free: FloatArray, places: FloatArray, told: Any) -> Any:
-        """Return counts of C (k,); where it knows only the parity, told < 0, eigenvalues are counted."""
+        """Return counts of C (k,); eigenvalues are counted where loads follow and it knows the parity alone: told < 0."""
         unknown = np.flatnonzero(told < 0)
-        if len(unknown):
+        if self.follows and len(unknown):
             tangents = [self.linearise(free[k], places[k]).tangent for k in unknown.tolist()]
             told[unknown] = energy.count_divergent(self.mesh, np.array(tangents))
         return told
