@@ -69,10 +69,14 @@ def _import_verb(name: str) -> ModuleType:
     return import_module(f"{verbs.__name__}.{name.replace('-', '_')}")
 
 
+def _options_of(module: ModuleType) -> Any:
+    return vars(module)[module.run.__annotations__["options"]]
+
+
 def _make_command(name: str) -> Any:
     """Return the command of a verb: its options are the fields of what its `run` takes."""
     module = _import_verb(name)
-    options = vars(module)[module.run.__annotations__["options"]]
+    options = module.make_options() if hasattr(module, "make_options") else _options_of(module)
 
     def callback(**values: Any) -> Call:
         return Call(module.run, options(**values))

@@ -12,8 +12,9 @@ means over the window is what a solid misses; what clamped ends add is left out 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
@@ -23,19 +24,18 @@ from cfmkit.families.end_stops_spec import BEFORE_STOP
 from cfmkit.families.run_control import Run
 from cfmkit.metrics import mean_effort
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.processes import MIN_METAL_MODULUS
+from cfmkit.stock.processes import MIN_METAL_MODULUS, PROCESSES_BY_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.request_spec import Springs, SuggestBlock
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
 
 MaterialBlock = Mapping[str, Any]
-
-Springs = Literal["catalogue", "custom"]  # springs as they are sold, or made to a wire, a coil and a number of turns
 
 STRENGTH_SHARE = 0.8
 """Share of the strength that is used where made parts have to be good: sources scatter moduli by 10 % and more."""
@@ -47,6 +47,9 @@ STOP_MARGIN_SHARE = 0.03
 the travel. For parts of a few millimetres that is a tenth of one, the usual tolerance of a cut length."""
 
 
+THINNEST_LEAF = 2e-5  # of no stated process [m]
+
+
 class Refinement(Protocol):
     """A function that makes one specification of another for a request."""
 
@@ -56,8 +59,12 @@ class Refinement(Protocol):
 
 @dataclass(frozen=True)
 class Request:
-    """Requirements of a mechanism that is to be suggested."""
+    """Requirements of a mechanism that is to be suggested.
 
+    What a search relaxes, or designs aim at, is a field; every other key is read from `stated`.
+    """
+
+    stated: SuggestBlock = field(repr=False)  # the block as it is written
     kind: Literal["force", "torque"]  # what is to be constant: over a travel, or over an angle
     target: float  # how large [N or N m]; of a band, its middle
     # low, high: ends of the band in which every force has to lie, or, where only a number is required, of what the mean
@@ -71,17 +78,33 @@ class Request:
     materials: tuple[MaterialBlock, ...] = ()  # `mechanism.material` of each one allowed; empty: whatever is usual
     adjustable: tuple[float, float] | None = None  # between which forces it is to be adjusted [N]
     hysteresis: float | None = None  # largest loss of a cycle over its work
-    # presses that it has to survive; judged where the material has fatigue data, whose allowable stress counts
-    cycles: int | None = None
-    thinnest: float = 2e-5  # thinnest leaf that the process makes [m]
-    springs: Springs | None = None  # that it may be put together with; None: either
+    thinnest: float = THINNEST_LEAF  # thinnest leaf that the process makes [m]
     safety: float = 1.0  # least strength over stress, of everything whose stress is known
-    good_parts: float | None = None  # least share of manufactured parts that meet all of it
-    # by which tolerances they are made; None: those of the process that is usual for the material
-    process: str | None = None
-    overload: float | None = None  # that an end stop behind the travel has to bear [N]; None: it needs no stop
     # share of what the safety factor leaves that designs by beams may use: solids have more stress, in fillets
     reserve: float = 1.0
+
+    @classmethod
+    def from_block(cls, block: SuggestBlock) -> Request:
+        """Return what a block requests."""
+        low, high = block.ends
+        value: Any = block.force if block.force is not None else block.torque
+        banded = isinstance(value, tuple)
+        return cls(
+            stated=block,
+            kind="force" if block.force is not None else "torque",
+            target=_middle(low, high) if banded else value,
+            low=low,
+            high=high,
+            banded=banded,
+            travel=float(block.travel if block.travel is not None else block.angle or 0.0),
+            ripple=block.ripple,
+            envelope=block.envelope,
+            materials=tuple(map(block.state_for_cycles, block.materials)),
+            adjustable=block.adjustable,
+            hysteresis=block.hysteresis,
+            thinnest=PROCESSES_BY_NAME[block.process].least_feature if block.process else THINNEST_LEAF,
+            safety=block.safety,
+        )
 
     @property
     def depth(self) -> float | None:
@@ -94,13 +117,15 @@ class Request:
 
         Up to an end stop the stress rises at most about as the motion does.
         """
-        up_to_stop = 1.0 if self.overload is None else 1.0 + STOP_MARGIN_SHARE
-        return self.reserve * (1.0 if self.good_parts is None else STRENGTH_SHARE) / (self.safety * up_to_stop)
+        up_to_stop = 1.0 if self.stated.overload is None else 1.0 + STOP_MARGIN_SHARE
+        return self.reserve * (1.0 if self.stated.min_yield is None else STRENGTH_SHARE) / (self.safety * up_to_stop)
 
     @property
     def stop_margin(self) -> float:
         """Way from the end of the travel to the end stop [m]; zero if none is required."""
-        return 0.0 if self.overload is None else max(round(STOP_MARGIN_SHARE * self.travel, 6), 2.0 * BEFORE_STOP)
+        return (
+            0.0 if self.stated.overload is None else max(round(STOP_MARGIN_SHARE * self.travel, 6), 2.0 * BEFORE_STOP)
+        )
 
     @property
     def with_strengths(self) -> tuple[Request, ...]:
@@ -111,12 +136,17 @@ class Request:
 
     def allows(self, candidate: Candidate) -> bool:
         """Return whether a candidate has springs of the kind that is required, and a stop where one is."""
-        is_of_kind = None in (candidate.springs, self.springs) or candidate.springs == self.springs
-        return is_of_kind and (self.overload is None or bool(candidate.spec.end_stop_changes(1.0)))
+        is_of_kind = None in (candidate.springs, self.stated.springs) or candidate.springs == self.stated.springs
+        return is_of_kind and (self.stated.overload is None or bool(candidate.spec.end_stop_changes(1.0)))
 
     def stated_material(self, block: MaterialBlock) -> MaterialBlock:
         """Return the material of a candidate as the request states it: without a strength that was only assumed."""
         return next((stated for stated in self.materials if block in _with_strengths(stated)), block)
+
+
+def _middle(low: float, high: float) -> float:
+    """Return what designs in a band aim at: the middle, of a band over more than an octave that of its logarithm."""
+    return math.sqrt(low * high) if high > 2.0 * low else 0.5 * (low + high)
 
 
 def _with_strengths(block: MaterialBlock) -> tuple[MaterialBlock, MaterialBlock]:
@@ -153,7 +183,9 @@ def name_variant(variant: str, request: Request, block: MaterialBlock) -> str:
 
     Examples
     --------
-    >>> request = Request("force", 1.0, 1.0, 1.0, False, 1.0, 0.1, (1.0, 1.0), ({"name": "pla"}, {"name": "pom"}))
+    >>> from cfmkit.runs import read_request
+    >>> keys = {"force": "1 N", "travel": "1 mm", "envelope": "[9 mm, 9 mm]", "material": "[pla, pom]"}
+    >>> request = Request.from_block(read_request(None, keys))
     >>> name_variant("2 Vs", request, request.materials[1])
     '2 Vs, pom'
     """

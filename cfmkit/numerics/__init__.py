@@ -10,5 +10,6 @@ __getattr__, __all__ = lazy_names(
         "rigid_point_registration": "turn_points",
         "roots": "bracketed_root",
         "sqp": "Effort Optimum SearchEnding minimize",
+        "unit_cube_samples": "SAMPLE_KINDS",
     },
 )

@@ -7,21 +7,23 @@ figures, page and metrics.json.
 
 from __future__ import annotations
 
+import inspect
 import os
 from dataclasses import dataclass, field, fields
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack, get_type_hints
 
 from cfmkit.documents import html
 from cfmkit.documents.suggestion_document import document_of
 from cfmkit.errors import ExitCode, Problem, SpecError
+from cfmkit.families.proposals import Request
+from cfmkit.families.request_spec import RequestArguments, SuggestBlock, SuggestFile
 from cfmkit.families.run_control import Run, read_time
 from cfmkit.runs.specfile import STDIN_PATH, content, rename_source, standard_input
 from cfmkit.specs.units import format_short, to_border
 from cfmkit.specs.yamlio import read_document
 from cfmkit.studies.pool import give_up_at
 from cfmkit.studies.suggest.outcome_of_search import Suggestions
-from cfmkit.studies.suggest.spec import SuggestBlock, SuggestFile
 from cfmkit.tables.csv_and_json import json_bytes
 
 if TYPE_CHECKING:
@@ -81,7 +83,7 @@ def as_json(suggestions: Suggestions, block: SuggestBlock) -> dict[str, Any]:
     return {
         "status": STATUS_BY_CODE[suggestions.exit_code],
         "message": suggestions.message,
-        "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
+        "suggest": block.as_written(),
         "order": list(block.prefer),
         "proposals": [
             _proposal_record(suggestions, proposal, number) for number, proposal in enumerate(suggestions.proposals, 1)
@@ -142,22 +144,7 @@ def suggest(
     seed: int = 0,
     jobs: int = 1,
     time_budget: str | float | None = 180.0,
-    force: str | Sequence[str] | None = None,
-    torque: str | Sequence[str] | None = None,
-    travel: str | None = None,
-    angle: str | None = None,
-    ripple: str | float | None = None,
-    envelope: Sequence[str] | None = None,
-    material: str | Sequence[str] | None = None,
-    process: str | None = None,
-    adjustable: Sequence[str] | None = None,
-    hysteresis: str | float | None = None,
-    cycles: int | None = None,
-    min_yield: str | float | None = None,
-    safety: str | float | None = None,
-    springs: str | Sequence[str] | None = None,
-    overload: str | None = None,
-    prefer: Sequence[str] | None = None,
+    **keys: Unpack[RequestArguments],
 ) -> SuggestionsView:
     """Return mechanisms of every family that meet the requirements, ranked, and those not judged in full.
 
@@ -171,34 +158,7 @@ def suggest(
         Processes; 1: only this one, in which a long job cannot be stopped when the time budget ends.
     time_budget : str or float, optional
         A text with its unit (``"20 s"``, ``"2 min"``), or a number [s]; None: no limit.
-    force, torque : str or sequence of str, optional
-        To keep constant, ``"20 N"``, or a band of them. These and the next ones replace the keys of the file.
-    travel, angle : str, optional
-        Over which the force, or the torque, is constant.
-    ripple : str or float, optional
-        Largest (max - min)/max over the travel.
-    envelope : sequence of str, optional
-        Box that it stays in, ``["80 mm", "60 mm", "6 mm"]``: across the travel, along it, and the depth.
-    material : str or sequence of str, optional
-        Allowed materials.
-    process : str, optional
-        How it is made.
-    adjustable : sequence of str, optional
-        Range over which the constant force must be adjustable, its lowest and its highest value.
-    hysteresis : str or float, optional
-        Largest energy loss of a cycle, as a share of its work.
-    cycles : int, optional
-        Required life.
-    min_yield : str or float, optional
-        Smallest share of manufactured parts that meet all requirements, as 0.95 or ``"95 %"``: the key `yield`.
-    safety : str or float, optional
-        Smallest safety factor.
-    springs : str or sequence of str, optional
-        Which springs may be used.
-    overload : str, optional
-        Force along the travel that a rigid end stop has to bear.
-    prefer : sequence of str, optional
-        What decides the order: ``size``, ``ripple``, ``parts``, ``stress``, ``depth``.
+    KEYS
 
     Raises
     ------
@@ -212,22 +172,40 @@ def suggest(
     >>> len(found.proposals), len(found.answers)
     (0, 4)
     """
-    arguments = locals()
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import serial
     from cfmkit.studies.suggest.search import suggest as search_families
 
+    if unknown := keys.keys() - SuggestBlock.model_fields.keys():
+        raise TypeError(f"suggest() got an unexpected keyword argument {min(unknown)!r}")
+
     def format_value(value: Any) -> str:
         return "[" + ", ".join(map(format_value, value)) + "]" if isinstance(value, list | tuple) else str(value)
 
-    keys = {key: value for key, value in arguments.items() if key in SuggestBlock.model_fields and value is not None}
-    keys |= {} if min_yield is None else {"yield": min_yield}
+    stated = {SuggestBlock.key_of(name): format_value(value) for name, value in keys.items() if value is not None}
     name = None if request is None else os.fspath(request)
-    block = read_request(name, {key: format_value(value) for key, value in keys.items()}, mark="")
+    block = read_request(name, stated, mark="")
     run = Run(seed, time_budget=read_time(time_budget), executor=serial if jobs == 1 else Pool(jobs))
-    return SuggestionsView.answering(search_families(block.request(), run, block.prefer), block)
+    return SuggestionsView.answering(search_families(Request.from_block(block), run, block.prefer), block)
 
 
+def _list_arguments() -> None:
+    """State the keys of a request in the signature and the docstring of `suggest`."""
+    types = get_type_hints(RequestArguments)
+    plain = inspect.signature(suggest)
+    others = [
+        parameter for parameter in plain.parameters.values() if parameter.kind is not inspect.Parameter.VAR_KEYWORD
+    ]
+    keys = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=types[name])
+        for name in SuggestBlock.model_fields
+    ]
+    suggest.__signature__ = plain.replace(parameters=[*others, *keys])  # type: ignore[attr-defined]
+    lines = [f"    {name} : optional\n        {field.description}" for name, field in SuggestBlock.model_fields.items()]
+    suggest.__doc__ = (suggest.__doc__ or "").replace("    KEYS", "\n".join(lines))
+
+
+_list_arguments()
 OPTIONS_SOURCE = "options"  # name of a request that has no file
 
 

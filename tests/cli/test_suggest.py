@@ -13,7 +13,7 @@ from suggest_support import request_of, small_block
 
 import cfmkit
 from cfmkit.cli.main import main
-from cfmkit.cli.verbs.suggest import REQUEST_KEYS, SuggestOptions, keys, parse_envelope, seconds
+from cfmkit.cli.verbs.suggest import keys, make_options, seconds
 from cfmkit.errors import UsageError
 
 REQUESTS = Path(__file__).parents[1] / "requests"
@@ -134,22 +134,26 @@ def test_every_contradiction_is_refused(name, tmp_path):
 
 
 def test_a_material_named_again_is_one_more_and_replaces_none():
-    assert keys(SuggestOptions(material=["pom", "pla,abs"])) == {"material": "[pom,pla,abs]"}
-    assert keys(SuggestOptions(force="19N, 21 N")) == {"force": "[19N, 21 N]"}
-    assert keys(SuggestOptions(torque="[1 N*m, 2 N*m]", force="1,5 N")) == {
+    assert keys(make_options()(material=["pom", "pla,abs"])) == {"material": "[pom,pla,abs]"}
+    assert keys(make_options()(force="19N, 21 N")) == {"force": "[19N, 21 N]"}
+    assert keys(make_options()(torque="[1 N*m, 2 N*m]", force="1,5 N")) == {
         "torque": "[1 N*m, 2 N*m]",
         "force": "1,5 N",
     }
-    assert keys(SuggestOptions(material=["[pom]"], prefer=[])) == {"material": "[pom]"}
-    assert keys(SuggestOptions(material=["[pom, pla]", "abs"])) == {"material": "[pom, pla,abs]"}
+    assert keys(make_options()(material=["[pom]"], prefer=[])) == {"material": "[pom]"}
+    assert keys(make_options()(material=["[pom, pla]", "abs"])) == {"material": "[pom, pla,abs]"}
 
 
 def test_a_room_and_a_time_may_be_written_short():
-    assert parse_envelope("80x60x6mm") == "[80 mm, 60 mm, 6 mm]"
-    assert parse_envelope("8cm x 60 mm") == "[8 cm, 60 mm]"
-    assert parse_envelope("8e1x6E1mm") == "[8e1 mm, 6E1 mm]"
+
+    def write_envelope(text):
+        return keys(make_options()(envelope=text))["envelope"]
+
+    assert write_envelope("80x60x6mm") == "[80 mm, 60 mm, 6 mm]"
+    assert write_envelope("8cm x 60 mm") == "[8 cm, 60 mm]"
+    assert write_envelope("8e1x6E1mm") == "[8e1 mm, 6E1 mm]"
     with pytest.raises(UsageError, match="100x100x20 has no unit; write 100x100x20mm"):
-        parse_envelope("100x100x20")
+        write_envelope("100x100x20")
     assert seconds("90s") == 90.0
     assert seconds("2 min") == 120.0
     with pytest.raises(UsageError):
@@ -157,7 +161,8 @@ def test_a_room_and_a_time_may_be_written_short():
 
 
 def test_every_key_of_a_request_is_an_option_and_reaches_families_under_its_name():
-    assert set(REQUEST_KEYS) == set(type(small_block()).model_fields)
+    block = type(small_block())
+    assert set(block.options()) == set(block.model_fields)
     stated = {
         "force": "20 N", "travel": "10 mm", "ripple": "3 %", "envelope": "[100 mm, 90 mm, 20 mm]", "process": "laser",
         "adjustable": "[15 N, 25 N]", "hysteresis": "7 %", "springs": "custom", "safety": "1.7", "cycles": "12345",
@@ -165,5 +170,10 @@ def test_every_key_of_a_request_is_an_option_and_reaches_families_under_its_name
     }  # fmt: skip
     request = request_of(stated)
     assert (request.travel, request.ripple, request.envelope) == (0.01, 0.03, (0.1, 0.09, 0.02))
-    assert (request.process, request.adjustable, request.hysteresis) == ("laser", (15.0, 25.0), 0.07)
-    assert (request.springs, request.safety, request.cycles, request.overload) == ("custom", 1.7, 12345, 60.0)
+    assert (request.stated.process, request.adjustable, request.hysteresis) == ("laser", (15.0, 25.0), 0.07)
+    assert (request.stated.springs, request.safety, request.stated.cycles, request.stated.overload) == (
+        "custom",
+        1.7,
+        12345,
+        60.0,
+    )

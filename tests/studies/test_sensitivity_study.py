@@ -14,7 +14,7 @@ import cfmkit
 from cfmkit import families
 from cfmkit.errors import ExitCode, SpecError, UsageError
 from cfmkit.families import family
-from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS
+from cfmkit.numerics import SAMPLE_KINDS
 from cfmkit.results import Status
 from cfmkit.studies.engine import ROW_MISSING, run
 from cfmkit.studies.parts.share import Share

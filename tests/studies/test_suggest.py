@@ -58,7 +58,7 @@ def test_more_cycles_than_a_material_is_known_for_are_refused_in_one_line():
     with pytest.raises(SpecError, match=r"'cycles' is 2e.06, more than the 1e.06 at which 'points' end") as error:
         request(material=f"[pom, {LASTING}]", cycles="2000000")
     assert len(error.value.problems) == 1
-    assert request(material=f"[pom, {LASTING}]", cycles="1000000").cycles == 1_000_000
+    assert request(material=f"[pom, {LASTING}]", cycles="1000000").stated.cycles == 1_000_000
 
 
 def test_the_life_of_leaves_is_not_that_of_bought_springs_whose_wire_is_not_known_to_last():
@@ -260,6 +260,14 @@ def test_equal_names_are_told_apart_by_their_size():
     names = [one.variant for one in search.distinct([proposal(0.03), proposal(0.04), proposal(0.04)])]
     assert names == ["2 springs, 30 x 50 mm", "2 springs, 40 x 50 mm (1)", "2 springs, 40 x 50 mm (2)"]
     assert search.distinct([proposal(0.03)])[0].variant == "2 springs"
+
+
+@pytest.mark.parametrize("key", [{"cycles": "100"}, {"springs": "custom"}, {"overload": "60 N"}, {"prefer": "[parts]"}])
+def test_what_was_made_for_one_request_is_not_reused_for_another(key):
+    (candidate, *_) = offered("vcfm")[1]
+    jobs = [ProposalJob("vcfm", candidate, asked, 0) for asked in (request(), request(), request(**key))]
+    first, same, other = map(search._key, jobs)
+    assert first == same != other
 
 
 def test_a_key_of_a_request_is_listed_as_it_is_written():

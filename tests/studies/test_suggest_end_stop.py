@@ -61,7 +61,7 @@ def test_the_stop_carries_what_the_overload_has_above_the_own_force(proposal):
     asked, made = proposal
     curve = cfmkit.analyze(cfmkit.loads(made.text)).curve
     number = float(re.search(r"carries (\S+) N of 60 N", made.notes[0])[1])
-    assert number + curve.effort[curve.motion.argmax()] == pytest.approx(asked.overload, rel=2e-3)
+    assert number + curve.effort[curve.motion.argmax()] == pytest.approx(asked.stated.overload, rel=2e-3)
 
 
 def test_a_proposal_is_driven_no_further_than_its_stop(proposal):

@@ -68,7 +68,7 @@ def test_a_number_for_a_share_is_asked_back_as_a_percentage(key):
 
 @pytest.mark.parametrize("material", ["pla", "petg", "{youngs_modulus: 2 GPa, yield_strength: 40 MPa}"])
 def test_what_a_process_makes_is_accepted(material):
-    assert request(material=material, process="fdm").process == "fdm"
+    assert request(material=material, process="fdm").stated.process == "fdm"
 
 
 @pytest.fixture(scope="module")

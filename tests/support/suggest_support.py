@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import Run
-from cfmkit.families import family
+from cfmkit.families import Request, family
 from cfmkit.runs import read_request
 from cfmkit.studies.suggest import ProposalJob, make_proposal
 
@@ -37,12 +37,12 @@ def small_block(**keys: Any) -> Any:
 
 def request(**keys: Any) -> Any:
     """Return the small request with other keys."""
-    return small_block(**keys).request()
+    return Request.from_block(small_block(**keys))
 
 
 def request_of(keys: Mapping[str, Any] = {}, file: Path | None = None) -> Any:
     """Return the request of these keys alone, or of a file."""
-    return block(keys, file).request()
+    return Request.from_block(block(keys, file))
 
 
 def propose(name: str, asked: Any) -> Any:

@@ -12,7 +12,7 @@ from vcfm_support import CONFIGS, MM, TABLE_I
 
 import cfmkit
 from cfmkit import Run, api
-from cfmkit.families import family
+from cfmkit.families import Request, family
 from cfmkit.families.vcfm import proposals
 from cfmkit.families.vcfm.design import closed_form, fit_widths
 from cfmkit.results import Status
@@ -150,7 +150,7 @@ def test_without_an_adjustment_there_is_no_preload_and_nothing_is_required_of_on
 @pytest.mark.parametrize("structure", ["cosine arches", "hybrid leaves", "folded spring"])
 def test_a_proposal_with_another_structure_is_adjusted_by_preloads_of_its_own_spring(structure):
     stated = {"force": "10 N", "travel": "2 mm", "ripple": "5 %", "envelope": "[200 mm, 200 mm]"}
-    request = read_request(None, stated | {"adjustable": "[8 N, 12 N]"}).request()
+    request = Request.from_block(read_request(None, stated | {"adjustable": "[8 N, 12 N]"}))
     words = proposals.STRUCTURE_BLOCKS[structure][1].variant
     candidates = proposals.propose(request, Run()).candidates
     chosen = next(one for one in candidates if one.variant.startswith(words))

@@ -2,7 +2,8 @@
 
 A verb module has
 
-- a frozen dataclass whose fields are its arguments and options (see `cfmkit.cli.options`);
+- a frozen dataclass whose fields are its arguments and options (see `cfmkit.cli.options`), or ``make_options()``, which
+  returns one with more fields;
 - ``run(options, terminal) -> Document``, which takes one: its docstring is the help text;
 - ``HELP_POSITION``: where it stands in ``cfmkit --help``, and perhaps ``HELP_EXAMPLE``.
 

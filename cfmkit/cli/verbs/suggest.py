@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 import time
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, make_dataclass, replace
 from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import (
@@ -40,34 +39,8 @@ WRITING_SHARE = 0.1  # share of the time budget that is kept for files
 
 
 @dataclass(frozen=True, kw_only=True)
-class RequestOptions(Common):
-    """Options that are keys of a request."""
-
-    force: str | None = option("FORCE", "Constant force, '20 N', or a band, '19 N, 21 N'.")
-    torque: str | None = option("TORQUE", "Constant torque, '100 N*mm', or a band.")
-    travel: str | None = option("LENGTH", "Travel over which the force is to be constant.")
-    angle: str | None = option("ANGLE", "Angle over which the torque is to be constant.")
-    ripple: str | None = option("SHARE", "Largest (max - min)/max over the travel; default: 5 %.")
-    envelope: str | None = option("AxBxCmm", "Space available: across the travel, along it, and the depth (optional).")
-    material: list[str] | None = option("A,B", "Permitted materials; `cfmkit show materials` lists them. Repeatable.")
-    process: str | None = option("NAME", "Manufacturing process: fdm, sls, laser, wire-edm or mill.")
-    adjustable: str | None = option("A,B", "Lowest and highest adjustable force: 15N,25N.")
-    hysteresis: str | None = option("SHARE", "Largest energy loss of a cycle, as a share of its work.")
-    springs: str | None = option("KIND", "Helical springs it may have: catalogue or custom; default: either.")
-    safety: str | None = option("FACTOR", "Least safety factor of stresses, against yield; default: 1.5.")
-    cycles: str | None = option("N", "Required life in cycles; judged for materials with fatigue data.")
-    made_well: str | None = option(
-        "SHARE", "Required share of manufactured parts that meet the requirements.", "--yield"
-    )
-    overload: str | None = option("FORCE", "Force to bear at the end of the travel, by a rigid end stop: '60 N'.")
-    prefer: list[str] | None = option(
-        "A,B", "Ranking, most important first: size,ripple,parts,stress,depth. Repeatable."
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class SuggestOptions(RequestOptions):
-    """Arguments and options."""
+class SuggestOptions(Common):
+    """Arguments and options, but those that are keys of a request: see `make_options`."""
 
     request: str | None = argument("FILE", "YAML file with a block 'suggest'; - reads standard input.", default=None)
     time_budget: str = option("TIME", "Time for the whole command: 60s, 10min.", shown=True, default=DEFAULT_BUDGET)
@@ -81,10 +54,20 @@ class SuggestOptions(RequestOptions):
     no_lock: bool = NO_LOCK_FLAG()
 
 
-REQUEST_KEYS = tuple(option.name for option in fields(RequestOptions) if option not in fields(Common))
-"""Options that are keys of a request."""
-LIST_KEYS = ("material", "adjustable", "prefer")
-BAND_KEYS = ("force", "torque")  # keys that are a list where two values are given
+def make_options() -> type[SuggestOptions]:
+    """Return the options of the command: one for each key of a request, then all others."""
+    from cfmkit.families.request_spec import SuggestBlock
+
+    keys = [
+        (
+            name,
+            (list[str] if item.is_repeatable else str) | None,
+            option(item.metavar, item.help, f"--{SuggestBlock.key_of(name)}"),
+        )
+        for name, item in SuggestBlock.options().items()
+    ]
+    of_request = make_dataclass("RequestOptions", keys, bases=(Common,), frozen=True, kw_only=True)
+    return make_dataclass("AllOptions", [], bases=(SuggestOptions, of_request), frozen=True, kw_only=True)
 
 
 def run(options: SuggestOptions, terminal: Terminal) -> Document:
@@ -99,6 +82,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     from cfmkit.designing.run_many_starts import Clock
     from cfmkit.documents import suggestion_document
     from cfmkit.documents.document import Written, with_skipped_families
+    from cfmkit.families.proposals import Request
     from cfmkit.families.run_control import Run
     from cfmkit.runs import suggest as suggestion_files
     from cfmkit.runs import suggest as suggestion_record
@@ -125,7 +109,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
             if jobs == 1:  # a process of its own, which can be ended when the time is up
                 working = replace(working, executor=Pool(1))
             reserve = max(FIGURES_RESERVE, WRITING_SHARE * budget) if options.no_plots else FIGURE_SECONDS
-            suggestions = suggest(block.request(), working, block.prefer, reserve)
+            suggestions = suggest(Request.from_block(block), working, block.prefer, reserve)
             deadlines = suggestion_files.Deadlines(Clock(ends - FIGURES_RESERVE), Clock(ends - WRITING_RESERVE))
             command = shlex.join(["cfmkit", *terminal.arguments]) if options.report else None
             for name, content in suggestion_files.files(
@@ -136,7 +120,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
         manifest = folder.commit(
             {
                 "command": "suggest", "arguments": list(terminal.arguments), "seed": options.seed,
-                "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
+                "suggest": block.as_written(),
                 "reused": suggestions.reused, "status": code.name.lower(), "exit_code": int(code),
             }
         )  # fmt: skip
@@ -162,44 +146,14 @@ def _bug_complaints(bugs: Sequence[str], shown: bool) -> Iterator[str]:
 
 def keys(options: SuggestOptions) -> dict[str, str]:
     """Return the keys of a request that options say, each as a file would have it."""
+    from cfmkit.families.request_spec import SuggestBlock
+
     values_by_key = {}
-    for item in fields(options):
-        value = getattr(options, item.name)
-        if item.name not in REQUEST_KEYS or value is None or value == []:
+    for name, item in SuggestBlock.options().items():
+        value = getattr(options, name)
+        if value is None or value == []:
             continue
         if isinstance(value, list):
             value = value[0] if len(value) == 1 else ",".join(part.strip().strip("[]") for part in value)
-        if item.name == "envelope":
-            value = parse_envelope(value)
-        elif (item.name in LIST_KEYS or (item.name in BAND_KEYS and _are_two(value))) and not value.strip().startswith(
-            "["
-        ):
-            value = f"[{value}]"
-        values_by_key["yield" if item.name == "made_well" else item.name] = value
+        values_by_key[SuggestBlock.key_of(name)] = item.write(value)
     return values_by_key
-
-
-def _are_two(text: str) -> bool:
-    """Return True if a text has two values with units, so that its comma is no decimal one."""
-    parts = text.split(",")
-    return len(parts) == 2 and all(re.search(r"[a-zA-Z]", part) for part in parts)
-
-
-def parse_envelope(text: str) -> str:
-    """Return the sides of an envelope as a list: ``80x60x6mm``, or ``80 mm x 60 mm``.
-
-    Examples
-    --------
-    >>> parse_envelope("80x60x6mm"), parse_envelope("80 mm x 6 cm"), parse_envelope("8e1 x 60mm")
-    ('[80 mm, 60 mm, 6 mm]', '[80 mm, 6 cm]', '[8e1 mm, 60 mm]')
-    """
-    if text.strip().startswith("["):
-        return text
-    sides = [
-        re.sub(r"^([+-]?[\d.,]*(?:[eE][+-]?\d+)?)\s*", r"\1 ", side.strip()).partition(" ")
-        for side in re.split(r"(?<=[\d. a-z])x(?=[\d. ])", text.strip())
-    ]
-    unit = sides[-1][2]
-    if not unit:
-        raise UsageError(f"--envelope: {text.strip()} has no unit; write {text.strip()}mm")
-    return "[" + ", ".join(f"{number} {unit_of_side or unit}" for number, _, unit_of_side in sides) + "]"

@@ -179,7 +179,7 @@ class CompiledEquations(NumpyEquations):
         return solutions, int(self._count_each(free[None], np.array([place]), count)[0])
 
     def _count_each(self, free: FloatArray, places: FloatArray, told: Any) -> Any:
-        """Return counts of C (k,); eigenvalues are counted where loads follow and it knows the parity alone: told < 0."""
+        """Return counts of C (k,); where loads follow and told < 0 is a parity, eigenvalues are counted."""
         unknown = np.flatnonzero(told < 0)
         if self.follows and len(unknown):
             tangents = [self.linearise(free[k], places[k]).tangent for k in unknown.tolist()]

@@ -204,7 +204,7 @@ def _size_section(
     spec = _write_shape(kept, size, block, (thicker * thin, wide), window)
     area = size**2 * kept.envelope.across * kept.envelope.along / (request.envelope[0] * request.envelope[1])
     # of made parts those with thick beams are most alike: an error of the thickness counts three times
-    promise = area if request.good_parts is None else -thicker * thin
+    promise = area if request.stated.min_yield is None else -thicker * thin
     strain = request.strength_used * strength / material.modulus
     promise += mechanism.layers - 1.0  # one layer is easier to make than two
     promise += WIDE_LAST * is_too_wide(request, wide, thicker * thin, strain)

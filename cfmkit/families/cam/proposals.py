@@ -157,7 +157,7 @@ def spare_stroke(request: Request) -> float:
 
     Half of made parts end before their own stroke; behind an end stop there is as much of it as before.
     """
-    spare = 0.0 if request.good_parts is None else SPARE_SHARE * request.travel + SPARE_LENGTH
+    spare = 0.0 if request.stated.min_yield is None else SPARE_SHARE * request.travel + SPARE_LENGTH
     return spare + 2.0 * request.stop_margin
 
 

@@ -94,7 +94,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
                 variant = name_variant(f"{pairs} V{'s' if pairs > 1 else ', guided'}", request, block)
                 # of made parts those with thick leaves are most alike: an error of the thickness counts three times
                 thick = min(sizes.leaf.thickness, sizes.spring_leaf.thickness)
-                promise = over["across"] * over["along"] if request.good_parts is None else -thick
+                promise = over["across"] * over["along"] if request.stated.min_yield is None else -thick
                 promise += WIDE_LAST * _is_too_wide(request, block, sizes)
                 candidates.append(Candidate(variant, spec, True, finish, float(promise), correct=correct))
             if (coiled := _offer_coiled(request, block, spec, sizes)) is not None:
@@ -255,7 +255,7 @@ def _offer_coiled(request: Request, block: MaterialBlock, spec: VcfmSpec, sizes:
     if not springs:
         return None
     promise = across * (stands + min(spring.free_length or 0.0 for spring in springs))
-    promise = promise if request.good_parts is None else -float(leaf.thickness)
+    promise = promise if request.stated.min_yield is None else -float(leaf.thickness)
     # the spring decides how wide the leaves are: of those for which there is a place, one whose leaves fit the depth
     listed = spec.replace({"design.catalogue": tuple(springs), "design.max_width": request.depth})
     variant = name_variant("2 Vs, catalogue springs", request, block)

@@ -6,6 +6,5 @@ __getattr__, __all__ = lazy_names(
     __name__,
     {
         "proposal_making_and_judging": "Proposal ProposalJob make_proposal",
-        "spec": "SuggestBlock",
     },
 )

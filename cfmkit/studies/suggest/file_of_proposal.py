@@ -94,7 +94,7 @@ def add_end_stop(spec: Spec, request: Request) -> Spec:
     Raises SolutionError if it can have none.
     """
     window: Any = spec.get_value("analysis.window")
-    if request.overload is None or window is None:
+    if request.stated.overload is None or window is None:
         return spec
     changes = spec.end_stop_changes(round(float(window[1]) + request.stop_margin, 9))
     if not changes:
@@ -104,7 +104,7 @@ def add_end_stop(spec: Spec, request: Request) -> Spec:
 
 def remove_end_stop(spec: Spec, request: Request) -> Spec:
     """Return a mechanism without the end stop that an overload needs: corrections look for windows behind it."""
-    return spec if request.overload is None else spec.replace({"mechanism.stops": {}})
+    return spec if request.stated.overload is None else spec.replace({"mechanism.stops": {}})
 
 
 def note_end_stop(request: Request, result: Result, depth: float | None) -> tuple[str, ...]:
@@ -112,11 +112,11 @@ def note_end_stop(request: Request, result: Result, depth: float | None) -> tupl
 
     With it comes the pin that bears it, standing out of what holds the mechanism over all of its depth.
     """
-    if request.overload is None:
+    if request.stated.overload is None:
         return ()
     curve = result.curve
-    carried = max(request.overload - float(curve.effort[curve.motion.argmax()]), 0.0)
-    place, load = format_short(request.stop_margin, "length"), format_short(request.overload, "force")
+    carried = max(request.stated.overload - float(curve.effort[curve.motion.argmax()]), 0.0)
+    place, load = format_short(request.stop_margin, "length"), format_short(request.stated.overload, "force")
     said = f"end stop, rigid, {place} behind the travel: it carries {format_short(carried, 'force', 3)} of {load}"
     if depth is None:
         return (f"{said}; its strength is not judged: the depth is not known",)
@@ -143,14 +143,14 @@ def add_process_and_materials(spec: Spec, request: Request) -> Spec:
             block = material.model_dump(exclude_unset=True)
             if (stated := request.stated_material(block)) != block:
                 spec = spec.replace({f"{path}.material": dict(stated)})
-    if request.process is None:
+    if request.stated.process is None:
         return spec
-    radius = PROCESSES_BY_NAME[request.process].least_radius
+    radius = PROCESSES_BY_NAME[request.stated.process].least_radius
     fillet = getattr(spec.get_value("mechanism"), "fillet", 0.0)
     changes: tuple[dict[str, Any], ...] = (
-        {"mechanism.part.process": request.process, "mechanism.part.fillet": max(radius, fillet)},
-        {"mechanism.part.process": request.process},
-        {"mechanism.plate.process": request.process},
+        {"mechanism.part.process": request.stated.process, "mechanism.part.fillet": max(radius, fillet)},
+        {"mechanism.part.process": request.stated.process},
+        {"mechanism.plate.process": request.stated.process},
     )
     for change in changes:
         try:

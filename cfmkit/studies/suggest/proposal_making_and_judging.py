@@ -279,7 +279,7 @@ def redesign_for_yield(
 ) -> Proposal:
     """Return a proposal of the required yield, else the best found, with what is missing of it."""
     clock = Clock.from_budgets(run.time_budget)
-    wanted = asked = float(request.good_parts or 0.0)
+    wanted = asked = float(request.stated.min_yield or 0.0)
     best, spec, last, obstacle = near, near.spec, None, ""
     for _ in range(MAX_YIELD_TRIES):
         run = replace(run, time_budget=clock.get_time_left())
@@ -378,9 +378,9 @@ def judge_proposal(
         misses += [("force", text) for text in beyond]
     if near is not None:
         numbers["yield"] = near.numbers.get("yield")
-        if request.good_parts is not None:
+        if request.stated.min_yield is not None:
             warnings["yield"] = f"yield by the {near.model} model"
-    elif request.good_parts is not None and len(misses) <= 1:
+    elif request.stated.min_yield is not None and len(misses) <= 1:
         parts: GoodParts = good_parts(replace(result, spec=written), request, clock, draw=not misses)
         if parts.late:
             return Proposal(name, variant, message=OUT_OF_TIME)

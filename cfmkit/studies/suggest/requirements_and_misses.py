@@ -66,7 +66,7 @@ def list_unjudged(request: Request, result: Result) -> Iterator[str]:
     quantities = evaluate(result)
     if request.hysteresis is not None and "unload" not in result.curve.branches:
         yield f"hysteresis not judged: no loss factor is known of {_material(result)}"
-    if request.cycles is not None:
+    if request.stated.cycles is not None:
         yield from _unknown_lives(result, quantities)
     if request.adjustable is not None and "adjusted_force_min" not in quantities:
         yield "adjustment not judged: the model does not know its ends"
@@ -98,9 +98,9 @@ def stressed_motion(request: Request, spec: Spec) -> tuple[str, str]:
     A made part begins and ends a little before or after the perfect one: a metric over all that this does has no value.
     """
     window: Any = spec.get_value("analysis.window")
-    if request.good_parts is None or window is None or request.kind == "torque":
+    if request.stated.min_yield is None or window is None or request.kind == "torque":
         return "0 %", "100 %"
-    end = "100 %" if request.overload is not None else format_short(float(window[1]), "length", 12)
+    end = "100 %" if request.stated.overload is not None else format_short(float(window[1]), "length", 12)
     return format_short(0.5 * float(window[0]), "length", 12), end  # an end stop is where it is for all parts
 
 
@@ -153,12 +153,12 @@ def _require_loss(request: Request, result: Result) -> Iterator[dict[str, Any]]:
 
 
 def _require_lives(request: Request, result: Result, quantities: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
-    if request.cycles is None:
+    if (cycles := request.stated.cycles) is None:
         return
     if _bends(result) and "fatigue_life" in quantities and getattr(_block(result.spec), "fatigue", None) is not None:
-        yield {"metric": "fatigue_life", "min": f"{request.cycles}", "over": stressed_motion(request, result.spec)}
+        yield {"metric": "fatigue_life", "min": f"{cycles}", "over": stressed_motion(request, result.spec)}
     if _value_of(quantities, "spring_life") is not None:
-        yield {"metric": "spring_life", "min": f"{request.cycles}"}
+        yield {"metric": "spring_life", "min": f"{cycles}"}
 
 
 def _unknown_lives(result: Result, quantities: Mapping[str, Quantity]) -> Iterator[str]:

@@ -107,7 +107,7 @@ def suggest(
     answers, unasked = _answers(request, run, times.asking, bugs)
     queues = {answer.family: list(answer.offer.candidates) for answer in answers}
     making = _Making(run, times, sum(map(len, queues.values())), bugs)
-    turn, cut, enough = 0, unasked, ENOUGH_PROPOSALS if request.good_parts is None else ENOUGH_WITH_PARTS
+    turn, cut, enough = 0, unasked, ENOUGH_PROPOSALS if request.stated.min_yield is None else ENOUGH_WITH_PARTS
     while not making.late() and (
         batch := list(_next(queues, making.done, ROUND_SIZES[min(turn, len(ROUND_SIZES) - 1)], enough))
     ):
@@ -317,8 +317,9 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
         for candidate in offer.candidates:
             if request.allows(candidate):
                 candidates.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
-    reason = f"it needs {OTHER_SPRINGS[request.springs]} springs" if offer.candidates and request.springs else ""
-    reason = NO_END_STOP if offer.candidates and request.overload is not None else reason
+    springs = request.stated.springs
+    reason = f"it needs {OTHER_SPRINGS[springs]} springs" if offer.candidates and springs else ""
+    reason = NO_END_STOP if offer.candidates and request.stated.overload is not None else reason
     likely_first = tuple(sorted(candidates.values(), key=lambda candidate: candidate.doubtful))
     return FamilyOffer(likely_first, offer.reason if candidates else offer.reason or reason)
 
@@ -341,6 +342,7 @@ def _key(job: ProposalJob) -> str:
         "family": job.family, "variant": candidate.variant, "design": candidate.design,
         "finish": _name_refinement(candidate.finish), "correct": _name_refinement(candidate.correct),
         "spec": candidate.spec.model_dump(mode="json"), "suggest": repr(job.request), "seed": job.seed,
+        "stated": job.request.stated.as_written(),
         "code": code_stamp(),
         "again": job.near and job.near.text, "reserve": candidate.reserve,
     }  # fmt: skip

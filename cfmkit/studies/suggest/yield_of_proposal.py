@@ -74,7 +74,7 @@ class MovedForYield:
 
 def with_made_parts(spec: Spec, request: Request, seed: int) -> Spec:
     """Return a specification whose block `sensitivity` says how its parts are made; as it is where nobody knows."""
-    stated = tolerances(spec, request.process) if request.good_parts is not None else {}
+    stated = tolerances(spec, request.stated.process) if request.stated.min_yield is not None else {}
     if not stated:
         return spec
     parameters: dict[str, Any] = {
@@ -83,7 +83,7 @@ def with_made_parts(spec: Spec, request: Request, seed: int) -> Spec:
     }
     block = {
         "method": "tolerance", "parameters": parameters, "samples": N_DRAWN, "seed": seed,
-        "min_yield": f"{100.0 * float(request.good_parts or 0.0):.12g} %",
+        "min_yield": f"{100.0 * float(request.stated.min_yield or 0.0):.12g} %",
     }  # fmt: skip
     return spec.replace({"sensitivity": block})
 
@@ -96,8 +96,8 @@ def good_parts(
     draw: bool,  # whether to draw parts where the estimate of first order is good enough; else that is the answer
 ) -> GoodParts:
     """Return what becomes of the made parts of a mechanism."""
-    wanted = float(request.good_parts or 0.0)
-    assumed = assume_errors(result.spec, request.process)
+    wanted = float(request.stated.min_yield or 0.0)
+    assumed = assume_errors(result.spec, request.stated.process)
     if assumed is None or result.spec.sensitivity is None:
         return GoodParts(
             None, "its yield is not known: the errors that the process causes in its dimensions are not known"

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import fields
-from typing import Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Sequence  # noqa: TC003  read when the program runs
+from typing import Annotated, Any, ClassVar, Literal, Self, TypedDict
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from cfmkit.families.base import article
-from cfmkit.families.proposals import Request, Springs
+from cfmkit.families.request_options import RequestOption, write_band, write_envelope, write_list
 from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Ratio, Torque, format_short
 from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec, SafetyFactor
 from cfmkit.stock.processes import PROCESSES_BY_NAME, ProcessName, why_not_made
 
 PositiveTorque = Annotated[Torque, Field(gt=0)]
+PositiveAngle = Annotated[Angle, Field(gt=0)]
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
 
 MEAN_TOL = 0.025  # how far the mean may be from a force that is required as a number; who wants less gives a band
@@ -31,6 +30,7 @@ USUAL_MATERIALS: dict[str, tuple[str, ...]] = {
 }
 """What is made by a process where the request names no material."""
 
+Springs = Literal["catalogue", "custom"]  # springs as they are sold, or made to a wire, a coil and a number of turns
 Prefer = Literal["size", "ripple", "parts", "stress", "depth"]
 
 
@@ -39,50 +39,83 @@ class SuggestBlock(Model):
 
     removed_keys: ClassVar[dict[str, str]] = {"room": "write 'envelope'"}
 
-    force: PositiveForce | tuple[PositiveForce, PositiveForce] | None = Field(
-        None, description="force to keep constant; or a band that contains every force: [19 N, 21 N]"
+    force: Annotated[
+        PositiveForce | tuple[PositiveForce, PositiveForce] | None,
+        RequestOption("FORCE", "Constant force, '20 N', or a band, '19 N, 21 N'.", write_band),
+    ] = Field(None, description="force to keep constant; or a band that contains every force: [19 N, 21 N]")
+    torque: Annotated[
+        PositiveTorque | tuple[PositiveTorque, PositiveTorque] | None,
+        RequestOption("TORQUE", "Constant torque, '100 N*mm', or a band.", write_band),
+    ] = Field(None, description="torque at a crank to keep constant; or a band that contains every torque")
+    travel: Annotated[
+        PositiveLength | None, RequestOption("LENGTH", "Travel over which the force is to be constant.")
+    ] = Field(None, description="over which the force is constant")
+    angle: Annotated[PositiveAngle | None, RequestOption("ANGLE", "Angle over which the torque is to be constant.")] = (
+        Field(None, description="over which the torque is constant")
     )
-    torque: PositiveTorque | tuple[PositiveTorque, PositiveTorque] | None = Field(
-        None, description="torque at a crank to keep constant; or a band that contains every torque"
+    ripple: Annotated[Share, RequestOption("SHARE", "Largest (max - min)/max over the travel; default: 5 %.")] = Field(
+        DEFAULT_RIPPLE, description="largest (max - min)/max over the travel, in each direction"
     )
-    travel: PositiveLength | None = Field(None, description="over which the force is constant")
-    angle: Annotated[Angle, Field(gt=0)] | None = Field(None, description="over which the torque is constant")
-    ripple: Share = Field(DEFAULT_RIPPLE, description="largest (max - min)/max over the travel, in each direction")
-    envelope: tuple[PositiveLength, ...] = Field(
+    envelope: Annotated[
+        tuple[PositiveLength, ...],
+        RequestOption(
+            "AxBxCmm", "Space available: across the travel, along it, and the depth (optional).", write_envelope
+        ),
+    ] = Field(
         min_length=2,
         max_length=3,
         description="box that it stays in, pressed or not, frame included: across the travel, along it, and the depth, "
         "which may be left out",
     )
-    material: MaterialField | Annotated[tuple[MaterialField, ...], Field(min_length=1)] | None = Field(
-        None, description="allowed materials: names from `show materials`, or values"
-    )
-    process: ProcessName | None = Field(
+    material: Annotated[
+        MaterialField | Annotated[tuple[MaterialField, ...], Field(min_length=1)] | None,
+        RequestOption("A,B", "Permitted materials; `cfmkit show materials` lists them. Repeatable.", write_list, True),
+    ] = Field(None, description="allowed materials: names from `show materials`, or values")
+    process: Annotated[
+        ProcessName | None, RequestOption("NAME", "Manufacturing process: fdm, sls, laser, wire-edm or mill.")
+    ] = Field(
         None, description="manufacturing process: determines the thinnest leaf, and the materials if none are stated"
     )
-    adjustable: tuple[PositiveForce, PositiveForce] | None = Field(
-        None, description="lowest and highest force of the adjustment"
-    )
-    overload: PositiveForce | None = Field(
+    adjustable: Annotated[
+        tuple[PositiveForce, PositiveForce] | None,
+        RequestOption("A,B", "Lowest and highest adjustable force: 15N,25N.", write_list),
+    ] = Field(None, description="lowest and highest force of the adjustment")
+    overload: Annotated[
+        PositiveForce | None,
+        RequestOption("FORCE", "Force to bear at the end of the travel, by a rigid end stop: '60 N'."),
+    ] = Field(
         None,
         description="force along the travel that it has to bear at its end: a rigid end stop behind the travel carries "
         "what is above its own force",
     )
-    hysteresis: Share | None = Field(None, description="largest energy loss of a cycle, as a share of its work")
-    springs: Springs | None = Field(None, description="helical springs that it may have; default: either")
-    safety: SafetyFactor = Field(DEFAULT_SAFETY, description="least safety factor of stresses, against yield")
-    cycles: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="required life in cycles; checked for materials with `fatigue` data"
-    )
-    made_well: Share | None = Field(
+    hysteresis: Annotated[
+        Share | None, RequestOption("SHARE", "Largest energy loss of a cycle, as a share of its work.")
+    ] = Field(None, description="largest energy loss of a cycle, as a share of its work")
+    springs: Annotated[
+        Springs | None, RequestOption("KIND", "Helical springs it may have: catalogue or custom; default: either.")
+    ] = Field(None, description="helical springs that it may have; default: either")
+    safety: Annotated[
+        SafetyFactor, RequestOption("FACTOR", "Least safety factor of stresses, against yield; default: 1.5.")
+    ] = Field(DEFAULT_SAFETY, description="least safety factor of stresses, against yield")
+    cycles: Annotated[
+        Annotated[int, Field(ge=1)] | None,
+        RequestOption("N", "Required life in cycles; judged for materials with fatigue data."),
+    ] = Field(None, description="required life in cycles; checked for materials with `fatigue` data")
+    min_yield: Annotated[
+        Share | None,
+        RequestOption("SHARE", "Required share of manufactured parts that meet the requirements."),
+    ] = Field(
         None,
         alias="yield",
         description="share of manufactured parts that must meet all requirements, with the tolerances assumed for the "
         "process",
     )
-    prefer: tuple[Prefer, ...] = Field(
-        ("size", "ripple", "parts", "stress"), description="criteria for the order of the proposals"
-    )
+    prefer: Annotated[
+        tuple[Prefer, ...],
+        RequestOption(
+            "A,B", "Ranking, most important first: size,ripple,parts,stress,depth. Repeatable.", write_list, True
+        ),
+    ] = Field(("size", "ripple", "parts", "stress"), description="criteria for the order of the proposals")
 
     @field_validator("force", "torque", "adjustable")
     @classmethod
@@ -98,9 +131,8 @@ class SuggestBlock(Model):
         wanted, unused = ("travel", "angle") if self.force is not None else ("angle", "travel")
         what = "force" if self.force is not None else "torque"
         if getattr(self, unused) is not None:
-            raise ValueError(
-                f"a {what} is constant over {article(wanted)} {wanted}: '{unused}' does not go with '{what}'"
-            )
+            motion = "a travel" if wanted == "travel" else "an angle"
+            raise ValueError(f"a {what} is constant over {motion}: '{unused}' does not go with '{what}'")
         if getattr(self, wanted) is None:
             raise ValueError(f"'{wanted}' is missing: over which the {what} is constant")
         return self
@@ -131,7 +163,7 @@ class SuggestBlock(Model):
     def _can_be_made(self) -> Self:
         if self.process is None:
             return self
-        reasons = [why_not_made(self.process, material.name, material.modulus) for material in self._materials]
+        reasons = [why_not_made(self.process, material.name, material.modulus) for material in self._stated_materials]
         if reported := "; ".join(dict.fromkeys(filter(None, reasons))):
             refuse("SuggestBlock", {("process",): reported})
         least = PROCESSES_BY_NAME[self.process].least_feature
@@ -145,7 +177,7 @@ class SuggestBlock(Model):
 
     @model_validator(mode="after")
     def _lasts_as_long_as_materials_are_known(self) -> Self:
-        for material in self._materials:
+        for material in self._stated_materials:
             fatigue = material.fatigue
             if self.cycles is None or fatigue is None:
                 continue
@@ -156,12 +188,18 @@ class SuggestBlock(Model):
         return self
 
     @property
-    def _materials(self) -> tuple[MaterialSpec, ...]:
+    def _stated_materials(self) -> tuple[MaterialSpec, ...]:
         if self.material is None:
             return ()
         return self.material if isinstance(self.material, tuple) else (self.material,)
 
-    def _lasting(self, entry: MaterialSpec) -> dict[str, Any]:
+    @property
+    def materials(self) -> tuple[MaterialSpec, ...]:
+        """Materials that are allowed: those that are usual for the process if none are stated."""
+        usual = USUAL_MATERIALS[self.process] if self.process else ()
+        return self._stated_materials or tuple(MaterialSpec(name=name) for name in usual)
+
+    def state_for_cycles(self, entry: MaterialSpec) -> dict[str, Any]:
         """Return a material as a specification states it; with S-N data, assumed ones too, for the requested cycles."""
         block = entry.model_dump(exclude_unset=True)
         law = entry.fatigue
@@ -175,33 +213,45 @@ class SuggestBlock(Model):
         value: Any = self.force if self.force is not None else self.torque
         return value if isinstance(value, tuple) else (value * (1.0 - MEAN_TOL), value * (1.0 + MEAN_TOL))
 
-    def request(self) -> Request:
-        """Return the same as families know it."""
-        value: Any = self.force if self.force is not None else self.torque
-        usual = USUAL_MATERIALS[self.process] if self.process else ()
-        materials = self._materials or tuple(MaterialSpec(name=name) for name in usual)
-        blocks = tuple(self._lasting(material) for material in materials)
-        low, high = self.ends
-        derived: dict[str, Any] = {
-            "kind": "force" if self.force is not None else "torque",
-            "target": _middle(low, high) if isinstance(value, tuple) else value,
-            "low": low,
-            "high": high,
-            "banded": isinstance(value, tuple),
-            "travel": float(self.travel if self.travel is not None else self.angle or 0.0),
-            "materials": blocks,
-            "good_parts": self.made_well,
+    def as_written(self) -> dict[str, Any]:
+        """Return the keys that are stated, as files have them."""
+        return self.model_dump(mode="json", exclude_unset=True, by_alias=True)
+
+    @classmethod
+    def options(cls) -> dict[str, RequestOption]:
+        """Return the options of the command line, by field; option and key have the alias of a field if it has one."""
+        return {
+            name: option
+            for name, field in cls.model_fields.items()
+            for option in field.metadata
+            if isinstance(option, RequestOption)
         }
-        if self.process:
-            derived["thinnest"] = PROCESSES_BY_NAME[self.process].least_feature
-        # every other key goes on under its own name
-        names = {field.name for field in fields(Request)} & type(self).model_fields.keys() - derived.keys()
-        return Request(**{name: getattr(self, name) for name in names}, **derived)
+
+    @classmethod
+    def key_of(cls, name: str) -> str:
+        """Return the key of a file that a field stands for."""
+        return cls.model_fields[name].alias or name
 
 
-def _middle(low: float, high: float) -> float:
-    """Return what designs in a band aim at: the middle, of a band over more than an octave that of its logarithm."""
-    return math.sqrt(low * high) if high > 2.0 * low else 0.5 * (low + high)
+class RequestArguments(TypedDict, total=False):
+    """Keys of a request as arguments of a function: text with a unit, or a number of what has none."""
+
+    force: str | Sequence[str] | None
+    torque: str | Sequence[str] | None
+    travel: str | None
+    angle: str | None
+    ripple: str | float | None
+    envelope: Sequence[str] | None
+    material: str | Sequence[str] | None
+    process: str | None
+    adjustable: Sequence[str] | None
+    hysteresis: str | float | None
+    springs: str | None
+    safety: str | float | None
+    cycles: int | None
+    min_yield: str | float | None
+    overload: str | None
+    prefer: Sequence[str] | None
 
 
 class SuggestFile(Model):
