@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk, ellipkinc
 
 import cfmkit.elastica as el
+from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE
 
 LENGTH, RIGIDITY = 0.1, 2e9 * 8e-3 * 1e-9 / 12
 EULER = np.pi**2 * RIGIDITY / (4 * LENGTH**2)  # of a column clamped at its foot, free at its top
@@ -170,6 +171,17 @@ def test_a_column_under_just_its_critical_load_may_be_relieved_or_pressed_furthe
     m = brentq(lambda m: (ellipk(m) * 2 / np.pi) ** 2 - 1.2 - off, 1e-9, 0.9)
     turns = [path.motion("top")[-1, 2] for path in further]
     assert turns == pytest.approx([-2 * np.arcsin(np.sqrt(m)), 2 * np.arcsin(np.sqrt(m))], rel=1e-6)
+
+
+def test_a_branch_that_ends_where_it_begins_does_not_go_back_on_its_mirror_image(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In numpy a step along the arc led round its end, and far back."""
+    monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
+    path = pressed(1 + 1e-9, el.PointLoad("top", fx=EULER), [0.05, 0.2])
+    assert path.status is el.PathStatus.COMPLETE
+    assert (np.diff(path.drive) > 0).all()
+    assert path.events[1].drive == pytest.approx(1e-9, abs=2e-11)
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-7, 1e-9])

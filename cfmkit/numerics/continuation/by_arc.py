@@ -147,6 +147,9 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
             fold = locate_fold(problem, move, options.span)
             if fold is not None:
                 return (yield from _end_at_fold(walk, begin, move, *fold, fineness))
+            if fineness > FINEST_RETRY and walk.branch is not None:  # it has passed the end of a branch, unseen
+                again = walk.restart(move.old, walk.step, same_piece=True)
+                return (yield from follow_by_arc(again, 0.1 * fineness))
         if move.new.unstable > move.old.unstable:  # a bifurcation: by the drive it is located
             step = 0.5 * abs(move.new.drive - move.old.drive)
             return walk.restart(move.old, step, same_piece=True) if count > 1 else None
