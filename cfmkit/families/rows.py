@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from functools import lru_cache, wraps
+from functools import cached_property, lru_cache, wraps
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -325,7 +325,7 @@ class RowsSolution(Protocol):
 
     @property
     def branches(self) -> Mapping[str, CurveRows]:
-        """The nominal curve of each mechanism, by branch."""
+        """The nominal curve of each mechanism, by branch: made anew, since curves refer to their solution."""
         ...
 
 
@@ -456,7 +456,7 @@ class SolvedRows(Generic[RowsT]):
         """Return which mechanisms have which finding, (m,) by name."""
         return findings_of_rows(self.rules, self.solution, len(self.solution))
 
-    @property
+    @cached_property
     def branches(self) -> Mapping[str, CurveRows]:
         """The nominal curve of each mechanism, by branch."""
         return self.solution.branches

@@ -34,6 +34,13 @@ MIN_BLOCK_SIZES, SMALLEST_TRACED = 64, 8
 """Mechanisms that are solved together at least, of closed forms and of traced models, which take milliseconds each."""
 
 
+LARGEST_KEPT_ARRAY = 32_000_000  # [bytes], of those that glibc may keep
+np.empty(LARGEST_KEPT_ARRAY, dtype=np.uint8)
+"""Freed at once and never written to: from then on glibc keeps arrays up to this size, twice as much together, for the
+next ones. Else it gives each back to the system, and cleared pages from there take longer than most operations on them.
+"""
+
+
 @dataclass(frozen=True, eq=False)
 class SingleRow:
     """A mechanism that is analysed by itself, or what is wrong with it: read as `SolvedRows` of one mechanism."""

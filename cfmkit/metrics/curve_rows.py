@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -188,7 +189,8 @@ class CurveRows(ShortRepr):
     name: str = ""  # of the branch, for messages
     frame: MeasuringFrame = NO_FRAME  # what one curve is measured against, beside the above
     turns_back: bool = False  # whether the motion of one curve does: its samples stand in the order of the path
-    windows: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # `restrict_to_window`, by window
+    # `restrict_to_window`, by window, as long as they are in use
+    windows: WeakValueDictionary[Any, Any] = field(default_factory=WeakValueDictionary, init=False, repr=False)
 
     def all_at(self, places: FloatArray) -> FloatArray:
         """Return the effort at places of every row, (d, m); of one that is known at its points between these."""

@@ -35,9 +35,9 @@ ZERO_EFFORT_SHARE = 1e-9
 def restrict_to_window(curves: CurveRows, window: Ends | None) -> RowsInWindow:
     """Return curves in windows, (d,) each; None: over their full travel."""
     key = None if window is None else tuple(end.tobytes() for end in window)
-    if key not in curves.windows:
-        curves.windows[key] = RowsInWindow(curves, window)
-    rows: RowsInWindow = curves.windows[key]
+    rows: RowsInWindow | None = curves.windows.get(key)
+    if rows is None:
+        curves.windows[key] = rows = RowsInWindow(curves, window)
     return rows
 
 

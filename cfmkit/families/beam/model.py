@@ -360,7 +360,7 @@ class BeamRows:
     def _laws(self) -> list[BetweenPoints]:
         return [law for solution in self.each if (law := solution.model_between_points) is not None]
 
-    @cached_property
+    @property
     def branches(self) -> Mapping[str, CurveRows]:
         """The curve of each mechanism."""
         each, paths = self.each, PathsOfDesigns(self._laws)

@@ -341,7 +341,7 @@ class Solution(ShortRepr):
         alone = replace(loads, roller_weight=0.0, slider_weight=0.0, sideways=(0.0, 0.0), off_plane=0.0)
         return replace(self, assembly=replace(self.assembly, loads=alone))
 
-    @cached_property
+    @property
     def branches(self) -> dict[str, CurveRows]:
         """The curves by branch, up and down."""
         motion = self._spread_over_rows(self.displacement)
@@ -350,7 +350,7 @@ class Solution(ShortRepr):
         target = target_force(self.assembly.spec, self.assembly)
         return {
             name: CurveRows(
-                RowSamples(motion, self._spread_over_rows(state.slider), np.full(self.count, motion.shape[1])),
+                self._samples_of(state.slider),
                 lambda: self._spread_over_rows(self.places),
                 partial(self._effort_in_rows, name),
                 self.column(self.effort_error),
@@ -365,6 +365,10 @@ class Solution(ShortRepr):
             )
             for name, state in (("load", self.up), ("unload", self.down))
         }
+
+    def _samples_of(self, values: FloatArray) -> RowSamples:
+        motion, values = (self._spread_over_rows(item) for item in (self.displacement, values))
+        return RowSamples(motion, values, np.full(self.count, motion.shape[1]))
 
     def _spread_over_rows(self, values: FloatArray) -> FloatArray:
         return np.broadcast_to(values, (self.count, values.shape[-1]))
@@ -382,9 +386,7 @@ class Solution(ShortRepr):
         allowable = allowable_stress(self.mechanism)
 
         def read() -> list[RowSamples]:
-            values = self._spread_over_rows(stress(self.contact_pressure(state)))
-            curve = self.branches[name].samples
-            return [RowSamples(curve.motion, values, curve.count)]
+            return [self._samples_of(stress(self.contact_pressure(state)))]
 
         def evaluate(places: FloatArray, rows: Any) -> FloatArray:
             return np.broadcast_to(self.stress(name, places, rows), places.shape)

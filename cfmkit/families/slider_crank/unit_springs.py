@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -164,6 +164,16 @@ class _SliderState:
     cosine: FloatArray
 
 
+class _Slopes(NamedTuple):
+    """Derivatives at places on the slider's path."""
+
+    d2: FloatArray  # squared distance of the pins at both ends
+    lever: FloatArray  # psi' sin(psi) of the knee angle psi, by the travel
+    knee1: FloatArray  # psi'
+    by_knee: FloatArray  # (3, n), what the first three q do by the knee angle with the line between the pins at rest
+    first: FloatArray  # (3, n), q' by the travel
+
+
 NEARLY_FOLDED = 0.99
 """Above this share of sin(psi/2) the knee angle is computed from its cosine, which keeps the digits next to pi."""
 NEAR_FOOT = 0.01  # below this share of the stretched position squared, x0 squared as a difference has lost digits
@@ -231,33 +241,28 @@ class SliderPath:
         is_beyond: NDArray[np.bool_] = (travel > self.inward + slack) | (travel < -self.outward - slack)
         return is_beyond
 
-    def _to_stretched(self, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the distances from the stretched positions on either side, x_s - x and x_s + x, without cancellation.
-
-        The product of both is x_s^2 - x^2.
-        """
-        xs, outside = self.stretched, np.asarray(self.x0) >= 0.0
-        nearest = np.maximum(self.gap / (xs + np.abs(self.x0)) + np.where(outside, travel, -travel), 0.0)
-        far = xs + np.where(outside, self.x0 - travel, travel - self.x0)
-        return np.where(outside, nearest, far), np.where(outside, far, nearest)
+    def _square_to_stretched(self, travel: FloatArray) -> FloatArray:
+        """Return x_s^2 - x^2, the product of both distances from the stretched positions, without cancellation."""
+        xs, x0 = self.stretched, np.abs(self.x0)
+        outward = np.where(np.asarray(self.x0) >= 0.0, travel, -travel)
+        return np.maximum(self.gap / (xs + x0) + outward, 0.0) * (xs + (x0 - outward))
 
     def evaluate(self, travel: FloatArray) -> _SliderState:
         """Return the state at some travels."""
         link = self.linkage
-        position = self.x0 - travel
-        ahead, behind = self._to_stretched(travel)
-        share = np.sqrt(ahead * behind / (4.0 * link.crank * link.coupler))
+        position, whole = self.x0 - travel, 4.0 * link.crank * link.coupler
+        square = self._square_to_stretched(travel) / whole
+        share = np.sqrt(square)  # sin(psi/2)
         knee = 2.0 * np.arcsin(np.minimum(share, 1.0))
+        sine, cosine = 2.0 * share * np.sqrt(1.0 - square), 1.0 - 2.0 * square
         if (is_folding := share > NEARLY_FOLDED).any():
-            sine_squared = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / (
-                4.0 * link.crank * link.coupler
-            )
-            folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(sine_squared, 0.0), 1.0)))
-            knee = np.where(is_folding, folding, knee)
-        knee = self.side * knee
+            rest = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / whole
+            folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(rest, 0.0), 1.0)))
+            pairs = (folding, knee), (np.sin(folding), sine), (np.cos(folding), cosine)
+            knee, sine, cosine = (np.where(is_folding, *pair) for pair in pairs)
+        knee, sine = self.side * knee, self.side * sine
         e = link.offset
         view = np.arctan2(e * travel, position * self.x0 + e * e)  # how far the direction from A to C has turned
-        sine, cosine = np.sin(knee), np.cos(knee)
         phi, chi = _shares(link, sine, cosine)
         turn = np.empty((4, *np.shape(knee)))
         turn[0], turn[1] = view + phi - self.shares[0], self.start - knee
@@ -266,48 +271,41 @@ class SliderPath:
 
     def forces(self, state: _SliderState) -> FloatArray:
         """Return q q' by the travel, (4, n)."""
-        return self._forces(state, *self._differentiate_by_knee(state.cosine))
+        return self._forces(state, self._slopes(state))
 
-    def _forces(self, state: _SliderState, d2: FloatArray, by_knee: FloatArray) -> FloatArray:
-        link = self.linkage
-        lever = state.position / (link.crank * link.coupler)  # psi' = lever / sin psi
-        ratio = state.turn[:3] / state.sine
+    def _forces(self, state: _SliderState, slopes: _Slopes) -> FloatArray:
+        effort = np.empty_like(state.turn)
+        np.multiply(state.turn[:3], slopes.first, out=effort[:3])
         relaxed = (np.equal(self.start, 0.0) | np.equal(np.abs(self.start), math.pi)) & (state.knee == self.start)
         if relaxed.any():  # 0/0: the limit is that of the slopes
-            ratio = np.where(relaxed, by_knee / np.cos(self.start), ratio)
-        effort = np.empty_like(state.turn)
-        effort[:3] = ratio * by_knee * lever
-        effort[:3:2] += state.turn[:3:2] * (link.offset / d2)  # these turn with the line from pivot to slider pin, too
+            limit = slopes.by_knee**2 * slopes.lever / np.cos(self.start)
+            effort[:3] = np.where(relaxed, limit, effort[:3])
         effort[3] = -state.turn[3]
         return effort
 
-    def _differentiate_by_knee(self, cosine: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the squared distance of the pins at both ends, and what the first three q do by the knee angle."""
-        r1, r2 = self.linkage.crank, self.linkage.coupler
+    def _slopes(self, state: _SliderState) -> _Slopes:
+        link, cosine = self.linkage, state.cosine
+        r1, r2 = link.crank, link.coupler
         d2 = r1 * r1 + r2 * r2 + 2.0 * r1 * r2 * cosine
-        slopes = np.empty((3, *np.shape(cosine)))
-        slopes[0], slopes[1], slopes[2] = r2 * (r2 + r1 * cosine) / d2, -1.0, -r1 * (r1 + r2 * cosine) / d2
-        return d2, slopes
+        lever = state.position / (r1 * r2)
+        knee1 = lever / state.sine
+        by_knee = np.empty((3, *np.shape(cosine)))
+        by_knee[0], by_knee[1], by_knee[2] = r2 * (r2 + r1 * cosine) / d2, -1.0, -r1 * (r1 + r2 * cosine) / d2
+        first = by_knee * knee1
+        first[::2] += link.offset / d2  # these turn with the line from pivot to slider pin, too
+        return _Slopes(d2, lever, knee1, by_knee, first)
 
     def efforts(self, state: _SliderState) -> tuple[FloatArray, FloatArray]:
         """Return q q' and (q q')' by the travel, (4, n) each."""
-        link, knee, x = self.linkage, state.knee, state.position
-        r1, r2, e = link.crank, link.coupler, link.offset
-        sine, cosine = state.sine, state.cosine
-        d2, by_knee = self._differentiate_by_knee(cosine)
-        view1, view2 = e / d2, 2.0 * e * x / d2**2
-        lever = x / (r1 * r2)
-        bend = r1 * r2 * (r2**2 - r1**2) * sine / d2**2
-        knee1 = lever / sine
-        knee2 = (-1.0 / (r1 * r2) - knee1**2 * cosine) / sine
-        first, second = by_knee * knee1, by_knee * knee2
-        first[::2] += view1
-        second[::2] += bend * knee1**2
-        second[::2] += view2
-        stiffness = np.empty((4, *np.shape(knee)))
-        stiffness[:3], stiffness[3] = first**2 + state.turn[:3] * second, 1.0
-        stiffness[:3, (sine == 0.0) | (np.abs(knee) == math.pi)] = np.nan
-        return self._forces(state, d2, by_knee), stiffness
+        r1, r2, e = self.linkage.crank, self.linkage.coupler, self.linkage.offset
+        sine, slopes = state.sine, self._slopes(state)
+        square, knee_square = slopes.d2 * slopes.d2, slopes.knee1 * slopes.knee1
+        second = slopes.by_knee * ((-1.0 / (r1 * r2) - knee_square * state.cosine) / sine)
+        second[::2] += (r1 * r2 * (r2**2 - r1**2) * sine * knee_square + 2.0 * e * state.position) / square
+        stiffness = np.empty_like(state.turn)
+        stiffness[:3], stiffness[3] = slopes.first**2 + state.turn[:3] * second, 1.0
+        stiffness[:3, (sine == 0.0) | (np.abs(state.knee) == math.pi)] = np.nan
+        return self._forces(state, slopes), stiffness
 
 
 @lru_cache(maxsize=8)

@@ -395,7 +395,7 @@ class Solution(ShortRepr):
             for curve_numbers in every
         ]
 
-    @cached_property
+    @property
     def branches(self) -> dict[str, CurveRows]:
         """The nominal curves by branch, as metrics see them."""
         curves = self.nominal

@@ -168,7 +168,7 @@ def _solution(specs: Sequence[SliderCrankSpec], assemblies: Sequence[Assembly], 
 
 def _is_complete(solution: Solution) -> NDArray[np.bool_]:
     """Return which mechanisms have an effort at every point and place of the grid, (m,)."""
-    curves = [solution.curve.value, *(branch.samples.values for branch in solution.branches.values())]
+    curves = [solution.curve.value, *solution.branch_efforts.values()]
     return np.asarray(np.all([np.isfinite(values).all(axis=1) for values in curves], axis=0))
 
 

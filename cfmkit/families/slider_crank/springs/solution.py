@@ -409,14 +409,18 @@ class Solution(ShortRepr):
 
     # --- rows for metrics ---------------------------------------------------------------------------------------------
 
-    @cached_property
+    @property
+    def branch_efforts(self) -> dict[str, FloatArray]:
+        """Efforts by branch, (m, n) each; with friction there are two [N m or N]."""
+        if self.friction_branches is None:
+            return {"load": self.effort}
+        forth, back = (self.broadcast(curves.effort) for curves in self.friction_branches)
+        return {"load": forth, "unload": back}
+
+    @property
     def branches(self) -> dict[str, CurveRows]:
-        """The curves by branch; with friction there are two."""
+        """The curves by branch."""
         motion = self.broadcast(self.motion)
-        efforts = {"load": self.effort}
-        if self.friction_branches is not None:
-            forth, back = (self.broadcast(curves.effort) for curves in self.friction_branches)
-            efforts = {"load": forth, "unload": back}
         full = np.full(len(self), motion.shape[1])
         return {
             name: CurveRows(
@@ -432,7 +436,7 @@ class Solution(ShortRepr):
                 pose=self.reference[:, 0],
                 followed=self.spec.target_curve,
             )
-            for name, effort in efforts.items()
+            for name, effort in self.branch_efforts.items()
         }
 
 

@@ -154,9 +154,8 @@ class Assembly(ShortRepr):
         """Ends of the motion that the linkage allows [rad or m]; infinite where the crank turns fully."""
         if self.drive == "torque":
             return self.linkage.arc(self.unloaded)
-        inward, outward = self.linkage.room(self.unloaded)
         first, last = self._relaxed_ends
-        return 0.0 if first else -outward, 0.0 if last else inward
+        return 0.0 if first else -self.path.outward, 0.0 if last else self.path.inward
 
     @cached_property
     def _relaxed_ends(self) -> tuple[bool, bool]:
