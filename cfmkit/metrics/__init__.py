@@ -27,15 +27,15 @@ from cfmkit.metrics.metric_values import (
     flat_metrics,
     frame_of,
     gaps,
-    left_of,
     mean_effort,
     measure,
     metrics_json,
     search_json,
+    shorten_window,
     survey,
     travel_of,
+    warn_of_uncovered_windows,
     window_of,
-    windows_judged,
 )
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
 from cfmkit.metrics.usable_interval_of_all_branches import CycleRows, metric_of_rows
@@ -60,7 +60,6 @@ __all__ = [
     "frame_of",
     "gaps",
     "known_metrics",
-    "left_of",
     "mean_effort",
     "measure",
     "metric_of_rows",
@@ -70,6 +69,7 @@ __all__ = [
     "requirement_problems",
     "restrict",
     "search_json",
+    "shorten_window",
     "split_name",
     "survey",
     "traces",
@@ -77,6 +77,6 @@ __all__ = [
     "unknown_metric",
     "validate_requirements",
     "values_of_family",
+    "warn_of_uncovered_windows",
     "window_of",
-    "windows_judged",
 ]

@@ -1,4 +1,4 @@
-"""Block `suggest` of a specification."""
+"""Block `suggest` of a specification: requirements of a mechanism, their checks, and the request that they make."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ class SuggestBlock(Model):
             return ()
         return self.material if isinstance(self.material, tuple) else (self.material,)
 
-    def _lasting(self, entry: MaterialSpec) -> dict[str, Any]:
+    def _state_material(self, entry: MaterialSpec) -> dict[str, Any]:
         """Return a material as a specification states it; with S-N data, assumed ones too, for the requested cycles."""
         block = entry.model_dump(exclude_unset=True)
         law = entry.fatigue
@@ -180,7 +180,7 @@ class SuggestBlock(Model):
         value: Any = self.force if self.force is not None else self.torque
         usual = USUAL_MATERIALS[self.process] if self.process else ()
         materials = self._materials or tuple(MaterialSpec(name=name) for name in usual)
-        blocks = tuple(self._lasting(material) for material in materials)
+        blocks = tuple(self._state_material(material) for material in materials)
         low, high = self.ends
         derived: dict[str, Any] = {
             "kind": "force" if self.force is not None else "torque",
