@@ -26,8 +26,8 @@ import numpy as np
 
 import cfmkit
 from cfmkit.families.cam.dynamics.inverse import respond
-from cfmkit.families.cam.dynamics.lagrange_multiplier_check import NineCoordinates, Scheme
 from cfmkit.families.cam.dynamics.machine_from_spec import build
+from cfmkit.families.cam.dynamics.nine_coordinate_multibody import NineCoordinates, Scheme
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "cam_dynamics.yaml"
 POINTS = 201

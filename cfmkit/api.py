@@ -159,11 +159,11 @@ def analyze(spec: AnySpec, run: Run | None = None) -> AnalysisView:
     >>> round(result.metrics["theoretical_force"].value, 4)
     50.0002
     """
-    from cfmkit.metrics import windows_judged
+    from cfmkit.metrics import warn_of_uncovered_windows
     from cfmkit.runs.notebook_result import AnalysisView
 
     spec = spec_of(spec)
-    return AnalysisView.from_result(windows_judged(family(spec.family).analyze(spec, run or Run())))
+    return AnalysisView.from_result(warn_of_uncovered_windows(family(spec.family).analyze(spec, run or Run())))
 
 
 def design(spec: AnySpec, run: Run | None = None) -> Design:

@@ -24,7 +24,7 @@ from cfmkit.documents.document import (
 )
 from cfmkit.errors import ExitCode
 from cfmkit.families import family
-from cfmkit.metrics import Window, evaluate, known_metrics, left_of, split_name, window_of
+from cfmkit.metrics import Window, evaluate, known_metrics, shorten_window, split_name, window_of
 from cfmkit.metrics.metric_definitions import words
 from cfmkit.specs.further_metrics import OF_MANY_PARTS
 from cfmkit.specs.units import border_unit, format_short, to_border
@@ -215,9 +215,9 @@ def span(low: float, high: float, dimension: str) -> str:
 def shown_window(report: Report) -> Window | None:
     """Return the window of the title: that of the analysis, else the one that all requirements share."""
     if (window := window_of(report.result)) is not None:
-        return left_of(window, report.result)
+        return shorten_window(window, report.result)
     shared = {outcome.over for outcome in report.requirements if outcome.over is not None}
-    return left_of(Window(*shared.pop()), report.result) if len(shared) == 1 else None
+    return shorten_window(Window(*shared.pop()), report.result) if len(shared) == 1 else None
 
 
 def _summary(report: Report) -> str:
@@ -256,7 +256,7 @@ def metrics_of(report: Report) -> tuple[ValueRow, ...]:
         return ()
     names = [name for name in report.metrics if "[" not in name and _has_value(report, name)]
     names += [name for name in report.metrics if "[" in name and split_name(name)[0] not in report.metrics]
-    window = left_of(window_of(report.result), report.result)
+    window = shorten_window(window_of(report.result), report.result)
     return tuple(
         ValueRow(
             words(name),

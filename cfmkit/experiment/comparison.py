@@ -23,7 +23,7 @@ from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
 from cfmkit.metrics.branches import span_text
-from cfmkit.metrics.compare import Compared, Points, counterpart, effort_at, largest, mean, overlap, rms
+from cfmkit.metrics.compare import ComparedSide, Points, counterpart, effort_at, largest, mean, overlap, rms
 from cfmkit.metrics.compare import compare as compare_sides
 from cfmkit.numerics.holes_in_samples import holes_between, sample_weights
 from cfmkit.results import Quantity
@@ -111,7 +111,9 @@ class Comparison(ShortRepr):
         points = {
             item.branch: Points(item.motion, item.effort, item.model_branch, item.weight) for item in self.samples
         }
-        differences = compare_sides(Compared("measured", points=points), Compared("model", self.curve), self.window)
+        differences = compare_sides(
+            ComparedSide("measured", points=points), ComparedSide("model", self.curve), self.window
+        )
         return empty_uncovered(differences.summarize(_ERROR_METRICS, self.curve.kind), self.holes, self.curve.kind)
 
     def loss(self) -> dict[str, Quantity]:

@@ -1,7 +1,7 @@
-"""The registry of families: one line each, imported when first needed; other packages add theirs by entry points.
+"""Registry of mechanism families: lists them, imports one when it is first named, and says why one cannot be used.
 
-A program adds one with `register`, and metrics of its own with `cfmkit.metric`: both hold for its process. What an
-author of a family needs is imported here when it is first used.
+A family is one of cfmkit, of another installed package (an entry point), or added to this process with `register`;
+`cfmkit.metric` adds metrics. What an author of a family needs is imported here when it is first used.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def register(record: Family) -> Family:
 
     if not isinstance(record, Family):
         raise UsageError(f"a cfmkit.families.base.Family is needed, not {type(record).__name__}")
-    fault = entry_point_plugins.fault_of_record(record, needs_interface=False) or _fault_of_name(record)
+    fault = entry_point_plugins.fault_of_record(record, needs_interface=False) or _explain_bad_name(record)
     if record.name in FAMILY_MODULES:
         fault = "cfmkit itself has a family of this name"
     elif record.name in {offer.name for offer in entry_point_plugins.offers()}:
@@ -68,7 +68,7 @@ def register(record: Family) -> Family:
     return record
 
 
-def _fault_of_name(record: Family) -> str:
+def _explain_bad_name(record: Family) -> str:
     """Return why specifications of a family cannot name it; empty if they can."""
     allowed = get_args(record.spec_type.model_fields["family"].annotation)
     if not allowed or record.name in allowed:
@@ -106,7 +106,7 @@ def family(name: str) -> Family:
     cfmkit.errors.UsageError
         If there is none; the message names the nearest. Or if a metric of the user has the name of another one.
     """
-    record = _record(name)
+    record = _find_family(name)
     return record if not further_metrics.own_metrics() else _with_own_metrics(record)
 
 
@@ -126,7 +126,7 @@ def _with_own_metrics(record: Family) -> Family:
     return extended
 
 
-def _record(name: str) -> Family:
+def _find_family(name: str) -> Family:
     if name in FAMILY_MODULES:
         record: Family = import_module(FAMILY_MODULES[name]).FAMILY_RECORD
         return record

@@ -1,4 +1,4 @@
-"""Interface of a family of mechanisms: a frozen record of functions, not a base class."""
+"""Interface of a family of mechanisms (`Family`, a record of functions), and the box in space that one needs."""
 
 from __future__ import annotations
 

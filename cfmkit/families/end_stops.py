@@ -1,4 +1,4 @@
-"""End stops of a guided part whose motion is driven: a shuttle or a slider, along which they act.
+"""End stops of a driven shuttle or slider: their force on the drive, their columns, scalar results and findings.
 
 What is driven moves as it is driven. So a stop changes nothing but the force that this takes: beyond its gap an elastic
 one adds stiffness times the way beyond, at a rigid one the drive is blocked and the curve ends. A part that rests on a

@@ -1,4 +1,4 @@
-"""Specification of the end stops of a shuttle or a slider."""
+"""Specification of the end stops of a shuttle or a slider, and checks of their names and of requirements on them."""
 
 from __future__ import annotations
 

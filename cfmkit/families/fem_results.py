@@ -1,4 +1,4 @@
-"""Results of a part that is solved as a solid: scalar results, and the stress in each fillet.
+"""Results of a part that is solved as a solid: errors of the mesh, and each fillet's stress over that of beams there.
 
 Scalar results are errors of the mesh and the stress concentration; `fillets.csv` has a row for each fillet.
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.curves import Column
-from cfmkit.families.findings import bracket
+from cfmkit.families.findings import describe_wide_part
 from cfmkit.families.rows import with_values
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.tables import Table, TableColumn, border_column
@@ -148,7 +148,7 @@ def findings_of_mesh(
     for name, reported in error.too_large():
         yield finding(name, reported)
     for width, thickness in sections:
-        if reported := bracket(width, thickness, poisson, wide_beams):
+        if reported := describe_wide_part(width, thickness, poisson, wide_beams):
             yield finding("wide_beam", reported)
 
 

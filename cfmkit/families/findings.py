@@ -1,6 +1,6 @@
-"""Wording of findings: by name, with numbers as users read them; and errors that carry one.
+"""Findings of families, made by name; numbers in them as users read them; and errors that carry one.
 
-These are a mechanism that cannot exist, and targets that no mechanism meets: with the finding that says so.
+The errors: a mechanism that cannot exist (`CannotBuild`), and targets that no mechanism meets (`Infeasible`).
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def percent(value: float) -> str:
     return format_short(value, "ratio", 3)
 
 
-def too_soft(share: float, where: str) -> str:
+def describe_wide_beam(share: float, where: str) -> str:
     """Return what the finding `wide_beam` says: by what share of the energy, and where; nothing of a small one."""
     if not share > TOO_SOFT:
         return ""
@@ -174,19 +174,19 @@ def too_soft(share: float, where: str) -> str:
     )
 
 
-def stiffer(share: float) -> str:
+def wide_beam_in_short(share: float) -> str:
     """Return the same in short."""
     return f"force at least {percent(share)} larger: anticlastic bending is suppressed"
 
 
-def bracket(width: float, thickness: float, poisson_ratio: float, wide_beams: bool) -> str:
+def describe_wide_part(width: float, thickness: float, poisson_ratio: float, wide_beams: bool) -> str:
     """Return what the finding `wide_beam` says of a part that is solved in plane stress; nothing of a narrow one.
 
     Where `wide_beams` is requested, it also says that this changes nothing here.
 
     Examples
     --------
-    >>> bracket(10e-3, 1e-3, 0.35, False)
+    >>> describe_wide_part(10e-3, 1e-3, 0.35, False)
     'the force is between plane stress, as solved, and plane strain, 14 % more (10 mm wide, 1 mm thick)'
     """
     if not width > MIN_PLANE_STRESS_RATIO * thickness:

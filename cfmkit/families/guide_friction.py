@@ -33,7 +33,7 @@ class GuideFriction:
         return cls(guide.friction, guide.drag, tilt)
 
     @property
-    def there(self) -> bool:
+    def is_present(self) -> bool:
         """Whether anything rubs."""
         numbers: tuple[Any, ...] = (self.friction, self.drag)
         return any(bool(np.any(value) if np.ndim(value) else value) for value in numbers)

@@ -1,4 +1,4 @@
-"""Proposals: a request for a constant force, what a family answers to it, and what answers have in common.
+"""Types of a suggestion (request, candidate, a family's offer), and what families share: flattest window, stiffening.
 
 A family's ``propose(request, run)`` looks at scaling laws, which takes milliseconds, and names designs that are worth
 trying; the caller designs them, analyses each with its exact model and keeps those that do what is required. SI

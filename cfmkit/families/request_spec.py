@@ -1,4 +1,4 @@
-"""Block `suggest` of a specification."""
+"""Block `suggest` of a specification: requirements of a mechanism, their checks, and the request that they make."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A solved mechanism as rows of curves, with a table of named quantities and a table of findings.
+"""Solved mechanisms as rows of curves, with tables of named quantities and findings; and variants of a specification.
 
 One mechanism is one row; a sweep, a yield or a search are many rows of one solution. Nothing is computed before it is
 read: a result of one mechanism reads the tables by name at row 0, a study reads columns.
@@ -52,7 +52,7 @@ def stack(items: Sequence[ItemT]) -> ItemT:
     elif is_dataclass(first):
         stacked = object.__new__(type(first))  # without what is known of the first one
         for name in (*(item.name for item in fields(first)), *getattr(first, "also_stacked", ())):
-            vars(stacked)[name] = stack([getattr(one, name) for one in items])
+            vars(stacked)[name] = stack([getattr(item, name) for item in items])
     elif isinstance(first, tuple):
         stacked = tuple(stack(column) for column in zip(*items, strict=True))
     elif not ((values := np.array(items)) == values[0]).all():
@@ -293,7 +293,7 @@ class SeveralSolutions(Protocol[S_co]):
     """Mechanisms that are solved one by one, as traced ones are."""
 
     @property
-    def each(self) -> Sequence[S_co]:
+    def solutions(self) -> Sequence[S_co]:
         """Their solutions."""
         ...
 
@@ -302,7 +302,7 @@ def each_quantity(quantity: ScalarQuantity[SolutionT]) -> ScalarQuantity[Any]:
     """Return a quantity of one solution as that of several."""
 
     def function(several: SeveralSolutions[SolutionT]) -> FloatArray:
-        return np.array([float(np.ravel(quantity.function(solution))[0]) for solution in several.each])
+        return np.array([float(np.ravel(quantity.function(solution))[0]) for solution in several.solutions])
 
     return ScalarQuantity(*quantity.about, function, words=quantity.words)
 
@@ -311,9 +311,9 @@ def each_rule(rule: FindingRule[SolutionT]) -> FindingRule[Any]:
     """Return a rule on one solution as that on several."""
 
     def holds(several: SeveralSolutions[SolutionT]) -> NDArray[np.bool_]:
-        return np.array([bool(np.ravel(rule.holds(solution))[0]) for solution in several.each])
+        return np.array([bool(np.ravel(rule.holds(solution))[0]) for solution in several.solutions])
 
-    return FindingRule(rule.name, holds, lambda several: rule.sentence(several.each[0]))
+    return FindingRule(rule.name, holds, lambda several: rule.sentence(several.solutions[0]))
 
 
 class RowsSolution(Protocol):

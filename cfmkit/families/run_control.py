@@ -1,4 +1,4 @@
-"""Settings of a run of a family's function: seed, progress, time, who does independent jobs, what is kept."""
+"""Settings of a run of a family's function: seed, progress report, time limit, executor of jobs, store of results."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _one_by_one(
         yield job, work(job)
 
 
-class _Forgotten:
+class _NothingKept:
     """Keeps nothing: the default for library use."""
 
     def find(self, _key: str, /) -> None:
@@ -48,9 +48,9 @@ def silent(_fraction: float, _text: str) -> None:
 class Rising:
     """Passes on the largest fraction so far, with the newest text."""
 
-    def __init__(self, told: Callable[[float, str], None]) -> None:
-        """Begin a progress report to `told`, from 0 on."""
-        self._told = told
+    def __init__(self, report: Callable[[float, str], None]) -> None:
+        """Begin a progress report to `report`, from 0 on."""
+        self._told = report
         self._most = 0.0
 
     def __call__(self, fraction: float, text: str) -> None:
@@ -72,9 +72,9 @@ class Scaled:
         self.whole(self.begun + (self.ended - self.begun) * fraction, text)
 
 
-def rising(told: Callable[[float, str], None]) -> Callable[[float, str], None]:
+def rising(report: Callable[[float, str], None]) -> Callable[[float, str], None]:
     """Return what passes progress on and never falls; what cannot fall is returned as it is."""
-    return told if told is silent or isinstance(told, Rising | Scaled) else Rising(told)
+    return report if report is silent or isinstance(report, Rising | Scaled) else Rising(report)
 
 
 def read_time(time: str | float | None, name: str = "time_budget") -> float | None:
@@ -108,7 +108,7 @@ class Run:
     progress: Callable[[float, str], None] = silent
     time_budget: float | None = None  # in seconds, a text with its unit is read; None: no limit
     executor: Executor = _one_by_one  # does independent jobs, in this process or in others
-    notes: Notes = field(default_factory=_Forgotten)  # keeps what is finished
+    notes: Notes = field(default_factory=_NothingKept)  # keeps what is finished
 
     def __post_init__(self) -> None:
         """Let no search that looks again take its progress back."""

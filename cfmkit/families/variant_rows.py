@@ -113,10 +113,10 @@ def count_together(variants: Variants, batches: BatchSolver | None, knows: Knows
     if batches is None:
         return 1
     try:
-        known = sum(1 for _ in valid(variants))  # of those that are not valid each says so by itself
+        n_valid = sum(1 for _ in valid(variants))  # of those that are not valid each says so by itself
         groups = [(len(members), knows(solved), solved.traced) for members, solved in batches(variants)]
     except CfmError:
         return 1
-    if not known or sum(count for count, _, _ in groups) != known or not all(told for _, told, _ in groups):
+    if not n_valid or sum(count for count, _, _ in groups) != n_valid or not all(told for _, told, _ in groups):
         return 1
     return SMALLEST_TRACED if any(traced for _, _, traced in groups) else MIN_BLOCK_SIZES

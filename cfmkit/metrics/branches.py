@@ -1,4 +1,4 @@
-"""Branches of a curve and their part inside a window, in the order of the path.
+"""Branches of a curve, their part inside a window, and mean, extremes and broken limits where the motion turns back.
 
 A window keeps the samples inside it and adds interpolated end points where its ends lie strictly between two samples.
 It never reaches beyond the data. A branch that folds back in displacement enters and leaves a window several times:

@@ -1,4 +1,4 @@
-"""One thing beside its reference: where its curve differs, branch by branch, and which of its numbers do.
+"""Comparison of a mechanism with a reference: the difference of their curves, branch by branch, and changed metrics.
 
 The reference may be a measurement, the finest model or an earlier batch. Nothing is extrapolated, and a branch that
 turns back is not compared: it is many-valued.
@@ -44,7 +44,7 @@ class Points:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class ComparedSide:
     """One side of a comparison: what is known of a mechanism."""
 
     name: str  # as sentences call it
@@ -132,23 +132,25 @@ class Differences:
 
 
 def compare(
-    reference: Compared, compared: Compared, over: Window | None = None, tolerance: float = COMPARISON_RTOL
+    reference: ComparedSide, compared: ComparedSide, over: Window | None = None, tolerance: float = COMPARISON_RTOL
 ) -> Differences:
     """Return what something has more than its reference: its curve inside a window, and its metrics.
 
     `tolerance`: relative change of a metric up to which it counts as the same.
     """
-    changes = tuple(_changes(reference.metrics, compared, tolerance))
+    changes = tuple(_list_changes(reference.metrics, compared, tolerance))
     nothing: FloatArray = np.empty(0)
     if reference.points and compared.curve is not None:
         gap = f"the {compared.name} has no equilibrium at some of the points"
-        curves = {branch: _less(points, compared.curve, gap) for branch, points in reference.points.items()}
+        curves = {
+            branch: _subtract_reference(points, compared.curve, gap) for branch, points in reference.points.items()
+        }
         return Differences(curves, nothing, over, changes)
     if reference.curve is None or compared.curve is None:
         missing = next((side for side in (compared, reference) if side.curve is None and not side.points), compared)
         return Differences({"": Difference(nothing, f"there is no {missing.name} curve")}, nothing, None, changes)
     fine, coarse = reference.curve, compared.curve
-    pairs = {name: counterpart(coarse, name, _measure_direction(fine, name)) for name in fine.branches}
+    pairs = {name: counterpart(coarse, name, _direction_of_branch(fine, name)) for name in fine.branches}
     parts = [part for name, its in pairs.items() for part in (fine.select_branch(name), coarse.select_branch(its))]
     window = overlap([(float(part.motion.min()), float(part.motion.max())) for part in parts], over)
     if window is None:
@@ -158,7 +160,7 @@ def compare(
     return Differences(curves, places, window, changes)
 
 
-def _measure_direction(curve: Curve, branch: str) -> float:
+def _direction_of_branch(curve: Curve, branch: str) -> float:
     motion = curve.select_branch(branch).motion
     return float(motion[-1] - motion[0])
 
@@ -166,12 +168,12 @@ def _measure_direction(curve: Curve, branch: str) -> float:
 def _difference_between(fine: tuple[Curve, str], coarse: tuple[Curve, str], places: FloatArray) -> Difference:
     try:
         points = Points(places, effort_at(*fine, places), coarse[1])
-        return _less(points, coarse[0], "there is no equilibrium at some of the places")
+        return _subtract_reference(points, coarse[0], "there is no equilibrium at some of the places")
     except Undefined as problem:
         return Difference(np.full(len(places), np.nan), problem.reason)
 
 
-def _less(points: Points, curve: Curve, gap: str) -> Difference:
+def _subtract_reference(points: Points, curve: Curve, gap: str) -> Difference:
     """Return a curve less its reference at the places of that."""
     try:
         values = effort_at(curve, points.counterpart, points.motion) - points.effort
@@ -184,7 +186,7 @@ def _is_number(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and math.isfinite(value)
 
 
-def _changes(before: Metrics, compared: Compared, tolerance: float) -> Iterator[MetricChange]:
+def _list_changes(before: Metrics, compared: ComparedSide, tolerance: float) -> Iterator[MetricChange]:
     after = compared.metrics
     for name in dict.fromkeys((*before, *after)):
         old, new = (side.get(name, {}).get("value") for side in (before, after))

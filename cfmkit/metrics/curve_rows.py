@@ -45,7 +45,7 @@ class RowSamples:
     count: NDArray[np.intp]  # (d,) of each row
 
     @property
-    def own(self) -> NDArray[np.bool_] | None:
+    def is_distinct(self) -> NDArray[np.bool_] | None:
         """Which values are not repeated last ones, (d, n); None if all rows are equally long."""
         size = self.motion.shape[1]
         return None if (self.count == size).all() else np.arange(size) < self.count[:, None]
@@ -54,8 +54,8 @@ class RowSamples:
         """Return `with_ends` with the values (d, 2) where an end is between two points; one at a point has its own."""
         slack, ends = WINDOW_RTOL * (high - low), np.stack([low, high], axis=1)
         at_point = (np.abs(self.motion[:, :, None] - ends[:, None]) <= slack[:, None, None]).any(axis=1)
-        own = np.stack([self.interpolate(low), self.interpolate(high)], axis=1)
-        return self.with_ends((low, high), np.where(at_point, own, values), slack)
+        at_own_points = np.stack([self.interpolate(low), self.interpolate(high)], axis=1)
+        return self.with_ends((low, high), np.where(at_point, at_own_points, values), slack)
 
     def interpolate(self, place: FloatArray) -> FloatArray:
         """Return the value of each row at a place, (d,), by linear interpolation."""
@@ -91,9 +91,9 @@ class RowSamples:
         """Return the samples inside of windows and their ends, with values (d, 2) there."""
         inside, ends = self.find_between(window, slack), np.stack(window, axis=1)
         if inside.strides[0] == 0:  # all are alike
-            own = slice(int(inside[0].argmax()), int(inside[0].argmax() + inside[0].sum()))
-            motion = np.concatenate([ends[0, :1], self.motion[0, own], ends[0, 1:]])
-            inner = np.concatenate([values[:, :1], self.values[:, own], values[:, 1:]], axis=1)
+            columns = slice(int(inside[0].argmax()), int(inside[0].argmax() + inside[0].sum()))
+            motion = np.concatenate([ends[0, :1], self.motion[0, columns], ends[0, 1:]])
+            inner = np.concatenate([values[:, :1], self.values[:, columns], values[:, 1:]], axis=1)
             return RowSamples(np.broadcast_to(motion, inner.shape), inner, np.full(len(inner), len(motion)))
         count = inside.sum(axis=1) + 2
         motion, inner = (
@@ -143,7 +143,9 @@ class StressRows:
     allowable: FloatArray  # (d,) NaN if there is none [Pa]
     # between two places of each row, (d,), (d,) -> (d,) [Pa]; None: to be looked for from the points on
     largest: Callable[[FloatArray, FloatArray], FloatArray | None] | None = None
-    own: Callable[[FloatArray], FloatArray] | None = None  # `at` in the load case of the curve, where that differs
+    read_alone: Callable[[FloatArray], FloatArray] | None = (
+        None  # `at` in the load case of the curve, where that differs
+    )
 
     @cached_property
     def samples(self) -> Sequence[RowSamples]:
@@ -203,8 +205,8 @@ class CurveRows(ShortRepr):
         """The effort at the peaks; NaN behind the last of a row."""
         if self.peaks is None:
             return self.dense_effort
-        known = np.isfinite(self.peaks)
-        return np.where(known, self.all_at(np.where(known, self.peaks, self.samples.motion[:, :1])), np.nan)
+        is_peak = np.isfinite(self.peaks)
+        return np.where(is_peak, self.all_at(np.where(is_peak, self.peaks, self.samples.motion[:, :1])), np.nan)
 
     @cached_property
     def dense(self) -> FloatArray:
@@ -225,16 +227,16 @@ class CurveRows(ShortRepr):
     def level_along(self, curve: TargetCurve, size: FloatArray) -> CurveRows:
         """Return curves less one that they are to follow, on constant efforts (d,)."""
 
-        own = self.effort
+        effort_of_curves = self.effort
 
         def effort(places: FloatArray, rows: Any) -> FloatArray:
             level = size if rows is None else size[rows]
-            assert own is not None
-            return np.asarray(own(places, rows) - curve.evaluate(places) + level[:, None])
+            assert effort_of_curves is not None
+            return np.asarray(effort_of_curves(places, rows) - curve.evaluate(places) + level[:, None])
 
         motion, values = self.samples.motion, self.samples.values
         samples = replace(self.samples, values=values - curve.evaluate(motion) + size[:, None])
-        return replace(self, samples=samples, effort=own and effort, target=size, followed=None)
+        return replace(self, samples=samples, effort=effort_of_curves and effort, target=size, followed=None)
 
 
 def rows_of_curve(curve: Curve, frame: MeasuringFrame) -> dict[str, CurveRows]:

@@ -1,4 +1,4 @@
-"""References that a curve is measured against."""
+"""References that metrics of a curve need: target, allowable stress, other load cases, model between points, error."""
 
 from __future__ import annotations
 

@@ -176,8 +176,8 @@ class Survey:
         if not chosen:
             return (Value(None, self._no_branch(branch)),)
         if definition.scope == "branch":
-            return tuple(_value(function, rows) for rows in chosen.values())
-        return (_value(function, self.subject if branch is None else CycleRows(chosen)),)
+            return tuple(_compute_value(function, rows) for rows in chosen.values())
+        return (_compute_value(function, self.subject if branch is None else CycleRows(chosen)),)
 
     def _no_branch(self, name: str | None) -> str:
         if not self.branches:
@@ -208,7 +208,7 @@ def worst_branch(
     return np.asarray(np.abs(values - target).argmax(axis=0))
 
 
-def _value(function: Callable[..., FloatArray], subject: object) -> Value:
+def _compute_value(function: Callable[..., FloatArray], subject: object) -> Value:
     try:
         (value,) = function(subject).tolist()
     except Undefined as gap:
@@ -238,11 +238,11 @@ def measure(
     extra : iterable of Definition
         More metrics, computed by their functions.
     """
-    return _all(survey(curve, frame, window), definitions(curve.kind, extra))
+    return _measure_all(survey(curve, frame, window), definitions(curve.kind, extra))
 
 
 @np.errstate(all="ignore")
-def _all(view: Survey, table: Iterable[Definition]) -> dict[str, Quantity]:
+def _measure_all(view: Survey, table: Iterable[Definition]) -> dict[str, Quantity]:
     return dict(item for definition in table for item in _entries(view, definition))
 
 
@@ -333,7 +333,7 @@ def survey_of(result: Result, window: Window | None, surveys: Surveys | None = N
     return known_surveys[window]
 
 
-def left_of(window: Window | None, result: Result) -> Window | None:
+def shorten_window(window: Window | None, result: Result) -> Window | None:
     """Return what is left of a window inside which the curve of a partial result ends; else the window itself."""
     if window is None or result.status is not Status.PARTIAL or not result.curves or not len(result.curves[0]):
         return window
@@ -375,12 +375,12 @@ def evaluate(
     cfmkit.errors.UsageError
         If one of `names` exists neither as a metric nor as a value of the family.
     """
-    view = survey_of(result, left_of(window or window_of(result), result), surveys)
+    view = survey_of(result, shorten_window(window or window_of(result), result), surveys)
     kind, extra = kind_of(result), tuple(extra_definitions)
     if names is not None:
         by_name = metrics_by_name(kind, extra)
         return {name: result.values.get(name) or _named_quantity(view, name, by_name, result) for name in names}
-    return ({} if view is None else _all(view, definitions(kind, extra))) | dict(result.values)
+    return ({} if view is None else _measure_all(view, definitions(kind, extra))) | dict(result.values)
 
 
 def mean_effort(result: Result) -> float | None:
@@ -440,7 +440,7 @@ def find_uncovered(
     return tuple(UncoveredWindow(window, tuple(where), common, kind) for window, where in paths.items())
 
 
-def windows_judged(result: Result) -> Result:
+def warn_of_uncovered_windows(result: Result) -> Result:
     """Return a result that warns of windows that its nominal curve does not cover."""
     warnings = tuple(Finding(WINDOW_OUTSIDE, _report_gap(gap, result)) for gap in gaps(result))
     return replace(result, warnings=LazySequence(lambda: (*result.warnings, *warnings))) if warnings else result
@@ -453,7 +453,7 @@ def _report_gap(gap: UncoveredWindow, result: Result) -> str:
     travel = travel_of(result)
     if result.status is Status.PARTIAL and travel is not None and min(travel) <= window.lo and window.hi <= max(travel):
         text += f", which ends before the requested travel does ({span_text(min(travel), max(travel), kind)})"
-    if (left := left_of(window, result)) != window and left is not None:
+    if (left := shorten_window(window, result)) != window and left is not None:
         return (
             f"{text}: metrics are taken over {span_text(left.lo, left.hi, kind)}, and requirements over the window are "
             "missed"

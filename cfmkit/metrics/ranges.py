@@ -114,9 +114,9 @@ def band_range(rows: RowsInWindow, tolerance: float) -> FloatArray:
     curves, pose = rows.curves, rows.pose
     is_reached = rows.reach(pose)
     rows.require_straight()
-    here = np.abs(rows.remember(_effort_at_pose, "pose")[:, 0])
+    size_at_pose = np.abs(rows.remember(_effort_at_pose, "pose")[:, 0])
     largest = np.nanmax(np.abs(curves.samples.values), axis=1, initial=0.0)
-    zero = here <= np.maximum(curves.error, ZERO_EFFORT_SHARE * largest)
+    zero = size_at_pose <= np.maximum(curves.error, ZERO_EFFORT_SHARE * largest)
     rows.require(~zero, f"the {curves.kind} at the reference pose is zero within its numerical error")
     if curves.effort is None:
         width = _width_between_points(rows, tolerance)
@@ -163,45 +163,45 @@ def _solve_ends(rows: RowsInWindow, with_rise: bool = True, with_bands: bool = T
     some = np.isfinite(nominal) & (np.abs(nominal) > curves.error)
     start = np.where(first == 0, curves.dense[:, 0], start)
     stop = np.where(some & (first > 0) & with_rise, stop, start)
-    here, inside, outside, ends = _find_bands(rows)
+    effort_at_pose, inside, outside, ends = _find_bands(rows)
     outside = outside if with_bands else inside
     widths, effort = np.repeat(list(BAND_RANGES.values()), 2) * (1 + BAND_RTOL), curves.effort
     assert effort is not None
 
     def excess(at: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
         rows, which = np.divmod(ends, 1 + len(widths))
-        found, of_band = effort(at, rows), which > 0
-        risen = found / nominal[rows, None] - (0.95 - BAND_RTOL)
-        away = np.abs(found / here[rows] - 1) - widths[which - 1][:, None]
+        efforts, of_band = effort(at, rows), which > 0
+        risen = efforts / nominal[rows, None] - (0.95 - BAND_RTOL)
+        away = np.abs(efforts / effort_at_pose[rows] - 1) - widths[which - 1][:, None]
         # Where there is no effort, 95 % are not reached, and it is outside every band.
         return np.where(of_band[:, None], away, np.where(np.isnan(risen), -np.inf, risen))
 
     places = last_places(excess, np.column_stack([start, inside]), np.column_stack([stop, outside]))
-    found = np.where(np.isnan(ends), places[:, 1:], ends)
-    bands = found[:, 1::2] - found[:, ::2]
+    band_ends = np.where(np.isnan(ends), places[:, 1:], ends)
+    bands = band_ends[:, 1::2] - band_ends[:, ::2]
     return np.where(some & with_rise, places[:, 0], np.nan), bands if with_bands else np.full_like(bands, np.nan)
 
 
 def _find_bands(rows: RowsInWindow) -> tuple[FloatArray, ...]:
     """Return efforts at the poses, (d, 1), and of both ends of `BAND_RANGES` places inside, outside, and known ends."""
     motion, place = rows.curves.dense, rows.pose
-    here = rows.remember(_effort_at_pose, "pose")
-    offset, last = np.abs(rows.curves.dense_effort / here - 1), motion.shape[1] - 1
+    effort_at_pose = rows.remember(_effort_at_pose, "pose")
+    offset, last = np.abs(rows.curves.dense_effort / effort_at_pose - 1), motion.shape[1] - 1
     index, samples = (motion < place[:, None]).sum(axis=1)[:, None], np.arange(motion.shape[1])
     inside, outside, ends = [], [], []
     for tolerance in BAND_RANGES.values():
         bad = ~(offset <= tolerance * (1 + BAND_RTOL))
-        for there, inward in ((bad & (samples < index), 1), (bad & (samples >= index), -1)):
-            worst = last - there[:, ::-1].argmax(axis=1) if inward > 0 else there.argmax(axis=1)
+        for bad_on_side, inward in ((bad & (samples < index), 1), (bad & (samples >= index), -1)):
+            worst = last - bad_on_side[:, ::-1].argmax(axis=1) if inward > 0 else bad_on_side.argmax(axis=1)
             worst = worst[:, None]
             inner = np.take_along_axis(motion, np.clip(worst + inward, 0, last), axis=1)
             # The reference pose, with no offset, stands between the samples index - 1 and index.
             good = np.where(worst == (index - 1 if inward > 0 else index), place[:, None], inner)
-            some = there.any(axis=1, keepdims=True)
+            some = bad_on_side.any(axis=1, keepdims=True)
             ends.append(np.where(some, np.nan, motion[:, :1] if inward > 0 else motion[:, -1:]))
             inside.append(good)
             outside.append(np.where(some, np.take_along_axis(motion, worst, axis=1), good))
-    return here, np.hstack(inside), np.hstack(outside), np.hstack(ends)
+    return effort_at_pose, np.hstack(inside), np.hstack(outside), np.hstack(ends)
 
 
 def find_usable(cycle: CycleRows, which: int) -> FloatArray:

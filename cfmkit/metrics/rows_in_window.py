@@ -66,7 +66,7 @@ class RowsInWindow:
 
     # --- what is known, and why something is not --------------------------------------------------------------------
 
-    def require(self, known: Any, reason: str | Callable[[], str]) -> NDArray[np.bool_]:
+    def require(self, is_known: Any, reason: str | Callable[[], str]) -> NDArray[np.bool_]:
         """Return which rows are known, (d,).
 
         Raises
@@ -74,7 +74,7 @@ class RowsInWindow:
         Undefined
             If there is one row, and it is not.
         """
-        mask: NDArray[np.bool_] = np.broadcast_to(known, len(self))
+        mask: NDArray[np.bool_] = np.broadcast_to(is_known, len(self))
         if len(mask) == 1 and not mask[0]:
             raise Undefined(reason if isinstance(reason, str) else reason())
         return mask
@@ -174,23 +174,23 @@ class RowsInWindow:
     @cached_property
     def mean(self) -> FloatArray:
         """Mean effort over the points; of a recording over the motion. What is not above the error is zero."""
-        inside, own = self.inside, self.inside.own
+        inside, is_distinct = self.inside, self.inside.is_distinct
         if self.curves.frame.over_motion:
             mean = _mean_over_motion(inside.motion, inside.values)
-        elif own is None:
+        elif is_distinct is None:
             mean = inside.values.mean(axis=1)
         else:
-            mean = np.where(own, inside.values, 0.0).sum(axis=1) / inside.count
+            mean = np.where(is_distinct, inside.values, 0.0).sum(axis=1) / inside.count
         return np.where(np.abs(mean) <= self.curves.error, 0.0, mean)
 
     @property
     def deviation(self) -> FloatArray:
         """Sample standard deviation (n - 1) of the effort at the points; of a recording over the motion."""
-        inside, own = self.inside, self.inside.own
+        inside, is_distinct = self.inside, self.inside.is_distinct
         offset = inside.values - self.mean[:, None]
         if self.curves.frame.over_motion:
             return np.sqrt(_mean_over_motion(inside.motion, offset**2))
-        offset = offset if own is None else np.where(own, offset, 0.0)
+        offset = offset if is_distinct is None else np.where(is_distinct, offset, 0.0)
         return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / (inside.count - 1)))
 
     @property
@@ -219,9 +219,9 @@ class RowsInWindow:
             places = np.where(np.isfinite(heights), places, np.nan)  # places without an effort go behind all others
             order = np.argsort(places, axis=1)
             places, heights = np.take_along_axis(places, order, 1), np.take_along_axis(heights, order, 1)
-        is_early, own = places <= low, (places > low) & (places < high)
+        is_early, is_inside = places <= low, (places > low) & (places < high)
         ends = np.where(is_early, inside.values[:, :1], inside.values[:, -1:])
-        return np.where(own, places, np.where(is_early, low, high)), np.where(own, heights, ends)
+        return np.where(is_inside, places, np.where(is_early, low, high)), np.where(is_inside, heights, ends)
 
     @cached_property
     def _uneven(self) -> NDArray[np.bool_]:
@@ -284,8 +284,9 @@ class RowsInWindow:
         stress, (low, high) = self.curves.stress, self._cut
         self.inside  # noqa: B018  (raises where the window is not covered)
         beside = self.list_stress_ranges_beside()
-        own = None if stress is None or stress.largest is None else stress.largest(low, high)
-        return np.asarray(np.max([self.find_stress_range()[1] if own is None else own, *(top for _, top in beside)], 0))
+        solved = None if stress is None or stress.largest is None else stress.largest(low, high)
+        largest = self.find_stress_range()[1] if solved is None else solved
+        return np.asarray(np.max([largest, *(top for _, top in beside)], 0))
 
     def find_stress_range(self, alone: bool = False) -> Ends:
         """Return the least and the largest stress, (d,) each [Pa]; of a model next to the points, too.
@@ -306,8 +307,8 @@ class RowsInWindow:
         if stress.at is None:
             return inside.values.min(axis=1), inside.values.max(axis=1)
         rows, function = np.arange(len(self)), stress.at
-        if alone and (own := stress.own) is not None:  # ends between two points have the stress of all load cases
-            return inside.change(own(inside.motion)).extremes(own)[::-1]
+        if alone and (read := stress.read_alone) is not None:  # ends between points have the stress of all load cases
+            return inside.change(read(inside.motion)).extremes(read)[::-1]
         return inside.extremes(lambda places: function(places, rows))[::-1]
 
     def _stress_inside(self, stress: StressRows) -> RowSamples:
@@ -327,19 +328,19 @@ class RowsInWindow:
         """Return the least and the largest stress in each other load case, as far as it goes, (d,) each [Pa]."""
         stress, (low, high) = self.curves.stress, self._cut
         ranges = []
-        for other in () if stress is None or (stress.largest and len(self) > 1) else stress.samples[1:]:
-            start, stop = np.maximum(other.motion.min(axis=1), low), np.minimum(other.motion.max(axis=1), high)
+        for case in () if stress is None or (stress.largest and len(self) > 1) else stress.samples[1:]:
+            start, stop = np.maximum(case.motion.min(axis=1), low), np.minimum(case.motion.max(axis=1), high)
             if self.window is None:
-                least, most = other.values.min(axis=1), other.values.max(axis=1)
+                least, most = case.values.min(axis=1), case.values.max(axis=1)
             else:
-                inner, ends = other.find_between((start, stop)), (other.interpolate(end) for end in (start, stop))
+                inner, ends = (case.find_between((start, stop)), (case.interpolate(end) for end in (start, stop)))
                 first, last = ends
-                most = np.maximum(np.where(inner, other.values, -np.inf).max(axis=1), np.maximum(first, last))
-                least = np.minimum(np.where(inner, other.values, np.inf).min(axis=1), np.minimum(first, last))
-            there = (start < stop) | (self.window is None)
-            unknown = there & np.isnan(most)
+                most = np.maximum(np.where(inner, case.values, -np.inf).max(axis=1), np.maximum(first, last))
+                least = np.minimum(np.where(inner, case.values, np.inf).min(axis=1), np.minimum(first, last))
+            overlaps = (start < stop) | (self.window is None)
+            unknown = overlaps & np.isnan(most)
             self.require(~unknown, "the stress of another load case is not known everywhere in the window")
-            ranges.append((np.where(there, least, np.inf), np.where(there, most, -np.inf)))
+            ranges.append((np.where(overlaps, least, np.inf), np.where(overlaps, most, -np.inf)))
         return ranges
 
     # --- the curve that is to be followed, or the constant effort ---------------------------------------------------
@@ -354,8 +355,8 @@ class RowsInWindow:
         curves = self.curves
 
         def reason() -> str:
-            known = "there is no target to compare with" if np.isnan(curves.target[0]) else "the target is zero"
-            return f"{known}; 'deviation_from_curve' compares with a curve" if curves.followed else known
+            missing = "there is no target to compare with" if np.isnan(curves.target[0]) else "the target is zero"
+            return f"{missing}; 'deviation_from_curve' compares with a curve" if curves.followed else missing
 
         return np.where(self.require(self.has_target, reason), curves.target, np.nan)
 
@@ -370,10 +371,10 @@ class RowsInWindow:
 
     def largest_followed(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """Return the largest effort of the curve that is to be followed between places, (d,); NaN where it is zero."""
-        size, curve, known = np.full(len(low), np.nan), self.curves.followed, self.is_followed(low, high)
-        if curve is not None and known.any():
-            pairs, which = np.unique(np.stack([low, high], axis=1)[known], axis=0, return_inverse=True)
-            size[known] = np.array([curve.largest(*pair) for pair in pairs.tolist()])[which.ravel()]
+        size, curve, is_known = np.full(len(low), np.nan), self.curves.followed, self.is_followed(low, high)
+        if curve is not None and is_known.any():
+            pairs, which = np.unique(np.stack([low, high], axis=1)[is_known], axis=0, return_inverse=True)
+            size[is_known] = np.array([curve.largest(*pair) for pair in pairs.tolist()])[which.ravel()]
         return np.where(size > self.curves.error, size, np.nan)
 
     def is_followed(self, low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:

@@ -57,14 +57,14 @@ class CycleRows:
         """
         branches = _level_branches(list(self.branches.values()))
         target = _find_reference(branches)
-        known, target = np.isfinite(target), np.where(np.isfinite(target), target, 1.0)
+        is_known, target = np.isfinite(target), np.where(np.isfinite(target), target, 1.0)
         valid = branches[0].curves.frame.valid
         if all(rows.curves.effort is not None for rows in branches) and (valid is None or len(valid) == 1):
             start, end = _solve_interval(branches, target)
         else:
             start, end = np.array([_find_interval_between_points(branches, float(target[0]))]).T
         stroke = np.where(np.isnan(start), 0.0, end - start)
-        return UsableInterval(*(np.where(known, values, np.nan) for values in (stroke, start, end)))
+        return UsableInterval(*(np.where(is_known, values, np.nan) for values in (stroke, start, end)))
 
 
 def _find_reference(branches: Sequence[RowsInWindow]) -> FloatArray:
@@ -112,20 +112,20 @@ def _solve_interval(branches: Sequence[RowsInWindow], target: FloatArray) -> End
     limits = valid, np.where(until < last - 1e-9 * reached, until, np.inf)
     width = np.broadcast_to(first.band * (1 + BAND_RTOL), len(motion))
 
-    def excess(at: FloatArray, rows: NDArray[np.intp], known: bool = False) -> FloatArray:
+    def excess(at: FloatArray, rows: NDArray[np.intp], on_dense_places: bool = False) -> FloatArray:
         """Return by what share that exceeds its limit which does so most; NaN where one is not a number."""
         start, stop = (limit[rows, None] for limit in limits)
         worst = np.maximum(start - at, at - stop) / reached[rows, None]
         for branch in branches:
             curves = branch.curves
             if curves.effort is not None:
-                effort = curves.dense_effort if known else curves.effort(at, rows)
+                effort = curves.dense_effort if on_dense_places else curves.effort(at, rows)
                 worst = np.maximum(worst, np.abs(effort / target[rows, None] - 1) - width[rows, None])
             if curves.stress is not None and curves.stress.limits:
                 worst = np.maximum(worst, curves.stress.excess(at, rows))
         return worst
 
-    good = excess(motion, every, known=True) <= 0
+    good = excess(motion, every, on_dense_places=True) <= 0
     begins, ends = good.copy(), good.copy()
     begins[:, 1:] &= ~good[:, :-1]
     ends[:, :-1] &= ~good[:, 1:]
@@ -159,20 +159,20 @@ def _intervals_between_places(
     some = np.flatnonzero(passes.any(axis=1))
     if exact is None or not some.size:
         return start, end
-    own, step = rows[some], passes[some].argmax(axis=1)
-    left, right = curves.dense[own, step][:, None], curves.dense[own, step + 1][:, None]
+    some_rows, step = rows[some], passes[some].argmax(axis=1)
+    left, right = curves.dense[some_rows, step][:, None], curves.dense[some_rows, step + 1][:, None]
     sign = np.where(above[some, step], -1.0, 1.0)[:, None]
 
     def short(at: FloatArray, few: NDArray[np.intp]) -> FloatArray:
-        goal = target[own[few], None]
-        return np.asarray(sign[few] * (exact(at, own[few]) - goal) / np.abs(goal))
+        goal = target[some_rows[few], None]
+        return np.asarray(sign[few] * (exact(at, some_rows[few]) - goal) / np.abs(goal))
 
     middle = last_places(short, left, right)
-    kept = np.flatnonzero(excess(middle, own)[:, 0] <= 0)
+    kept = np.flatnonzero(excess(middle, some_rows)[:, 0] <= 0)
     if kept.size:
         inside, outside = np.hstack([middle, middle])[kept], np.hstack([left, right])[kept]
-        found = last_places(lambda at, ends: excess(at, own[kept][ends // 2]), inside, outside)
-        start[some[kept]], end[some[kept]] = found.T
+        kept_ends = last_places(lambda at, ends: excess(at, some_rows[kept][ends // 2]), inside, outside)
+        start[some[kept]], end[some[kept]] = kept_ends.T
     return start, end
 
 

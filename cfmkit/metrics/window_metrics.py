@@ -54,32 +54,32 @@ def smallest(rows: RowsInWindow) -> FloatArray:
 
 def ripple(rows: RowsInWindow) -> FloatArray:
     """Return (max - min) / max."""
-    return _share(rows, rows.spread.max - rows.spread.min, rows.spread.max)
+    return _divide_by_whole(rows, rows.spread.max - rows.spread.min, rows.spread.max)
 
 
 def half_band(rows: RowsInWindow) -> FloatArray:
     """Return (max - min) / (max + min)."""
     width, whole = rows.spread.max - rows.spread.min, rows.spread.max + rows.spread.min
-    return _share(rows, width, np.where(whole > EXTREME_RTOL * width, whole, 0.0))
+    return _divide_by_whole(rows, width, np.where(whole > EXTREME_RTOL * width, whole, 0.0))
 
 
 def deviation_from_mean(rows: RowsInWindow) -> FloatArray:
     """Return the largest ``|F - mean| / mean``."""
     middle, high, low, _ = rows.spread
-    return _share(rows, np.maximum(high - middle, middle - low), middle)
+    return _divide_by_whole(rows, np.maximum(high - middle, middle - low), middle)
 
 
-def _share(rows: RowsInWindow, part: FloatArray, whole: FloatArray) -> FloatArray:
-    known = rows.require(whole > rows.curves.error, rows.describe_gap)
-    return np.where(known, part / np.where(known, whole, 1.0), np.nan)
+def _divide_by_whole(rows: RowsInWindow, part: FloatArray, whole: FloatArray) -> FloatArray:
+    is_known = rows.require(whole > rows.curves.error, rows.describe_gap)
+    return np.where(is_known, part / np.where(is_known, whole, 1.0), np.nan)
 
 
 def static_balance(rows: RowsInWindow) -> FloatArray:
     """Return the largest ``|F|`` over the largest of one spring or member in the window."""
     part = rows.largest_part
     text = "no spring or member bears more than the numerical error"
-    known = rows.require(part > rows.curves.error, lambda: f"{text}, {rows.error_text}")
-    return np.where(known, np.abs(rows.extremes).max(axis=0) / np.where(known, part, 1.0), np.nan)
+    is_known = rows.require(part > rows.curves.error, lambda: f"{text}, {rows.error_text}")
+    return np.where(is_known, np.abs(rows.extremes).max(axis=0) / np.where(is_known, part, 1.0), np.nan)
 
 
 def deviation_from_target(rows: RowsInWindow) -> FloatArray:
@@ -152,19 +152,19 @@ def safety_factor(rows: RowsInWindow) -> FloatArray:
 
 def fatigue_life(rows: RowsInWindow) -> FloatArray:
     """Return the cycles to failure between the least and the largest stress in the window, of all load cases."""
-    known = rows.curves.frame.durability
-    if known is None or known.fatigue is None:
+    durability = rows.curves.frame.durability
+    if durability is None or durability.fatigue is None:
         raise Undefined("the material has no fatigue data: add 'fatigue' to it")
     ranges = [rows.find_stress_range(alone=True), *rows.list_stress_ranges_beside()]
-    return np.array([min(known.fatigue.life(most, least) for (least,), (most,) in ranges if least <= most)])
+    return np.array([min(durability.fatigue.life(most, least) for (least,), (most,) in ranges if least <= most)])
 
 
 def effort_after(rows: RowsInWindow, time: float) -> FloatArray:
     """Return the mean effort in the window after a hold of a time [s]."""
-    known = rows.curves.frame.durability
-    if known is None or known.relaxation is None:
+    durability = rows.curves.frame.durability
+    if durability is None or durability.relaxation is None:
         raise Undefined("the material has no relaxation data: add 'relaxation' to it")
-    return np.asarray(rows.mean * known.relaxation.ratio(time))
+    return np.asarray(rows.mean * durability.relaxation.ratio(time))
 
 
 _TABLE_3 = "[Sanchez-Salinas 2022, Table 3]"

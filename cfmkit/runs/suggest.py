@@ -92,7 +92,7 @@ def as_json(suggestions: Suggestions, block: SuggestBlock) -> dict[str, Any]:
             _proposal_record(suggestions, proposal, number)
             for number, proposal in enumerate(suggestions.unjudged, len(suggestions.proposals) + 1)
         ],
-        "near_misses": [_proposal_record(suggestions, proposal) for proposal in suggestions.near],
+        "near_misses": [_proposal_record(suggestions, proposal) for proposal in suggestions.near_misses],
         "families": [
             {
                 "family": answer.family,
@@ -116,7 +116,7 @@ def _reason_without_proposal(suggestions: Suggestions, name: str, out_of_reach: 
     )
     if untried:
         return f"none of its {untried} candidates was tried in the time"
-    misses = [proposal.missed[0] for proposal in suggestions.near if proposal.family == name]
+    misses = [proposal.missed[0] for proposal in suggestions.near_misses if proposal.family == name]
     return (misses or list(suggestions.failed.get(name, ())) or [""])[0]
 
 
@@ -377,7 +377,7 @@ def table(suggestions: Suggestions) -> bytes:
     from cfmkit.tables import to_csv
     from cfmkit.tables.table import Table, TableColumn
 
-    rows = [*enumerate(suggestions.listed, 1), *((None, proposal) for proposal in suggestions.near)]
+    rows = [*enumerate(suggestions.listed, 1), *((None, proposal) for proposal in suggestions.near_misses)]
     numbers = [numbers_in_border_units(suggestions, proposal) for _, proposal in rows]
     unit = "N" if suggestions.request.kind == "force" else "N*mm"
     columns = [

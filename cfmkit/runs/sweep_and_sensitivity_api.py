@@ -79,9 +79,9 @@ class StudyResult:
             return figures(self.findings)
         if self.spec is None or "drawn" not in self.summary:
             return {}
-        from cfmkit.studies.pictures import makers_of_tables
+        from cfmkit.studies.pictures import list_pictures_of_tables
 
-        return makers_of_tables(self.spec, self.summary, self.table, self.curves)
+        return list_pictures_of_tables(self.spec, self.summary, self.table, self.curves)
 
     def to_pandas(self) -> Any:
         """Return the points as a `pandas.DataFrame`, columns headed ``force_mean [N]``."""

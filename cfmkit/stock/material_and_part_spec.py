@@ -1,4 +1,4 @@
-"""Material and part in a specification, and the share of the strength that may be used.
+"""Specification of a material, of how a part is cut (process, holes, frame, screws), and of pins and guides that rub.
 
 One grammar: a name from the library, a block of values, or a name with some of its values changed; and one for how
 a part is cut, and for plain pins and guides that rub.

@@ -1,4 +1,4 @@
-"""Named materials that constant-force mechanisms are made of, each with its source and its scatter.
+"""Named materials with source and scatter, and the fatigue, creep and loss data that are assumed of them.
 
 The nominal value is where a design starts; the scatter is what it must survive.
 For metals the low end is the minimum of the standard. For printed plastics the
@@ -315,7 +315,7 @@ class AssumedCreep:
 
 @dataclass(frozen=True)
 class LastingData:
-    """LastingData data of one material; None: nothing is assumed."""
+    """Fatigue, relaxation and loss factor of one material; None: nothing is assumed."""
 
     fatigue: AssumedFatigue | None = None
     relaxation: AssumedCreep | None = None

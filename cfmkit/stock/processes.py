@@ -185,12 +185,12 @@ def _processes_of(material: str | None, youngs_modulus: float) -> tuple[str, ...
     return ("laser", "fdm", "mill") if material in MATERIALS_BY_NAME else ("laser", "fdm", "sls", "mill")
 
 
-def usual(material: str | None, youngs_modulus: float) -> ProcessAccuracy:
+def usual_process(material: str | None, youngs_modulus: float) -> ProcessAccuracy:
     """Return the process that a material is usually made by: what it was named for, else wire for metals, else laser.
 
     Examples
     --------
-    >>> usual("pla", 3e9).name, usual(None, 200e9).name, usual(None, 2e9).name
+    >>> usual_process("pla", 3e9).name, usual_process(None, 200e9).name, usual_process(None, 2e9).name
     ('fdm', 'wire-edm', 'laser')
     """
     name = PROCESS_BY_PLASTIC.get(material or "", "wire-edm" if youngs_modulus > MIN_METAL_MODULUS else "laser")

@@ -2,12 +2,10 @@
 
 A study sees a specification, dotted paths and names of metrics; it knows no family.
 
-`variations` and `variations` say what may vary and how, `plan` enumerates the points,
-`point_evaluation` says what is noted of each, `variants_in_rows` evaluates them as rows,
-`serial_and_cluster_executors` and `pool` are ways to get that done, `journal` and `row_blocks_for_journal`
-remember what is finished, `engine` puts these together, `point_evaluation` names what is
-noted, `summary_and_tables` writes it, `summary_and_tables` sums it up, and `sweep_request_and_files` is the study that
-varies a specification.
+`variations` says what may vary and how, `plan` enumerates the points, `point_evaluation` says what is noted of each,
+`variants_in_rows` evaluates them as rows, `serial_and_cluster_executors` and `pool` do jobs, `journal` and
+`row_blocks_for_journal` keep what is finished, `engine` puts these together, `summary_and_tables` writes and sums up,
+and `sweep_request_and_files` is the study that varies a specification.
 """
 
 from cfmkit.lazy_names import lazy_names

@@ -196,18 +196,20 @@ def folders(files: Sequence[str]) -> tuple[str, ...]:
     depths = dict.fromkeys(paths, 1)
     while twice := _find_repeated(depths):
         depths |= {path: depths[path] + 1 for path in twice}
-    return tuple(_make_folder_names(_tail(path, depths[path]) for path in paths))
+    return tuple(_make_folder_names(_join_last_folders(path, depths[path]) for path in paths))
 
 
-def _tail(path: Path, depth: int) -> str:
+def _join_last_folders(path: Path, depth: int) -> str:
     return "-".join(path.parts[1:][-depth:]) or "spec"
 
 
 def _find_repeated(depths: Mapping[Path, int]) -> list[Path]:
     """Return different paths whose tails are the same, capitals apart, and could be longer."""
-    counts = Counter(_tail(path, depth).lower() for path, depth in depths.items())
+    counts = Counter(_join_last_folders(path, depth).lower() for path, depth in depths.items())
     return [
-        path for path, depth in depths.items() if counts[_tail(path, depth).lower()] > 1 and depth < len(path.parts)
+        path
+        for path, depth in depths.items()
+        if counts[_join_last_folders(path, depth).lower()] > 1 and depth < len(path.parts)
     ]
 
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import CfmError, Problem, SpecError, UsageError
 from cfmkit.families import family
-from cfmkit.metrics import window_of, windows_judged
+from cfmkit.metrics import warn_of_uncovered_windows, window_of
 from cfmkit.metrics.branches import span_text
-from cfmkit.metrics.compare import N_COMPARED_PLACES, Compared, largest, mean, rms
+from cfmkit.metrics.compare import N_COMPARED_PLACES, ComparedSide, largest, mean, rms
 from cfmkit.metrics.compare import compare as compare_sides
 from cfmkit.results import Finding, Status
 
@@ -100,8 +100,8 @@ class FidelityComparison:
     @cached_property
     def _differences(self) -> Mapping[str, Differences]:
         """Differences of each of the others from the finest, inside `analysis.window`."""
-        reference, over = _side(self.reference), window_of(self.variants[0].result)
-        return {item.name: compare_sides(reference, _side(item), over) for item in self.compared}
+        reference, over = _comparison_side(self.reference), window_of(self.variants[0].result)
+        return {item.name: compare_sides(reference, _comparison_side(item), over) for item in self.compared}
 
     def differences(self, item: Variant) -> Differences:
         """Return what the nominal curve of a variant has more than that of the finest, by branch of the finest."""
@@ -130,8 +130,8 @@ class FidelityComparison:
         }
 
 
-def _side(item: Variant) -> Compared:
-    return Compared(item.name, item.result.curve if item.result.curves else None)
+def _comparison_side(item: Variant) -> ComparedSide:
+    return ComparedSide(item.name, item.result.curve if item.result.curves else None)
 
 
 def choices_of(spec: Spec) -> Choices:
@@ -164,7 +164,7 @@ def compare(
     own_fidelity = fidelity_of(nominal)
     analyze = family(nominal.spec.family).analyze
     others = (
-        Variant(name, windows_judged(analyze(spec, run)))
+        Variant(name, warn_of_uncovered_windows(analyze(spec, run)))
         for name, spec in choices.specs.items()
         if name != own_fidelity
     )
@@ -197,10 +197,10 @@ def _records(comparison: FidelityComparison) -> Iterator[dict[str, object]]:
 
 def lines_of(comparison: FidelityComparison) -> tuple[tuple[str, str], ...]:
     """Return the paragraphs that a page shows: one for each curve and branch."""
-    return tuple(("fidelity", line) for item in comparison.compared for line in _lines(comparison, item))
+    return tuple(("fidelity", line) for item in comparison.compared for line in _describe_differences(comparison, item))
 
 
-def _lines(comparison: FidelityComparison, item: Variant) -> Iterator[str]:
+def _describe_differences(comparison: FidelityComparison, item: Variant) -> Iterator[str]:
     from cfmkit.specs.units import format_short
 
     metrics, differences = comparison.metrics(), comparison.differences(item)

@@ -125,9 +125,9 @@ def verify_by_solid(requested: Spec, design: Design, run: Run) -> Design:
     beams = record.analyze(design.spec, run)
     solid = record.analyze(as_solid, run)
     levels = record.design.levels if record.design else ()
-    path = next((path for path in levels if _level(requested, path)), None)
-    by_beams, by_solid, where = _values(beams, solid, AT_END[path]) if path in AT_END else _means(beams, solid)
-    wanted = by_beams if path is None else math.copysign(_level(requested, path), by_beams or 0.0)
+    path = next((path for path in levels if _number_at(requested, path)), None)
+    by_beams, by_solid, where = _forces_at_end(beams, solid, AT_END[path]) if path in AT_END else _means(beams, solid)
+    wanted = by_beams if path is None else math.copysign(_number_at(requested, path), by_beams or 0.0)
     if solid.status is not Status.COMPLETE or not wanted or not by_solid or not by_beams or wanted / by_solid <= 0:
         reported = f"the part as a solid has no force that could be corrected: {solid.message}"
         return replace(design, spec=as_solid, notes=(*design.notes, ("verify", reported)))
@@ -138,8 +138,8 @@ def verify_by_solid(requested: Spec, design: Design, run: Run) -> Design:
         f"{design.spec.fidelity} has a {mean}{kind} of {format_short(by_beams, kind)}, the part as a solid of "
         f"{format_short(by_solid, kind)} ({100 * (by_solid / by_beams - 1):+.2g} %){where}"
     )
-    if _sheet(as_solid):
-        return _relevel(requested, design, as_solid, path, factor, begun, run)
+    if _states_sheet(as_solid):
+        return _design_other_force(requested, design, as_solid, path, factor, begun, run)
     corrected = {path: float(f"{factor * width:.{WIDTH_DIGITS}g}") for path, width in _widths(as_solid).items()}
     outside = _explain_outside(requested, design.spec, corrected)
     if outside is not None:
@@ -161,14 +161,14 @@ def verify_by_solid(requested: Spec, design: Design, run: Run) -> Design:
     return replace(design, spec=made, search={**design.search, **about}, notes=(*design.notes, ("verify", note)))
 
 
-def _relevel(
+def _design_other_force(
     requested: Spec, design: Design, as_solid: Spec, path: str | None, factor: float, begun: str, run: Run
 ) -> Design:
     """Return a design of another force, whose solid has the wanted one: the widths are those of the sheet."""
     if path is None:
         reported = f"{begun}; the sheet fixes the widths and the design states no force: no correction is made"
         return replace(design, spec=as_solid, notes=(*design.notes, ("verify", reported)))
-    wanted = _level(requested, path)
+    wanted = _number_at(requested, path)
     method = family(requested.family).design
     assert method is not None
     again = method.make(requested.replace({path: factor * wanted}), run)
@@ -185,7 +185,7 @@ def _relevel(
     return replace(again, spec=made, notes=(*again.notes, ("verify", note)))
 
 
-def _values(beams: Result, solid: Result, name: str) -> tuple[float | None, float | None, str]:
+def _forces_at_end(beams: Result, solid: Result, name: str) -> tuple[float | None, float | None, str]:
     """Return the forces of both at the end of the window, and that they are those there."""
     by_beams, by_solid = (evaluate(result, [name])[name].value if result.curves else None for result in (beams, solid))
     return by_beams, by_solid, " at the end of the window"
@@ -217,14 +217,14 @@ def _widths(spec: Spec) -> Mapping[str, float]:
     return {f"mechanism.{key}": float(width) for key, width in spec.out_of_plane_widths.items() if width is not None}
 
 
-def _sheet(spec: Spec) -> bool:
+def _states_sheet(spec: Spec) -> bool:
     try:
         return spec.get_value("mechanism.part.sheet") is not None
     except KeyError:
         return False
 
 
-def _level(spec: Spec, path: str) -> float:
+def _number_at(spec: Spec, path: str) -> float:
     try:
         return float(spec.get_value(path) or 0.0)
     except KeyError:
@@ -289,10 +289,10 @@ def move_free_values(
         moved = redesign.drawing(redesign.solve())
     except CfmError as problem:
         return Design(None, Status.INFEASIBLE, str(problem))
-    design = Design(moved, Status.COMPLETE, notes=(("free", _changes(spec, moved, tuple(redesign.limits))),))
+    design = Design(moved, Status.COMPLETE, notes=(("free", _describe_changes(spec, moved, tuple(redesign.limits))),))
     if drawn is not spec:
         design = verify_by_solid(spec, design, run)
-    return design if design.spec is None else _judge(design, run)
+    return design if design.spec is None else _check_requirements(design, run)
 
 
 def _analyze(spec: Spec, run: Run) -> Result:
@@ -301,7 +301,7 @@ def _analyze(spec: Spec, run: Run) -> Result:
     return add_size(result, record.envelope(result)) if result.curves else result
 
 
-def _judge(design: Design, run: Run) -> Design:
+def _check_requirements(design: Design, run: Run) -> Design:
     """Return a design, or what it misses by more than the rounding of its values."""
     assert design.spec is not None
     outcomes = family(design.spec.family).check(_analyze(design.spec, run))
@@ -339,7 +339,7 @@ def _choose_finest_beam_model(spec: Spec) -> Spec:
     return spec
 
 
-def _changes(before: Spec, after: Spec, paths: Sequence[str]) -> str:
+def _describe_changes(before: Spec, after: Spec, paths: Sequence[str]) -> str:
     from cfmkit.experiment.redrawn_values import dimension_of
 
     moved = [

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import ExitCode, OutputError, UsageError, visible
 from cfmkit.families import origins
 from cfmkit.metrics import flat_metrics
-from cfmkit.metrics.compare import COMPARISON_RTOL, Compared, MetricChange, compare
+from cfmkit.metrics.compare import COMPARISON_RTOL, ComparedSide, MetricChange, compare
 from cfmkit.results import Status
 from cfmkit.store import Manifest, file_hash, origin, stable_hash
 from cfmkit.store.file_names_and_overwrite_checks import MANIFEST_NAME
@@ -107,7 +107,7 @@ def changes(
         if entry.written:
             record = _read_json(os.path.join(folder, entry.folder, "metrics.json")) or {}
             now = flat_metrics(record.get("metrics", {}))
-            sides = Compared("the earlier batch", metrics=before.metrics), Compared(entry.spec, metrics=now)
+            sides = ComparedSide("the earlier batch", metrics=before.metrics), ComparedSide(entry.spec, metrics=now)
             changes += compare(*sides, tolerance=tolerance).changes
     return tuple(changes)
 
@@ -130,8 +130,8 @@ def changes_table(changes: Sequence[MetricChange]) -> Table:
         (
             text_column("spec", (change.spec for change in changes)),
             text_column("metric", (change.name for change in changes)),
-            text_column("before", (_cell(change.before) for change in changes)),
-            text_column("after", (_cell(change.after) for change in changes)),
+            text_column("before", (_cell_text(change.before) for change in changes)),
+            text_column("after", (_cell_text(change.after) for change in changes)),
             text_column("unit", (change.unit for change in changes)),
             TableColumn("relative_change", tuple(change.relative for change in changes)),
             TableColumn("beyond_tolerance", tuple(change.beyond for change in changes)),
@@ -139,7 +139,7 @@ def changes_table(changes: Sequence[MetricChange]) -> Table:
     )
 
 
-def _cell(value: float | str | None) -> str:
+def _cell_text(value: float | str | None) -> str:
     """Return a value as text: words and numbers stand in one column."""
     return "" if value is None else value if isinstance(value, str) else repr(float(value))
 
@@ -179,7 +179,7 @@ class KeptRuns:
         reported = None if key is None else self._notes.find(key)
         if reported is None:
             return None
-        entry = _entry(reported["entry"])
+        entry = _read_entry(reported["entry"])
         if not entry.verb:
             return entry
         data_there = all(_hash_beside(spec, name) == digest for name, digest in reported["data"])
@@ -220,8 +220,8 @@ class KeptRuns:
         ):
             return False
         try:
-            found = Manifest.read(place)
-            return found is not None and not found.mismatches(place)
+            earlier_manifest = Manifest.read(place)
+            return earlier_manifest is not None and not earlier_manifest.mismatches(place)
         except (OSError, OutputError):
             return False
 
@@ -235,7 +235,7 @@ def _hash_beside(spec: str, name: str) -> str | None:
         return None
 
 
-def _entry(reported: dict[str, Any]) -> Entry:
+def _read_entry(reported: dict[str, Any]) -> Entry:
     return Entry(
         reported["spec"],
         reported["folder"],

@@ -1,4 +1,4 @@
-"""The engine: from a study and a plan to rows, each computed once, whoever computes it."""
+"""Engine of studies: computes the row of each point once, in jobs of any executor, with journal and progress."""
 
 from __future__ import annotations
 
@@ -205,7 +205,7 @@ class Records:
         """Yield (indices of points, their rows) in order, about `size` at a time; unfinished points are left out."""
         starts: list[NDArray[np.int64]] = []
         parts: list[ResultRows] = []
-        for start, part in self._pieces():
+        for start, part in self._read_pieces():
             starts.append(np.arange(start, start + len(part)))
             parts.append(part)
             if sum(map(len, parts)) >= size:
@@ -214,7 +214,7 @@ class Records:
         if parts:
             yield np.concatenate(starts), join_rows(parts)
 
-    def _pieces(self) -> Iterator[tuple[int, ResultRows]]:
+    def _read_pieces(self) -> Iterator[tuple[int, ResultRows]]:
         at = 0
         while at < len(self._places):
             place = int(self._places[at])
@@ -231,13 +231,13 @@ class Records:
         first = np.append(True, (noted[1:] != noted[:-1]).any(axis=1))[: len(noted)]
         yield from (key.tobytes() for key in noted[first])
 
-    def _key(self, index: int) -> str:
+    def _journal_key(self, index: int) -> str:
         key: bytes = self._keys[index].tobytes()
         return key.hex()
 
     def _read(self, index: int) -> ResultRows:
         assert self._journal is not None  # some row is in it
-        return self.work.recall(self._journal.read(self._key(index)))
+        return self.work.recall(self._journal.read(self._journal_key(index)))
 
     def row(self, index: int) -> ResultRows:
         """Return the row of one finished point."""
@@ -260,17 +260,17 @@ def run(
         raise UsageError(f"{family(study.spec.family).phrase} cannot be designed, only analysed")
     records, watch = Records(work, journal), monitor or NullMonitor()
     watch.total(len(work.plan))
-    queue = _neighbours(_new(records, work.jobs(), watch), work.together)
+    queue = _join_neighbours(_skip_noted(records, work.jobs(), watch), work.together)
     while True:
-        lost = _round(records, executor, queue, watch)
+        lost = _do_jobs(records, executor, queue, watch)
         if not lost or watch.stopping():
             return records
         # A block that was lost costs only those of its points that are lost alone, too.
         alone = (work.job(at, at + 1) for block in lost for at in range(block.start, block.stop))
-        queue = _new(records, alone, watch)
+        queue = _skip_noted(records, alone, watch)
 
 
-def _round(records: Records, executor: Executor, queue: Iterator[Job], watch: Monitor) -> list[Job]:
+def _do_jobs(records: Records, executor: Executor, queue: Iterator[Job], watch: Monitor) -> list[Job]:
     """Do the jobs of a queue; return the blocks that were lost."""
     lost: list[Job] = []
     work = records.work
@@ -287,7 +287,7 @@ def _round(records: Records, executor: Executor, queue: Iterator[Job], watch: Mo
     return lost
 
 
-def _new(records: Records, queue: Iterator[Job], watch: Monitor) -> Iterator[Job]:
+def _skip_noted(records: Records, queue: Iterator[Job], watch: Monitor) -> Iterator[Job]:
     """Yield the jobs that the journal does not know."""
     for job in queue:
         rows = records.recall(job)
@@ -297,7 +297,7 @@ def _new(records: Records, queue: Iterator[Job], watch: Monitor) -> Iterator[Job
             watch.add_finished(len(rows), rows.failed, True)
 
 
-def _neighbours(queue: Iterator[Job], most: int) -> Iterator[Job]:
+def _join_neighbours(queue: Iterator[Job], most: int) -> Iterator[Job]:
     """Yield jobs whose points follow each other as one, of at most so many points."""
     held: list[Job] = []
     for job in queue:

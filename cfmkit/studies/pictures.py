@@ -28,16 +28,16 @@ if TYPE_CHECKING:
     from cfmkit.tables import Cell
 
 
-def makers(records: Records, summary: Summary) -> dict[str, Callable[[], Figure]]:
+def list_pictures(records: Records, summary: Summary) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a study, by name; nothing for one that was not finished."""
     if records.finished < len(records) or not summary.usable:
         return {}
-    study_findings = findings(records, summary)
+    study_findings = study_marks(records, summary)
     lines, labels = curves(records, study_findings) if len(study_findings.varied) <= 2 else ([], ("", ""))
     return figures(study_findings, lines, labels)
 
 
-def findings(records: Records, summary: Summary) -> StudyMarks:
+def study_marks(records: Records, summary: Summary) -> StudyMarks:
     """Return what the pictures show."""
     study, plan = records.work.study, records.work.plan
     values = np.concatenate([values for _, values, _ in summary.kept])
@@ -147,7 +147,7 @@ def _branches(table: Table) -> dict[str, tuple[FloatArray, FloatArray]]:
     return {name: (motion[branch == name], effort[branch == name]) for name in dict.fromkeys(branch.tolist())}
 
 
-def makers_of_tables(
+def list_pictures_of_tables(
     spec: Spec,  # what was swept
     summary: Mapping[str, Any],  # as metrics.json
     # table, curves: as results.csv and curves.csv, which not every sweep has
@@ -172,7 +172,7 @@ def _marks(spec: Spec, summary: Mapping[str, Any], table: Table) -> StudyMarks:
         scales(spec, varied, shown, [parameter["words"] for parameter in drawn["varied"]]),
         tuple(metric for metric in metrics if np.isfinite(metric.values).any()),
         tuple(drawn["grid"]),
-        _meets(columns),
+        _find_meeting(columns),
         None if best is None else best["point"] - 1,
         spec.name,
         "" if best is None else best_words(best["by"], best["sense"], best["ties"]),
@@ -192,7 +192,7 @@ def _numbers(cells: Sequence[Cell]) -> FloatArray:
     return np.array([np.nan if cell is None else cell for cell in cells], dtype=np.float64)
 
 
-def _meets(columns: Mapping[str, TableColumn]) -> NDArray[np.bool_]:
+def _find_meeting(columns: Mapping[str, TableColumn]) -> NDArray[np.bool_]:
     """Return whether each point was solved and meets every requirement."""
     usable = {status.key for status in Status if status.usable}
     solved = [cell in usable for cell in columns["status"].cells()]
@@ -210,7 +210,7 @@ def _curves(table: Table | None, marks: StudyMarks) -> tuple[list[StudyCurve], t
         next(column for column in table.columns if column.name == parameter_marks.name)
         for parameter_marks in marks.varied
     ]
-    points = {values: at for at, values in enumerate(zip(*map(_spoken, marks.varied), strict=True))}
+    points = {values: at for at, values in enumerate(zip(*map(_cells_of_scale, marks.varied), strict=True))}
     rows: dict[int, list[int]] = {}
     for row, values in enumerate(zip(*(column.cells() for column in parameter_columns), strict=True)):
         rows.setdefault(points[values], []).append(row)
@@ -232,6 +232,6 @@ def _curves(table: Table | None, marks: StudyMarks) -> tuple[list[StudyCurve], t
     return lines, labels
 
 
-def _spoken(scale: DrawnScale) -> list[Cell]:
+def _cells_of_scale(scale: DrawnScale) -> list[Cell]:
     """Return the values of a scale as the cells of a table have them."""
     return [scale.words[int(value)] for value in scale.values] if scale.words else [*scale.values.tolist()]

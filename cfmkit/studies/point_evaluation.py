@@ -24,8 +24,8 @@ from cfmkit.metrics import (
     metrics_by_name,
     requirement_problems,
     values_of_family,
+    warn_of_uncovered_windows,
     window_of,
-    windows_judged,
 )
 from cfmkit.metrics.window_metrics import STATIC_BALANCE
 from cfmkit.results import Result
@@ -158,11 +158,11 @@ class Study:
         """Return the result of a variant, designed first if the study says so, with the warnings of both."""
         record, run = family(spec.family), Run(self.seed)
         if not self.design or record.design is None:
-            return windows_judged(record.with_envelope(record.analyze(spec, run), self.names))
+            return warn_of_uncovered_windows(record.with_envelope(record.analyze(spec, run), self.names))
         design = self.make_design(spec, record.design.make, Run(self.seed))
         if design.spec is None:
             return Result(spec, design.status, design.explanation, warnings=design.warnings)
-        result = windows_judged(record.with_envelope(record.analyze(design.spec, run), self.names))
+        result = warn_of_uncovered_windows(record.with_envelope(record.analyze(design.spec, run), self.names))
         return replace(result, warnings=(*design.warnings, *result.warnings))
 
     def check_requirements(self, kind: Kind) -> None:

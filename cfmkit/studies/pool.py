@@ -52,7 +52,7 @@ class _Worker:
     """A process, the thread that listens to it, and the jobs it was given, the one it works on first."""
 
     process: subprocess.Popen[bytes]
-    given: deque[Any] = field(default_factory=deque)
+    unfinished_jobs: deque[Any] = field(default_factory=deque)
     ready: bool = False
     started: float | None = None
     listener: threading.Thread = field(init=False)
@@ -73,14 +73,14 @@ class _Worker:
 
     def give(self, job: Any) -> None:
         """Send a job, or keep it until the worker has the work."""
-        self.given.append(job)
+        self.unfinished_jobs.append(job)
         if self.ready:
             self.send(job)
 
     def begin(self) -> None:
         """Send the jobs that were kept."""
         self.ready = True
-        for job in self.given:
+        for job in self.unfinished_jobs:
             self.send(job)
 
     def send(self, job: Any) -> None:
@@ -112,7 +112,7 @@ class Pool:
         Raises CfmError if the processes cannot be started.
         """
         with _Crew(self, work, jobs, stopping) as crew:
-            while crew.hire():
+            while crew.hand_out_jobs():
                 yield from crew.collect_finished()
 
 
@@ -137,18 +137,18 @@ class _Crew:
         for worker in self.workers:
             worker.end()
 
-    def hire(self) -> bool:
+    def hand_out_jobs(self) -> bool:
         """Hand out jobs, to new workers where there are too few; tell whether anything is going on."""
         for worker in self.workers:
-            while len(worker.given) < self._ahead() and (job := self._next()) is not None:
+            while len(worker.unfinished_jobs) < self._n_jobs_ahead() and (job := self._next()) is not None:
                 worker.give(job)
         while len(self.workers) < self.pool.processes and (job := self._next()) is not None:
             self.workers.append(_start_worker())
             self.workers[-1].give(job)
             self.workers[-1].listen(self.what, self.messages)
-        return any(worker.given for worker in self.workers)
+        return any(worker.unfinished_jobs for worker in self.workers)
 
-    def _ahead(self) -> int:
+    def _n_jobs_ahead(self) -> int:
         return JOBS_AHEAD if self.pace is not None and self.pace < QUICK_JOB_DURATION else 1
 
     def _next(self) -> Any:
@@ -169,7 +169,7 @@ class _Crew:
                 if worker in self.workers:
                     yield from self._remove_worker(worker) if message is None else self._handle_message(worker, message)
                 worker, message = self.messages.get_nowait()
-        yield from self._late()
+        yield from self._end_late_jobs()
 
     def _handle_message(self, worker: _Worker, message: bytes) -> Iterator[tuple[Any, Any]]:
         kind, rest = message[:1], message[1:]
@@ -181,7 +181,7 @@ class _Crew:
             took = time.monotonic() - (worker.started or 0.0)
             self.pace = took if self.pace is None else 0.9 * self.pace + 0.1 * took
             worker.started = None
-            job, outcome = worker.given.popleft(), pickle.loads(rest)
+            job, outcome = worker.unfinished_jobs.popleft(), pickle.loads(rest)
             if kind == worker_process.BROKEN_MESSAGE:
                 outcome = Lost(Status.CRASHED, f"{BUG_PREFIX}{outcome[0]}", outcome[1])
             yield job, outcome
@@ -192,26 +192,26 @@ class _Crew:
         worker.end()
         self._count_stillborn(worker)
         if worker.started is not None:
-            job = worker.given.popleft()
+            job = worker.unfinished_jobs.popleft()
             self.deaths[job] += 1
             if self.deaths[job] < MAX_WORKER_DEATHS:
                 self.again.appendleft(job)
             else:
                 reported = (
                     f"the process that worked on this point died {MAX_WORKER_DEATHS} times "
-                    f"({_cause(worker.process.returncode)})"
+                    f"({_describe_exit(worker.process.returncode)})"
                 )
                 yield job, Lost(Status.CRASHED, reported)
-        self.again.extend(worker.given)
+        self.again.extend(worker.unfinished_jobs)
 
     def _count_stillborn(self, worker: _Worker) -> None:
         if worker.started is not None or worker.ready:
             return
         self.stillborn += 1
         if self.stillborn >= MOST_STILLBORN[worker.process.returncode < 0]:
-            raise CfmError(f"worker processes end before they begin ({_cause(worker.process.returncode)})")
+            raise CfmError(f"worker processes end before they begin ({_describe_exit(worker.process.returncode)})")
 
-    def _late(self) -> Iterator[tuple[Any, Any]]:
+    def _end_late_jobs(self) -> Iterator[tuple[Any, Any]]:
         """Yield the jobs that have used up their time, and end their workers."""
         over = self.pool.deadline is not None and time.time() > self.pool.deadline
         if over:
@@ -221,14 +221,16 @@ class _Crew:
             return
         now, allowed = time.monotonic(), self.pool.timeout
         # a worker that has not begun yet is still loading: with all time up nobody waits for it
-        for worker in [worker for worker in self.workers if worker.given and (over or worker.started is not None)]:
+        for worker in [
+            worker for worker in self.workers if worker.unfinished_jobs and (over or worker.started is not None)
+        ]:
             late = over or (allowed is not None and now - (worker.started or now) > allowed)
             if late:
                 self.workers.remove(worker)
                 worker.end()
-                job = worker.given.popleft()
+                job = worker.unfinished_jobs.popleft()
                 if not over:
-                    self.again.extend(worker.given)
+                    self.again.extend(worker.unfinished_jobs)
                 yield job, Lost(Status.TIMEOUT, OUT_OF_TIME_MESSAGE if over else f"not finished within {allowed:g} s")
 
 
@@ -269,7 +271,7 @@ def give_up_at(executor: Executor, deadline: float | None) -> Executor:
     return replace(executor, deadline=deadline) if isinstance(executor, Pool) else executor
 
 
-def _cause(code: int) -> str:
+def _describe_exit(code: int) -> str:
     import signal
 
     if code >= 0:

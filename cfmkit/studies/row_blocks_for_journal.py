@@ -1,4 +1,4 @@
-"""Rows of a study many at a time, and how they are written to the journal and read back."""
+"""Blocks of consecutive rows of a study: joined, cut, selected, and packed for the journal and read back."""
 
 from __future__ import annotations
 
@@ -76,17 +76,19 @@ def record(rows: ResultRows) -> Any:
     reported = {"n": len(rows), "v": squeeze(rows.values), "q": _pack(np.packbits(rows.met)), "o": odd}
     if rows.warned:
         reported["w"] = {name: _pack(np.packbits(mask)) for name, mask in sorted(rows.warned.items())}
-    return reported | ({"u": {str(k): _text(curve) for k, curve in rows.curves.items()}} if rows.curves else {})
+    return reported | (
+        {"u": {str(k): _compress_to_text(curve) for k, curve in rows.curves.items()}} if rows.curves else {}
+    )
 
 
 def recall_rows(reported: Any, metrics: int, requirements: int) -> ResultRows:
     """Return the rows that are stored in a record."""
     count = reported["n"]
     values = unsqueeze(reported["v"], count, metrics)
-    met = _mask(reported["q"], count * requirements).reshape(count, requirements)
-    curves = {int(k): _bytes(text) for k, text in reported.get("u", {}).items()}
+    met = _unpack_mask(reported["q"], count * requirements).reshape(count, requirements)
+    curves = {int(k): _decompress_text(text) for k, text in reported.get("u", {}).items()}
     odd = {int(k): (_STATUS_BY_KEY[s], m) for k, (s, m) in reported["o"].items()}
-    warned = {name: _mask(bits, count) for name, bits in reported.get("w", {}).items()}
+    warned = {name: _unpack_mask(bits, count) for name, bits in reported.get("w", {}).items()}
     return ResultRows(values, met, odd, curves, warned=warned)
 
 
@@ -192,13 +194,13 @@ def _fold_sign(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return ((signed << 1) ^ (signed >> 63)).view(np.uint64)
 
 
-def _mask(text: str, count: int) -> NDArray[np.bool_]:
+def _unpack_mask(text: str, count: int) -> NDArray[np.bool_]:
     return np.unpackbits(_unpack(text, np.uint8), count=count).astype(bool)
 
 
-def _text(data: bytes) -> str:
+def _compress_to_text(data: bytes) -> str:
     return base64.b64encode(compress(data, 1)).decode()
 
 
-def _bytes(text: str) -> bytes:
+def _decompress_text(text: str) -> bytes:
     return decompress(base64.b64decode(text))

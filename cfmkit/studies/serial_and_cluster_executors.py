@@ -55,17 +55,17 @@ class Lost:
     bug: str = ""
 
 
-def lost_to(error: Exception) -> Lost:
+def lose_to_bug(error: Exception) -> Lost:
     """Return the outcome of a job that a bug ended, with its traceback."""
     return Lost(Status.CRASHED, f"{BUG_PREFIX}{_one_line(error)}", "".join(traceback.format_exception(error)))
 
 
-def surviving(work: Work, job: Any) -> Any:
+def do_or_lose(work: Work, job: Any) -> Any:
     """Return what comes of a job; `Lost` where a bug ends it."""
     try:
         return work(job)
     except Exception as error:
-        return lost_to(error)
+        return lose_to_bug(error)
 
 
 def never() -> bool:
@@ -371,7 +371,7 @@ def do_parcel(stamp: Stamp, family: str, parcel: bytes) -> Any:
     if ours != stamp:
         return OtherCode(_worker_name(), ours)
     work, job = _unpack(parcel)
-    return surviving(work, job)
+    return do_or_lose(work, job)
 
 
 @lru_cache(maxsize=8)

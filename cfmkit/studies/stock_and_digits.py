@@ -84,7 +84,7 @@ def with_stock_sheet(original: Spec, outcome: Design, finish: Callable[[Spec], D
             reasons.append(f"{format_short(sheet, 'length')}: {error.problems[0].message}")
             continue
         if again.spec is not None:
-            note = _change(outcome.spec, again.spec, series, sheet, widths, run)
+            note = _describe_sheet(outcome.spec, again.spec, series, sheet, widths, run)
             return replace(again, notes=(*again.notes, ("stock", note)))
         reasons.append(f"{format_short(sheet, 'length')}: {again.message}")
     text = f"part.stock: no design from a sheet of {material} that is sold ({system}: {'; '.join(reasons)})"
@@ -104,12 +104,12 @@ def with_whole_strands(original: Spec, outcome: Design, finish: Callable[[Spec],
     leaves = {path: size for path, size in outcome.spec.leaves() if is_leaf(path, size)}
     if not leaves or all(is_whole(size, nozzle) for size in leaves.values()):
         return outcome
-    neighbours = [{path: _whole(size, nozzle, rank) for path, size in leaves.items()} for rank in (0, 1)]
+    neighbours = [{path: _choose_whole_strands(size, nozzle, rank) for path, size in leaves.items()} for rank in (0, 1)]
     before, _ = _outcomes(outcome.spec, run)
     words = "; ".join(strands_in_words(size, nozzle) for size in dict.fromkeys(leaves.values()))
     for changes in neighbours:
         try:
-            levers = _levers(original, leaves, changes)
+            levers = _list_changed_keys(original, leaves, changes)
             stated = {path: value for path, value in original.leaves() if path in levers}  # the stated ones stay
             again = finish(original.replace({**changes, **levers}))
             spec = None if again.spec is None else again.spec.replace({**changes, **stated})
@@ -120,13 +120,13 @@ def with_whole_strands(original: Spec, outcome: Design, finish: Callable[[Spec],
         means = [mean_effort(family(entry.family).analyze(entry, run)) or math.nan for entry in (outcome.spec, spec)]
         if not abs(means[1] / means[0] - 1.0) <= MOST_CHANGE:
             continue
-        told = _comparison(f"whole strands taken: {words}", outcome.spec, spec, run)
+        told = _describe_change(f"whole strands taken: {words}", outcome.spec, spec, run)
         return replace(again, spec=spec, notes=(*again.notes, ("strands", told)))
     text = f"left as they are, because no design of whole strands meets as much: {words}"
     return replace(outcome, notes=(*outcome.notes, ("strands", text)))
 
 
-def _levers(original: Spec, leaves: Mapping[str, float], changes: Mapping[str, float]) -> dict[str, Any]:
+def _list_changed_keys(original: Spec, leaves: Mapping[str, float], changes: Mapping[str, float]) -> dict[str, Any]:
     """Return by which keys a design comes to thicknesses: a strip is as thick as its stress allows, or thinner."""
     beam = "mechanism.beam.thickness"
     if beam not in changes or getattr(getattr(original, "design", None), "beam", None) is None:
@@ -141,7 +141,7 @@ def is_leaf(path: str, size: Any) -> bool:
     return leaf and isinstance(size, float)
 
 
-def _whole(thickness: float, nozzle: float, rank: int) -> float:
+def _choose_whole_strands(thickness: float, nozzle: float, rank: int) -> float:
     numbers = strands(thickness, nozzle)
     return round(numbers[min(rank, len(numbers) - 1)] * nozzle, 9)
 
@@ -152,14 +152,16 @@ def _widths(spec: Spec) -> dict[str, float]:
     return {f"mechanism.{key}": float(width) for key, width in stated if width is not None}
 
 
-def _change(before: Spec, after: Spec, series: StockSeries, sheet: float, widths: Mapping[str, float], run: Run) -> str:
+def _describe_sheet(
+    before: Spec, after: Spec, series: StockSeries, sheet: float, widths: Mapping[str, float], run: Run
+) -> str:
     """Return which sheet was taken instead of which widths, and what that does to the force."""
     old = ", ".join(format_short(width, "length") for width in dict.fromkeys(widths.values()))
     begun = f"sheet {format_short(sheet, 'length', 6)} ({series.system}, {series.standard}) instead of {old}"
-    return _comparison(begun, before, after, run)
+    return _describe_change(begun, before, after, run)
 
 
-def _comparison(begun: str, before: Spec, after: Spec, run: Run) -> str:
+def _describe_change(begun: str, before: Spec, after: Spec, run: Run) -> str:
     """Return a sentence on a change, and what that does to the force."""
     record = family(after.family)
     means = [mean_effort(record.analyze(entry, run)) for entry in (before, after)]

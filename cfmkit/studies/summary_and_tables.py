@@ -222,8 +222,8 @@ def main_columns(study: Study, headline: tuple[str, ...]) -> tuple[int, ...]:
     wanted = [*required, *DEFAULT_OBJECTIVES, *headline, *study.names]
     chosen = objective(study)
     first = [] if chosen is None else [chosen.column]
-    found = dict.fromkeys([*first, *(study.names.index(name) for name in wanted if name in study.names)])
-    return tuple(found)[:MOST_SHOWN]
+    columns = dict.fromkeys([*first, *(study.names.index(name) for name in wanted if name in study.names)])
+    return tuple(columns)[:MOST_SHOWN]
 
 
 @dataclass

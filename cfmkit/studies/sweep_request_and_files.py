@@ -1,4 +1,4 @@
-"""The study that varies a specification: its request, and the files that it writes."""
+"""A sweep: its request, its plan of points, and the files that it writes."""
 
 from __future__ import annotations
 
@@ -114,11 +114,11 @@ def outputs(records: Records, summary: Summary, curves: bool = False) -> Iterato
     yield "results.csv", results_csv(records, summary.add)
     if curves:
         yield "curves.csv", curves_csv(records)
-    yield "metrics.json", json_bytes(summary.as_json(records) | {"drawn": _drawn_data(records, summary)})
+    yield "metrics.json", json_bytes(summary.as_json(records) | {"drawn": _picture_data(records, summary)})
     yield "resolved.yaml", dump(family(study.spec.family).resolve(study.spec), complete=True).encode()
 
 
-def _drawn_data(records: Records, summary: Summary) -> dict[str, Any]:
+def _picture_data(records: Records, summary: Summary) -> dict[str, Any]:
     """Return what the pictures of a sweep show: so they can be drawn again from its files, in a figure of several."""
     study, plan = records.work.study, records.work.plan
     shown = [study.metrics[column] for column in summary.shown]

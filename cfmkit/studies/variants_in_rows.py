@@ -25,7 +25,7 @@ from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import WINDOW_OUTSIDE, Status
 from cfmkit.specs.units import TravelShare, window_places
 from cfmkit.studies.row_blocks_for_journal import ResultRows, failed_rows, scatter_rows, select_rows
-from cfmkit.studies.serial_and_cluster_executors import lost_to
+from cfmkit.studies.serial_and_cluster_executors import lose_to_bug
 from cfmkit.tables import curve_table, to_csv
 
 if TYPE_CHECKING:
@@ -316,11 +316,11 @@ def _note_rows(study: Study, variants: Variants, members: NDArray[np.intp], solv
         status = _STATUS_OF_EXIT_CODE.get(error.exit_code, Status.INVALID)
         if status is not Status.CRASHED:
             return failed_rows(shape, status, describe_error(error))
-        lost = lost_to(error)
+        lost = lose_to_bug(error)
     except Exception as error:
         if not isinstance(solved, SingleRow):
             raise
-        lost = lost_to(error)
+        lost = lose_to_bug(error)
     return failed_rows(shape, lost.status, lost.message, lost.bug)
 
 

@@ -1,4 +1,4 @@
-"""Values of a specification that a study varies: which may vary, and how, as ``roller_radius=8 mm:16 mm:5`` says it.
+"""Values of a specification that a study varies: which may vary, and how: ``roller_radius=8 mm:16 mm:5``.
 
 Any number, word or switch may vary, by its dotted path. A range includes both ends and is spaced evenly in the unit of
 the border, so that 8 mm to 16 mm in five steps is 8, 10, 12, 14, 16 mm and not 10.000000000000002 mm.
@@ -117,7 +117,7 @@ def leaf(spec_type: type[Spec], path: str) -> Leaf:
         key: str | int = int(part) if part.isdecimal() and part.isascii() and len(part) < 10 else part
         below = tuple(inner for slot in slots for inner in slot.child(key))
         if not below:
-            raise CannotVary(_unknown(spec_type, path, ".".join(parts[:depth]), slots))
+            raise CannotVary(_explain_unknown_path(spec_type, path, ".".join(parts[:depth]), slots))
         slots = below
     return _leaf_of(path, slots)
 
@@ -143,7 +143,7 @@ def _kind(slot: Slot) -> Kind | None:
     return kinds.get(slot.kind)
 
 
-def _unknown(spec_type: type[Spec], path: str, above: str, slots: tuple[Slot, ...]) -> str:
+def _explain_unknown_path(spec_type: type[Spec], path: str, above: str, slots: tuple[Slot, ...]) -> str:
     """Return an error that there is nothing at a path, and which one could be meant."""
     known_paths = list(paths(spec_type))
     last = path.rpartition(".")[2]
@@ -282,13 +282,13 @@ def axis(spec: Spec, variation: WantedVariation, drawn: bool) -> Axis:
     made = (
         _listed_axis(place, variation.content)
         if isinstance(variation.content, tuple)
-        else _range(place, variation.content, drawn)
+        else _read_range(place, variation.content, drawn)
     )
-    _try(spec, variation.path, made.listed[0] if made.listed else made.ends)
+    _refuse_missing_place(spec, variation.path, made.listed[0] if made.listed else made.ends)
     return made
 
 
-def _try(spec: Spec, path: str, value: Any) -> None:
+def _refuse_missing_place(spec: Spec, path: str, value: Any) -> None:
     """Raise if the specification has no such place: an index beyond a list, a key below a value."""
     try:
         spec.replace({path: value[0] if isinstance(value, tuple) else value})
@@ -309,7 +309,7 @@ def _listed_axis(place: Leaf, items: tuple[Any, ...]) -> Axis:
     return Axis(place, read[0][1], values, count=len(values))
 
 
-def _range(place: Leaf, text: str, drawn: bool) -> Axis:
+def _read_range(place: Leaf, text: str, drawn: bool) -> Axis:
     parts = [part.strip() for part in text.split(":")]
     if place.kind in ("word", "switch"):
         words = ", ".join(map(str, place.choices)) or "a, b"
@@ -318,7 +318,7 @@ def _range(place: Leaf, text: str, drawn: bool) -> Axis:
     if len(parts) != (2 if drawn else 3):
         more = "; samples are drawn from it, so that it has no number of steps" if drawn and len(parts) == 3 else ""
         raise CannotVary(f"{text!r} is not a range; write {wanted}, with units, or a list [a, b]{more}")
-    start, stop = (_end(place, part) for part in parts[:2])
+    start, stop = (_read_end(place, part) for part in parts[:2])
     if start[1] != stop[1]:
         raise CannotVary(f"{text!r} starts as {start[1]} and stops as {stop[1]}")
     low, high = float(start[0]), float(stop[0])
@@ -326,13 +326,13 @@ def _range(place: Leaf, text: str, drawn: bool) -> Axis:
         raise CannotVary(f"{text!r} starts where it stops; write [{parts[0]}] for one value")
     if drawn:
         return Axis(place, start[1], ends=(low, high))
-    count = _count(parts[2])
+    count = _read_count(parts[2])
     if place.kind == "whole" and (high - low) % (count - 1):
         raise CannotVary(f"{count} steps from {parts[0]} to {parts[1]} are no whole numbers")
     return Axis(place, start[1], ends=(low, high), count=count)
 
 
-def _end(place: Leaf, text: str) -> tuple[Any, str]:
+def _read_end(place: Leaf, text: str) -> tuple[Any, str]:
     """Return (SI value, dimension) of one end of a range."""
     from cfmkit.errors import QuantityError
     from cfmkit.specs.units import read_number
@@ -345,7 +345,7 @@ def _end(place: Leaf, text: str) -> tuple[Any, str]:
         raise CannotVary(str(error)) from None
 
 
-def _count(text: str) -> int:
+def _read_count(text: str) -> int:
     if not (text.isascii() and text.isdigit()):
         raise CannotVary(f"{text!r} is not a number of values; write e.g. 11")
     count = int(text) if len(text) < 19 else MAX_COUNT

@@ -62,7 +62,7 @@ def main(
         register(added)
     work = pickle.loads(received.get())
     with contextlib.suppress(BrokenPipeError):
-        _serve(work, received, outlet)
+        _do_received_jobs(work, received, outlet)
 
 
 def _pipes() -> tuple[IO[bytes], IO[bytes]]:
@@ -78,7 +78,7 @@ def _pipes() -> tuple[IO[bytes], IO[bytes]]:
     return pipes
 
 
-def _serve(work: Any, received: SimpleQueue[bytes], outlet: IO[bytes]) -> None:
+def _do_received_jobs(work: Any, received: SimpleQueue[bytes], outlet: IO[bytes]) -> None:
     send(outlet, READY_MESSAGE)
     with garbage_collector() as collect:
         while True:

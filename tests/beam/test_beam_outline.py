@@ -249,8 +249,8 @@ def test_a_part_that_cannot_be_drawn_within_its_tolerance_is_refused(tmp_path, c
 def test_a_line_without_its_end_keeps_all_other_points(end):
     line = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [4.0, 2.0]])
     kept = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [3.5, 2.0]] if end else [[0.5, 0.0], *line[1:].tolist()]
-    assert strip_module._away(line, end, 0.5).tolist() == kept
-    assert len(strip_module._away(line, end, 6.0)) == 0
+    assert strip_module._cut_off(line, end, 0.5).tolist() == kept
+    assert len(strip_module._cut_off(line, end, 6.0)) == 0
 
 
 def test_a_strip_is_as_curved_as_its_beam():

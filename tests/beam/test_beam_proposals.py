@@ -7,12 +7,12 @@ from suggest_support import offered
 
 import cfmkit
 from cfmkit import api
-from cfmkit.families.beam.proposals import _write_shape, kept_shapes
+from cfmkit.families.beam.proposals import _write_shape, load_kept_shapes
 
 
 def test_kept_shapes_scale_as_beams_that_only_bend():
     """Twice as large with twice the thickness: twice the force at twice the travel, the stress as before."""
-    shape = kept_shapes()[0]
+    shape = load_kept_shapes()[0]
     own = shape.spec.mechanism
     block = {"youngs_modulus": 2e9, "poisson_ratio": 0.35, "yield_strength": 76e6}
     end = float(shape.motion[-1])
@@ -33,6 +33,6 @@ def test_offered_shapes_of_one_layer_have_the_force_required_before_they_are_cor
 
 
 def test_no_stored_shape_touches_itself():
-    for kept in kept_shapes():
+    for kept in load_kept_shapes():
         result = cfmkit.analyze(kept.spec.replace({"analysis.fidelity": "reissner", "analysis.points": 11}))
         assert "beams_touch" not in {one.name for one in result.warnings}, kept.name

@@ -397,7 +397,7 @@ def test_the_widest_designs_are_widened_again_in_finer_orders_and_none_gets_narr
 def test_the_progress_of_a_search_never_goes_back_and_ends_at_one(monkeypatch) -> None:
     """It had gone from 1 to 0.75 where the widest designs are refined."""
     flat = ShapeCandidate(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
-    for name in ("search_start", "searched_far"):
+    for name in ("search_start", "search_far"):
         monkeypatch.setattr(multistart, name, lambda _task, _seed, _index, plan: flat)
     for name in ("widen", "nearer", "refine"):
         monkeypatch.setattr(multistart, name, lambda _task, found, _plan: found)
@@ -422,7 +422,7 @@ def test_of_two_designs_of_a_start_the_wider_one_is_kept(monkeypatch) -> None:
         "search_start": lambda _task, _seed, _index, plan: near,
         "widen": lambda _task, found, _plan: found,
         "audit_design": lambda _task, _found: None,
-        "searched_far": lambda _task, _seed, index, plan: replace(far, objective=bands[index]),
+        "search_far": lambda _task, _seed, index, plan: replace(far, objective=bands[index]),
         "nearer": lambda _task, found, _plan: replace(found, start=led[found.objective], objective=0.02),
     }.items():
         monkeypatch.setattr(multistart, name, step)

@@ -8,7 +8,7 @@ from beam_support import CONFIGS
 import cfmkit
 from cfmkit.designing import Clock
 from cfmkit.errors import SpecError
-from cfmkit.families.beam.shaping.design import _nothing, task_of, with_stretch_and_shear
+from cfmkit.families.beam.shaping.design import _explain_no_design, task_of, with_stretch_and_shear
 from cfmkit.families.beam.shaping.multistart import Explored
 from cfmkit.families.beam.shaping.search import StartBudget
 
@@ -52,8 +52,8 @@ def test_nothing_that_may_vary_is_refused():
 
 def test_a_start_that_the_time_ended_is_no_reason_to_widen_the_envelope():
     nothing = Explored({0: None}, reused=0, missing=0)
-    assert "the time budget ended" in _nothing(nothing, StartBudget(clock=Clock(0.0))).message
-    assert "widen the envelope" in _nothing(nothing, StartBudget()).message
+    assert "the time budget ended" in _explain_no_design(nothing, StartBudget(clock=Clock(0.0))).message
+    assert "widen the envelope" in _explain_no_design(nothing, StartBudget()).message
 
 
 @pytest.mark.parametrize(

@@ -148,7 +148,7 @@ def test_weight_across_the_way_acts_as_in_the_model_of_a_motion():
     slow = analyze(spec.replace({"analysis.dynamics": lifted})).state
     still = analyze(spec).state
     low = slow.history.contact.min(axis=0)
-    at = slow.history.moment.position - still.assembly.track.start
+    at = slow.history.slider.position - still.assembly.track.start
     np.testing.assert_allclose(np.interp(at, still.travel, still.up.least_contact), low, rtol=2e-4)
     np.testing.assert_allclose(np.interp(at, still.travel, still.up.slider), slow.history.force, rtol=2e-5)
 

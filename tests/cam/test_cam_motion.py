@@ -16,8 +16,8 @@ from cfmkit.errors import SpecError
 from cfmkit.families.cam.dynamics.axis_springs import AxisSprings
 from cfmkit.families.cam.dynamics.force_of_given_motion import inverse_history, multibody_history
 from cfmkit.families.cam.dynamics.inverse import respond, statics
-from cfmkit.families.cam.dynamics.lagrange_multiplier_check import CornerContact, NineCoordinates, Scheme
 from cfmkit.families.cam.dynamics.machine_from_spec import build
+from cfmkit.families.cam.dynamics.nine_coordinate_multibody import CornerContact, NineCoordinates, Scheme
 from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.families.cam.statics import forces
 from cfmkit.metrics import Window, evaluate
@@ -88,7 +88,7 @@ def test_a_damper_between_the_axes_takes_its_power_from_the_slider_in_both_formu
     assert relative(other.force, response.force) < 1e-9
     assert relative(other.contact, response.contact) < 1e-9
     lengthening = (response.axis_distance[2:] - response.axis_distance[:-2]) / (times[2:] - times[:-2])
-    power = (response.force - without.force) * response.moment.speed
+    power = (response.force - without.force) * response.slider.speed
     np.testing.assert_allclose(power[1:-1], 30.0 * lengthening**2, rtol=0, atol=2e-3 * power.max())
 
 
@@ -138,7 +138,7 @@ def test_the_force_does_the_work_that_becomes_energy(changes):
     found = respond(
         parts.machine, parts.motion.evaluate((0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * nodes).ravel())
     )
-    power = (found.force * found.moment.speed).reshape(-1, 8)
+    power = (found.force * found.slider.speed).reshape(-1, 8)
     energy = respond(parts.machine, parts.motion.evaluate(edges)).energy
     np.testing.assert_allclose(np.diff(energy), (power @ weights) * half, rtol=0, atol=1e-9 * np.ptp(energy))
 
@@ -167,15 +167,15 @@ def test_the_force_of_a_slow_motion_is_that_at_rest_on_the_same_way(position, st
 
 def test_rolling_resistance_costs_the_power_of_force_times_speed_of_the_rollers():
     free, held = response(moving(), 101), response(moving(rolling_friction=0.002), 101)
-    lost = 0.002 * (held.contact * held.at.way).sum(axis=0)
+    lost = 0.002 * (held.contact * held.at.arc_slope).sum(axis=0)
     np.testing.assert_allclose(held.force - free.force, lost, rtol=1e-9)
 
 
 def test_sides_with_their_parts_exchanged_give_the_same_force():
     parts = build(moving(**UNLIKE))
     mirrored = replace(parts.machine, right=parts.machine.left, left=parts.machine.right)
-    moment = parts.motion.evaluate(parts.motion.times(51))
-    one, other = respond(parts.machine, moment), respond(mirrored, moment)
+    slider = parts.motion.evaluate(parts.motion.times(51))
+    one, other = respond(parts.machine, slider), respond(mirrored, slider)
     np.testing.assert_allclose(other.force, one.force, rtol=1e-13)
     np.testing.assert_allclose(other.contact, one.contact[::-1], rtol=1e-13)
     np.testing.assert_allclose(other.guide, -one.guide, rtol=1e-9, atol=1e-12)

@@ -12,7 +12,7 @@ from cam_support import analyze, take_gravity_of_the_note
 
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.machine_from_spec import build
-from cfmkit.families.cam.dynamics.roller_curves_and_motion import Moment
+from cfmkit.families.cam.dynamics.roller_curves_and_motion import SliderState
 
 WIDE_ROLLER = {"masses__roller_inertia": 4.61e-5}
 FROM_CAM = {"analysis__dynamics__origin": "cam-start"}
@@ -84,7 +84,7 @@ def test_without_weight_equal_steps_of_spring_mass_would_give_them():
 
 def test_one_second_is_not_yet_static():
     slow = response(moving(analysis__dynamics__time=1.0), 20001)
-    rest = statics(slow.machine, slow.moment.position).force
+    rest = statics(slow.machine, slow.slider.position).force
     assert 100 * (slow.force / rest - 1).max() == pytest.approx(1.4715, abs=0.51e-4)
     fast = response(moving(), 20001)
     assert 100 * (fast.force / rest - 1).max() == pytest.approx(94.1755, abs=0.51e-4)
@@ -146,7 +146,7 @@ def test_symmetric_closed_forms_of_weight_and_moving_mass_along_the_whole_stroke
     machine, law = build(spec).machine, build(spec).right.profile.path.law
     position = np.linspace(0.2, 0.42, 23)
     still = np.zeros_like(position)
-    found = respond(machine, Moment(position, still, still))
+    found = respond(machine, SliderState(position, still, still))
     x = found.at.center[0].real
     slope, tangent = law.slope(x), x / np.sqrt(0.04 - x**2)
     rise, out = slope / (slope - tangent), 1.0 / (slope - tangent)

@@ -7,7 +7,7 @@ from beam_support import CONFIGS, cantilever
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.families.findings import bracket
+from cfmkit.families.findings import describe_wide_part
 
 LAN, DING = CONFIGS / "beam_lan2010.yaml", CONFIGS / "vcfm_ding2022.yaml"
 STRIP = CONFIGS / "slider_crank_strip.yaml"
@@ -92,9 +92,9 @@ def test_anything_but_a_truth_value_is_refused(path, value):
 
 
 def test_the_bracket_of_a_solid_says_that_wide_beams_counts_in_beam_models_only():
-    assert "beam models only" in bracket(10e-3, 1e-3, 0.35, True)
-    assert "beam models only" not in bracket(10e-3, 1e-3, 0.35, False)
-    assert bracket(2e-3, 1e-3, 0.35, True) == ""
+    assert "beam models only" in describe_wide_part(10e-3, 1e-3, 0.35, True)
+    assert "beam models only" not in describe_wide_part(10e-3, 1e-3, 0.35, False)
+    assert describe_wide_part(2e-3, 1e-3, 0.35, True) == ""
 
 
 def test_natural_frequencies_do_not_know_wide_beams():

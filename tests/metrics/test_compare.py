@@ -8,7 +8,7 @@ import pytest
 from cfmkit.curves import Curve
 from cfmkit.metrics import Undefined, Window
 from cfmkit.metrics.compare import (
-    Compared,
+    ComparedSide,
     Difference,
     Differences,
     Points,
@@ -90,14 +90,16 @@ def test_a_word_that_tells_curves_apart_leads_the_table_without_a_unit():
 
 def test_two_curves_a_measurement_and_metrics_are_compared_by_one_function():
     fine, coarse = line([0.0, 2.0], [1.0, 3.0]), line([-1.0, 1.0], [1.5, 3.5], "up")
-    found = compare(Compared("fine", fine), Compared("coarse", coarse))
+    found = compare(ComparedSide("fine", fine), ComparedSide("coarse", coarse))
     assert found.window == Window(0.0, 1.0)
     np.testing.assert_allclose(found.curves["load"].values, 1.5)
     points = {"load": Points(np.array([0.5, 3.0]), np.array([2.0, 2.0]), "up", np.array([1.0, 0.0]))}
-    found = compare(Compared("measured", points=points), Compared("model", coarse))
+    found = compare(ComparedSide("measured", points=points), ComparedSide("model", coarse))
     np.testing.assert_array_equal(found.curves["load"].values, [1.0, np.nan])
     before, after = {"a": {"value": 2.0, "unit": "N"}, "b": {"value": "x"}}, {"a": {"value": 2.5, "unit": "N"}}
-    changes = compare(Compared("before", metrics=before), Compared("spec.yaml", metrics=after), tolerance=0.3).changes
+    changes = compare(
+        ComparedSide("before", metrics=before), ComparedSide("spec.yaml", metrics=after), tolerance=0.3
+    ).changes
     assert [(one.spec, one.name, one.relative, one.beyond) for one in changes] == [
         ("spec.yaml", "a", 0.25, False),
         ("spec.yaml", "b", None, True),
@@ -109,6 +111,6 @@ def test_what_cannot_be_compared_says_why():
     some, apart = line([0.0, 1.0], [1.0, 1.0]), line([2.0, 3.0], [1.0, 1.0])
     back = line([0.0, 1.0, 0.5], [0.0, 1.0, 2.0])
     for other, why in ((None, "there is no coarse curve"), (apart, "they have no travel in common")):
-        found = compare(Compared("fine", some), Compared("coarse", other))
+        found = compare(ComparedSide("fine", some), ComparedSide("coarse", other))
         assert (found.window, found.curves[""].reason) == (None, why)
-    assert "many-valued" in compare(Compared("fine", some), Compared("coarse", back)).curves["load"].reason
+    assert "many-valued" in compare(ComparedSide("fine", some), ComparedSide("coarse", back)).curves["load"].reason

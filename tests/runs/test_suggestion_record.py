@@ -21,5 +21,5 @@ def test_what_was_not_judged_meets_nothing_and_says_what_is_missing(monkeypatch)
     assert [one["unjudged"] for one in record["unjudged"]] == [list(one.open) for one in found.unjudged]
     assert "life not judged: no S-N data for the wire of its springs" in record["unjudged"][0]["unjudged"]
     rows = table(found).decode().splitlines()
-    assert len(rows) == 1 + len(found.unjudged) + len(found.near)
+    assert len(rows) == 1 + len(found.unjudged) + len(found.near_misses)
     assert ",open: " in rows[1]

@@ -34,7 +34,7 @@ from cfmkit.families.slider_crank.printed.flexure_sizing import rotations, size_
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
     Elasticity,
     Flexure,
-    spread,
+    stations,
 )
 from cfmkit.families.slider_crank.printed.part import Leg
 from cfmkit.families.slider_crank.printed.solution import first_at
@@ -92,7 +92,7 @@ def test_a_short_flexure_is_the_spring_it_stands_for() -> None:
 
 def test_places_at_the_corners_are_those_of_the_corners() -> None:
     line = np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 14.0]])
-    np.testing.assert_allclose(spread(line, [[0.5], [0.1, 0.9]]), [0, 1 / 6, 0.4, 14 / 15, 1], atol=1e-15)
+    np.testing.assert_allclose(stations(line, [[0.5], [0.1, 0.9]]), [0, 1 / 6, 0.4, 14 / 15, 1], atol=1e-15)
 
 
 def test_force_is_proportional_to_width_and_modulus_and_the_stress_does_not_know_the_width() -> None:

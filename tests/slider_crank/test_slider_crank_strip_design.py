@@ -16,7 +16,7 @@ from cfmkit import Run
 from cfmkit.elastica import PathStatus
 from cfmkit.families.slider_crank.printed import Elasticity, sqp_program, strip_thickness_search
 from cfmkit.families.slider_crank.printed import design as printed
-from cfmkit.families.slider_crank.printed.audit import judge
+from cfmkit.families.slider_crank.printed.audit import judge_strip
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import joints
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import FoundStrip, infeasible
@@ -206,9 +206,9 @@ def test_a_strip_that_breaks_its_band_where_it_begins_is_searched_with_more_in_r
 ) -> None:
     """It had ended the design with a message of the beam engine, about the points of a drive."""
     (pins, own), limits = (joints(LINKAGE, UNLOADED), found(TASK, [0.977, 0.977, 2.0])), (1e-4, None)
-    assert judge(np.array([0.977, 0.977]), own, limits, pins) is None
-    judged, original = [], printed.judge
-    monkeypatch.setattr(printed, "judge", lambda *given: original(*given) if judged else judged.append(1))
+    assert judge_strip(np.array([0.977, 0.977]), own, limits, pins) is None
+    judged, original = [], printed.judge_strip
+    monkeypatch.setattr(printed, "judge_strip", lambda *given: original(*given) if judged else judged.append(1))
     assert cfmkit.design(config("taper_design", "design.beam.nodes=2", "analysis.points=31")).status is Status.COMPLETE
 
 

@@ -11,7 +11,7 @@ from sources import nodes
 
 from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 from cfmkit.stock.springs.kinds import AXIAL_KINDS, HELICAL_KINDS, TURNED_KINDS
-from cfmkit.stock.springs.offers import generic, slimmest_spring
+from cfmkit.stock.springs.offers import generic_series, slimmest_spring
 from cfmkit.stock.springs.spec import CatalogueSpring
 
 
@@ -61,7 +61,7 @@ class ConicalSpring(HelicalSpring):
 
 
 def test_a_new_kind_has_a_series_and_springs_made_to_measure():
-    offer = generic(ConicalSpring)[0]
+    offer = generic_series(ConicalSpring)[0]
     assert offer.name == "generic-conical-d0.4-D2.4-n6"
     assert (offer.free_length, offer.rate) == (offer.wound.wire, offer.wound.rate)
     made = slimmest_spring(ConicalSpring, 500.0, 0.01, 2e-3)

@@ -17,7 +17,7 @@ from cfmkit.families import family
 from cfmkit.stock.springs.compression_springs import CompressionSpring, buckling_deflection
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.helical_spring_formulas import SEAT_FACTORS
-from cfmkit.stock.springs.offers import PIN_SHARE, SERIES_SHARES, generic, slimmest_spring, stiffest
+from cfmkit.stock.springs.offers import PIN_SHARE, SERIES_SHARES, generic_series, slimmest_spring, stiffest_rates
 from cfmkit.stock.springs.spec import CatalogueSpring, DataSource, offers
 from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireOutOfRange
@@ -99,7 +99,7 @@ def test_music_wire_that_is_too_thick_is_refused_and_other_wire_of_that_diameter
 def test_springs_wound_to_measure_keep_to_the_diameters_of_the_table():
     assert slimmest_spring(ExtensionSpring, 1e5, 0.02, 5.0) is None  # 2000 N take 7.2 mm or more
     assert 4e-3 < slimmest_spring(ExtensionSpring, 5e4, 0.02, 5.0).wire <= MUSIC_WIRE.thickest
-    (rate,) = stiffest(HelicalTorsionSpring, np.array([1.0]), 1.0, 1.0)
+    (rate,) = stiffest_rates(HelicalTorsionSpring, np.array([1.0]), 1.0, 1.0)
     assert slimmest_spring(HelicalTorsionSpring, 0.98 * rate, 1.0, 1.0).wire <= MUSIC_WIRE.thickest
     assert slimmest_spring(HelicalTorsionSpring, 1.02 * rate, 1.0, 1.0) is None
 
@@ -192,7 +192,7 @@ def test_a_spring_is_stable_up_to_the_slenderness_of_shigley():
 
 
 def test_of_the_generic_series_what_buckles_comes_with_a_rod_that_fits():
-    series = generic(CompressionSpring)
+    series = generic_series(CompressionSpring)
     for one in series:
         limit = buckling_deflection(one.free_length, one.wound.coil)
         assert (one.guide_rod is not None) == (limit < one.largest)
@@ -203,7 +203,7 @@ def test_of_the_generic_series_what_buckles_comes_with_a_rod_that_fits():
 
 def test_loops_of_the_generic_series_are_below_what_shigley_allows_in_bending():
     """[Shigley, eq. 10-34] with the mean radius of a full loop D/2: sigma_A = F (K_A 16 D/(pi d^3) + 4/(pi d^2))."""
-    for one in generic(ExtensionSpring):
+    for one in generic_series(ExtensionSpring):
         d, c = one.wound.wire, one.wound.index
         curved = (4 * c * c - c - 1) / (4 * c * (c - 1))
         load = one.rate * one.largest

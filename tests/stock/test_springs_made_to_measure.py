@@ -7,7 +7,7 @@ import pytest
 
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
-from cfmkit.stock.springs.offers import SERIES_SHARES, slimmest_spring, stiffest
+from cfmkit.stock.springs.offers import SERIES_SHARES, slimmest_spring, stiffest_rates
 from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 from cfmkit.stock.stock_series import series_of
 
@@ -27,7 +27,7 @@ def test_a_spring_of_wire_keeps_its_rate_and_its_stress():
 def test_the_stiffest_spring_that_fits_is_just_the_last_that_can_be_made(spring_type):
     for deflection, widest, long in [(0.3, 8e-3, 20e-3), (0.02, 5e-3, 60e-3), (1.5, 12e-3, 10e-3)]:
         far = deflection if spring_type.dimension == "angle" else 0.02 * deflection
-        rate = float(stiffest(spring_type, np.array([far]), widest, long)[0])
+        rate = float(stiffest_rates(spring_type, np.array([far]), widest, long)[0])
         last, none = (slimmest_spring(spring_type, share * rate, far, long) for share in (0.98, 1.02))
         assert last.outer_diameter <= widest
         assert none is None or none.outer_diameter > widest

@@ -15,7 +15,7 @@ from cfmkit.errors import DataError, SpecError
 from cfmkit.stock.springs.compression_springs import CompressionSpring
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.kinds import HELICAL_KINDS
-from cfmkit.stock.springs.offers import Miss, generic, nearest
+from cfmkit.stock.springs.offers import Miss, describe_nearest, generic_series
 from cfmkit.stock.springs.spec import CatalogueSpring, DataSource, offers
 from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 
@@ -25,7 +25,9 @@ WANTED = {"force": "50 N", "stroke": "200 mm", "choose": "catalogue"}
 
 @pytest.mark.parametrize("spring_type", HELICAL_KINDS.values())
 def test_the_generic_series_written_as_a_list_is_the_same_series(spring_type):
-    assert offers(tuple(map(CatalogueSpring.from_offer, generic(spring_type))), spring_type) == generic(spring_type)
+    assert offers(tuple(map(CatalogueSpring.from_offer, generic_series(spring_type))), spring_type) == generic_series(
+        spring_type
+    )
 
 
 def chosen(catalogue, **changes):
@@ -95,7 +97,7 @@ def test_springs_that_only_press_or_turn_are_no_springs_for_a_cam():
 def test_the_generic_series_serves_and_says_what_is_bought():
     found = chosen("generic")
     springs, result = found.spec.mechanism.springs, analyze(found.spec)
-    offer = {item.name: item for item in generic(ExtensionSpring)}[springs.name]
+    offer = {item.name: item for item in generic_series(ExtensionSpring)}[springs.name]
     assert springs.stiffness == offer.rate
     assert offer.stress(result.state.elongation.max()) <= offer.wound.stress(offer.rate * offer.largest) * (1 + 1e-9)
     table = result.tables["parts"]()
@@ -236,7 +238,7 @@ def test_a_torsion_spring_is_wound_up_to_its_largest_angle_or_torque(torque, lar
 
 def test_of_what_misses_the_nearest_three_are_told():
     misses = [Miss(f"s{k}", share, f"by {share}") for k, share in enumerate((0.5, 0.1, 0.3, 0.2))]
-    assert nearest(misses) == "s1: by 0.1; s3: by 0.2; s2: by 0.3; 1 other misses by more"
+    assert describe_nearest(misses) == "s1: by 0.1; s3: by 0.2; s2: by 0.3; 1 other misses by more"
 
 
 def test_a_design_with_the_generic_series_is_written_and_read_again(tmp_path):

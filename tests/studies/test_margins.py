@@ -24,7 +24,7 @@ from cfmkit.studies.parts.requirement_rows import (
     places_of,
     requirement_rows,
     rows_of,
-    sampled_of,
+    sample_part,
     stated_places,
 )
 
@@ -34,7 +34,7 @@ CRANK = "configs/studies/slider_crank_strip_yield.yaml"
 def rows_and_numbers(spec):
     result = cfmkit.analyze(spec)
     places = places_of(result)
-    seen = sampled_of(spec, places, Run())
+    seen = sample_part(spec, places, Run())
     rows = rows_of(result, seen, places)
     numbers = np.concatenate([*seen.effort.values(), *seen.stress])
     return result, rows, rows.matrix @ numbers + rows.constant
@@ -47,7 +47,7 @@ def test_a_part_that_ends_before_a_stated_window_is_bad_for_the_search_as_for_th
     design = design.replace({"design.tolerances": {"mechanism.roller_radius": {"normal": "0.05 mm"}}})
     nominal = cfmkit.analyze(design)
     places = places_of(nominal)
-    rows = rows_of(nominal, sampled_of(design, places, Run()), places)
+    rows = rows_of(nominal, sample_part(design, places, Run()), places)
     part = redesign.PartNumbers(Parts.from_design(design, design.design, 0), (), rows)
     larger, smaller = np.array([5e-5]), np.array([-5e-5])
     assert part.are_good(np.empty(0), np.array([larger, smaller])).tolist() in ([False, True], [True, False])
@@ -67,7 +67,7 @@ def test_a_part_is_analysed_once_for_its_forces_and_metrics_without_what_nobody_
     """Every part was analysed twice, with all values and findings: 52 ms of processor time instead of 8."""
     spec = cfmkit.load("configs/vcfm_titanium.yaml")
     result, places = cfmkit.analyze(spec), places_of(cfmkit.analyze(spec))
-    seen = sampled_of(spec, places, Run())
+    seen = sample_part(spec, places, Run())
     rows = rows_of(result, seen, places)
     assert [one.name for one in rows.metrics] == ["force_change_max"]
     found = []
@@ -87,7 +87,7 @@ def test_a_part_with_few_points_is_looked_at_on_its_closed_form():
     """Between 31 points the force of a cam's start was a straight line, and hardly any part seemed to be good."""
     design = cfmkit.design("configs/cam.yaml").spec
     places = np.array([0.002, 0.005, 0.1])
-    few, many = (sampled_of(design.replace({"analysis.points": points}), places, Run()) for points in (31, 20001))
+    few, many = (sample_part(design.replace({"analysis.points": points}), places, Run()) for points in (31, 20001))
     for branch in ("load", "unload"):
         assert few.effort[branch] == pytest.approx(many.effort[branch], rel=1e-9)
 
@@ -97,7 +97,7 @@ def test_what_is_seen_quickly_is_what_the_analysis_finds(name):
     spec = cfmkit.load(f"configs/studies/{name}.yaml")
     result = cfmkit.analyze(spec)
     places = places_of(result)
-    seen = sampled_of(spec, places, Run())
+    seen = sample_part(spec, places, Run())
     curve = result.curve
     exact = spec.replace({"analysis.points": 1201})
     curve = cfmkit.analyze(exact).curve
@@ -114,7 +114,7 @@ def test_margins_of_beams_look_at_few_parts():
     spec = cfmkit.load(LAN)
     nominal, made = cfmkit.analyze(spec), Parts.from_design(spec, spec.design, 0)
     free, places = redesign.free_of(spec, spec), places_of(nominal)
-    rows = rows_of(nominal, sampled_of(spec, places, Run()), places)
+    rows = rows_of(nominal, sample_part(spec, places, Run()), places)
     part = redesign.PartNumbers(made, tuple(free), rows)
     start = np.array([spec.get_value(path) for path in free])
     found = part.slopes(start, np.zeros(len(made.paths)))

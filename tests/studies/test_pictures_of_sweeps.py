@@ -9,7 +9,7 @@ import pytest
 
 import cfmkit
 from cfmkit.studies.engine import run
-from cfmkit.studies.pictures import _nominal, findings
+from cfmkit.studies.pictures import _nominal, study_marks
 from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare, summary_of
 from cfmkit.studies.variations import collect_variations
 from cfmkit.tables import Table, TableColumn
@@ -32,7 +32,7 @@ def test_shares_are_drawn_in_per_cent_as_the_page_has_them():
     spec = cfmkit.load("configs/cam.yaml").replace({"requirements": ()})
     records, summary = swept(spec, {"mechanism.rolling_friction": (0.001, 0.002)}, "force_ripple", "force_mean")
     add_all(summary, records)
-    ripple = next(one for one in findings(records, summary).metrics if one.name == "force_ripple")
+    ripple = next(one for one in study_marks(records, summary).metrics if one.name == "force_ripple")
     assert ripple.label == "force ripple [%]"
     assert ripple.values == pytest.approx(100 * summary.kept[0][1][:, 0])
 

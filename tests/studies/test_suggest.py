@@ -164,7 +164,7 @@ def test_a_request_for_more_good_parts_than_there_are_is_missed(few_parts):
     asked = request(**PRINTED_CAM, **{"yield": "95 %"})
     offer = propose("cam", asked)
     one = proposal_of("cam", offer.candidates[0], asked, 3)
-    assert one.near
+    assert one.is_near_miss
     assert one.missed[0].startswith("yield")
     assert ", wanted at least 95 % (" in one.missed[0]  # what it would be after a trim follows
     assert one.numbers["yield"] < 0.95
@@ -257,9 +257,9 @@ def test_equal_names_are_told_apart_by_their_size():
     def proposal(across):
         return Proposal("cam", "2 springs", numbers={"across": across, "along": 0.05})
 
-    names = [one.variant for one in search.distinct([proposal(0.03), proposal(0.04), proposal(0.04)])]
+    names = [one.variant for one in search.name_apart([proposal(0.03), proposal(0.04), proposal(0.04)])]
     assert names == ["2 springs, 30 x 50 mm", "2 springs, 40 x 50 mm (1)", "2 springs, 40 x 50 mm (2)"]
-    assert search.distinct([proposal(0.03)])[0].variant == "2 springs"
+    assert search.name_apart([proposal(0.03)])[0].variant == "2 springs"
 
 
 @pytest.mark.parametrize("key", [{"cycles": "100"}, {"springs": "custom"}, {"overload": "60 N"}, {"prefer": "[parts]"}])
@@ -469,7 +469,7 @@ def test_two_relaxed_keys_are_named_after_one_analysis_each(monkeypatch):
 
 def test_the_laws_of_a_family_out_of_reach_are_asked_once_for_each_key(monkeypatch):
     asked = []
-    monkeypatch.setattr(relaxed_requests, "_offer", lambda relaxed, *_: asked.append(relaxed))
+    monkeypatch.setattr(relaxed_requests, "_list_candidates", lambda relaxed, *_: asked.append(relaxed))
     assert list(edges(request(), ("beam",), 0, UNLIMITED_CLOCK)) == []
     relaxed_keys = {"force", "travel", "ripple", "envelope"}
     assert len(asked) == 1 + len(relaxed_keys)
@@ -482,7 +482,7 @@ def test_no_requirement_is_relaxed_by_more_than_six_times(monkeypatch):
         sides.append(relaxed.envelope[0] / request().envelope[0])
         return ("a candidate",) if sides[-1] > 5.9 else ()
 
-    monkeypatch.setattr(relaxed_requests, "_offer", offer)
+    monkeypatch.setattr(relaxed_requests, "_list_candidates", offer)
     monkeypatch.setattr(relaxed_requests, "make_proposal", lambda job: Proposal(job.family, "too large still"))
     monkeypatch.setattr(relaxed_requests, "ProposalJob", lambda name, *_: Proposal(name, ""))
     (edge,) = [edge for edge in edges(request(), ("beam",), 0, UNLIMITED_CLOCK) if edge.key == "envelope"]
@@ -502,7 +502,7 @@ def test_a_request_that_nothing_comes_near_says_so(monkeypatch):
 
 
 def test_a_family_whose_candidates_all_miss_is_relaxed_by_a_little_first(monkeypatch):
-    monkeypatch.setattr(relaxed_requests, "_offer", lambda *_: ("a candidate",))
+    monkeypatch.setattr(relaxed_requests, "_list_candidates", lambda *_: ("a candidate",))
     assert {edge.factor for edge in edges(request(), ("beam",), 0, UNLIMITED_CLOCK)} == {1.0}
 
 
@@ -570,7 +570,7 @@ def test_of_a_list_of_materials_the_one_that_is_wrong_is_told(material, words):
 
 
 def test_what_only_the_largest_factor_helps_is_named_with_it(monkeypatch):
-    monkeypatch.setattr(relaxed_requests, "_offer", lambda relaxed, *_: ("a candidate",))
+    monkeypatch.setattr(relaxed_requests, "_list_candidates", lambda relaxed, *_: ("a candidate",))
     monkeypatch.setattr(relaxed_requests, "ProposalJob", lambda _name, _candidate, asked, *_: asked)
     made = []
 

@@ -24,7 +24,7 @@ from cfmkit.studies.suggest import proposal_making_and_judging as judging
 from cfmkit.studies.suggest.outcome_of_search import Suggestions
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, judge_proposal, make_proposal
 from cfmkit.studies.suggest.requirements_and_misses import list_misses_within_mesh_error, list_requirements, raised_out
-from cfmkit.studies.suggest.search import _Making, _Times, offer_of
+from cfmkit.studies.suggest.search import _MadeCandidates, _Times, offer_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -91,14 +91,14 @@ def test_what_its_beams_alone_judged_meets_nothing(beams):
 
 def test_of_each_family_as_many_go_to_the_finest_model_as_it_lacks(beams):
     asked, one = beams
-    making = _Making(Run(), _Times(), 3, [])
+    making = _MadeCandidates(Run(), _Times(), 3, [])
     job = ProposalJob("beam", first("beam", asked), asked, 0)
     settled = replace(one, pending="", model="solid")
     for proposal in (one, settled, one):
         making._take(job, proposal)
-    assert [again.near for again in making.select_for_finest(2)] == [one]
+    assert [again.earlier for again in making.select_for_finest(2)] == [one]
     making._take(making.select_for_finest(2)[0], replace(one, missed=("force mean 12 N",), pending=""))
-    assert [again.near for again in making.select_for_finest(2)] == [one]
+    assert [again.earlier for again in making.select_for_finest(2)] == [one]
     assert making.select_for_finest(1) == []
 
 
@@ -108,12 +108,12 @@ def test_a_part_is_corrected_and_judged_until_the_finest_model_finds_nothing(bea
 
     def judge(name, variant, spec, *_):
         asked_for.append(spec.fidelity)
-        return Proposal(name, variant, near.text, next(outcomes), model="solid", own="reissner")
+        return Proposal(name, variant, near.text, next(outcomes), model="solid", design_model="reissner")
 
     monkeypatch.setattr(judging, "judge_proposal", judge)
     correct = {judging.FIDELITY_KEY: "solid"}
     candidate = replace(first("beam", asked), correct=lambda spec, _request: spec.replace(correct))
-    found = proposal_of("beam", candidate, asked, 0, near=near)
+    found = proposal_of("beam", candidate, asked, 0, earlier=near)
     assert found.good
     assert asked_for == ["solid", "solid"]
 
@@ -128,7 +128,7 @@ def test_what_a_solid_judged_keeps_every_requirement_when_its_file_is_analysed(n
     job = ProposalJob(name, candidate_named(offers, variant), asked, 0)
     near = make_proposal(job)
     assert near.pending == "solid", near.missed or near.message
-    one = make_proposal(replace(job, near=near))
+    one = make_proposal(replace(job, earlier=near))
     assert one.good, one.missed or one.message or one.open
     spec = cfmkit.loads(one.text)
     assert spec.fidelity == "solid"
@@ -380,7 +380,7 @@ def test_a_mechanism_whose_springs_are_stretched_too_far_is_no_proposal():
     found = judge_proposal("cam", "2 springs", spec, request(force="50 N", travel="100 mm", envelope="[1 m, 1 m]"))
     assert found.fails == ("springs",)
     assert found.missed[0].startswith("spring_overstretched: ")
-    assert found.near
+    assert found.is_near_miss
 
 
 def test_only_springs_of_the_kind_that_is_required_are_offered():

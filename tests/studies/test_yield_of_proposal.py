@@ -12,8 +12,8 @@ from cfmkit.studies.parts.near_parts import expected_shares
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.suggest import proposal_making_and_judging
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, redesign_for_yield
-from cfmkit.studies.suggest.search import _key, _Making, _Times
-from cfmkit.studies.suggest.yield_of_proposal import MovedForYield, moved_for_yield
+from cfmkit.studies.suggest.search import _key, _MadeCandidates, _Times
+from cfmkit.studies.suggest.yield_of_proposal import MovedForYield, move_for_yield
 
 MEASURED = "{youngs_modulus: 1477 MPa, poisson_ratio: 0.3, yield_strength: 30.5 MPa}"
 
@@ -62,7 +62,7 @@ def test_a_yield_that_the_modulus_rules_out_is_said_to_be_so_with_what_to_do():
     keys = {"force": "20 N", "travel": "5 mm", "envelope": "[200 mm, 150 mm, 30 mm]", "material": "pla"}
     asked = request(**keys, process="fdm", ripple="6 %", **{"yield": "60 %"})
     one = proposal_of("vcfm", offered("vcfm", asked)[0], asked)
-    assert one.near, one.missed or one.message
+    assert one.is_near_miss, one.missed or one.message
     assert not one.movable
     # 1 - 0.975/1.025 of 4 GPa, out of 1.6 to 4 GPa
     assert "no shape exceeds 8.13 %" in one.missed[0]
@@ -84,7 +84,7 @@ def moved_to(monkeypatch, shares):
         asked.append(share)
         return MovedForYield(spec, 0.5, shares[len(asked) - 1], "mechanism.bistable.thickness")
 
-    monkeypatch.setattr(proposal_making_and_judging, "moved_for_yield", moved)
+    monkeypatch.setattr(proposal_making_and_judging, "move_for_yield", moved)
     return asked
 
 
@@ -109,7 +109,7 @@ def test_what_margins_do_not_reach_names_the_largest_yield_and_the_costliest_tol
         return Proposal("vcfm", "2 Vs", near.text, ("yield 58 %",), numbers={"yield": 0.58}, movable=True)
 
     found = redesign_for_yield(near, Candidate("2 Vs", near.spec), request(**{"yield": "80 %"}), Run(), judge)
-    assert found.near
+    assert found.is_near_miss
     assert not found.movable
     assert found.numbers["yield"] == 0.58
     assert found.missed[0].startswith("yield 58 %; design margins cannot improve it further")
@@ -129,13 +129,13 @@ def test_what_moves_out_of_the_room_for_a_yield_stays_as_it_was(near, monkeypatc
 
 def test_families_that_lack_proposals_try_their_nearest_again_once(near):
     asked = request(**{"yield": "80 %"})
-    making = _Making(Run(), _Times(), 3, [])
+    making = _MadeCandidates(Run(), _Times(), 3, [])
     job = ProposalJob("vcfm", Candidate("2 Vs", near.spec), asked, 0)
     worse = Proposal("vcfm", "1 V", near.text, ("yield 20 %",), movable=True, numbers={"yield": 0.2})
     for one in (worse, near):
         making._take(job, one)
     (again,) = making.with_margins(1)
-    assert again.near is near
+    assert again.earlier is near
     assert _key(again) != _key(job)
     good = Proposal("vcfm", "2 Vs", near.text, numbers={"yield": 0.9})
     making._take(again, good)
@@ -152,7 +152,7 @@ def test_a_strip_moved_for_a_yield_has_it():
     given = given.replace({"analysis.points": 31})
     spec = given.replace({"design": None, "requirements": asked, "sensitivity": block})
     candidate = Candidate("strip", given, design=True)
-    moved = moved_for_yield(candidate, spec, request(**{"yield": "85 %"}), 0.85, Run())
+    moved = move_for_yield(candidate, spec, request(**{"yield": "85 %"}), 0.85, Run())
     assert moved.began < 0.6
     assert moved.share >= 0.85
     found = cfmkit.sensitivity(moved.spec, method="tolerance", samples=60, parameters=parameters)

@@ -17,7 +17,7 @@ from cfmkit.families.slider_crank.printed import (
     flexure_ends,
     flexure_network,
     joints,
-    spread,
+    stations,
 )
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def strip_chain(
     if len(values) == 1:
         values = np.repeat(values, 2)
     if places is None:
-        places = spread(points, SHARES) if len(values) == 12 else np.linspace(0, 1, len(values))
+        places = stations(points, SHARES) if len(values) == 12 else np.linspace(0, 1, len(values))
 
     def build(at: np.ndarray) -> object:
         return Strip(at, width, values, places).network(material)

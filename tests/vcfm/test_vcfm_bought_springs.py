@@ -15,7 +15,7 @@ from cfmkit.families import family
 from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.results import Status
-from cfmkit.stock.springs import CompressionSpring, generic
+from cfmkit.stock.springs import CompressionSpring, generic_series
 
 FATIGUE = "mechanism.material.fatigue"
 CONFIG = Path(__file__).parents[2] / "configs" / "vcfm_bought_springs.yaml"
@@ -111,7 +111,7 @@ def test_a_design_does_not_press_its_own_springs_until_their_turns_touch(spec):
 
 
 def test_the_initial_tension_of_extension_springs_carries_a_part_of_the_force(spec):
-    rate = generic(CompressionSpring)[0].rate
+    rate = generic_series(CompressionSpring)[0].rate
     offer = {"name": "pull", "kind": "extension", "stiffness": f"{rate / 1000} N/mm", "initial_tension": "1 N"}
     hung = spec.replace({"mechanism.springs": {"kind": "extension", "stiffness": "1 N/mm"}})
     found = designed(hung, catalogue=(offer | {"counts": (1, 2)},), rise=None, preload=None, spring_room=None)
@@ -161,7 +161,7 @@ def test_of_generic_springs_the_one_nearest_to_the_largest_rise_is_taken(spec, r
     # springs with a rise between this one and the limit are too long, are deflected too far, or would need a guide
     nearer = [
         one
-        for one in generic(CompressionSpring)
+        for one in generic_series(CompressionSpring)
         for count in one.counts
         if h * (1 + 1e-6) < 11.15 / (one.rate * count) <= rise
     ]

@@ -15,7 +15,7 @@ from cfmkit import api
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.families import family
-from cfmkit.families.vcfm.curves_in_rows import Preloaded
+from cfmkit.families.vcfm.curves_in_rows import PreloadedRows
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring, parts
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
@@ -27,7 +27,7 @@ from cfmkit.families.vcfm.leaves.v_beam import TrussLeaf, VBeam, critical_force
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import rests_by_laws, rests_of, solve_rows
 from cfmkit.families.vcfm.part import _leaf_spring, leaf_thickness
-from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES, spread
+from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES, force_statistics
 from cfmkit.families.vcfm.range_and_flatness_findings import extreme_sums
 from cfmkit.metrics import CycleRows, evaluate
 from cfmkit.results import Status
@@ -41,7 +41,7 @@ def test_what_all_preloads_share_is_what_each_has_alone(name):
     spec = cfmkit.load(CONFIGS / f"{name}.yaml").replace({"analysis.preloads": ["0 mm", "1 mm", "3 mm", "-0.5 mm"]})
     solution = cfmkit.analyze(spec).state
     grid = np.linspace(0.0, spec.travel, spec.analysis.points)
-    together = Preloaded(solution.sampler, np.array(spec.analysis.preloads)[:, None], solution.curves.stops)
+    together = PreloadedRows(solution.sampler, np.array(spec.analysis.preloads)[:, None], solution.curves.stops)
     alone = [rests_of(replace(together, preload=one[None]), grid)[0] for one in together.preload]
     assert rests_of(together, grid) == pytest.approx(alone, rel=1e-13, nan_ok=True)
     windows = np.transpose(solution.curves.flat_parts(spec.analysis.flatness))
@@ -607,8 +607,8 @@ def test_what_the_table_of_preloads_says_of_a_window_does_not_depend_on_the_poin
     """The curve turns a corner where the leaves buckle, inside this window: between points it is no straight line."""
     spec = cfmkit.load("configs/vcfm_pla_adjustable.yaml").replace({"analysis.window": ["1 mm", "4.4 mm"]})
     few, many = (cfmkit.analyze(spec.replace({"analysis.points": points})).state for points in (23, 801))
-    wanted = spread(many.window_forces[0, 0])
-    assert spread(few.window_forces[0, 0]) == pytest.approx(wanted, rel=1e-12)
+    wanted = force_statistics(many.window_forces[0, 0])
+    assert force_statistics(few.window_forces[0, 0]) == pytest.approx(wanted, rel=1e-12)
 
 
 @pytest.mark.parametrize("points", [23, 801])

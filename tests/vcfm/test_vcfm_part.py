@@ -25,7 +25,7 @@ def test_levels_of_cosine_leaves_touch_where_they_are_steepest():
 
     def between(spacing: float) -> Any:
         wider = mechanism.replace({"mechanism.frame.spacing": f"{spacing} mm"})
-        law, sides = part._leaf(wider), ((1.0, 0), (-1.0, 1))
+        law, sides = part._leaf_law(wider), ((1.0, 0), (-1.0, 1))
         edges = [np.concatenate([item.points for item in part._edge(law, side, (0.0, level * 1e-3 * spacing))])
                  for side, level in sides]  # fmt: skip
         return Polygon(np.concatenate([edges[0], edges[1][::-1]]))

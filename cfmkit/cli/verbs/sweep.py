@@ -140,6 +140,6 @@ def _first_refusal(records: Records, document: YamlDocument) -> tuple[str, ...]:
 
 
 def _pictures(records: Records, summary: Summary) -> dict[str, Any]:
-    from cfmkit.studies.pictures import makers  # imports matplotlib, which takes half a second
+    from cfmkit.studies.pictures import list_pictures  # imports matplotlib, which takes half a second
 
-    return makers(records, summary)
+    return list_pictures(records, summary)

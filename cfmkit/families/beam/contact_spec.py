@@ -1,4 +1,4 @@
-"""Specification of contact: stops of nodes, obstacles that pads and beams may touch, contacts between parts."""
+"""Specification of contact (stops of nodes, obstacles, contacts between parts), its checks, and its columns' names."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ class ArcObstacle(_BeginsAnywhere):
         return getattr(self, "from"), self.to
 
     @model_validator(mode="after")
-    def _turns(self) -> Self:
+    def _turns_at_most_half_round(self) -> Self:
         if not 0 < abs(self.ends[1] - self.ends[0]) <= math.pi:
             raise ValueError("between 'from' and 'to' there must be more than 0 and at most 180 deg")
         return self
@@ -315,7 +315,7 @@ def contacts_of(mechanism: Mechanism) -> tuple[Contact, ...]:
     return tuple(contacts)
 
 
-def rubs(mechanism: Mechanism) -> bool:
+def has_friction(mechanism: Mechanism) -> bool:
     """Return True if a contact has friction: the way back is another one then."""
     touched = (*mechanism.stops.values(), *mechanism.obstacles.values())
     return any(getattr(item, "friction", 0.0) for item in touched)
@@ -385,7 +385,7 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
     ]
     smooth += [("contacts", number) for number in range(len(mechanism.contacts))]
     reported = any(obstacle.friction and obstacle.beams for obstacle in mechanism.obstacles.values())
-    if smooth and rubs(mechanism) and not reported:
+    if smooth and has_friction(mechanism) and not reported:
         text = "flanks of beams beside contacts with friction are not modelled: state the 'nodes' that may touch it"
         yield smooth[0], f"{text}, or leave out 'friction'"
     yield from _stop_faults(mechanism)
@@ -428,7 +428,7 @@ def _side_faults(mechanism: Mechanism, obstacle: ObstacleBase, place: tuple[str 
 def _column_faults(mechanism: Mechanism) -> Iterator[Fault]:
     seen = {f"{name}_force" for name in mechanism.beams}
     for place, force in column_names(mechanism):
-        for column in (force, *(friction_columns(force) if rubs(mechanism) else ())):
+        for column in (force, *(friction_columns(force) if has_friction(mechanism) else ())):
             if column in seen:
                 yield place, f"its column {column!r} has the name of another one: rename it"
             seen.add(column)

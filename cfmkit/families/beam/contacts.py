@@ -1,4 +1,4 @@
-"""Forces of contacts along the curve of a beam mechanism: columns, scalar results and findings."""
+"""Contacts of a beam mechanism along its curve: force columns, scalar results, findings; refuses overlaps at rest."""
 
 from __future__ import annotations
 
@@ -184,18 +184,19 @@ def _place_values(path: Path, numbers: list[int]) -> FloatArray:
 
 
 def _event_column(solution: Solution) -> Column:
+    """Return the changes of contacts at each point of the curve, as text."""
     path, marks = solution.path, [""] * len(solution.path)
     for event in path.contact_events:
-        point = _point_of_event(path, event)
-        marks[point] = f"{marks[point]}; {_mark(path, event)}".removeprefix("; ")
+        point = _index_of_event(path, event)
+        marks[point] = f"{marks[point]}; {_describe_change(path, event)}".removeprefix("; ")
     return Column(np.array([marks[point] for point in solution.keep], np.str_), "text")
 
 
-def _point_of_event(path: Path, event: ContactEvent) -> int:
+def _index_of_event(path: Path, event: ContactEvent) -> int:
     return int(np.abs(np.where(path.changes_contact, path.drive, np.inf) - event.drive).argmin())
 
 
-def _mark(path: Path, event: ContactEvent) -> str:
+def _describe_change(path: Path, event: ContactEvent) -> str:
     contact = path.network.contacts[event.number]
     names_both = isinstance(contact, Stop | BeamOnBeam) or contact.name == f"{toucher(contact)}_{counterpart(contact)}"
     return f"{contact.name if names_both else f'{contact.name} {toucher(contact)}'} {event.kind}"
@@ -300,7 +301,7 @@ def change_sentences(
 ) -> Iterator[tuple[str, str]]:
     """Yield the same on what changes along a curve, behind sentences on what was before it."""
     path = solution.path
-    sentences = [_sentence(solution, event, say(event.drive)) for event in path.contact_events]
+    sentences = [_describe_event(solution, event, say(event.drive)) for event in path.contact_events]
     told = [*before, *(text for text in sentences if text)]
     if told:
         more = f"; and {len(told) - MOST_NAMED} more changes" if len(told) > MOST_NAMED else ""
@@ -321,7 +322,7 @@ def change_sentences(
 
 def _state_taken(path: Path, event: ContactEvent) -> str:
     """Return which of several states of friction the curve goes on with: that of the next point."""
-    point = min(_point_of_event(path, event) + 1, len(path) - 1)
+    point = min(_index_of_event(path, event) + 1, len(path) - 1)
     state = str(path.contact_friction(event.number)[1][point])
     return {"stick": "it sticks here", "slip": "it slides here"}.get(state, "it leaves here")
 
@@ -332,7 +333,7 @@ def describe(contact: Contact) -> str:
     return f"stop {contact.name!r}" if isinstance(contact, Stop) else touches
 
 
-def _sentence(solution: Solution, event: ContactEvent, place: str) -> str:
+def _describe_event(solution: Solution, event: ContactEvent, place: str) -> str:
     contact, path = solution.path.network.contacts[event.number], solution.path
     if event.kind == "blocks" or (event.kind == "spreads" and isinstance(contact, NodeOnBeam | BeamOnBeam)):
         return ""
@@ -359,6 +360,7 @@ def _sentence(solution: Solution, event: ContactEvent, place: str) -> str:
 
 
 def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
+    """Yield a sentence on each contact that is nearly closed, or much too far away, all along the curve."""
     path = solution.path
     changed = {event.number for event in path.contact_events}
     parts = {contact.name for contact in path.network.contacts if isinstance(contact, BeamOnBeam)}
@@ -380,8 +382,8 @@ def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
             where = f"the gap of {describe(contact)} closes to {format_short(least, 'length')} and stays open"
             yield "near_contact", f"{where}: tolerances of that size decide whether they touch"
         elif not isinstance(contact, Stop) and least > OUT_OF_REACH * moved:
-            who, nearest, way = toucher(contact), format_short(least, "length"), format_short(moved, "length")
-            text = f"{who!r} comes no nearer to {counterpart(contact)!r} than {nearest}, and moves by {way} only"
+            who, nearest, movement = toucher(contact), format_short(least, "length"), format_short(moved, "length")
+            text = f"{who!r} comes no nearer to {counterpart(contact)!r} than {nearest}, and moves by {movement} only"
             yield "obstacle_out_of_reach", text
 
 

@@ -1,8 +1,7 @@
-"""From targets to a specification: one method for each key of the block `design`.
+"""Design of a beam mechanism: `optimise` searches its shape (`shaping`), `rescale` its size, section or material.
 
-`optimise` searches positions and shapes (`shaping`). `rescale` keeps the form of the force curve for another force,
-size, section or material [Lan, eq. 6 and sec. 2.3]: F L^2 / EI is the same for all mechanisms of one shape whose beams
-bend without stretching, at the same displacement per size. Stretching breaks that: its share goes with
+`rescale` keeps the form of the force curve [Lan, eq. 6 and sec. 2.3]: F L^2 / EI is the same for all mechanisms of one
+shape whose beams bend without stretching, at the same displacement per size. Stretching breaks that: it goes with
 (thickness / size)^2. The value that is free is therefore found by Eq. 6 and corrected with the model of the
 specification until the force is the one wanted.
 
@@ -60,7 +59,7 @@ def rescale(spec: BeamSpec, wanted: Rescale) -> Design:
     """Return the specification with the changes made and the force wanted reached, or why it cannot be."""
     wanted = wanted.model_copy(update={"free": wanted.choose_dimension(sheet_of(spec.mechanism.part))})
     changed = changed_spec(spec, wanted)
-    validity = _validity(spec, wanted)
+    validity = _report_error_of_law(spec, wanted)
     for _ in range(MAX_ROUNDS):
         before = changed
         if wanted.to_allowable_stress:
@@ -81,7 +80,9 @@ def rescale(spec: BeamSpec, wanted: Rescale) -> Design:
         changed = again
         if changed == before or not wanted.to_allowable_stress:
             break
-    return Design(changed, Status.COMPLETE, _report_changes(spec, changed), warnings=(*validity, *_stress(changed)))
+    return Design(
+        changed, Status.COMPLETE, _report_changes(spec, changed), warnings=(*validity, *_report_overstress(changed))
+    )
 
 
 def _force(spec: BeamSpec) -> float | None:
@@ -105,12 +106,12 @@ def _correct_value(spec: BeamSpec, wanted: Rescale, force: float) -> tuple[BeamS
         again = _force(spec)
         if again is None:
             break
-        exponent = _exponent(force, again, factor, exponent)
+        exponent = _measure_exponent(force, again, factor, exponent)
         force = again
     return spec, None
 
 
-def _exponent(before: float, after: float, factor: float, expected: float) -> float:
+def _measure_exponent(before: float, after: float, factor: float, expected: float) -> float:
     """Return how the force went with what was scaled: wide beams, stretch and shear bend the law a little."""
     if not after / before > 0 or factor == 1.0:
         return expected
@@ -193,10 +194,10 @@ def _to_allowable_stress(spec: BeamSpec) -> tuple[BeamSpec | None, str]:
     if place is None:
         return (None, why) if why else (spec, "")
     end = _round_down(place)
-    ended = _set_window(spec, 0.0, end)
+    ended = _with_travel_and_window(spec, 0.0, end)
     start = number_of("range_start", solve(ended))
     if start is not None and abs(_round_up(start)) < abs(end):
-        ended = _set_window(ended, _round_up(start), end)
+        ended = _with_travel_and_window(ended, _round_up(start), end)
     return ended, ""
 
 
@@ -238,12 +239,12 @@ def _round_up(value: float) -> float:
     return math.copysign(round(math.ceil(abs(value) / TRAVEL_STEP - 1e-6) * TRAVEL_STEP, 9), value)
 
 
-def _set_window(spec: BeamSpec, start: float, end: float) -> BeamSpec:
+def _with_travel_and_window(spec: BeamSpec, start: float, end: float) -> BeamSpec:
     window = tuple(Place(place) for place in sorted((start, end)))
     return with_values(spec, {"analysis.travel": Place(end), "analysis.window": window})
 
 
-def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
+def _report_error_of_law(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
     """Return by how much Eq. 6 alone is off where beams stretch: at the end of the window as given, times the size."""
     if spec.fidelity == "inextensible" or (force := _force(spec)) is None:
         return []
@@ -269,7 +270,7 @@ def _force_ratio(old: Mechanism, new: Mechanism) -> float:
     return float(_modulus(new) / _modulus(old) * math.prod(sizes))
 
 
-def _stress(spec: BeamSpec) -> list[Finding]:
+def _report_overstress(spec: BeamSpec) -> list[Finding]:
     """Return from where on the stress is too large after the change, in words."""
     solution = solve(spec)
     allowable, along = solution.assembly.allowable_stress, solution.along

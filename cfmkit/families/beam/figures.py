@@ -1,4 +1,4 @@
-"""Pictures of a beam mechanism: curve, shapes to scale, forces of each beam, stresses, a surface that is followed."""
+"""Pictures of a beam mechanism: curve, shapes, beam forces, stresses, frequencies, a touched surface; and its film."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cfmkit.export.posed_part import PosedBody
 from cfmkit.families.beam.drawn_contacts import draw_contacts
 from cfmkit.families.beam.network_from_spec import node_place
 from cfmkit.families.beam.part import BOX_TOLERANCE, bodies, made_strips, regions
-from cfmkit.families.beam.scalar_results import natural
+from cfmkit.families.beam.scalar_results import natural_frequencies
 from cfmkit.families.beam.solution import choose_points, node_at
 from cfmkit.families.beam.strips_and_gaps import strips
 from cfmkit.families.beam.tip_on_uneven_surface import follow_surface
@@ -76,7 +76,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     return {maker.__name__: partial(maker, result) for maker in makers}
 
 
-def _motion(result: Result) -> Scale:
+def _x_axis(result: Result) -> Scale:
     return Scale(result.curve.motion_name, result.curve.motion_dimension)
 
 
@@ -115,7 +115,7 @@ def shapes(result: Result) -> Figure:
     shown, made = bodies(solution, poses, centre_line=centre_line), made_strips(solution.assembly)
     drawn = {int(pose): [body.core_at(k) for body in shown] for k, pose in enumerate(poses)}
     springs = solution.assembly.add_images(spring_lines(solution.path))
-    box = _box([*made, *shown, *(PosedBody.line("spring", "free", line, 0.0) for line in springs)])
+    box = _box_of_bodies([*made, *shown, *(PosedBody.line("spring", "free", line, 0.0) for line in springs)])
     width, height = box[2] - box[0], box[3] - box[1]
     scale = min(138.0 / width, 110.0 / height)
     heading = Heading.from_result(result, "shapes to scale, as cut and during the travel")
@@ -129,14 +129,14 @@ def shapes(result: Result) -> Figure:
     for number, line in enumerate(springs):
         ends = [(float(x), float(y)) for x, y in line]
         parts.spring(ax, ends[0], ends[1], 0.02 * max(width, height), f"spring-{number}")
-    peak = _poses(solution, ax, drawn)
+    peak = _draw_poses(solution, ax, drawn)
     motion = f"{result.curve.motion_name}:"
     color_key(ax, [(motion, TEXT_INK), *_key(solution, list(drawn))])
     _supports(solution, ax)
     draw_contacts(solution, ax, max(width, height), dict(zip(drawn, _colors(len(drawn)), strict=True)))
     parts.to_scale(ax, box)
     ax.set_ylabel("y [mm]")
-    place_labels(ax, [peak, *_names(solution)])
+    place_labels(ax, [peak, *_label_beams(solution)])
     return figure
 
 
@@ -154,7 +154,7 @@ def _key(solution: Solution, poses: list[int]) -> list[tuple[str, str]]:
     return list(zip(reported, _colors(len(poses)), strict=True))
 
 
-def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> Label:
+def _draw_poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> Label:
     """Draw the bent beams of each pose, and mark the largest stress; return the name of the mark."""
     for color, (pose, lines) in zip(_colors(len(drawn)), drawn.items(), strict=True):
         for number, line in enumerate(lines):
@@ -163,10 +163,10 @@ def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> 
         for number, line in enumerate(solution.assembly.add_images(rigid_parts(solution.path, point))):
             parts.edge(ax, line, f"rigid-{pose}-{number}", color=color, linewidth=0.7, linestyle="--", zorder=2.4)
     index = int(np.argmax(np.where(np.isfinite(solution.stress), solution.stress, -np.inf)))
-    return _peak(solution, ax, index)
+    return _mark_peak(solution, ax, index)
 
 
-def _peak(solution: Solution, ax: Axes, index: int) -> Label:
+def _mark_peak(solution: Solution, ax: Axes, index: int) -> Label:
     """Mark where the stress is largest, on the unbent beam: there a reader finds the place on the part."""
     name, share = str(solution.stress_at[0][index]), float(solution.stress_at[1][index])
     points = _unbent_line(solution.path, name)
@@ -177,7 +177,7 @@ def _peak(solution: Solution, ax: Axes, index: int) -> Label:
     return parts.part_name(value_text(float(solution.stress[index]), "stress"), [(x, y)], (1.0, 0.6), TROUBLE_RED)
 
 
-def _names(solution: Solution) -> list[Label]:
+def _label_beams(solution: Solution) -> list[Label]:
     """Return the names of the beams as cut."""
     labels = []
     for name in list(solution.path.network.beams)[: 2 * MOST_BEAMS]:
@@ -191,7 +191,7 @@ def _unbent_line(path: Path, name: str) -> FloatArray:
     return np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
 
 
-def _box(shown: Sequence[PosedBody]) -> parts.Box:
+def _box_of_bodies(shown: Sequence[PosedBody]) -> parts.Box:
     return parts.box_around(shown, (0.08, 0.08, 0.08, 0.08))[0]
 
 
@@ -224,13 +224,13 @@ def reactions(result: Result) -> Figure:
     size = max(float(np.nanmax(np.abs(force[:, :2]))) for force in forces.values())
     along, across = ({name: zero_rounding(row, size) for name, row in rows.items()} for rows in (along, across))
     per_copy = ", one copy" if solution.assembly.parallel > 1 else ""
-    heading = Heading.from_result(result, f"force of each beam on its last node{per_copy}{_left_out(forces)}")
+    heading = Heading.from_result(result, f"force of each beam on its last node{per_copy}{_more_beams(forces)}")
     pairs = zip(names, (along, across), strict=True)
-    diagrams = [Diagram(solution.motion, _motion(result), Scale(name, "force"), _series(rows)) for name, rows in pairs]
+    diagrams = [Diagram(solution.motion, _x_axis(result), Scale(name, "force"), _series(rows)) for name, rows in pairs]
     return diagram_figure(heading, diagrams)
 
 
-def _left_out(beams: Mapping[str, object]) -> str:
+def _more_beams(beams: Mapping[str, object]) -> str:
     """Note that a diagram has not all beams."""
     return "" if len(beams) <= MOST_BEAMS else f"; the {MOST_BEAMS} largest of {len(beams)}"
 
@@ -240,7 +240,7 @@ def _series(values: dict[str, FloatArray]) -> list[Series]:
     size = {name: float(np.nanmax(np.abs(value))) for name, value in values.items()}
     lines: dict[str, tuple[str, FloatArray]] = {}
     for name in sorted(size, key=lambda name: -size[name])[:MOST_BEAMS]:
-        same = next((key for key, (_, drawn_values) in lines.items() if _alike(values[name], drawn_values)), None)
+        same = next((key for key, (_, drawn_values) in lines.items() if _same_line(values[name], drawn_values)), None)
         names = name if same is None else f"{lines[same][0]}, {name}"
         lines[same or name] = (names, values[name])
     series = []
@@ -251,7 +251,7 @@ def _series(values: dict[str, FloatArray]) -> list[Series]:
     return series
 
 
-def _alike(first: FloatArray, second: FloatArray) -> bool:
+def _same_line(first: FloatArray, second: FloatArray) -> bool:
     largest = float(np.nanmax(np.abs(first)))
     return bool(np.nanmax(np.abs(first - second)) <= LINE_RTOL * largest)
 
@@ -266,15 +266,15 @@ def stress(result: Result) -> Figure:
         limits.append(Limit(allowable, f"allowable {value_text(allowable, 'stress')}", trouble=over))
     series = _series({name: value for name, (value, _) in solution.stresses.items()})
     part = "bending and axial" if solution.spec.stress == "total" else "bending"
-    diagram = Diagram(solution.motion, _motion(result), Scale("largest stress", "stress"), series, limits)
-    heading = Heading.from_result(result, f"largest stress of each beam ({part}){_left_out(solution.stresses)}")
+    diagram = Diagram(solution.motion, _x_axis(result), Scale("largest stress", "stress"), series, limits)
+    heading = Heading.from_result(result, f"largest stress of each beam ({part}){_more_beams(solution.stresses)}")
     return diagram_figure(heading, [diagram])
 
 
 def frequencies(result: Result) -> Figure:
     """Return the natural frequencies over the motion, with the drive held and with it free."""
     solution: Solution = result.state
-    series, both = [], natural(solution)
+    series, both = [], natural_frequencies(solution)
     for number in range(min(MOST_MODES, solution.spec.analysis.modes)):
         for name, dashed in (("held", False), ("free", True)):
             values = both[name][:, number]
@@ -286,7 +286,7 @@ def frequencies(result: Result) -> Figure:
     values = np.concatenate([line.values[np.isfinite(line.values)] for line in series] or [np.ones(1)])
     wide = bool(values.min() > 0 and values.max() > MAX_LINEAR_FREQUENCY_RATIO * values.min())
     scale = Scale("frequency", "frequency", zero=not wide, log=wide)
-    return diagram_figure(heading, [Diagram(solution.motion, _motion(result), scale, series)])
+    return diagram_figure(heading, [Diagram(solution.motion, _x_axis(result), scale, series)])
 
 
 def surface(result: Result) -> Figure:
@@ -315,7 +315,7 @@ def moving(result: Result) -> Moving | None:
     points = choose_poses(len(solution.keep))
     made = made_strips(solution.assembly)
     shown = bodies(solution, points, regions(solution.spec, BOX_TOLERANCE), centre_line)
-    box = _box([*made, *shown])
+    box = _box_of_bodies([*made, *shown])
 
     def draw(ax: Axes, number: int) -> None:
         parts.bodies(ax, made, 0, {})

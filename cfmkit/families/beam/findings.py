@@ -1,7 +1,4 @@
-"""Warnings of the beam family: their rules and sentences.
-
-The names are stable; the sentences say what the name means. The message that a run reports carries the numbers.
-"""
+"""Warnings of the beam family: of each its name, when it is raised, and its sentence with numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +16,7 @@ from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thi
 from cfmkit.families.beam.path_ending import add_units, drive_text, ending_of
 from cfmkit.families.beam.scalar_results import find_in_window
 from cfmkit.families.beam.solution import node_at, pairs_in_contact
-from cfmkit.families.findings import percent, stiffer, too_soft
+from cfmkit.families.findings import describe_wide_beam, percent, wide_beam_in_short
 from cfmkit.families.rows import FindingRule, findings_of_one
 from cfmkit.specs.units import format_short
 
@@ -281,17 +278,17 @@ def _hindered_share(solution: Solution) -> tuple[float, str]:
 
 def _wide_beams(solution: Solution) -> Sentence:
     wide, narrow = "mechanism.wide_beams=true", solution.spec.analysis.modes  # frequencies are of narrow beams only
-    return too_soft(*_hindered_share(solution)), (wide, "analysis.modes=0") if narrow else wide
+    return describe_wide_beam(*_hindered_share(solution)), (wide, "analysis.modes=0") if narrow else wide
 
 
-def _overlap(gap: BeamGap | None) -> bool:
+def _overlaps(gap: BeamGap | None) -> bool:
     return gap is not None and gap.size <= 0
 
 
 def _touching_beams(solution: Solution) -> Sentence:
     still, moving = solution.gaps
     assert moving is not None
-    when = "before any load" if _overlap(still) else "during the travel"
+    when = "before any load" if _overlaps(still) else "during the travel"
     if frozenset((moving.first, moving.second)) in pairs_in_contact(solution.path.network):
         return (f"beams {moving.first} and {moving.second} overlap {when}, beside their contact that is stated",)
     remedy = "" if moving.second.endswith("'") else "; state it in 'mechanism.contacts'"
@@ -383,11 +380,11 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
 LAST_RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule(
         "wide_beam",
-        lambda solution: bool(too_soft(*_hindered_share(solution))),
+        lambda solution: bool(describe_wide_beam(*_hindered_share(solution))),
         _wide_beams,
-        lambda solution: stiffer(_hindered_share(solution)[0]),
+        lambda solution: wide_beam_in_short(_hindered_share(solution)[0]),
     ),
-    FindingRule("beams_touch", lambda solution: _overlap(solution.gaps[1]), _touching_beams),
+    FindingRule("beams_touch", lambda solution: _overlaps(solution.gaps[1]), _touching_beams),
     FindingRule("gap_small", _has_small_gap, _small_gap),
 )
 

@@ -1,4 +1,4 @@
-"""Specification of a network of beams as a whole, and its checks."""
+"""Specification of a whole beam mechanism (`Mechanism`), and checks that nodes, beams, links and drive fit together."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
     if along and across:
         remedy = f"'guided' with 'direction: {format_short(drive.direction, 'angle')}'"
         yield at, f"{drive.node!r} cannot move: its support is {node.support!r}; {remedy} or 'free' lets it"
-    elif across and not parallel(drive.direction, node.direction or 0.0):
+    elif across and not are_parallel(drive.direction, node.direction or 0.0):
         drive_angle, guide_angle = format_short(drive.direction, "angle"), format_short(node.direction or 0.0, "angle")
         yield (
             ("drive", drive.kind, "direction"),
@@ -195,7 +195,7 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
         )
 
 
-def parallel(angle: float, reference: float) -> bool:
+def are_parallel(angle: float, reference: float) -> bool:
     """Return True if two directions [rad] are parallel, in either sense."""
     return abs(math.sin(angle - reference)) < _SAME_DIRECTION
 

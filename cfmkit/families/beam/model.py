@@ -4,9 +4,9 @@ Beams bend without stretching unless the specification says otherwise [Lan]; wit
 Reissner. The force is that of all copies together; the forces of single beams are those of one copy. A curve with
 hysteresis has branch `load` of the forward travel and branch `unload` of the return.
 
-Mechanisms of one topology whose paths go straight on are looked at together. Each path is traced as that of one
-mechanism is, so that a row is what a run of its own would be. What is asked of the rows, efforts between points,
-stresses and metrics, is computed for all of them at once.
+Mechanisms of one topology whose motion only increases along the path become rows. Each path is traced as that of one
+mechanism is, so that a row is what a run of its own would be; efforts between points, stresses and metrics are computed
+for all rows at once.
 
 [Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism for adaptive robot end-effector
 operations (2010), sec. 2.
@@ -28,13 +28,13 @@ from cfmkit.elastica.model.beam_fits import BeamFits, coils
 from cfmkit.elastica.results.paths_of_designs import PathsOfDesigns
 from cfmkit.errors import CfmError, InputError
 from cfmkit.families.beam.constant_force_range_and_extremes import travel_of
-from cfmkit.families.beam.contact_spec import rubs
+from cfmkit.families.beam.contact_spec import has_friction
 from cfmkit.families.beam.contacts import contact_columns, contact_values, refuse_overlap_at_rest
 from cfmkit.families.beam.findings import findings_of, rules_of
 from cfmkit.families.beam.network_elements_spec import LoadsDrive
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
 from cfmkit.families.beam.path_ending import add_units, distance, ending_of, ways_to_supports
-from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, natural, target_of
+from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, natural_frequencies, target_of
 from cfmkit.families.beam.solution import END_FORCES, Solution, columns_of, output_columns
 from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as OF_SURFACES
 from cfmkit.families.beam.tip_on_uneven_surface import add_surface
@@ -111,7 +111,7 @@ def solve(spec: BeamSpec) -> Solution:
     _refuse_tight_coils(assembly)
     _refuse_torn_beams(assembly)
     refuse_overlap_at_rest(assembly)
-    if not rubs(spec.mechanism):
+    if not has_friction(spec.mechanism):
         path = trace(assembly.network, assembly.drive(), assembly.control())
         return Solution(assembly, path, *_keep_points(assembly, path))
     drive = assembly.drive()
@@ -241,7 +241,7 @@ def _frequencies(solution: Solution) -> LazyColumns:
     """Return the natural frequencies that were requested: empty where a pose is not stable, or not accurate."""
 
     def column(mode: int, hold: str) -> Column:
-        return Column(natural(solution)[hold][:, mode], "frequency")
+        return Column(natural_frequencies(solution)[hold][:, mode], "frequency")
 
     modes = range(solution.spec.analysis.modes)
     return {f"frequency_{k + 1}_{hold}": partial(column, k, hold) for k in modes for hold in ("held", "free")}
@@ -350,39 +350,40 @@ ROW_COLUMNS = {name: each_quantity(quantity) for name, quantity in SCALAR_QUANTI
 class BeamRows:
     """Mechanisms of one kind (`cfmkit.families.rows.RowsSolution`)."""
 
-    each: Sequence[Solution]
+    solutions: Sequence[Solution]
 
     def __len__(self) -> int:
         """Return the number of mechanisms."""
-        return len(self.each)
+        return len(self.solutions)
 
     @cached_property
     def _laws(self) -> list[BetweenPoints]:
-        return [law for solution in self.each if (law := solution.model_between_points) is not None]
+        return [law for solution in self.solutions if (law := solution.model_between_points) is not None]
 
     @property
     def branches(self) -> Mapping[str, CurveRows]:
         """The curve of each mechanism."""
-        each, paths = self.each, PathsOfDesigns(self._laws)
+        solutions, paths = self.solutions, PathsOfDesigns(self._laws)
+        motions = [solution.motion for solution in solutions]
         paths.solve_knots()
-        pose = np.array([or_nan(solution.spec.analysis.reference) for solution in each])
-        allowable = np.array([or_nan(solution.assembly.allowable_stress) for solution in each])
+        pose = np.array([or_nan(solution.spec.analysis.reference) for solution in solutions])
+        allowable = np.array([or_nan(solution.assembly.allowable_stress) for solution in solutions])
         samples = RowSamples(
-            _pad_rows([solution.motion for solution in each]),
-            _pad_rows([solution.effort for solution in each]),
-            np.array([len(solution.motion) for solution in each]),
+            _pad_rows(motions),
+            _pad_rows([solution.effort for solution in solutions]),
+            np.array([len(motion) for motion in motions]),
         )
         curves = CurveRows(
             samples,
             lambda: _pad_rows([law.places for law in self._laws]),
             paths.effort,
-            np.array([or_nan(solution.effort_error) for solution in each]),
-            np.array([or_nan(target_of(solution)) for solution in each]),
-            np.array([solution.spec.analysis.band for solution in each]),
-            (np.array([solution.motion[0] for solution in each]), np.array([solution.motion[-1] for solution in each])),
+            np.array([or_nan(solution.effort_error) for solution in solutions]),
+            np.array([or_nan(target_of(solution)) for solution in solutions]),
+            np.array([solution.spec.analysis.band for solution in solutions]),
+            (np.array([motion[0] for motion in motions]), np.array([motion[-1] for motion in motions])),
             self._part_efforts,
             StressRows(tuple, self._stress_at, allowable, paths.largest_stress),
-            each[0].spec.mechanism.drive.effort_dimension,
+            solutions[0].spec.mechanism.drive.effort_dimension,
             None if np.isnan(pose).any() else pose,
             _pad_rows([law.peaks for law in self._laws], np.nan),
             traced=True,
@@ -394,7 +395,7 @@ class BeamRows:
 
     def _part_efforts(self, places: FloatArray) -> FloatArray:
         return np.array(
-            [solution.part_efforts("", row_places) for solution, row_places in zip(self.each, places, strict=True)]
+            [solution.part_efforts("", row_places) for solution, row_places in zip(self.solutions, places, strict=True)]
         )
 
 
@@ -449,6 +450,6 @@ def solve_rows(specs: Sequence[BeamSpec]) -> Iterator[tuple[NDArray[np.intp], So
             alike.setdefault(_kind(solution), {})[index] = solution
         for members in alike.values():
             solved = BeamRows(tuple(members.values()))
-            rules = [each_rule(rule) for rule in rules_of(solved.each[0])]
+            rules = [each_rule(rule) for rule in rules_of(solved.solutions[0])]
             rows = SolvedRows(solved, ROW_COLUMNS, rules, np.ones(len(members), bool), traced=True)
             yield np.array(list(members)), rows

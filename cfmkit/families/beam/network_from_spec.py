@@ -1,4 +1,4 @@
-"""From a specification to the network, the drive and the controls of the beam engine.
+"""From a specification to the network, masses, drive and path controls of the beam engine; stages in series, mirrors.
 
 The closure "chain": beams keep their shapes and lengths, and the nodes go where the beams end. From the nodes that are
 held in place, each beam in the given order whose one end is placed carries its other end with it; a beam between two

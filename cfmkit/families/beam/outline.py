@@ -64,7 +64,7 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     holes = [area for hole in solid.holes for area in hole.to_polygons(thinnest)]
     sections = check_outline(contours, tuple(_specified_pieces(beams, pieces, thinnest)), thinnest, fillet, holes)
     contours += tuple(circle(hole.at, 0.5 * hole.diameter, "cut", hole=True) for hole in part.holes)
-    paths = [Contour((_line(strip),), "path") for strips in both_halves(assembly, beams).values() for strip in strips]
+    paths = [Contour((_axis(strip),), "path") for strips in both_halves(assembly, beams).values() for strip in strips]
     places = held_places(assembly, beams, tolerance)
     marks = [mark(shape, place.node in assembly.moving_nodes) for place in places for shape in place.shapes]
     marks += [mark(shape, False) for shape in frame]
@@ -77,8 +77,8 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
         (*notes, *bare),
         _sheet(assembly, beams),
         dimensions=tuple(_dimensions(assembly)),
-        facts=tuple(_facts(assembly, fillet)),
-        warnings=(*pins_drawn_solid(spec), *joined_unasked(assembly, beams, solid.blocks, contours, fillet)),
+        facts=tuple(_title_block_lines(assembly, fillet)),
+        warnings=(*pins_drawn_solid(spec), *find_unintended_joins(assembly, beams, solid.blocks, contours, fillet)),
         tolerance=fine,
         sections=sections,
     )
@@ -117,7 +117,7 @@ def _distances(words: str, start: Any, end: Any, along: tuple[Literal["x", "y"],
             yield DrawnDimension(words, (float(start[0]), float(start[1])), (float(end[0]), float(end[1])), axis)
 
 
-def _facts(assembly: Assembly, fillet: float) -> Iterator[tuple[str, str]]:
+def _title_block_lines(assembly: Assembly, fillet: float) -> Iterator[tuple[str, str]]:
     """Yield what the part is made of, and how thick its beams are."""
     mechanism = assembly.spec.mechanism
     materials = {name: material.words for name, material in mechanism.collect_beam_values("material").items()}
@@ -150,7 +150,7 @@ def _sheet(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Sheet:
     return Sheet(mechanism.width, tuple(regions))
 
 
-def _line(strip: BeamStrip) -> Smooth:
+def _axis(strip: BeamStrip) -> Smooth:
     return Smooth(strip.points, np.column_stack([np.cos(strip.angle), np.sin(strip.angle)]))
 
 
@@ -174,7 +174,7 @@ def _table(name: str, strips: list[BeamStrip]) -> Curve2D:
 MAX_NAMED_PAIRS = 4  # pairs that one line names
 
 
-def joined_unasked(
+def find_unintended_joins(
     assembly: Assembly,
     beams: dict[str, list[BeamStrip]],  # the described half
     blocks: Sequence[DrawnBlock],  # pads, eyes and bars of the described half, and bars that join the halves
@@ -194,7 +194,7 @@ def joined_unasked(
     joins = joined_away_from_nodes(strips, blocks, _nodes_and_bodies(assembly), contours, fillet)
     if joins:
         more = f" and {len(joins) - MAX_NAMED_PAIRS} more" if len(joins) > MAX_NAMED_PAIRS else ""
-        pairs = ", ".join(_phrase(join) for join in joins[:MAX_NAMED_PAIRS])
+        pairs = ", ".join(_describe_join(join) for join in joins[:MAX_NAMED_PAIRS])
         yield finding(
             "joined_away_from_nodes",
             f"drawn as one piece although the mechanism has them apart: {pairs}{more}; the part is stiffer than its "
@@ -215,7 +215,7 @@ def pins_drawn_solid(spec: BeamSpec) -> Iterator[Finding]:
         yield finding("pins_not_drawn", text)
 
 
-def _phrase(join: Join) -> str:
+def _describe_join(join: Join) -> str:
     at = ", ".join(format_short(place, "length") for place in np.round(join.at, 9).tolist())
     pair = f"{join.first} with itself" if join.first == join.second else f"{join.first} and {join.second}"
     filled = f", where fillets fill the gap of {format_short(join.gap, 'length')}" if join.gap > 0 else ""

@@ -1,4 +1,4 @@
-"""The part as it is drawn, as a planar solid: what nodes, fillets and pads change against beams.
+"""Analysis of the part as drawn, a planar solid: force, stress per fillet, mesh error; its models for other FE solvers.
 
 Assumes: plane stress; pads and what joins the moving pads of two halves are rigid from the root plane on, as in the
 model of beams; an eye turns about its hole as one piece. No contact, no plasticity.
@@ -23,7 +23,7 @@ from cfmkit.families.beam.outline import drawing
 from cfmkit.families.beam.part import drawn_fillet
 from cfmkit.families.beam.scalar_results import EXTREME_METRICS, RANGE_METRICS, SCALAR_DEFINITIONS, number_of, target_of
 from cfmkit.families.beam.solid_nodes_and_fillets import SolidNodes, fillets
-from cfmkit.families.beam.solid_part import driven_part, ends_of_windows, load_of_one, moved_far_enough
+from cfmkit.families.beam.solid_part import driven_part, ends_of_windows, load_of_drawn_leg, move_far_enough
 from cfmkit.families.beam.solution import output_columns
 from cfmkit.families.beam.tip_on_uneven_surface import N_PLACES, add_surface
 from cfmkit.families.fem_results import (
@@ -208,7 +208,7 @@ def _solve_part(spec: BeamSpec, run: Run) -> tuple[Assembly, AdaptiveSolution]:
     Raises GeometryError if the part cannot be meshed.
     """
     if spec.mechanism.drive.by_load:
-        spec = moved_far_enough(spec, run.progress)
+        spec = move_far_enough(spec, run.progress)
     assembly = assemble(spec)
     return assembly, driven_part(spec, assembly).solve(run.progress)
 
@@ -225,7 +225,7 @@ def _solve_loaded_part(spec: BeamSpec, assembly: Assembly, solved: AdaptiveSolut
     """Return the points of the curve of a part under a load: even loads, or an even travel through its maxima."""
     from cfmkit.solid.path_up_to_load import follow_to_load, travels_at, with_poses
 
-    load, through = load_of_one(spec), spec.analysis.through_folds
+    load, through = load_of_drawn_leg(spec), spec.analysis.through_folds
     fine, reached = follow_to_load(solved.solution, load, through)
     solved = replace(solved, solution=with_poses(fine, ends_of_windows(spec, reached.end)))
     if through:
@@ -239,7 +239,7 @@ def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
     """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
     spec = spec.replace({"analysis.fidelity": "solid"})
     if spec.mechanism.drive.by_load:
-        spec = moved_far_enough(spec)
+        spec = move_far_enough(spec)
     return (driven_part(spec, assemble(spec)),)
 
 
@@ -304,7 +304,7 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     if solution.worst is not None:
         numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()
     if not solution.spec.mechanism.drive.turns:
-        numbers |= {"travel_end": float(solution.motion[-1])} | _limit(solution)
+        numbers |= {"travel_end": float(solution.motion[-1])} | _load_limit_values(solution)
         names = (*EXTREME_METRICS, *(RANGE_METRICS if solution.reached is None else ()))
         numbers |= {name: number_of(name, solution) for name in names}
         if solution.solved.critical_points:
@@ -317,7 +317,7 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     return quantities(SCALAR_DEFINITIONS, numbers) | largest_concentration(solution.fillets)
 
 
-def _limit(solution: SolidSolution) -> dict[str, float | None]:
+def _load_limit_values(solution: SolidSolution) -> dict[str, float | None]:
     """Return the first maximum of a load; nothing of parts that are moved."""
     from cfmkit.solid.path_up_to_load import LoadEnd, first_maximum
 
@@ -332,7 +332,7 @@ def _limit(solution: SolidSolution) -> dict[str, float | None]:
     return {"limit_force": solution.copies * sense * float(law(first)) if first < law.x[-1] else None}
 
 
-def _sharp(spec: BeamSpec) -> str:
+def _explain_sharp_corners(spec: BeamSpec) -> str:
     """Return what is wrong with fillets that the outline does not have; empty if it has them."""
     fillet = spec.mechanism.fillet
     if fillet > 0.0 == drawn_fillet(spec):
@@ -350,7 +350,7 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         load = format_short(solution.copies * point.effort, drive.effort_dimension)
         accuracy = "" if math.isnan(point.error) else f" (both within {100 * point.error:.2g} %)"
         yield finding("bifurcation", f"the part leaves its path at {at} and {load}{accuracy} for a stable branch")
-    if reported := _sharp(spec):
+    if reported := _explain_sharp_corners(spec):
         yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
     yield from drawing(spec).warnings
     thinnest, section = solution.assembly.thinnest, next(iter(solution.assembly.network.beams.values())).section

@@ -1,4 +1,4 @@
-"""From a request to networks of beams worth designing: kept shapes, rescaled.
+"""Proposals of beam mechanisms for a request: shapes kept as files, rescaled, then refitted by models that stretch.
 
 Beams that only bend follow one curve: with every length in the plane times k, the thickness times q and the width times
 b, the force at the k-fold displacement is b q^3/k^2 times as large, the stress q/k times [L, eq. 6]. So a shape that
@@ -69,7 +69,7 @@ SAYS_LESS = 1e3
 
 
 @dataclass(frozen=True)
-class Kept:
+class KeptShape:
     """A shape with its curve, as it was followed once."""
 
     name: str
@@ -82,7 +82,7 @@ class Kept:
 
 
 @lru_cache(maxsize=1)
-def kept_shapes() -> tuple[Kept, ...]:
+def load_kept_shapes() -> tuple[KeptShape, ...]:
     """Return all shapes that are kept, each followed over its travel by the model in its file.
 
     That is bending alone, whose curve is the same for every thickness, or, where beams are stout, with stretch and
@@ -92,17 +92,19 @@ def kept_shapes() -> tuple[Kept, ...]:
     return (*plain, *(_stack_two_layers(kept) for kept in plain if kept.spec.mechanism.copies is not None))
 
 
-def _follow_shape(name: str) -> Kept:
+def _follow_shape(name: str) -> KeptShape:
     text = files("cfmkit").joinpath(f"families/beam/shapes/{name}.yaml").read_text(encoding="utf-8")
     spec = read_document(text, name).bind(BeamSpec)
     result = analyze(spec, Run())
     part = part_over_motion(result)
     assert part is not None
     curve = result.curve
-    return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, BoundingBox.from_part(part))
+    return KeptShape(
+        name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, BoundingBox.from_part(part)
+    )
 
 
-def _stack_two_layers(kept: Kept) -> Kept:
+def _stack_two_layers(kept: KeptShape) -> KeptShape:
     """Return two of a shape in series: twice the travel at the same force and stress."""
     spec = kept.spec.replace({"mechanism.copies.layers": 2})
     single_height, double_height = (float(box(as_made(assemble(stacked)))[1, 1]) for stacked in (kept.spec, spec))
@@ -121,7 +123,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
         return FamilyOffer(reason="the force of a network of beams cannot be adjusted")
     candidates: list[Candidate] = []
     missed: list[tuple[float, str]] = []
-    for kept in kept_shapes():
+    for kept in load_kept_shapes():
         sides = request.envelope[0] / kept.envelope.across, request.envelope[1] / kept.envelope.along
         largest = ROUNDED_BOX * min(sides)
         for share in RELATIVE_SIZES:
@@ -147,7 +149,7 @@ def _vary_by_turns(candidates: list[Candidate]) -> list[Candidate]:
 
 
 def _rescale_shape(
-    request: Request, kept: Kept, size: float, block: dict[str, Any], thickest: float
+    request: Request, kept: KeptShape, size: float, block: dict[str, Any], thickest: float
 ) -> Candidate | tuple[float, str]:
     """Return a shape at a size, up to a thickness over its own, or how far it misses what is required, and why."""
     length = request.travel / size
@@ -174,7 +176,7 @@ def _rescale_shape(
 
 def _size_section(
     request: Request,
-    kept: Kept,
+    kept: KeptShape,
     size: float,
     block: dict[str, Any],
     window: tuple[float, float],
@@ -213,12 +215,13 @@ def _size_section(
     return Candidate(variant, spec, False, finish, promise, free, correct)
 
 
-def _width(request: Request, kept: Kept, size: float, stiffer: float, thicker: float, force: float) -> float:
+def _width(request: Request, kept: KeptShape, size: float, stiffer: float, thicker: float, force: float) -> float:
+    """Return the width that gives the required force [m]."""
     return float(kept.spec.mechanism.width * request.target / force * size**2 / (stiffer * thicker**3))
 
 
 def _write_shape(
-    kept: Kept, size: float, block: dict[str, Any], section: tuple[float, float], window: tuple[float, float]
+    kept: KeptShape, size: float, block: dict[str, Any], section: tuple[float, float], window: tuple[float, float]
 ) -> BeamSpec:
     """Return the shape at a size, with another material and section."""
     data = kept.spec.model_dump(exclude_unset=True) | {"family": "beam", "name": "suggested"}

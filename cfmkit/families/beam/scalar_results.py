@@ -87,7 +87,7 @@ def _reading_along(read: Callable[[AlongMotion], float], place: bool = True) -> 
     return function
 
 
-def _turning(read: Callable[[AlongMotion], float]) -> Callable[[SolvedMechanism], float]:
+def _extreme(read: Callable[[AlongMotion], float]) -> Callable[[SolvedMechanism], float]:
     """Return what reads an extreme; none of drives that turn."""
     return lambda solution: math.nan if _turns(solution) else solution.along.to_spec_sign(read(solution.along))
 
@@ -184,7 +184,7 @@ def _has_pole(solution: Solution, observe: Callable[[Path], FloatArray], window:
 # --- natural frequencies --------------------------------------------------------------------------------------------
 
 
-def natural(solution: Solution) -> dict[str, FloatArray]:
+def natural_frequencies(solution: Solution) -> dict[str, FloatArray]:
     """Return the natural frequencies at every point with the drive "held" and "free", (n, modes) [Hz]; else nan."""
     frequencies = solution.frequencies
     if frequencies is None:
@@ -199,7 +199,7 @@ def _lowest_frequency(hold: str) -> Callable[[Solution], float]:
     """Return what reads the lowest natural frequency in the window; none where there is a pose without."""
 
     def function(solution: Solution) -> float:
-        frequencies = natural(solution) if solution.spec.analysis.modes else {}
+        frequencies = natural_frequencies(solution) if solution.spec.analysis.modes else {}
         if hold not in frequencies:
             return math.nan
         first = frequencies[hold][find_in_window(solution, *window_of(solution)), 0]
@@ -289,17 +289,17 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "slenderness_min": _quantity(
         "count", "smallest ratio of a beam's length to its largest thickness", _least_slenderness
     ),
-    "peak_force": _quantity("force", "first local maximum of the force", _turning(lambda a: a.peak[1])),
+    "peak_force": _quantity("force", "first local maximum of the force", _extreme(lambda a: a.peak[1])),
     "peak_displacement": _quantity(
-        "length", "where the force has its first local maximum", _turning(lambda a: a.peak[0])
+        "length", "where the force has its first local maximum", _extreme(lambda a: a.peak[0])
     ),
     "valley_force": _quantity(
-        "force", "first local minimum of the force after its first local maximum", _turning(lambda a: a.valley[1])
+        "force", "first local minimum of the force after its first local maximum", _extreme(lambda a: a.valley[1])
     ),
     "valley_displacement": _quantity(
         "length",
         "where the force has this first minimum after its first local maximum",
-        _turning(lambda a: a.valley[0]),
+        _extreme(lambda a: a.valley[0]),
     ),
     "limit_force": _quantity(
         "force", "first limit point of a growing force: it snaps there", _event("limit point", "force")

@@ -56,10 +56,10 @@ def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:
     from cfmkit.solid.adaptive_solution import DrivenPart
 
     analysis, reacting = spec.analysis, bool(spec.analysis.outputs.reactions)
-    return DrivenPart("beams", part_of(spec, assembly), analysis.solid.error, tuple(_stops(spec)), reacting)
+    return DrivenPart("beams", part_of(spec, assembly), analysis.solid.error, tuple(_list_travels(spec)), reacting)
 
 
-def _stops(spec: BeamSpec) -> list[float]:
+def _list_travels(spec: BeamSpec) -> list[float]:
     """Return the travels to solve for [m or rad]: even ones, and the ends of every window."""
     end = spec.extent
     inside = [place for place in ends_of_windows(spec, end) if 0.0 < place / end < 1.0]
@@ -104,7 +104,7 @@ def ends_of_windows(spec: BeamSpec, end: float) -> list[float]:
 INITIAL_TRAVEL = 1e-3  # travel that is looked at first where beams have no pose under the load, in m or rad
 
 
-def moved_by(spec: BeamSpec, travel: float) -> BeamSpec:
+def with_moved_node(spec: BeamSpec, travel: float) -> BeamSpec:
     """Return a mechanism that a load drives with its node moved by that load's motion instead [m or rad]."""
     drive: Any = spec.mechanism.drive
     if drive.turns:
@@ -116,7 +116,7 @@ def moved_by(spec: BeamSpec, travel: float) -> BeamSpec:
     return spec.replace({"mechanism.drive": drive_keys, "analysis.travel": extent, **dropped})
 
 
-def moved_far_enough(spec: BeamSpec, report: Callable[[float, str], None] = lambda _share, _text: None) -> BeamSpec:
+def move_far_enough(spec: BeamSpec, report: Callable[[float, str], None] = lambda _share, _text: None) -> BeamSpec:
     """Return a mechanism that a load drives with its node moved until a coarse mesh of the part carries the load.
 
     Raises GeometryError if the part cannot be meshed.
@@ -124,17 +124,17 @@ def moved_far_enough(spec: BeamSpec, report: Callable[[float, str], None] = lamb
     from cfmkit.solid.path_up_to_load import travel_for
 
     guess = _travel_of_beams(assemble(spec))
-    moved = moved_by(spec, guess)
+    moved = with_moved_node(spec, guess)
     mesh, poses = part_of(moved, assemble(moved)).create_mesh(), max(spec.analysis.solid.poses, 5)
 
     def tell(share: float) -> None:
         report(share, "travel at the load")
 
-    travel = travel_for(mesh, load_of_one(spec), guess, poses, spec.analysis.through_folds, tell)
-    return moved_by(spec, travel)
+    travel = travel_for(mesh, load_of_drawn_leg(spec), guess, poses, spec.analysis.through_folds, tell)
+    return with_moved_node(spec, travel)
 
 
-def load_of_one(spec: BeamSpec) -> float:
+def load_of_drawn_leg(spec: BeamSpec) -> float:
     """Return the load at the end of the drive on what is drawn: one leg, with its mirror image [N or N m]."""
     return spec.extent / spec.mechanism.legs
 

@@ -225,8 +225,8 @@ def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], first: st
     a, b, half = lines[first], lines[second], halves[second.rstrip("'")]
     for i, j in itertools.product((0, -1), repeat=2):
         if np.hypot(*(lines[first][i] - lines[second][j])) < END_DISTANCE_RATIO * (halves[first] + half):
-            a = _away(a, i, 2 * COMMON_END_THICKNESSES * halves[first])
-            b = _away(b, j, 2 * COMMON_END_THICKNESSES * half)
+            a = _cut_off(a, i, 2 * COMMON_END_THICKNESSES * halves[first])
+            b = _cut_off(b, j, 2 * COMMON_END_THICKNESSES * half)
     if len(a) < 2 or len(b) < 2:
         return None
     import shapely
@@ -235,7 +235,7 @@ def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], first: st
     return BeamGap(distance - halves[first] - half, first, second)
 
 
-def _away(line: FloatArray, end: int, length: float) -> FloatArray:
+def _cut_off(line: FloatArray, end: int, length: float) -> FloatArray:
     """Return a line without some length at one end; of a short one nothing may be left, and nothing is taken then."""
     if not len(line):
         return line

@@ -54,7 +54,7 @@ def flank_pressure(assembly: Assembly, states: TrackStates, force: FloatArray, r
     return np.where(states.on_corner, np.nan, pressures)
 
 
-def worst(pressures: FloatArray) -> int | None:
+def index_of_largest(pressures: FloatArray) -> int | None:
     """Return where the largest pressure is; None if there is none."""
     is_known = np.isfinite(pressures)
     return int(np.argmax(np.where(is_known, pressures, -np.inf))) if is_known.any() else None

@@ -1,4 +1,4 @@
-"""From targets to a cam: the force constant, the springs and the profile to cut.
+"""Design of a cam from target force and stroke: its force constant A, the springs, and the profile to cut.
 
 The force is F = 4 K A [SS, eq. 1]: of K and A one is given and the other follows, or
 both come from a catalogue. Springs that are tight at the start give the path a slope there that a larger roller
@@ -47,7 +47,7 @@ from cfmkit.families.findings import (
 )
 from cfmkit.results import OVERWRITTEN_FINDING, Design, Finding, Status
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
-from cfmkit.stock.springs.offers import Miss, nearest
+from cfmkit.stock.springs.offers import Miss, describe_nearest
 from cfmkit.stock.springs.spec import offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 
@@ -160,7 +160,7 @@ def design(spec: CamSpec, run: Run) -> Design:
     if target.target is not None:
         check_target(target)
     task = _Task.from_spec(spec, target)
-    _check_start_of(task)
+    _check_start(task)
     best, *others = _CHOICE_FUNCTIONS[target.choose](task)
     next_best = tuple(partial(_design_next_best, task, choice) for choice in others)
     return replace(_design_choice(task, best), next_best=next_best)
@@ -178,11 +178,11 @@ def _design_choice(task: _Task, choice: Choice) -> Design:
     _check_stroke(law, task.target, choice.springs)
     _check_bend(task, law)
     written = _write_profile(task, choice)
-    reported = (*_overwritten(task.spec, written), *_plate_lacks(written))
+    reported = (*_find_overwritten_values(task.spec, written), *_find_missing_plate_features(written))
     return Design(written, Status.COMPLETE, choice.note, active_bounds=choice.active, warnings=reported)
 
 
-def _check_start_of(task: _Task) -> None:
+def _check_start(task: _Task) -> None:
     """Raise if no force constant gives a mechanism, none avoids undercut, or the rollers overlap at the start."""
     x0, radius, brace = task.mechanism.rest_half_width, task.mechanism.roller_radius, task.mechanism.brace_length
     try:
@@ -259,7 +259,7 @@ def _choose_listed_springs(task: _Task) -> list[Choice]:
     if not rejected:
         none = "the catalogue has no extension spring, which is what pulls the rollers together"
         raise finding.infeasible("no_spring_fits", f"{none} ('design.catalogue')")
-    reported = f"no spring of the catalogue fits: {nearest(rejected)}; add others to 'design.catalogue'"
+    reported = f"no spring of the catalogue fits: {describe_nearest(rejected)}; add others to 'design.catalogue'"
     keys = [key for word, key in _BLOCKING_KEYS.items() if f": {word}" in reported]
     change = ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"
     raise finding.infeasible("no_spring_fits", f"{reported}, or change {change}")
@@ -400,14 +400,16 @@ _SOURCE_KEYS = {
 """What decides a value of a designed profile that does not follow the mechanism's of the same name."""
 
 
-def _overwritten(spec: CamSpec, written: CamSpec) -> Iterator[Finding]:
+def _find_overwritten_values(spec: CamSpec, written: CamSpec) -> Iterator[Finding]:
     """Yield what to say about values of the profile that the user gave and the design replaces."""
     stated, new = spec.mechanism.profile, written.mechanism.profile
     # What the design is for, its force constant and stroke, is meant to be replaced.
     for name in sorted(stated.model_fields_set - {"force_constant", "stroke"}):
         old, now = getattr(stated, name), getattr(new, name)
         if old is not None and old != now and not (isinstance(old, float) and isclose(old, now or 0.0, rel_tol=1e-12)):
-            values = [f"{item:g}" if name in ("friction", "slope_factor") else _length(item) for item in (old, now)]
+            values = [
+                f"{item:g}" if name in ("friction", "slope_factor") else _length_text(item) for item in (old, now)
+            ]
             source = _SOURCE_KEYS.get(name, f"mechanism.{name}")
             yield Finding(
                 OVERWRITTEN_FINDING,
@@ -416,11 +418,11 @@ def _overwritten(spec: CamSpec, written: CamSpec) -> Iterator[Finding]:
             )
 
 
-def _length(value: object) -> str:
+def _length_text(value: object) -> str:
     return mm(value) if isinstance(value, float) else "none" if value is None else str(value)
 
 
-def _plate_lacks(spec: CamSpec) -> Iterator[Finding]:
+def _find_missing_plate_features(spec: CamSpec) -> Iterator[Finding]:
     """Yield what the plate lacks for want of room."""
     try:
         sides = assemble_sides(spec)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.hardware import hardware
-from cfmkit.families.cam.part import moment, pivoting, pose, scene, start_curve, swallowtail
+from cfmkit.families.cam.part import describe_position, pivoting, pose, scene, start_curve, swallowtail
 from cfmkit.families.cam.part_sizes_and_clearances import nearest_pairs
 from cfmkit.families.cam.statics import constant_force
 from cfmkit.numerics.holes_in_samples import holes_between
@@ -143,9 +143,9 @@ def mechanism(result: Result) -> Figure:
     write_heading(figure, heading)
     last = len(solution.travel) - 1
     places = {"start": 0, "middle": last // 2, "end": last}
-    titles = [f"{name}: {moment(solution, index)}" for name, index in places.items()]
+    titles = [f"{name}: {describe_position(solution, index)}" for name, index in places.items()]
     panels = parts.panels(figure, (across, up), titles, stacked)
-    names = _names_at_start, _names_of_parts, _names_of_lines
+    names = _label_corner, _label_parts, _label_cam_and_path
     for ax, index, named in zip(panels, places.values(), names, strict=True):
         draw_mechanism(solution, index, ax, view)
         ax.tick_params(labelleft=stacked or index == 0, labelbottom=not stacked or index == last)
@@ -155,12 +155,12 @@ def mechanism(result: Result) -> Figure:
     return figure
 
 
-def _names_at_start(solution: Solution, index: int, _view: Scene) -> list[Label]:
+def _label_corner(solution: Solution, index: int, _view: Scene) -> list[Label]:
     drawn_pose = pose(solution, index)
     return [parts.part_name("corner", [drawn_pose.contact], (1.0, 0.6), TROUBLE_RED)] if drawn_pose.on_corner else []
 
 
-def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
+def _label_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
     drawn_pose, mechanism, height = pose(solution, index), solution.mechanism, view.box[3] - view.box[1]
     radius, number, (x, y) = mechanism.roller_radius, mechanism.springs.number, drawn_pose.roller
     roller, pin = np.array(drawn_pose.roller), np.array(drawn_pose.slider)
@@ -174,7 +174,7 @@ def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
     ]
 
 
-def _names_of_lines(_solution: Solution, _index: int, view: Scene) -> list[Label]:
+def _label_cam_and_path(_solution: Solution, _index: int, view: Scene) -> list[Label]:
     return [
         parts.part_name("cam", view.flank[len(view.flank) // 2 :] * np.array([0.4, 0.9]), (0.0, -1.0)),
         parts.part_name("roller\npath", view.path[: len(view.path) // 4], (0.5, -1.0), LINE_BLUE, prefer=0.1),

@@ -1,8 +1,4 @@
-"""Warnings of the cam family: their rules and sentences.
-
-The names are stable; the sentences say what the name means. The message that a run reports carries the numbers that
-decide and the cure.
-"""
+"""Warnings of the cam family: of each its name and meaning, when it is raised, and its sentence with numbers."""
 
 from __future__ import annotations
 
@@ -71,7 +67,7 @@ LENGTH_TOL = 1e-12
 """Springs shorter than at rest by less [m] are at rest: rounding of half widths of decimetres is smaller."""
 
 
-def yields(pressure: FloatArray | float, allowable: FloatArray | float) -> Any:
+def exceeds_yield_pressure(pressure: FloatArray | float, allowable: FloatArray | float) -> Any:
     """Return whether a contact pressure exceeds the one at which a material with an allowable stress first yields."""
     return np.asarray(pressure > YIELD_PRESSURE * allowable * (1 + LIMIT_RTOL))
 
@@ -94,7 +90,12 @@ def is_overstretched(longest: FloatArray | float, limit: float) -> Any:
 def find_overstress(mechanism: Mechanism, largest: float | None, place: str) -> Finding | None:
     """Return what to say where the contact yields under the largest pressure [Pa]; None if it does not."""
     allowable = allowable_stress(mechanism)
-    if mechanism.contact is None or allowable is None or largest is None or not yields(largest, allowable):
+    if (
+        mechanism.contact is None
+        or allowable is None
+        or largest is None
+        or not exceeds_yield_pressure(largest, allowable)
+    ):
         return None
     return finding("overstressed", *overstress(mechanism, largest, place))
 
@@ -113,7 +114,7 @@ def overstress(mechanism: Mechanism, largest: float, place: str) -> tuple[str, .
     )
 
 
-def left_out(spec: CamSpec) -> tuple[Finding, ...]:
+def warn_of_asymmetry(spec: CamSpec) -> tuple[Finding, ...]:
     """Return what to say where the two sides differ: the quasi-static model is symmetric."""
     errors, unsupported = spec.mechanism.errors, []
     if errors and (errors.slider_deviation or errors.flank_angle):
@@ -130,7 +131,7 @@ def left_out(spec: CamSpec) -> tuple[Finding, ...]:
     return (finding("symmetric_model", message),)
 
 
-def rubbing_left_out(spec: CamSpec, model: str) -> tuple[Finding, ...]:
+def warn_of_neglected_friction(spec: CamSpec, model: str) -> tuple[Finding, ...]:
     """Return what to say where a model has rolling friction only."""
     mechanism = spec.mechanism
     said = [name for name in ("bearings", "pins", "guide") if (part := getattr(mechanism, name)) and part.friction]
@@ -140,7 +141,7 @@ def rubbing_left_out(spec: CamSpec, model: str) -> tuple[Finding, ...]:
     return (finding("friction_left_out", f"{model} includes rolling friction only: {keys} is neglected"),)
 
 
-def _undercut(solution: Solution) -> tuple[str, ...]:
+def _describe_undercut(solution: Solution) -> tuple[str, ...]:
     profile, travel = solution.assembly.track.profile, solution.corner_travel
     assert profile.corner is not None
     law, point = profile.path.law, profile.corner.point
@@ -169,7 +170,7 @@ def _undercut_in_short(solution: Solution) -> str:
     return f"force not {'constant' if law.constant else 'as cut'} up to {mm(solution.corner_travel)}"
 
 
-def _corner_pressure(solution: Solution) -> tuple[str, ...]:
+def _describe_corner_pressure(solution: Solution) -> tuple[str, ...]:
     corner = mm(solution.corner_travel)
     return (f"on a sharp corner the contact pressure is unbounded: it is reported from {corner} of travel on",)
 
@@ -182,7 +183,7 @@ def _preload_cure(solution: Solution) -> float | None:
     return 2.0 * half if half is not None and is_cure else None
 
 
-def _jam(number: int) -> FindingRule[Solution]:
+def _make_jam_rule(number: int) -> FindingRule[Solution]:
     """Return the rule of the first interval without leverage, or of a later one."""
 
     def message(solution: Solution) -> tuple[str, ...]:
@@ -224,7 +225,7 @@ def _is_dead(solution: Solution) -> Any:
     return np.logical_or(solution.column(_is_sunk(solution)), solution.column(unbounded))
 
 
-def _dead_point(solution: Solution) -> tuple[str, ...]:
+def _describe_dead_point(solution: Solution) -> tuple[str, ...]:
     track, loads = solution.assembly.track, solution.assembly.loads
     if _is_sunk(solution):
         return (
@@ -245,7 +246,7 @@ def _travel_at(solution: Solution, elongation: float) -> float:
     return min(track.slider_at(half_width) - track.start, float(solution.travel[-1]))
 
 
-def _slack(solution: Solution) -> tuple[str, ...]:
+def _describe_slack(solution: Solution) -> tuple[str, ...]:
     last = _travel_at(solution, 0.0)
     return (
         f"the springs are shorter than their rest length for the first {mm(last)} of travel, by up to "
@@ -268,7 +269,7 @@ def describe_overstretch(longest: float, limit: float, travel: float) -> str:
     return f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(travel)} of travel"
 
 
-def _slack_cable(direction: Literal["up", "down"]) -> FindingRule[Solution]:
+def _make_slack_cable_rule(direction: Literal["up", "down"]) -> FindingRule[Solution]:
     # Springs that pull keep the rollers on the cam as long as nothing accelerates: the contact force is positive.
     def places(solution: Solution) -> NDArray[np.bool_]:
         return np.asarray((solution.elongation > 0) & (getattr(solution, direction).slider <= 0))
@@ -288,7 +289,7 @@ def _is_lifted(solution: Solution) -> Any:
     return mounted and (beside > 0) & (beside > spring_force(solution.states, loads)[..., :1])
 
 
-def _lift_off(solution: Solution) -> tuple[str, ...]:
+def _describe_lift_off(solution: Solution) -> tuple[str, ...]:
     loads, mounting = solution.assembly.loads, solution.mechanism.mounting
     beside, released = abs(loads.sideways[0]), _lifted_travel(solution)
     return (
@@ -328,7 +329,7 @@ def _describe_overload(solution: Solution) -> tuple[str, ...]:
 
 def _is_overstressed(solution: Solution) -> Any:
     allowable = allowable_stress(solution.mechanism)
-    return allowable is not None and yields(solution.largest_pressure, allowable)
+    return allowable is not None and exceeds_yield_pressure(solution.largest_pressure, allowable)
 
 
 def _describe_overstress(solution: Solution) -> tuple[str, ...]:
@@ -345,19 +346,19 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     """Return every rule that a solved mechanism may break, the gravest first."""
     number = max(map(len, solution.all_jams))
     return (
-        FindingRule("undercut", _is_undercut, _undercut, _undercut_in_short),
+        FindingRule("undercut", _is_undercut, _describe_undercut, _undercut_in_short),
         FindingRule(
             "corner_pressure",
             lambda solution: solution.mechanism.contact is not None and _is_undercut(solution),
-            _corner_pressure,
+            _describe_corner_pressure,
         ),
-        *map(_jam, range(number)),
-        FindingRule("dead_point", _is_dead, _dead_point),
-        FindingRule("spring_slack", lambda solution: is_slack(solution.elongation).any(axis=-1), _slack),
+        *map(_make_jam_rule, range(number)),
+        FindingRule("dead_point", _is_dead, _describe_dead_point),
+        FindingRule("spring_slack", lambda solution: is_slack(solution.elongation).any(axis=-1), _describe_slack),
         FindingRule("spring_overstretched", _is_overstretched, _describe_overstretch),
-        _slack_cable("up"),
-        _slack_cable("down"),
-        FindingRule("lift_off", _is_lifted, _lift_off, _lift_off_in_short),
+        _make_slack_cable_rule("up"),
+        _make_slack_cable_rule("down"),
+        FindingRule("lift_off", _is_lifted, _describe_lift_off, _lift_off_in_short),
         FindingRule("bearing_overloaded", _is_overloaded, _describe_overload),
         FindingRule("overstressed", _is_overstressed, _describe_overstress),
     )

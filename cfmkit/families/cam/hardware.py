@@ -91,7 +91,7 @@ class _SizingLoads:
         across, travel = float(np.hypot(abs(loads.sideways[1]), loads.off_plane)), float(np.ptp(solution.travel))
         side = 2.0 * mechanism.roller_radius
         rods = guide_rods(4, across, force, travel, side, mechanism.guide, plate.stock, strength)
-        hooks = _hooks(solution, brace, rods.slider_thickness)
+        hooks = _make_hooks(solution, brace, rods.slider_thickness)
         return cls(mechanism, strength, thickness, brace, pull, press, force, rods, hooks)
 
     @property
@@ -231,7 +231,7 @@ class _Hooks:
         return max(width, hole * (1.0 + 2.0 * LEAST_WALL))
 
 
-def _hooks(solution: Solution, brace: float, slider: float) -> _Hooks:
+def _make_hooks(solution: Solution, brace: float, slider: float) -> _Hooks:
     springs = solution.assembly.spec.mechanism.springs
     stretch, half_width = float(solution.elongation.max()), solution.assembly.spec.mechanism.rest_half_width
     count, (wire, coil) = springs.number, wire_and_coil(springs, stretch, half_width) or (0.0, math.inf)

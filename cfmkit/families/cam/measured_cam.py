@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.families.cam.contact_pressure import flank_pressure, stress, worst
+from cfmkit.families.cam.contact_pressure import flank_pressure, index_of_largest, stress
 from cfmkit.families.cam.findings import describe_overstretch, find_overstress, finding, is_overstretched
 from cfmkit.families.cam.geometry.flank_from_roller_path import DesignFlank
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
@@ -272,6 +272,7 @@ def root_mean_square(*parts: FloatArray) -> float:
 
 
 def _half_gap(built: MeasuredCam) -> FloatArray:
+    """Return the largest half difference of both branches over their mean."""
     up, down = built.forces(1.0)[0], built.forces(-1.0)[0]
     is_known = np.isfinite(up) & np.isfinite(down) & (up + down > 0)
     return largest_of_each((up - down)[is_known] / (up + down)[is_known])
@@ -281,7 +282,7 @@ def _count_outliers(built: MeasuredCam) -> int:
     return sum(int((~keep).sum()) for keep in built.registration.used)
 
 
-def _force_sd(built: MeasuredCam) -> Any:
+def _force_deviation_of_profile(built: MeasuredCam) -> Any:
     return np.nan if built.has_large_hole else np.nanstd(built.shares["profile"][built.in_window], ddof=1)
 
 
@@ -362,13 +363,13 @@ _PROFILE_QUANTITIES: Mapping[str, ScalarQuantity[MeasuredCam]] = {
         lambda built: built.registration.growth[1],
     ),
     "profile_force_sd": _quantity(
-        "force", "standard deviation (n - 1) of the force error due to the profile", _force_sd
+        "force", "standard deviation (n - 1) of the force error due to the profile", _force_deviation_of_profile
     ),
     "profile_force_share": _quantity(
         "ratio",
         "standard deviation of the force error due to the profile, over the mean force of the design [SS, fig. 13: 0.8 "
         "%]",
-        lambda built: _force_sd(built) / np.nanmean(built.shares["design"][built.in_window]),
+        lambda built: _force_deviation_of_profile(built) / np.nanmean(built.shares["design"][built.in_window]),
     ),
     "rest_force_mean": _quantity(
         "force",
@@ -433,7 +434,7 @@ def _built_mechanics(built: MeasuredCam) -> Iterator[Finding]:
         last = float(built.travel[slack][-1])
         yield finding("spring_slack", f"the springs carry no force up to {mm(last)} of travel: they are too long")
     pressed = built.pressure(1.0)
-    if (top := worst(pressed)) is not None:
+    if (top := index_of_largest(pressed)) is not None:
         place = f"at {mm(float(built.travel[top]))} of travel"
         if reported := find_overstress(built.assembly.spec.mechanism, float(pressed[top]), place):
             yield reported

@@ -24,7 +24,7 @@ import numpy as np
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
-from cfmkit.families.cam.findings import finding, left_out, rubbing_left_out
+from cfmkit.families.cam.findings import finding, warn_of_asymmetry, warn_of_neglected_friction
 from cfmkit.families.cam.geometry.flank_from_roller_path import BuiltFlank, DesignFlank, arc_lengths
 from cfmkit.families.cam.measured_cam import (
     MEASURED_QUANTITIES,
@@ -100,8 +100,8 @@ def analyze_built(spec: CamSpec) -> Result:
         values=values_of_one(MEASURED_QUANTITIES, built),
         warnings=(
             *warnings,
-            *left_out(spec),
-            *rubbing_left_out(spec, "the model of a measured cam"),
+            *warn_of_asymmetry(spec),
+            *warn_of_neglected_friction(spec, "the model of a measured cam"),
             *findings_of_built(built),
         ),
         travel=built.requested_ends,

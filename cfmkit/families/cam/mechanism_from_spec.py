@@ -123,7 +123,7 @@ def losses_of(mechanism: Mechanism) -> Losses | None:
     bearings, pins, guide = mechanism.bearings, mechanism.pins, GuideFriction.from_guide(mechanism.guide)
     bearing = 0.5 * bearings.bore * bearings.friction if bearings else 0.0
     pin = 0.5 * pins.diameter * pins.friction if pins else 0.0
-    if not agree(np.not_equal(bearing, 0.0)) and not agree(np.not_equal(pin, 0.0)) and not guide.there:
+    if not agree(np.not_equal(bearing, 0.0)) and not agree(np.not_equal(pin, 0.0)) and not guide.is_present:
         return None
     return Losses(
         rolling=mechanism.rolling_friction, roller_radius=mechanism.roller_radius, bearing=bearing, pin=pin, guide=guide

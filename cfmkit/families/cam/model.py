@@ -29,7 +29,7 @@ from cfmkit.arrays import LazySequence
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import CfmError, Problem, SpecError
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
-from cfmkit.families.cam.findings import finding, left_out, rules_of
+from cfmkit.families.cam.findings import finding, rules_of, warn_of_asymmetry
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import select_profiles
 from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.measured_cam import PROFILE_DEFINITIONS
@@ -136,7 +136,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
 
 def _findings(solution: Solution, short: Sequence[Finding]) -> Iterator[Finding]:
     yield from short
-    yield from left_out(solution.assembly.spec)
+    yield from warn_of_asymmetry(solution.assembly.spec)
     yield from findings_of_one(rules_of(solution), finding, solution)
     yield from touching(solution)
 

@@ -65,7 +65,7 @@ def drawing(spec: CamSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
         cut.notes,
         Sheet(thickness, key="mechanism.plate.thickness"),
         dimensions=tuple(cut.dimensions()),
-        facts=tuple(_facts(spec)),
+        facts=tuple(_title_block_lines(spec)),
     )
 
 
@@ -210,7 +210,7 @@ def _lines(corners: list[tuple[float, float]]) -> list[Line]:
     return [Line(a, b) for a, b in pairwise(points) if a != b]
 
 
-def _facts(spec: CamSpec) -> Iterator[tuple[str, str]]:
+def _title_block_lines(spec: CamSpec) -> Iterator[tuple[str, str]]:
     """Yield what the cam is made of, and what it is cut for."""
     mechanism, profile = spec.mechanism, spec.mechanism.profile
     yield "material", mechanism.contact.material.words if mechanism.contact else "not stated"

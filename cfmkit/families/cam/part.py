@@ -1,4 +1,4 @@
-"""Geometry of a cam mechanism over its motion; lengths in metres."""
+"""Geometry of a cam mechanism over its motion: bodies at every position, for exports; shapes for its figures [m]."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def start_curve(solution: Solution, travel: float, points: int = 400) -> Curve:
     return Curve(motion, np.concatenate([up, down[::-1]]), branch, np.ones(2 * points, dtype=bool))
 
 
-def moment(solution: Solution, index: int) -> str:
+def describe_position(solution: Solution, index: int) -> str:
     """Return travel and force at one point in words, on two lines."""
     travel = format_short(float(solution.travel[index] + solution.origin), "length", 3)
     up, down = (float(state.slider[index]) for state in (solution.up, solution.down))

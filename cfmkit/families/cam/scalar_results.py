@@ -142,12 +142,12 @@ def _wires(solution: Solution) -> Iterator[Mapping[str, Quantity]]:
         yield wire_quantities([SpringInUse(wound, least, largest, fatigue, life)])
 
 
-def _least_contact(solution: Solution) -> FloatArray:
+def _smallest_contact_force(solution: Solution) -> FloatArray:
     both = (solution.up.least_contact, solution.down.least_contact)
     return -largest_of_each(*(-contact[..., 1:] for contact in both if contact is not None))
 
 
-def _least_clearance(solution: Solution) -> float:
+def _smallest_clearance(solution: Solution) -> float:
     from cfmkit.families.cam.part_sizes_and_clearances import smallest_gap
 
     return smallest_gap(solution)
@@ -162,7 +162,7 @@ def _quantity(
     return ScalarQuantity(dimension, definition, function, "", applies)
 
 
-def _rubs(solution: Solution) -> bool:
+def _has_losses(solution: Solution) -> bool:
     return solution.assembly.loads.losses is not None
 
 
@@ -170,11 +170,11 @@ def _states_rating(name: str) -> Callable[[Solution], bool]:
     return lambda solution: getattr(solution.mechanism.bearings, name, None) is not None
 
 
-def _is_drawn(solution: Solution) -> bool:
+def _has_band(solution: Solution) -> bool:
     return solution.band is not None
 
 
-def _deviations(share: float) -> Callable[[Solution], float]:
+def _deviation_quantile(share: float) -> Callable[[Solution], float]:
     return lambda solution: float(np.quantile(solution.band.deviations(), share)) if solution.band else np.nan
 
 
@@ -264,13 +264,13 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
             "energy",
             f"energy that {words} over the window, up and down; the four losses add up to the loop's area",
             partial(_loop_energy, kind=kind),
-            _rubs,
+            _has_losses,
         )
         for kind, words in FRICTION_KINDS.items()
     },
     **{
         f"loop_share_{kind}": _quantity(
-            "ratio", f"share of the loop's area that {words}", partial(_loop_share, kind=kind), _rubs
+            "ratio", f"share of the loop's area that {words}", partial(_loop_share, kind=kind), _has_losses
         )
         for kind, words in FRICTION_KINDS.items()
     },
@@ -293,28 +293,28 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "contact_force_least": _quantity(
         "force",
         "smallest contact force beyond the first point; zero or negative if a roller leaves the cam",
-        _least_contact,
+        _smallest_contact_force,
         lambda solution: solution.up.least_contact is not None and solution.down.least_contact is not None,
     ),
     "manufacturing_force_share": _quantity(
         "ratio",
         "median over the sampled cams of the standard deviation of the force error along the travel, over the "
         "mean force [SS, fig. 13: 0.8 %]",
-        _deviations(0.5),
-        _is_drawn,
+        _deviation_quantile(0.5),
+        _has_band,
     ),
     "manufacturing_force_share_95": _quantity(
         "ratio",
         "95th percentile over the sampled cams of the standard deviation of the force error along the travel, over the "
         "mean force",
-        _deviations(0.95),
-        _is_drawn,
+        _deviation_quantile(0.95),
+        _has_band,
     ),
     **{name: quantity_of_each(name, about, _wires) for name, about in WIRE_DEFINITIONS.items()},
     "clearance_min": _quantity(
         "length",
         "smallest distance of the moving parts from plate, screws and each other",
-        _least_clearance,
+        _smallest_clearance,
         lambda solution: solution.mechanism.envelope is not None,
     ),
 }

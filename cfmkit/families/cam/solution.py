@@ -1,4 +1,4 @@
-"""Solution of a cam mechanism.
+"""Solution of one cam mechanism, or of several as rows: travel, rollers, forces both ways, and results read from them.
 
 Values are computed when they are first read; figures, findings and results import these types.
 """
@@ -161,7 +161,7 @@ class Solution(ShortRepr):
     @property
     def largest_angle_on_flank(self) -> FloatArray:
         """Largest angle between a brace's pull and its roller's motion on the flank, (..., 1) [rad]."""
-        return largest_of_each(*(np.where(at.there, at.states.pressure_angle, np.nan) for at in self._flank))
+        return largest_of_each(*(np.where(at.is_on_flank, at.states.pressure_angle, np.nan) for at in self._flank))
 
     @property
     def largest_half_gap(self) -> FloatArray:
@@ -169,7 +169,7 @@ class Solution(ShortRepr):
 
         def half_gap(at: FlankSamples) -> FloatArray:
             up, down = at.up.slider, at.down.slider
-            usable = at.there & np.isfinite(up) & np.isfinite(down) & (up + down > self.effort_error)
+            usable = at.is_on_flank & np.isfinite(up) & np.isfinite(down) & (up + down > self.effort_error)
             return np.where(usable, (up - down) / np.where(usable, up + down, 1.0), np.nan)
 
         return largest_of_each(*map(half_gap, self._flank))
@@ -193,7 +193,7 @@ class Solution(ShortRepr):
         def evaluate(travel: FloatArray) -> FloatArray:
             return pressure(*self.evaluate_travel(travel, 1.0, flank=True))
 
-        pressed = (np.where(at.there, pressure(at.states, at.up), np.nan) for at in self._flank)
+        pressed = (np.where(at.is_on_flank, pressure(at.states, at.up), np.nan) for at in self._flank)
         travel, values = (reduce(_append_column, parts) for parts in ((at.travel for at in self._flank), pressed))
         return extreme_next_to(evaluate, travel, values, self.count)
 
@@ -398,7 +398,7 @@ class FlankSamples(NamedTuple):
     """Places of which some are on the flank, (..., n) each."""
 
     travel: FloatArray  # increasing [m]
-    there: NDArray[np.bool_]  # which of the places are on the flank
+    is_on_flank: NDArray[np.bool_]  # which of the places are on the flank
     states: TrackStates
     # up, down: on the way up and on the way down
     up: Forces

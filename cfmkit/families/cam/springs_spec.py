@@ -63,8 +63,8 @@ class Springs(Model):
     @classmethod
     def from_offer(cls, offer: Offer, count: int) -> Self:
         """Return some springs of one that is on offer."""
-        own = {"stiffness": offer.rate, "count": count, "max_elongation": offer.largest}
-        return cls.model_validate(block_of(offer, initial_tension=offer.initial_tension or None, **own))
+        values = {"stiffness": offer.rate, "count": count, "max_elongation": offer.largest}
+        return cls.model_validate(block_of(offer, initial_tension=offer.initial_tension or None, **values))
 
     @property
     def each(self) -> float | tuple[float, ...]:

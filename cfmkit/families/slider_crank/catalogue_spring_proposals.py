@@ -21,7 +21,7 @@ from cfmkit.families.slider_crank.sprung_linkage_proposals import (
     with_links,
 )
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
-from cfmkit.stock.springs.offers import generic
+from cfmkit.stock.springs.offers import generic_series
 from cfmkit.stock.springs.spec import CatalogueSpring
 from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 
@@ -72,7 +72,7 @@ def _catalogue_springs(spec: SliderCrankSpec, request: Request, sheet: float) ->
     link = linkage_of(spec.mechanism)
     deep, widest = 0.5 * depth_of_springs(request, sheet), min(link.crank, link.coupler)
     listed = []
-    for offer in generic(HelicalTorsionSpring):
+    for offer in generic_series(HelicalTorsionSpring):
         # wound up by as much as it bears
         long = math.inf if offer.wound is None else offer.wound.room_for(offer.largest or 0.0)
         counts = tuple(count for count in offer.counts if count * long <= deep)

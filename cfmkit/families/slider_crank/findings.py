@@ -1,8 +1,4 @@
-"""Everything a slider-crank can suffer from, by name.
-
-The names are stable; the sentences say what the name means. The message that a
-run reports carries the numbers that decide and the cure.
-"""
+"""Names of the warnings of the slider-crank family, and what they mean: stable, unlike the sentences of a run."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, minimax
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
-from cfmkit.stock.springs.offers import stiffest
+from cfmkit.stock.springs.offers import stiffest_rates
 from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
 
 if TYPE_CHECKING:
@@ -80,11 +80,11 @@ class SprungMotion:
         deep = np.array([(below, above, above) for below, above in self.depths])[:, :, None]
         # all depths in one call: there are few places, and a call takes longer than they do
         alike = np.broadcast_to(turns[:3], (len(deep), *turns[:3].shape))
-        pins = stiffest(
+        pins = stiffest_rates(
             HelicalTorsionSpring, alike.ravel(), self.widest, (deep + np.zeros_like(alike)).ravel(), self.safety
         )
         wide = deep[:, 2] + np.zeros_like(turns[3])
-        slider = stiffest(ExtensionSpring, np.tile(turns[3], len(deep)), wide.ravel(), rest, self.safety).reshape(
+        slider = stiffest_rates(ExtensionSpring, np.tile(turns[3], len(deep)), wide.ravel(), rest, self.safety).reshape(
             wide.shape
         )
         return np.concatenate([pins.reshape(alike.shape), np.where(pushed, 0.0, slider)[:, None]], axis=1)

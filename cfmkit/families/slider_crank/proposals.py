@@ -25,10 +25,10 @@ from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.sprung_linkage_proposals import (
     Proportions,
     explain_overfilled,
-    largest_first,
+    propose_pushed_linkage,
+    propose_turned_linkages,
     pushed_analysis,
-    pushed_linkage,
-    turned_linkages,
+    rank_by_size,
 )
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
@@ -78,7 +78,7 @@ FOLLOWED_TRAVEL_RATIO = 1.02
 
 def propose(request: Request, run: Run) -> FamilyOffer:
     """Return linkages that fit the envelope, to be given springs, flexures or a strip by the family's design."""
-    return turned_linkages(request) if request.kind == "torque" else _propose_for_force(request)
+    return propose_turned_linkages(request) if request.kind == "torque" else _propose_for_force(request)
 
 
 def _propose_for_force(request: Request) -> FamilyOffer:
@@ -177,7 +177,7 @@ def _offer_pushed(request: Request, lengths: Proportions) -> list[Candidate | fl
             for block in _materials(request):
                 offers += PrintedSize(request, lengths, size * printed, block).slow_parts()
         if last <= lengths.reach * size * pinned and pins:
-            offers.append(linkage := pushed_linkage(request, lengths, size * pinned, first))
+            offers.append(linkage := propose_pushed_linkage(request, lengths, size * pinned, first))
             offers += [with_catalogue_springs(linkage)] if isinstance(linkage, Candidate) else []
     return offers
 
@@ -262,7 +262,7 @@ class PrintedSize:
             SliderCrankSpec.model_validate(data),
             True,
             finish,
-            largest_first(self.crank, request),
+            rank_by_size(self.crank, request),
             correct=correct,
         )
 

@@ -92,7 +92,7 @@ PIN_IN_COIL = 0.9
 """What finishes linkages with springs at their pins."""
 
 
-def turned_linkages(request: Request) -> FamilyOffer:
+def propose_turned_linkages(request: Request) -> FamilyOffer:
     """Return linkages for a torque at their crank, those whose springs can hold most of it first; or why none can."""
     if (reason := explain_overfilled(request)) is not None:
         return FamilyOffer(reason=reason)
@@ -204,7 +204,7 @@ def _slider_excess(request: Request, sheet: float) -> float:
     return max(rods.slider_thickness - sheet, 0.0)
 
 
-def _pushing(spec: SliderCrankSpec, request: Request, sheet: float | None = None) -> list[SprungMotion]:
+def _pushed_motions(spec: SliderCrankSpec, request: Request, sheet: float | None = None) -> list[SprungMotion]:
     """Return what springs have to do at the pins of a linkage that is pushed, what is wanted most first.
 
     A window at the beginning of the travel: there the springs turn least. Torsion springs that stay in the envelope
@@ -359,7 +359,7 @@ def _find_springs(spec: SliderCrankSpec, request: Request, sheet: float) -> Held
         turning = _turning(request, linkage_of(spec.mechanism), float(spec.mechanism.unloaded_angle or 0.0), sheet)
         return flattest_springs(turning, request.target, flat)
     best: HeldEffort | None = None
-    for motion in _pushing(spec, request, sheet):
+    for motion in _pushed_motions(spec, request, sheet):
         held = flattest_springs(motion, request.target, 0.0)
         if held is not None and (best is None or held.deviation < best.deviation):
             best = held
@@ -404,20 +404,20 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
         else:
             coil = slimmest_spring(HelicalTorsionSpring, *turns[name], deep, request.safety, pin)
         if coil is None or coil.outer_diameter > (deep if name == "slider" else widest):
-            raise SolutionError(_no_spring(name, turns[name], coil))
+            raise SolutionError(_explain_no_spring(name, turns[name], coil))
         bought[name] = coil
     # the rates are those of the wires
     return spec.replace({"mechanism.springs": {"bought": [{"at": name, **as_stated(bought[name])} for name in turns]}})
 
 
-def _no_spring(name: str, turn: tuple[float, float], coil: HelicalSpring | None) -> str:
+def _explain_no_spring(name: str, turn: tuple[float, float], coil: HelicalSpring | None) -> str:
     joint = JOINTS_BY_NAME[name]
     reported = f"{format_short(turn[0], joint.rate, 3)} over {format_short(turn[1], joint.motion, 3)}"
     wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
     return f"no spring of steel wire fits at the {joint.words}: {reported}{wide}"
 
 
-def pushed_linkage(request: Request, lengths: Proportions, crank: float, first: float) -> Candidate | float:
+def propose_pushed_linkage(request: Request, lengths: Proportions, crank: float, first: float) -> Candidate | float:
     """Return a linkage with springs at its pins, for a force from some travel on.
 
     Or the largest force that springs can hold, where that is less than what is required [N].
@@ -429,13 +429,13 @@ def pushed_linkage(request: Request, lengths: Proportions, crank: float, first: 
     }
     spec = _unsprung(mechanism | {"unloaded_offset": 4e-4}, pushed_analysis((first, lengths.reach * crank)))
     most = 0.0
-    for motion in _pushing(spec, request):
+    for motion in _pushed_motions(spec, request):
         most = max(most, largest_effort(motion))
         if most >= MIN_TORQUE_SHARE * request.low:  # what more there is does not matter
             break
     else:
         return most
-    return Candidate("springs at pins", spec, finish=finish, promise=largest_first(crank, request), springs="custom")
+    return Candidate("springs at pins", spec, finish=finish, promise=rank_by_size(crank, request), springs="custom")
 
 
 def pushed_analysis(travel: tuple[float, float]) -> dict[str, Any]:
@@ -446,6 +446,6 @@ def pushed_analysis(travel: tuple[float, float]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def largest_first(crank: float, request: Request) -> float:
+def rank_by_size(crank: float, request: Request) -> float:
     """Return how soon a size is tried: the largest first, which is the flattest and needs the least depth."""
     return -crank / request.envelope[1]

@@ -82,7 +82,7 @@ def curves_along_crank(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         turn, position = _turns(linkage, unloaded, angle, anchor)
         sine, cosine = np.sin(angle), np.cos(angle)
-        first, rise, level = _first(linkage, position, sine, cosine)
+        first, rise, level = _differentiate_turns(linkage, position, sine, cosine)
         _, _, b1, _ = first
         b2 = (r1 * sine / r2 + rise * b1**2) / level
         x2 = -r1 * cosine - r2 * (level * b1**2 + rise * b2)
@@ -95,12 +95,12 @@ def crank_efforts(linkage: Linkage, unloaded: float, angle: FloatArray, anchor: 
     angle = np.asarray(angle, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         turn, position = _turns(linkage, unloaded, angle, anchor)
-        first, _, _ = _first(linkage, position, np.sin(angle), np.cos(angle))
+        first, _, _ = _differentiate_turns(linkage, position, np.sin(angle), np.cos(angle))
         turn *= first
     return turn
 
 
-def _first(
+def _differentiate_turns(
     linkage: Linkage, position: FloatArray, sine: FloatArray, cosine: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the derivatives of q by the crank angle, (4, n), and sine and cosine of the coupler's angle."""

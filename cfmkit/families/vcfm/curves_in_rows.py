@@ -1,4 +1,4 @@
-"""Curves of mechanisms as rows: the model of leaves and spring at any travels, and what a curve of forces shows.
+"""Curves of leaves and a preloaded spring as rows: the model's samples, force and stress along each, where it is flat.
 
 Curves are (r, n) arrays, one preload of one mechanism a row, from where the shuttle rests to the end of its travel.
 """
@@ -97,7 +97,7 @@ class PartSampler(ABC):
 
 
 @dataclass(frozen=True, repr=False)
-class Push(ShortRepr):
+class PreloadCurve(ShortRepr):
     """One curve of one mechanism: what figures draw and sentences name."""
 
     preload: float  # of the spring's far end [m]
@@ -117,7 +117,7 @@ class Push(ShortRepr):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Preloaded(ShortRepr):
+class PreloadedRows(ShortRepr):
     """Mechanisms under preloads, one preload of one mechanism a row: their force at any travel."""
 
     sampler: PartSampler
@@ -134,7 +134,7 @@ class Preloaded(ShortRepr):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Rows(Preloaded):
+class Rows(PreloadedRows):
     """Curves of one model, one preload of one mechanism a row."""
 
     rest: FloatArray  # (r,) where the shuttle rests [m]; NaN if nothing holds it short of the end
@@ -167,7 +167,7 @@ class Rows(Preloaded):
         return SpringSamples(*self.sampler.spring(self.travel + self.preload))
 
     @cached_property
-    def there(self) -> NDArray[np.bool_]:
+    def is_distinct(self) -> NDArray[np.bool_]:
         """Which points are not repeated last ones, (r, n)."""
         return np.asarray(np.arange(self.travel.shape[1]) < self.count[:, None])
 
@@ -175,7 +175,7 @@ class Rows(Preloaded):
     def force(self) -> FloatArray:
         """Force on the shuttle at the points, (r, n) [N]; NaN after the end of a row."""
         total = self.leaf_force + self.spring_samples.force
-        return np.where(self.there, total + self.stops.force(self.travel) if self.stops else total, np.nan)
+        return np.where(self.is_distinct, total + self.stops.force(self.travel) if self.stops else total, np.nan)
 
     @property
     def ends(self) -> Ends:

@@ -48,7 +48,7 @@ from cfmkit.families.vcfm.leaf_sizing import (
     next_leaf,
     next_spring_leaf,
     shortest_leaf,
-    sized_leaf,
+    size_leaf,
     spring_leaf_of_sheet,
     stress_unreachable,
     thickness_for,
@@ -76,19 +76,21 @@ def design(spec: VcfmSpec, run: Run) -> Design:
 
     INFEASIBLE, with the reason and the nearest feasible values, if there is none.
     """
-    outcome = _attempt(spec)
+    outcome = _design_from_targets(spec)
     nearest, last = dict(outcome.nearest_feasible), outcome
     for _ in range(MAX_ROUNDS):
         if last.status is not Status.INFEASIBLE or not last.nearest_feasible:
             break
         # what cures one limit may break the next: what is proposed must meet all of them
-        last = _attempt(spec.replace({path: {"true": True}.get(value, value) for path, value in nearest.items()}))
+        last = _design_from_targets(
+            spec.replace({path: {"true": True}.get(value, value) for path, value in nearest.items()})
+        )
         nearest |= last.nearest_feasible
     return replace(outcome, nearest_feasible=nearest if last.status is Status.COMPLETE else {})
 
 
 @refusals_answered
-def _attempt(spec: VcfmSpec) -> Design:
+def _design_from_targets(spec: VcfmSpec) -> Design:
     target, allowable = spec.design, spec.mechanism.allowable_stress
     if target is None:
         return Design(None, Status.INVALID, "this spec has no 'design' block: add the targets 'force', 'stroke', ...")
@@ -129,7 +131,7 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> DesignSizes:
         )
     sheet, count = sheet_of(spec.mechanism.part), spec.mechanism.bistable.half_beams
     if sheet is None:
-        leaf = sized_leaf(spec, target, thickness, length)
+        leaf = size_leaf(spec, target, thickness, length)
     else:
         count, leaf = leaf_of_sheet(spec, target, thickness, length, sheet)
     spring_leaf = size_spring_leaf(spec, target, leaf, spec.mechanism.flexures.thickness)
@@ -159,7 +161,7 @@ def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
         return
 
     def wide_enough(steps: int) -> bool:
-        width = float(sized_leaf(spec, target, leaf.thickness, leaf.length * LENGTH_STEP**steps).width)
+        width = float(size_leaf(spec, target, leaf.thickness, leaf.length * LENGTH_STEP**steps).width)
         return width >= LENGTH_MARGIN * MIN_WIDTH_RATIO * float(leaf.thickness)
 
     # widths grow with lengths
@@ -222,7 +224,7 @@ def refine_sizes(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> Desi
     Raises Infeasible if the exact stress stays above the allowable one.
     """
     if (sheet := sheet_of(spec.mechanism.part)) is not None:
-        return _refined_for_sheet(spec, target, sizes, sheet)
+        return _refine_for_sheet(spec, target, sizes, sheet)
     allowable = spec.mechanism.allowable_stress or 0.0
     for _ in range(N_RESCALES):
         sizes, stresses = fit_widths(spec, target, sizes)
@@ -234,7 +236,7 @@ def refine_sizes(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> Desi
         if over[0] > 1.0 + 1e-4:
             if target.leaf_length is not None:
                 break
-            leaf = sized_leaf(spec, target, leaf.thickness, float(leaf.length) * sqrt(1.0005 * over[0]))
+            leaf = size_leaf(spec, target, leaf.thickness, float(leaf.length) * sqrt(1.0005 * over[0]))
         if over[1] > 1.0 + 1e-4:
             longer = float(spring_leaf.length) * sqrt(1.0005 * over[1])
             wider = spring_leaf.width * (longer / spring_leaf.length) ** 3
@@ -249,7 +251,7 @@ def refine_sizes(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> Desi
     )
 
 
-def _refined_for_sheet(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes, sheet: float) -> DesignSizes:
+def _refine_for_sheet(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes, sheet: float) -> DesignSizes:
     """Return the sizes for which the widths that the exact model wants are the sheet."""
     allowable, least = spec.mechanism.allowable_stress or 0.0, target.min_thickness or 0.0
     for _ in range(MAX_PASSES):

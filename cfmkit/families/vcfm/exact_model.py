@@ -1,4 +1,4 @@
-"""The leaves as beams in large deflection: bending, stretching and shear, with the branch that they really take.
+"""Exact model of a vcfm: leaves and spring as traced beams in large deflection; its analysis, its networks for exports.
 
 One half-beam is traced and counted `half_beams` times; a shuttle that can turn needs both leaves of a V. Of the spring
 one leaf or one chain is traced, by symmetry. How that is interpolated, `interpolated_equilibrium_path` says.
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Network
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.run_control import Run
-    from cfmkit.families.vcfm.interpolated_equilibrium_path import Traced
+    from cfmkit.families.vcfm.interpolated_equilibrium_path import TracedPath
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.leaves.kinds import SpringChain
     from cfmkit.families.vcfm.leaves_spec import Bistable
@@ -81,7 +81,7 @@ MAX_KEPT_PATHS = 128
 
 
 @lru_cache(maxsize=MAX_KEPT_PATHS)
-def _leaf_path(about: Bistable, made_of: MaterialSpec, wide: bool, end: float, branch: str | None) -> Traced:
+def _leaf_path(about: Bistable, made_of: MaterialSpec, wide: bool, end: float, branch: str | None) -> TracedPath:
     """Return what a leaf does up to `end` [m]; a branch is followed, and its waviness counts, where one is stated."""
     control = {} if branch is None else {"branch": branch, "imperfection": about.waviness}
     return trace_leaf(_network_of(about, made_of, wide), "shuttle", end, **control)

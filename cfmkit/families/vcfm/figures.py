@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.curves import Curve
 from cfmkit.export.posed_part import box
 from cfmkit.families.fem_results import number_fillets
-from cfmkit.families.vcfm.curves_in_rows import Preloaded
+from cfmkit.families.vcfm.curves_in_rows import PreloadedRows
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, rest_shift
 from cfmkit.families.vcfm.model import rests_of
 from cfmkit.families.vcfm.part import bodies
@@ -127,16 +127,16 @@ def stress(result: Result) -> Figure:
 @apply_style
 def preloads(result: Result) -> Figure:
     """Return the curves of all preloads over the travel from the unloaded position [D, Fig. 13 (a)]."""
-    return _curves(result, "force for each preload, from the unloaded position", shifted=False)
+    return _draw_preload_curves(result, "force for each preload, from the unloaded position", shifted=False)
 
 
 @apply_style
 def from_rest(result: Result) -> Figure:
     """Return the curves of all preloads, each from where the shuttle rests [D, Fig. 13 (b)]."""
-    return _curves(result, "force for each preload, from where the shuttle rests", shifted=True)
+    return _draw_preload_curves(result, "force for each preload, from where the shuttle rests", shifted=True)
 
 
-def _curves(result: Result, subject: str, shifted: bool) -> Figure:
+def _draw_preload_curves(result: Result, subject: str, shifted: bool) -> Figure:
     solution: Solution = result.state
     heading, figure = Heading.from_result(result, subject), new_figure()
     write_heading(figure, heading)
@@ -168,7 +168,7 @@ def adjustability(result: Result) -> Figure:
     character = solution.character
     places = np.linspace(*solution.window_of_one, 41)
     grid = np.linspace(0.0, float(solution.first.travel[-1]), 241)
-    pushed = Preloaded(solution.sampler, over[:, None], solution.curves.stops)
+    pushed = PreloadedRows(solution.sampler, over[:, None], solution.curves.stops)
     rests = -rests_of(pushed, grid)
     mean = pushed.force_at(places).mean(axis=1)
     nominal = float(np.interp(solution.first.preload, over, mean))
@@ -215,7 +215,7 @@ def stress_map(result: Result) -> Figure:
 def mechanism(result: Result) -> Figure:
     """Return the mechanism to scale in four poses: bent as the leaves really bend."""
     solution: Solution = result.state
-    poses = _poses(solution)
+    poses = _choose_poses(solution)
     shown = bodies(solution, [(travel, preload) for _, travel, preload in poses])
     (left, bottom), (right, top) = box(shown).tolist()
     room, aside = 0.12 * (top - bottom), 0.02 * (right - left)
@@ -265,7 +265,7 @@ def _end_of(shown: Sequence[PosedBody], name: str, pose: int, upper: bool) -> pa
     return float(x), float(y.max() if upper else y.min())
 
 
-def _poses(solution: Solution) -> list[tuple[str, float, float]]:
+def _choose_poses(solution: Solution) -> list[tuple[str, float, float]]:
     """Return four poses worth seeing: (what, travel, preload)."""
     nominal, most = solution.first, max(solution.pushes, key=lambda push: abs(push.preload))
     low, high = solution.window_of_one

@@ -13,14 +13,14 @@ from cfmkit.families.end_stops import STOP_FINDINGS
 from cfmkit.families.findings import (
     TOO_SOFT,
     Finder,
+    describe_wide_beam,
     format_at_least,
     mm,
     mpa,
     newton,
     percent,
     rate,
-    stiffer,
-    too_soft,
+    wide_beam_in_short,
 )
 from cfmkit.families.rows import FindingRule
 from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, leaf_law, leaf_spring, spring_room
@@ -28,7 +28,7 @@ from cfmkit.families.vcfm.leaves.positive_stiffness_springs import measured_stif
 from cfmkit.families.vcfm.leaves.s_form import POLE_LOAD
 from cfmkit.families.vcfm.leaves.v_beam import FLAT_BUCKLED_ABOVE
 from cfmkit.families.vcfm.range_and_flatness_findings import (
-    flattening,
+    find_flattening,
     is_stocky,
     leaves_out_of_range,
     range_of_leaves,
@@ -100,7 +100,7 @@ def _slenderness(solution: Solution) -> FloatArray:
 # --- what is reported of a built mechanism, and the spring's room ---------------------------------------------------
 
 
-def _do_measured_values_contradict(solution: Solution) -> Any:
+def _is_measured_contradictory(solution: Solution) -> Any:
     """Return whether reported force and K_p cannot both hold for these leaves, (m,); False where none are reported."""
     if solution.spec.analysis.measured is None or not solution.leaf_kind.buckles:
         return False  # such leaves push where they are flat
@@ -155,7 +155,7 @@ def closed_spring(solution: Solution) -> Sentence:
 # --- the kind of law, and the kind of leaf --------------------------------------------------------------------------
 
 
-def _truss(solution: Solution) -> Sentence:
+def _describe_truss(solution: Solution) -> Sentence:
     mechanism = solution.spec.mechanism
     law = leaf_law(mechanism.bistable, mechanism.material)
     places = np.linspace(0.0, 1.0, 401) * float(law.strip.rise)
@@ -230,7 +230,7 @@ def _uneven_force(solution: Solution) -> Sentence:
     reported = f"K_p = {rate(character.positive_stiffness)} and K_n = {rate(character.negative_stiffness)}"
     cause = f"{reported} cancel, but not in the whole window" if alike else f"{reported} do not cancel"
     low, high = max(low, float(push.travel[0])), min(high, float(push.travel[-1]))  # what is beyond is not known
-    words, cures = flattening(solution, ripple)
+    words, cures = find_flattening(solution, ripple)
     return (
         f"{cause}: over {mm(low)} ... {mm(high)} the force varies by {percent(ripple)} of its maximum, "
         f"{percent(allowed)} is allowed{words}",
@@ -241,7 +241,7 @@ def _uneven_force(solution: Solution) -> Sentence:
 # --- the way back ---------------------------------------------------------------------------------------------------
 
 
-def _stays(solution: Solution) -> Any:
+def _stays_behind_peak(solution: Solution) -> Any:
     """Return which mechanisms do not come back by themselves, (m,): past its peak their force is not above rounding."""
     least, largest = solution.least[1], np.nanmax(np.abs(solution.nominal.force), axis=1, initial=0.0)
     return np.isfinite(least) & ~(least > LIMIT_RTOL * largest)
@@ -332,7 +332,7 @@ def _slack(solution: Solution) -> Sentence:
 # --- strength, buckling, shape --------------------------------------------------------------------------------------
 
 
-def _shares_of_stress(solution: Solution) -> tuple[FloatArray, FloatArray]:
+def _stress_ratios(solution: Solution) -> tuple[FloatArray, FloatArray]:
     """Return the largest stress of leaves (m,), and of the spring at each preload (m, p), over what is allowed."""
     allowed = solution.allowable_stress
     leaves = solution.travel_leaf_stress / (allowed * (1 + np.maximum(solution.overrating, EXACT_FORM)))
@@ -342,12 +342,12 @@ def _shares_of_stress(solution: Solution) -> tuple[FloatArray, FloatArray]:
 def _is_overstressed(solution: Solution) -> Any:
     if np.isnan(solution.allowable_stress).all():
         return False
-    leaves, spring = _shares_of_stress(solution)
+    leaves, spring = _stress_ratios(solution)
     return (leaves > 1.0) | (spring > 1.0).any(axis=1)
 
 
 def _overstress(solution: Solution) -> Sentence:
-    (leaves, spring), allowed = _shares_of_stress(solution), float(solution.allowable_stress[0])
+    (leaves, spring), allowed = _stress_ratios(solution), float(solution.allowable_stress[0])
     number = int(spring[0].argmax())
     if leaves[0] > spring[0, number]:  # at any preload: the first at which they are pushed so far
         tops = solution.curves.leaf_stress()
@@ -367,7 +367,7 @@ def _overstress(solution: Solution) -> Sentence:
 
 
 def _overstress_in_short(solution: Solution) -> str:
-    (leaves, spring), allowed = _shares_of_stress(solution), float(solution.allowable_stress[0])
+    (leaves, spring), allowed = _stress_ratios(solution), float(solution.allowable_stress[0])
     if leaves[0] > spring[0].max():
         return f"{mpa(float(solution.travel_leaf_stress[0]))} in the leaves, {mpa(allowed)} allowed"
     return f"{mpa(float(solution.travel_spring_stress[0].max()))} in the spring, {mpa(allowed)} allowed"
@@ -382,7 +382,7 @@ def _turning_shuttle(solution: Solution) -> Sentence:
     )
 
 
-def _leaves_plane(solution: Solution) -> Any:
+def _buckles_out_of_plane(solution: Solution) -> Any:
     """Return whether leaves buckle out of the plane first, (m,): narrower than twice their thickness."""
     return solution.column(lambda spec: spec.mechanism.bistable.width - 2.0 * spec.mechanism.bistable.thickness) < 0
 
@@ -395,7 +395,7 @@ def _narrow_leaves(solution: Solution) -> Sentence:
     )
 
 
-def _wide(name: str) -> FindingRule[Solution]:
+def _make_width_rule(name: str) -> FindingRule[Solution]:
     """Return the rule on leaves, or a spring, that are too wide for beams."""
 
     def holds(solution: Solution) -> Any:
@@ -407,10 +407,10 @@ def _wide(name: str) -> FindingRule[Solution]:
         exact, wide = solution.fidelity == "exact", "mechanism.wide_beams=true"
         hint = "" if exact else "; only 'analysis.fidelity: exact' accounts for it"
         cure = wide if exact else (wide, "analysis.fidelity=exact")
-        return too_soft(share, f"in the {name} at {mm(place)}") + hint, cure
+        return describe_wide_beam(share, f"in the {name} at {mm(place)}") + hint, cure
 
     return FindingRule(
-        "wide_beam", holds, sentence, lambda solution: stiffer(float(solution.hindered_curling[name][0][0]))
+        "wide_beam", holds, sentence, lambda solution: wide_beam_in_short(float(solution.hindered_curling[name][0][0]))
     )
 
 
@@ -431,7 +431,7 @@ def _imperfection(solution: Solution) -> Sentence:
 def _is_unstable(solution: Solution) -> Any:
     if not solution.sampler.is_traced:
         return False  # laws are those of stable branches
-    return (~solution.nominal.leaves.stable & solution.nominal.there).any(axis=1)
+    return (~solution.nominal.leaves.stable & solution.nominal.is_distinct).any(axis=1)
 
 
 def _unstable_branch(solution: Solution) -> Sentence:
@@ -444,9 +444,9 @@ def _unstable_branch(solution: Solution) -> Sentence:
 
 
 FINDING_RULES: tuple[FindingRule[Solution], ...] = (
-    FindingRule("measured_contradiction", _do_measured_values_contradict, _describe_contradiction),
+    FindingRule("measured_contradiction", _is_measured_contradictory, _describe_contradiction),
     FindingRule("spring_closed", is_closed, closed_spring),
-    FindingRule("truss_law", lambda solution: solution.fidelity == "truss", _truss),
+    FindingRule("truss_law", lambda solution: solution.fidelity == "truss", _describe_truss),
     FindingRule("no_negative_stiffness", _only_rises, _rising_force),
     FindingRule("no_linear_region", _is_rounded, _rounded_force),
     FindingRule(
@@ -458,7 +458,7 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
             f"{percent(solution.spec.analysis.flatness)} allowed"
         ),
     ),
-    FindingRule("bistable", _stays, _second_position),
+    FindingRule("bistable", _stays_behind_peak, _second_position),
     FindingRule("force_reversal", _reverses, _reversal),
     FindingRule("overload", _is_overloaded, _overload),
     FindingRule("preload_out_of_range", lambda solution: _pulled_out_of_range(solution).any(axis=1), _pull),
@@ -475,9 +475,9 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
         lambda solution: solution.column(lambda spec: not spec.mechanism.bistable.guided) > 0,
         _turning_shuttle,
     ),
-    FindingRule("out_of_plane_buckling", _leaves_plane, _narrow_leaves),
-    _wide("leaves"),
-    _wide("spring"),
+    FindingRule("out_of_plane_buckling", _buckles_out_of_plane, _narrow_leaves),
+    _make_width_rule("leaves"),
+    _make_width_rule("spring"),
     FindingRule("imperfection", _is_wavy, _imperfection),
     FindingRule("unstable_branch", _is_unstable, _unstable_branch),
     FindingRule("theory_range", is_stocky, stocky_leaves),

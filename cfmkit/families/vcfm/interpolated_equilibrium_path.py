@@ -74,7 +74,7 @@ class PathPoints:
 
 
 @dataclass(frozen=True)
-class Traced:
+class TracedPath:
     """A path as a function of the travel, from zero on."""
 
     points: PathPoints  # travels all of one sign
@@ -127,14 +127,14 @@ class Traced:
     @cached_property
     def buckled(self) -> Any:
         """Whether each piece is on a branch that was not there unloaded."""
-        return self._most(self.points.buckled, False)
+        return self._majority(self.points.buckled, False)
 
     @cached_property
     def stable(self) -> Any:
         """Whether each piece is stable."""
-        return self._most(self.points.stable, True)
+        return self._majority(self.points.stable, True)
 
-    def _most(self, flags: Any, empty: bool) -> Any:
+    def _majority(self, flags: Any, empty: bool) -> Any:
         """Return what most of the points of each piece are."""
         pieces = self.piece(self.points.places)
         flags_of_pieces = [flags[pieces == number] for number in range(len(self.edges) - 1)]
@@ -160,7 +160,7 @@ def _stress_law(x: FloatArray, stress: FloatArray, low: float, high: float) -> C
     return lambda place: np.asarray(law(angle(place)))
 
 
-def trace_leaf(network: Network, node: str, end: float, **control: Any) -> Traced:
+def trace_leaf(network: Network, node: str, end: float, **control: Any) -> TracedPath:
     """Return what a network does while a node moves down by up to `end` [m], or up where that is negative."""
     route = Route(network, node, control)
     for count in GRID_SIZES:
@@ -217,7 +217,7 @@ class Route:
         return max(COEFFICIENT_RTOL, self.tolerances[0], self.rounding)
 
 
-def _begin_path(route: Route, end: float, count: int) -> tuple[Traced, FloatArray]:
+def _begin_path(route: Route, end: float, count: int) -> tuple[TracedPath, FloatArray]:
     """Return a first path through so many places at equal distances up to `end`, without panels, and these [m]."""
     from cfmkit.elastica import PathStatus
 
@@ -233,7 +233,7 @@ def _begin_path(route: Route, end: float, count: int) -> tuple[Traced, FloatArra
             inner.append(event)
     problem = "" if path.status is PathStatus.COMPLETE and whole else path.message
     zero = PathPoints(*(np.array([value]) for value in (0.0, 0.0, 0.0, True, False)))  # the unloaded position
-    return Traced(zero.merge(points), None, (0.0, *inner, reached), problem), places
+    return TracedPath(zero.merge(points), None, (0.0, *inner, reached), problem), places
 
 
 def _points(path: Path, places: FloatArray) -> PathPoints:
@@ -253,7 +253,7 @@ def _points(path: Path, places: FloatArray) -> PathPoints:
 
 def _resolve_panels(
     route: Route,
-    first: Traced,  # path that bifurcations are known from
+    first: TracedPath,  # path that bifurcations are known from
     grid: FloatArray,  # places that were requested of it [m]
     number: int,  # panels of a piece at first
 ) -> tuple[ChebyshevPanels, PathPoints, bool]:
@@ -280,7 +280,7 @@ def _resolve_panels(
     for left in range(MAX_HALVINGS, -1, -1):
         places = np.unique(np.concatenate([*guards, *(nodes_of(shrink_panel(panel)) for panel in wanted)]))
         more = _points(*route.trace_places(sense * places))
-        kept, points = kept and _alike(first, more), points.merge(more)
+        kept, points = kept and _is_same_branch(first, more), points.merge(more)
         size = sense * points.places
         largest = np.maximum.accumulate(np.abs(points.force))
         halves: list[tuple[float, float]] = []
@@ -301,7 +301,7 @@ def _resolve_panels(
     return ChebyshevPanels(borders, spans, np.array([done[panel] for panel in ordered])), points, kept
 
 
-def _alike(first: Traced, points: PathPoints) -> bool:
+def _is_same_branch(first: TracedPath, points: PathPoints) -> bool:
     """Return True if points are on the branch that a first path took in each piece, where it has points there."""
     traced = replace(first, points=points)
     both = np.isin(np.arange(len(first.edges) - 1), first.piece(first.points.places))

@@ -1,4 +1,4 @@
-"""From a specification to its leaves and their laws."""
+"""Leaves and spring of a specification: their laws, stiffnesses and linear range, and the room that the spring has."""
 
 from __future__ import annotations
 

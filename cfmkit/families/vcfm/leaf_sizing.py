@@ -128,7 +128,7 @@ def check_guide(spec: VcfmSpec) -> None:
         )
 
 
-def sized_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float, length: float) -> LeafStrip:
+def size_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float, length: float) -> LeafStrip:
     """Return a leaf as wide as the stiffness wants, F_c/h = n P_cr/X."""
     made, rise = spec.mechanism.material, target.height
     leaf = LeafStrip(length, asin(rise / length), thickness, 1.0, made.modulus, made.poisson)
@@ -277,13 +277,13 @@ def leaf_of_sheet(
             f"the plane: below twice the thickness they do; a sheet of {least} is enough",
             {f"mechanism.{path}": least for path in paths},
         )
-    leaf, have = sized_leaf(spec, target, thickness, shortest), spec.mechanism.bistable.half_beams
+    leaf, have = size_leaf(spec, target, thickness, shortest), spec.mechanism.bistable.half_beams
     count = leaves_for(have, have * leaf.width / sheet, sheet)
     for _ in range(MAX_ROUNDS):
         wide = leaf.width * have / count / sheet
         if abs(wide - 1.0) < WIDTH_RTOL:
             break
-        leaf = sized_leaf(spec, target, thickness, float(leaf.length) * wide ** (-1.0 / 3.0))
+        leaf = size_leaf(spec, target, thickness, float(leaf.length) * wide ** (-1.0 / 3.0))
     return count, replace(leaf, width=sheet)
 
 

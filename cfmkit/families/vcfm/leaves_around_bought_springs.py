@@ -30,7 +30,7 @@ from cfmkit.families.vcfm.leaf_sizing import (
     leaf_of_sheet,
     next_leaf,
     shortest_leaf,
-    sized_leaf,
+    size_leaf,
     thickness_for,
 )
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
@@ -39,7 +39,7 @@ from cfmkit.families.vcfm.model import farthest_back, rests_by_laws
 from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
 from cfmkit.stock.springs.kinds import PRESSED_FIRST
-from cfmkit.stock.springs.offers import Miss, guide_rod_for, nearest
+from cfmkit.stock.springs.offers import Miss, describe_nearest, guide_rod_for
 from cfmkit.stock.springs.spec import block_of, offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 from cfmkit.stock.springs.support_spec import guide_words
@@ -125,22 +125,22 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
         sized = _fit_width(spec, target, choice) if target.refine else choice
         if isinstance(sized, LeavesAroundSprings):
             others = fitting[number:MAX_TRIED_SPRINGS]
-            next_best = tuple(partial(_with_next, spec, target, following) for following in others)
+            next_best = tuple(partial(_design_next_choice, spec, target, following) for following in others)
             return replace(_make_design(spec, target, sized), next_best=next_best)
         missed.append(sized)
     none = "it lists no spring of the required kind ('mechanism.springs.kind')"
-    reported = f"no spring fits: {nearest(missed) if missed else none}"
+    reported = f"no spring fits: {describe_nearest(missed) if missed else none}"
     return no_design(
         finding("no_spring_fits", f"{reported} ('{'design.catalogue' if target.catalogue else 'mechanism.springs'}')")
     )
 
 
 @refusals_answered
-def _with_next(spec: VcfmSpec, target: VcfmDesign, choice: LeavesAroundSprings) -> Design:
+def _design_next_choice(spec: VcfmSpec, target: VcfmDesign, choice: LeavesAroundSprings) -> Design:
     """Return the design around springs that are not the best of the catalogue."""
     sized = _fit_width(spec, target, choice) if target.refine else choice
     if isinstance(sized, Miss):
-        return no_design(finding("no_spring_fits", nearest([sized])))
+        return no_design(finding("no_spring_fits", describe_nearest([sized])))
     return _make_design(spec, target, sized)
 
 
@@ -215,17 +215,17 @@ def _design_around(
         except Infeasible as problem:
             return Miss(label, 1.0, problem.finding.message)
     else:
-        leaf = _wide_enough(spec, own_target, thickness, length)
+        leaf = _size_wide_leaf(spec, own_target, thickness, length)
     leaves = LeavesAroundSprings(springs, own_target, leaf, onset_and_exit(leaf), count, offer is not None)
     return _find_miss(spec, target, leaves, offer) or leaves
 
 
-def _wide_enough(spec: VcfmSpec, own_target: VcfmDesign, thickness: float, length: float) -> LeafStrip:
+def _size_wide_leaf(spec: VcfmSpec, own_target: VcfmDesign, thickness: float, length: float) -> LeafStrip:
     """Return a leaf that does not buckle out of the plane: a longer one has to be wider. A stated length stays."""
-    leaf = sized_leaf(spec, own_target, thickness, length)
+    leaf = size_leaf(spec, own_target, thickness, length)
     while leaf.width < MIN_WIDTH_RATIO * leaf.thickness and own_target.leaf_length is None:
         length *= 1.02
-        leaf = sized_leaf(spec, own_target, thickness, length)
+        leaf = size_leaf(spec, own_target, thickness, length)
     return leaf
 
 
@@ -308,7 +308,7 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, sized: LeavesAroundSprings) -
         if target.leaf_length is not None:
             break
         # stress falls with the square of a length
-        longer = sized_leaf(spec, sized.target, sized.leaf.thickness, float(sized.leaf.length) * sqrt(1.0005 * worst))
+        longer = size_leaf(spec, sized.target, sized.leaf.thickness, float(sized.leaf.length) * sqrt(1.0005 * worst))
         sized = replace(sized, leaf=longer, linear=onset_and_exit(longer))
     return Miss(
         sized.label, worst - 1.0, f"the exact stress of the leaves is {mpa(worst * allowable)} of {mpa(allowable)}"

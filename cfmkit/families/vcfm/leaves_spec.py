@@ -1,4 +1,4 @@
-"""Specification of the leaves that snap through and about a spring of leaves, and of which kinds."""
+"""Specification of the snap-through leaves and of the spring of leaves, with the kinds that there are of each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Analysis: the force of leaves and spring over the shuttle's travel, for each preload, of one mechanism or of many.
+"""Analysis of a vcfm by closed forms: force of leaves and spring over travel at each preload, of one mechanism or many.
 
 Each curve begins where the shuttle rests under its preload: pulled back by it, with the leaves in tension.
 """
@@ -22,7 +22,7 @@ from cfmkit.families.vcfm.curves_in_rows import (
     Characteristics,
     LeafSamples,
     PartSampler,
-    Preloaded,
+    PreloadedRows,
     Rows,
 )
 from cfmkit.families.vcfm.findings import FINDING_RULES, closed_spring, finding, is_closed
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.end_stops import EndStops
     from cfmkit.families.run_control import Run
-    from cfmkit.families.vcfm.curves_in_rows import Push
+    from cfmkit.families.vcfm.curves_in_rows import PreloadCurve
     from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Finding
@@ -133,11 +133,11 @@ def solve(spec: VcfmSpec, made: LeafLaws, sampler: PartSampler) -> Solution:
     """
     preloads = np.array(spec.analysis.preloads)
     room = np.full(len(preloads), spring_room(spec))
-    pushed = Preloaded(sampler, preloads[:, None], spec.mechanism.end_stops)
+    pushed = PreloadedRows(sampler, preloads[:, None], spec.mechanism.end_stops)
     curves = _curves(pushed, travel_grid(spec)[None, :], room)
     curves.leaves  # noqa: B018  force and stress come of one root, and a curve has both
     is_known = np.isfinite(curves.force)
-    if (is_known != curves.there).any():
+    if (is_known != curves.is_distinct).any():
         travel, count = _compress_rows(curves.travel, is_known)
         curves = replace(curves, travel=travel, count=count)
     kept = curves.count >= LEAST_POINTS
@@ -189,11 +189,11 @@ def _solve_kind(specs: Sequence[VcfmSpec]) -> Solution:
     made.linear  # noqa: B018  once for all preloads
     sampler = LawSampler(made)
     sampler = sampler if count == 1 or len(specs) == 1 else sampler.select_rows(mechanism_of_row)
-    pushed = Preloaded(sampler, preloads[:, None], NO_STOPS)
+    pushed = PreloadedRows(sampler, preloads[:, None], NO_STOPS)
     return Solution(tuple(specs), made, _curves(pushed, grid[mechanism_of_row], room[mechanism_of_row]), count)
 
 
-def _curves(pushed: Preloaded, grid: FloatArray, room: FloatArray) -> Rows:
+def _curves(pushed: PreloadedRows, grid: FloatArray, room: FloatArray) -> Rows:
     """Return one curve for each preload, from where the shuttle rests up to where the spring is closed [m]."""
     rest, preload, stops = rests_of(pushed, grid), pushed.preload, pushed.stops
     travel, count = _travels(np.nan_to_num(rest), np.broadcast_to(grid, (len(preload), grid.shape[1])))
@@ -233,7 +233,7 @@ def _compress_rows(travel: FloatArray, kept: NDArray[np.bool_]) -> tuple[FloatAr
 
 
 def rests_of(
-    pushed: Preloaded,
+    pushed: PreloadedRows,
     grid: FloatArray,  # (n,) or (r, n): travels at which a shuttle whose spring is pulled is looked for first [m]
 ) -> FloatArray:
     """Return where the shuttle rests at each preload, (r,) [m]: the first place without force from the unloaded one on.
@@ -243,7 +243,7 @@ def rests_of(
     preload, (low, high) = pushed.preload[:, 0], pushed.stops.rigid_ends
     grid = np.broadcast_to(grid, (len(preload), np.shape(grid)[-1]))
     rest = np.where(preload == 0, 0.0, np.nan)
-    for rows, search in ((np.flatnonzero(preload < 0), _pulled_ahead), (np.flatnonzero(preload > 0), _pushed_back)):
+    for rows, search in ((np.flatnonzero(preload < 0), _rests_ahead), (np.flatnonzero(preload > 0), _rests_behind)):
         if rows.size:
             chosen = replace(pushed, sampler=pushed.sampler.select_rows(rows), preload=pushed.preload[rows])
             rest[rows] = search(chosen, grid[rows])
@@ -253,7 +253,7 @@ def rests_of(
     return np.minimum(rest, high)
 
 
-def _pulled_ahead(pushed: Preloaded, grid: FloatArray) -> FloatArray:
+def _rests_ahead(pushed: PreloadedRows, grid: FloatArray) -> FloatArray:
     """Return where the shuttle rests at negative preloads, (r,) [m]."""
     force, rows = pushed.force_at(grid), np.arange(len(grid))
     beyond = force >= 0
@@ -276,7 +276,7 @@ def _pulled_ahead(pushed: Preloaded, grid: FloatArray) -> FloatArray:
     return np.where(slack, 0.0, np.where(exact, high, np.where(some, place, np.nan)))
 
 
-def _pushed_back(pushed: Preloaded, _grid: FloatArray) -> FloatArray:
+def _rests_behind(pushed: PreloadedRows, _grid: FloatArray) -> FloatArray:
     """Return where the shuttle rests at positive preloads, (r,) [m]."""
     nothing, preload = np.zeros_like(pushed.preload), pushed.preload[:, 0]
     force_unloaded, force_behind = (pushed.force_at(at)[:, 0] for at in (nothing, -pushed.preload))
@@ -291,7 +291,7 @@ def _pushed_back(pushed: Preloaded, _grid: FloatArray) -> FloatArray:
     return np.where(rests, _polish_rest(pushed, place, 1e-9 * preload), np.nan)
 
 
-def _polish_rest(pushed: Preloaded, place: FloatArray, step: FloatArray) -> FloatArray:
+def _polish_rest(pushed: PreloadedRows, place: FloatArray, step: FloatArray) -> FloatArray:
     """Return rest positions after one secant more over what is left of their brackets: known to rounding."""
     force_here, force_ahead = (pushed.force_at(at[:, None])[:, 0] for at in (place, place + step))
     with np.errstate(all="ignore"):
@@ -301,7 +301,7 @@ def _polish_rest(pushed: Preloaded, place: FloatArray, step: FloatArray) -> Floa
 
 def rests_by_laws(laws: LeafLaws, preloads: Sequence[float], grid: FloatArray) -> FloatArray:
     """Return `rests_of` one mechanism of closed forms at each preload, (p,) [m]; zero where nothing holds it."""
-    return np.nan_to_num(rests_of(Preloaded(LawSampler(laws), np.array(preloads)[:, None], NO_STOPS), grid))
+    return np.nan_to_num(rests_of(PreloadedRows(LawSampler(laws), np.array(preloads)[:, None], NO_STOPS), grid))
 
 
 def farthest_back(spec: VcfmSpec, preloads: Sequence[float]) -> float:
@@ -309,7 +309,7 @@ def farthest_back(spec: VcfmSpec, preloads: Sequence[float]) -> float:
     return max(0.0, -float(rests_by_laws(parts(spec), preloads, travel_grid(spec)).min()))
 
 
-def _curve(push: Push, stops: EndStops, pressed: bool) -> Curve:
+def _curve(push: PreloadCurve, stops: EndStops, pressed: bool) -> Curve:
     leaves = push.leaves
     extra = {
         "bistable_force": Column(leaves.force, "force"),

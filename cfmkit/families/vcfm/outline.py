@@ -1,4 +1,4 @@
-"""Both structures as closed contours that can be cut or printed: the leaves with shuttle and walls, and the spring.
+"""Leaves (with shuttle and walls) and spring of a vcfm as closed contours that can be cut or printed.
 
 Sizes of shuttle, walls and blocks are those of `mechanism.frame`. The two parts stand apart, the spring below; of eight
 folded beams one half is drawn, to be made twice, and an odd number of leaves is made up to whole Vs.
@@ -61,10 +61,10 @@ def drawing(spec: VcfmSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
         "vcfm",
         (*contours, *marks),
         (table,),
-        (*_notes(spec), *frame_notes(spec, sizes), *_sharp(rounded, fillet), *bare),
+        (*_notes(spec), *frame_notes(spec, sizes), *_describe_sharp_corners(rounded, fillet), *bare),
         _sheet(spec, spring),
         tuple(_dimensions(spec, sizes)),
-        tuple(_facts(spec)),
+        tuple(_title_block_lines(spec)),
         tolerance=min(OUTLINE_TOLERANCE, COSINE_TOLERANCE_RATIO * thinnest),
         sections=sections,
     )
@@ -81,10 +81,10 @@ def sharp_corners(spec: VcfmSpec) -> tuple[str, ...]:
     """Return one line per inside corner of leaves and spring that no fillet fits, with its place."""
     leaves, spring, _ = _contours(spec)
     fillet = spec.mechanism.fillet
-    return _sharp([round_inside_corners(contour, fillet) for contour in (*leaves, *spring)], fillet)
+    return _describe_sharp_corners([round_inside_corners(contour, fillet) for contour in (*leaves, *spring)], fillet)
 
 
-def _sharp(rounded: Sequence[tuple[Contour, tuple[complex, ...]]], fillet: float) -> tuple[str, ...]:
+def _describe_sharp_corners(rounded: Sequence[tuple[Contour, tuple[complex, ...]]], fillet: float) -> tuple[str, ...]:
     return sharp_notes([place for _, sharp in rounded for place in sharp], fillet)
 
 
@@ -124,7 +124,7 @@ def _dimensions(spec: VcfmSpec, sizes: FrameSizes) -> Iterator[DrawnDimension]:
         yield DrawnDimension("seat of the spring", (0.0, face), (0.0, -spec.mechanism.frame.clearance), "y")
 
 
-def _facts(spec: VcfmSpec) -> Iterator[tuple[str, str]]:
+def _title_block_lines(spec: VcfmSpec) -> Iterator[tuple[str, str]]:
     """Yield what both parts are made of, and their leaves."""
     leaves, spring = spec.mechanism.bistable, spec.mechanism.positive
     yield "material", spec.mechanism.material.words

@@ -1,4 +1,4 @@
-"""Geometry of a mechanism: exact unloaded edges, and everything when the shuttle has travelled so far.
+"""Geometry of a vcfm: unloaded edges of leaves and spring, pieces for solid models, bodies at any travel and preload.
 
 The shuttle moves down along x = 0; the leaves go from it to the walls at both sides, the spring stands below it on
 a base that the preload pushes up. The unloaded apex of the lowest leaves is the origin.
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.curves_in_rows import Push
+    from cfmkit.families.vcfm.curves_in_rows import PreloadCurve
     from cfmkit.families.vcfm.leaves.kinds import LeafLaw, LeafSpring
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.families.vcfm.spec import VcfmSpec
@@ -62,7 +62,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
     )
 
 
-def _travels(push: Push) -> list[float]:
+def _travels(push: PreloadCurve) -> list[float]:
     """Return travels of a curve, from unloaded or, where a preload pushes the shuttle back, from rest on [m]."""
     end = float(push.travel[-1])
     back = [push.rest] if push.rest is not None and push.rest < 0 else []
@@ -106,7 +106,7 @@ def leaf_thickness(law: LeafLaw, count: int) -> FloatArray:
 
 def _leaf_spring(spec: VcfmSpec, top: float, compression: float) -> Iterator[PosedBody]:
     """Yield the blocks and leaves of a spring whose upper end is at `top`, at a compression [m]."""
-    frame, law = spec.mechanism.frame, _spring(spec)
+    frame, law = spec.mechanism.frame, _spring_law(spec)
     foot, blocks = law.blocks(frame.block, frame.corner, spec.mechanism.fillet, top, compression)
     lines, _ = law.bent_lines(compression, frame.corner)
     strips = [_strip(line + np.array([0.5 * frame.block, foot]), law.strip.thickness) for line in lines]
@@ -159,16 +159,16 @@ def _coils(spec: VcfmSpec, bottom: float, head: float, deflection: float, farthe
 
 def specified_pieces(spec: VcfmSpec, top: float) -> Iterator[SpecifiedPiece]:
     """Yield what both structures are united from, their spring with its upper end at `top` [m], and their sections."""
-    sizes, law = sizes_of_frame(spec), _leaf(spec)
+    sizes, law = sizes_of_frame(spec), _leaf_law(spec)
     for level in range(_levels(spec)):
         apex = (sizes.half, level * spec.mechanism.frame.spacing)
         upper, lower = (_edge(law, side, apex) for side in (1.0, -1.0))
-        leaf = np.vstack([_points(item) for item in (*upper, *_back(lower))])
+        leaf = np.vstack([_points(item) for item in (*upper, *_flip(lower))])
         yield SpecifiedPiece((leaf,), tuple(leaf_sections(law, apex)))
         yield SpecifiedPiece((leaf * MIRROR_FACTORS,))
     yield from (SpecifiedPiece((body.outline(),)) for body in sizes.bodies())
     if spec.mechanism.springs is None:
-        thickness = _spring(spec).strip.thickness
+        thickness = _spring_law(spec).strip.thickness
         for body in _leaf_spring(spec, top, 0.0):
             yield SpecifiedPiece((body.outline(),), (_section(body, thickness),) if body.name == "spring" else ())
 
@@ -206,7 +206,7 @@ def _check_levels(spec: VcfmSpec) -> None:
     Raises GeometryError with the place where they are closest, and the spacing at which they just touch.
     """
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
-    law = _leaf(spec)
+    law = _leaf_law(spec)
     x, y, slope = law.centre_line
     steepest = int(np.abs(slope).argmax())
     least = max(law.profile[1]) * float(np.hypot(1.0, slope[steepest]))
@@ -224,7 +224,7 @@ def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:
     Raises GeometryError if leaves overlap.
     """
     _check_levels(spec)
-    sizes, law, levels = sizes_of_frame(spec), _leaf(spec), range(_levels(spec))
+    sizes, law, levels = sizes_of_frame(spec), _leaf_law(spec), range(_levels(spec))
     half, bottom, wall, out = sizes.half, sizes.bottom, sizes.wall, sizes.out
     upper, lower = (
         [_edge(law, side, (half, level * spec.mechanism.frame.spacing)) for level in levels] for side in (1.0, -1.0)
@@ -235,14 +235,14 @@ def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:
     right += [*upper[-1], (wall, sizes.wall_top), (out, sizes.wall_top)]
     contours = []
     if sizes.floor is None:
-        right += [(out, sizes.wall_bottom), (wall, sizes.wall_bottom), *_back(lower[0]), (half, bottom), (0.0, bottom)]
-        contours = [_whole(right)]
+        right += [(out, sizes.wall_bottom), (wall, sizes.wall_bottom), *_flip(lower[0]), (half, bottom), (0.0, bottom)]
+        contours = [_close_symmetric(right)]
     else:
         right += [(out, sizes.foot), (0.0, sizes.foot)]
         inner: list[Item] = [(0.0, bottom), (half, bottom), *lower[0], (wall, sizes.floor), *sizes.ledge]
-        contours = [_whole(right), _contour([*inner, *_mirror_chain(inner)], hole=True)]
+        contours = [_close_symmetric(right), _contour([*inner, *_mirror_chain(inner)], hole=True)]
     for below, above in pairwise(levels):
-        hole = [*lower[above], *_back(upper[below])]
+        hole = [*lower[above], *_flip(upper[below])]
         contours += [_contour(hole, hole=True), _contour(_mirror_chain(hole), hole=True)]
     return contours, min(bottom, sizes.foot)
 
@@ -254,7 +254,7 @@ def sizes_of_frame(spec: VcfmSpec) -> FrameSizes:
     return frame_sizes(spec, spring_contours(spec, 0.0)[0].extents if seated else None)
 
 
-def _leaf(spec: VcfmSpec) -> LeafLaw:
+def _leaf_law(spec: VcfmSpec) -> LeafLaw:
     return leaf_law(spec.mechanism.bistable, spec.mechanism.material)
 
 
@@ -288,14 +288,14 @@ class SolvedPiece:
 
 def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
     """Return one leaf between shuttle and wall; both leaves of a V where the shuttle can turn."""
-    law, fillet = _leaf(spec), spec.mechanism.fillet
+    law, fillet = _leaf_law(spec), spec.mechanism.fillet
     strip = law.strip
     half, far = 0.5 * spec.mechanism.frame.shuttle_width, 0.5 * spec.mechanism.frame.shuttle_width + float(strip.reach)
     rise, over = float(strip.rise), 2.0 * (max(law.profile[1]) + fillet)
     upper, lower = (_edge(law, side, (half, 0.0)) for side in (1.0, -1.0))
     out = far + spec.mechanism.frame.block
     right: list[Item] = [(0.0, over), (half, over), *upper, (far, over - rise), (out, over - rise)]
-    right += [(out, -over - rise), (far, -over - rise), *_back(lower), (half, -over), (0.0, -over)]
+    right += [(out, -over - rise), (far, -over - rise), *_flip(lower), (half, -over), (0.0, -over)]
     wall = np.array([[far, over - rise], [out, over - rise], [out, -over - rise], [far, -over - rise]])
     sections = tuple(leaf_sections(law, (half, 0.0)))
     if spec.mechanism.bistable.guided:
@@ -303,13 +303,13 @@ def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
         return SolvedPiece(round_inside_corners(_contour(right), fillet)[0], shuttle, (wall,), True, sections)
     shuttle = np.array([[-half, over], [half, over], [half, -over], [-half, -over]])
     return SolvedPiece(
-        round_inside_corners(_whole(right), fillet)[0], shuttle, (wall, wall * MIRROR_FACTORS), True, sections
+        round_inside_corners(_close_symmetric(right), fillet)[0], shuttle, (wall, wall * MIRROR_FACTORS), True, sections
     )
 
 
 def solved_spring(spec: VcfmSpec) -> SolvedPiece:
     """Return one chain of the spring, of a diamond or folded beams the upper half of it."""
-    law, frame, fillet = _spring(spec), spec.mechanism.frame, spec.mechanism.fillet
+    law, frame, fillet = _spring_law(spec), spec.mechanism.frame, spec.mechanism.fillet
     half = 0.5 * frame.block
     around, bottom, held, glides = law.solved_piece(law.edges(frame.block, frame.corner, fillet, 0.0), half)
     block = np.array([[0.0, 0.0], [half, 0.0], [half, bottom], [0.0, bottom]])
@@ -325,19 +325,19 @@ def solved_spring(spec: VcfmSpec) -> SolvedPiece:
 def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:
     """Return the spring with its rigid blocks, its upper end at `top` [m]."""
     frame, half = spec.mechanism.frame, 0.5 * spec.mechanism.frame.block
-    outer, inner, low = _spring(spec).edges(frame.block, frame.corner, spec.mechanism.fillet, top)
+    outer, inner, low = _spring_law(spec).edges(frame.block, frame.corner, spec.mechanism.fillet, top)
     if spec.mechanism.flexures.loaded == "half":
-        hollow = [(-half, inner[-1][1]), *_back(inner), (-half, inner[0][1])] if inner else []
+        hollow = [(-half, inner[-1][1]), *_flip(inner), (-half, inner[0][1])] if inner else []
         return [_contour([(-half, top), (half, top), *outer, (half, low), (-half, low), *hollow])]
-    whole = _whole([(0.0, top), (half, top), *outer, (half, low), (0.0, low)])
+    whole = _close_symmetric([(0.0, top), (half, top), *outer, (half, low), (0.0, low)])
     return [whole, _contour([*inner, *_mirror_chain(inner)], hole=True)] if inner else [whole]
 
 
-def _spring(spec: VcfmSpec) -> LeafSpring:
+def _spring_law(spec: VcfmSpec) -> LeafSpring:
     return leaf_spring(spec.mechanism.flexures, spec.mechanism.material)
 
 
-def _whole(right: list[Item]) -> Contour:
+def _close_symmetric(right: list[Item]) -> Contour:
     return _contour([*right, *_mirror_chain(right)])
 
 
@@ -353,14 +353,14 @@ def _ends(item: Item) -> tuple[Point, Point]:
     return (first.real, first.imag), (last.real, last.imag)
 
 
-def _back(items: Sequence[Item]) -> list[Item]:
+def _flip(items: Sequence[Item]) -> list[Item]:
     """Return a chain run the other way."""
     return [item if isinstance(item, tuple) else item.reverse() for item in reversed(items)]
 
 
 def _mirror_chain(items: Sequence[Item]) -> list[Item]:
     """Return the mirror image of a chain, run the other way, so that it closes the first."""
-    return [(-item[0], item[1]) if isinstance(item, tuple) else item.mirror() for item in _back(items)]
+    return [(-item[0], item[1]) if isinstance(item, tuple) else item.mirror() for item in _flip(items)]
 
 
 def _contour(items: Sequence[Item], hole: bool = False) -> Contour:

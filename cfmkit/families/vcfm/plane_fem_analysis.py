@@ -1,4 +1,4 @@
-"""Leaves and spring as they are drawn, as planar solids: what fillets and the true roots change against beams.
+"""Analysis of leaves and spring as drawn, planar solids: what fillets and the true roots change against beams.
 
 One leaf, or both of a V whose shuttle can turn, and one chain of the spring are solved and counted as those of the
 exact model are: the shuttle is rigid, so that all leaves do the same. Shuttle, walls and blocks are held from their
@@ -66,7 +66,7 @@ POSE_EXPONENT = 1.5
 class SolidPath:
     """A part that is followed from rest in one direction.
 
-    It answers as a path of beams does (`interpolated_equilibrium_path.Traced`).
+    It answers as a path of beams does (`interpolated_equilibrium_path.TracedPath`).
     """
 
     solved: MeshSolution
@@ -190,7 +190,7 @@ def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
         places["spring"] = [share * (preload + place) for place in leaf_places]
     driven_parts = []
     for name, piece in pieces.items():
-        part, stops = part_of(spec, piece), _stops(spec, ends[name], 1, places[name])
+        part, stops = part_of(spec, piece), _list_travels(spec, ends[name], 1, places[name])
         driven_parts.append(DrivenPart(f"vcfm-{name}", part, spec.analysis.solid.error, stops))
     return tuple(driven_parts)
 
@@ -200,7 +200,7 @@ def _seams(polygon: FloatArray) -> tuple[FloatArray, ...]:
     return tuple(np.array([a, b]) for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True))
 
 
-def _stops(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ()) -> tuple[float, ...]:
+def _list_travels(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ()) -> tuple[float, ...]:
     """Return the travels to solve for, up to an end [m]: of the poses wanted one in `fewer`, and places on the way."""
     count = max(5, spec.analysis.solid.poses // fewer)
     shares = np.linspace(0.0, 1.0, count) ** POSE_EXPONENT
@@ -212,7 +212,8 @@ def _pull_back(spec: VcfmSpec, pushed: AdaptiveSolution, end: float, report: Cal
     """Return a part that is pulled back to a travel [m], on the mesh found for pushing, with a quarter of the poses."""
     from cfmkit.solid.adaptive_solution import BETWEEN_SHARE
 
-    return _path(pushed.meshed.follow_densely(_stops(spec, end, 4), report, BETWEEN_SHARE * pushed.error.target))
+    travels = _list_travels(spec, end, 4)
+    return _path(pushed.meshed.follow_densely(travels, report, BETWEEN_SHARE * pushed.error.target))
 
 
 def _path(solved: MeshSolution) -> SolidPath:

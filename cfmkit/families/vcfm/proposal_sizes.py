@@ -84,16 +84,16 @@ def open_corners(spec: VcfmSpec, travel: float, preloads: tuple[float, ...]) -> 
 
 
 def preloads_for(
-    spec: VcfmSpec, request: Request, per_force: float | None = None, known: tuple[float, ...] = (0.0,)
+    spec: VcfmSpec, request: Request, per_force: float | None = None, preloads: tuple[float, ...] = (0.0,)
 ) -> tuple[float, ...]:
     """Return the preloads with which the force is that of the middle and both ends of the adjustment [m].
 
     `per_force` is the preload for a change of the force [m/N]; None: that of the design, or of its bought springs.
-    `known` are those of a mechanism that has them already: without an adjustment they stay.
+    `preloads` are those of a mechanism that has them already: without an adjustment they stay.
     """
     design, bought = spec.design, spec.mechanism.springs
-    if request.adjustable is None or (len(known) == 1 and (design is None or not design.adjustment)):
-        return known
+    if request.adjustable is None or (len(preloads) == 1 and (design is None or not design.adjustment)):
+        return preloads
     if per_force is None:
         stroke = design.preload_stroke / design.adjustment if design and design.adjustment else 0.0
         per_force = stroke if bought is None else 1.0 / Coils.from_springs(bought).stiffness

@@ -33,7 +33,7 @@ from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.kinds import PRESSED_FIRST
-from cfmkit.stock.springs.offers import generic
+from cfmkit.stock.springs.offers import generic_series
 from cfmkit.stock.springs.spec import CatalogueSpring
 
 if TYPE_CHECKING:
@@ -267,7 +267,7 @@ def _springs_beside(request: Request, spec: VcfmSpec, travel: float, place: floa
     target = spec.design
     assert target is not None
     softest, preload = target.required_force / target.height, target.preload_stroke
-    for spring in chain.from_iterable(map(generic, PRESSED_FIRST)):
+    for spring in chain.from_iterable(map(generic_series, PRESSED_FIRST)):
         wide = spring.outer_diameter or 0.0
         # a pulled spring stands above a shuttle that goes down, and the preload moves its other end up
         long = (spring.free_length or 0.0) + max(spring.spring_type.lengthening, 0.0) * (target.stroke + preload)

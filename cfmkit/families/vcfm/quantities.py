@@ -272,7 +272,7 @@ def adjustability(solution: Solution) -> Table:
     )
     rows = []
     for push, (start, end), force, leaves, spring in zip(solution.pushes, flat, forces, *stresses, strict=True):
-        row: dict[str, Any] = {"preload": push.preload, "rest_position": push.rest} | spread(force)
+        row: dict[str, Any] = {"preload": push.preload, "rest_position": push.rest} | force_statistics(force)
         row |= {"force_change": float(force.mean() - forces[0].mean())}
         row |= {"spring_stress_max": spring, "bistable_stress_max": leaves}
         if np.isfinite(start):
@@ -299,7 +299,7 @@ _PRELOAD_COLUMNS = {
 }
 
 
-def spread(force: FloatArray) -> dict[str, float]:
+def force_statistics(force: FloatArray) -> dict[str, float]:
     """Return mean, extremes and (max - min)/max of a force [N]."""
     high, low = float(force.max()), float(force.min())
     ripple = (high - low) / high if high > 0 else np.nan
@@ -323,7 +323,7 @@ def readings(solution: Solution) -> Table:
     """
     rows = []
     for reading in _readings(solution):
-        spread_values = spread(_force(solution, reading))
+        spread_values = force_statistics(_force(solution, reading))
         about = {
             "reading": reading.text,
             "half_beams": reading.half_beams,

@@ -133,7 +133,7 @@ off, the whole must be kept."""
 MAX_WIDTH_FACTOR = 50.0  # factor on a width up to which one is looked for that makes the force flat
 
 
-def flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]]:
+def find_flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]]:
     """Return what makes the force flat, in words and as changes of the specification: only what has been tried.
 
     Where no width makes the force flat over the window, the window is wrong: then the flat part is named.

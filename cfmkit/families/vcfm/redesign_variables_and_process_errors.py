@@ -1,4 +1,4 @@
-"""Values that may vary when a design is changed to reach a yield, with ranges; and values with process errors."""
+"""Values that may vary when a design is changed to raise its yield of good parts, and values with process errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Solved mechanisms: F(x) = F_b(x) + F_p(x + dr), x from the unloaded position, dr the preload of the spring's far end.
+"""Solved vcfms as rows: F(x) = F_b(x) + F_p(x + dr), x from the unloaded position, dr the preload of the spring's end.
 
 Of m mechanisms with p preloads each, curves are m p rows, those of one mechanism together and the nominal preload
 first; of one mechanism m is 1. Everything that results, findings and studies read is computed here, when it is first
@@ -16,7 +16,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.section import hindered_share
-from cfmkit.families.vcfm.curves_in_rows import LeafSamples, Push
+from cfmkit.families.vcfm.curves_in_rows import LeafSamples, PreloadCurve
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.metrics.curve_rows import CurveRows, RowSamples, StressRows
 from cfmkit.metrics.longest_interval_in_band import extremes
@@ -115,23 +115,23 @@ class Solution(ShortRepr):
         return self.curves.sampler
 
     @cached_property
-    def pushes(self) -> tuple[Push, ...]:
+    def pushes(self) -> tuple[PreloadCurve, ...]:
         """The curves of the first mechanism, the nominal one first."""
-        return tuple(self._push(row) for row in range(self.preloads))
+        return tuple(self._make_preload_curve(row) for row in range(self.preloads))
 
     @property
-    def first(self) -> Push:
+    def first(self) -> PreloadCurve:
         """The nominal curve of the first mechanism."""
         return self.pushes[0]
 
-    def _push(self, row: int) -> Push:
+    def _make_preload_curve(self, row: int) -> PreloadCurve:
         curves, size = self.curves, int(self.curves.count[row])
         leaves = LeafSamples(*(column[row, :size] for column in vars(curves.leaves).values()))
         force, stress = (column[row, :size] for column in vars(curves.spring_samples).values())
         travel, preload, rest = curves.travel[row, :size], float(curves.preload[row, 0]), float(curves.rest[row])
         rest_or_none = None if np.isnan(rest) else rest
         stopped = curves.stops.force(travel) if curves.stops else None
-        return Push(
+        return PreloadCurve(
             preload, travel, leaves, force, stress, rest_or_none, stopped, curves.sampler.find_solved(travel, preload)
         )
 
@@ -279,13 +279,13 @@ class Solution(ShortRepr):
         """Place and value of the smallest nominal force past the peak of the leaves [m, N]; NaN without one."""
         curves, rows = self.nominal, np.arange(len(self))
         travel, (first, end) = curves.travel, curves.ends
-        falls = (np.diff(curves.leaf_force, axis=1) < 0) & (travel[:, :-1] >= 0) & curves.there[:, 1:]
+        falls = (np.diff(curves.leaf_force, axis=1) < 0) & (travel[:, :-1] >= 0) & curves.is_distinct[:, 1:]
         some = falls.any(axis=1)
         step = (travel[rows, curves.count - 1] - travel[rows, curves.count - 2])[:, None]
         # thin leaves have their peak between the first two points: it is looked for, not taken from them
         nearest = travel[rows, falls.argmax(axis=1)]
         peak = extremes(curves.sampler.leaf_force, nearest, step, (np.maximum(first, 0.0), end))
-        beyond = curves.there & (travel >= peak[:, None])
+        beyond = curves.is_distinct & (travel >= peak[:, None])
         lowest = travel[rows, np.where(beyond, curves.force, np.inf).argmin(axis=1)]
         lowest = np.where(beyond.any(axis=1), lowest, peak)
         pull = lambda places: -curves.force_at(places)  # noqa: E731  what is smallest is pulled back most
@@ -338,7 +338,7 @@ class Solution(ShortRepr):
                 continue
             sizes = [getattr(spec.mechanism, key) for spec in self.specs]
             width, thickness = (np.array([getattr(strip, size) for strip in sizes]) for size in ("width", "thickness"))
-            stress = np.where(rows.there, samples, -np.inf).reshape(len(self), -1)
+            stress = np.where(rows.is_distinct, samples, -np.inf).reshape(len(self), -1)
             worst = np.nanargmax(stress, axis=1)[:, None]
             curvature = 2.0 * np.take_along_axis(stress, worst, 1)[:, 0] / (modulus * thickness)
             share = np.asarray(hindered_share(width, thickness, nu, curvature))

@@ -1,4 +1,4 @@
-"""Surroundings of snap-through leaves: springs that are bought, walls, stop of the travel and seat of the spring.
+"""Surroundings of snap-through leaves: bought springs, walls, stop, seat of the spring; parts list and spring warnings.
 
 Springs are bought where they are no structure of leaves. The others are what of the leaves' part does not bend.
 """
@@ -58,7 +58,7 @@ def _list_springs(springs: BoughtSprings) -> ListedPart:
     return ListedPart(place, springs.name or "", springs.count, ", ".join(data), "buy", size)
 
 
-def _worst(solution: Solution) -> tuple[FloatArray, FloatArray]:
+def _extremes(solution: Solution) -> tuple[FloatArray, FloatArray]:
     """Return the largest preload of each mechanism and the deflection at the end of its travel, (m,) each [m]."""
     preload = solution.split_by_mechanism(solution.curves.preload[:, 0])
     rows, most = np.arange(len(preload)), preload.argmax(axis=1)
@@ -71,12 +71,12 @@ def is_overstretched(solution: Solution) -> Any:
     limits = solution.column(
         lambda spec: (None if spec.mechanism.springs is None else spec.mechanism.springs.max_elongation) or None
     )
-    return _worst(solution)[1] > limits * (1 + 1e-9)
+    return _extremes(solution)[1] > limits * (1 + 1e-9)
 
 
 def overstretching(solution: Solution) -> tuple[Any, ...]:
     """Return by how much the springs of one mechanism are deflected, and where they reach their limit."""
-    springs, (preload, most) = solution.spec.mechanism.springs, (float(value[0]) for value in _worst(solution))
+    springs, (preload, most) = (solution.spec.mechanism.springs, (float(value[0]) for value in _extremes(solution)))
     limit = springs.max_elongation if springs is not None and springs.max_elongation else 0.0
     place = f"at {mm(limit - preload)} of travel" if limit > preload else "by the preload alone"
     return (
@@ -91,12 +91,12 @@ def buckles(solution: Solution) -> Any:
         lambda spec: None if spec.mechanism.springs is None or spec.mechanism.springs.is_guided
         else spec.mechanism.springs.unguided
     )  # fmt: skip
-    return _worst(solution)[1] > limits * (1 + 1e-9)
+    return _extremes(solution)[1] > limits * (1 + 1e-9)
 
 
 def buckling(solution: Solution) -> tuple[Any, ...]:
     """Return how far the springs of one mechanism are pressed, and what guides them."""
-    springs, (preload, most) = solution.spec.mechanism.springs, (float(value[0]) for value in _worst(solution))
+    springs, (preload, most) = (solution.spec.mechanism.springs, (float(value[0]) for value in _extremes(solution)))
     assert springs is not None
     return (
         f"a spring of {mm(springs.free_length or 0.0)} buckles when it is deflected by {mm(springs.unguided)} "

@@ -8,7 +8,7 @@ __getattr__, __all__ = lazy_names(
         "compression_springs": "CompressionSpring",
         "extension_springs": "ExtensionSpring",
         "kinds": "HELICAL_KINDS",
-        "offers": "generic",
+        "offers": "generic_series",
         "torsion_springs": "HelicalTorsionSpring",
         "wire_materials": "WIRES_BY_NAME",
     },

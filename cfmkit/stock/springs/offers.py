@@ -79,19 +79,19 @@ class Offer:
 
 
 @lru_cache
-def generic(spring_type: type[HelicalSpring]) -> tuple[Offer, ...]:
+def generic_series(spring_type: type[HelicalSpring]) -> tuple[Offer, ...]:
     """Return the generic series of one kind.
 
     Examples
     --------
     >>> from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
-    >>> generic(HelicalTorsionSpring)[0].name
+    >>> generic_series(HelicalTorsionSpring)[0].name
     'generic-torsion-d0.4-D2.4-n3'
     """
     # 4.8, not 4.800000000000001, in what is written of a coil
     coils = [(wire, round(index * wire, 6)) for wire in GENERIC_WIRE_DIAMETERS for index in SPRING_INDICES]
     return tuple(
-        _generic(spring_type(wire * 1e-3, coil * 1e-3, float(turns)))
+        _make_generic_offer(spring_type(wire * 1e-3, coil * 1e-3, float(turns)))
         for wire, coil in coils
         for turns in spring_type.series_turns
     )
@@ -110,7 +110,7 @@ def _allowed_stress(wound: HelicalSpring) -> float:
     return SERIES_SHARES[wound.wire_stress] * tensile_strength(wound.wire)
 
 
-def _generic(wound: HelicalSpring) -> Offer:
+def _make_generic_offer(wound: HelicalSpring) -> Offer:
     largest = wound.deflection_at(_allowed_stress(wound))
     offer = Offer(
         f"generic-{wound.kind}-d{wound.wire * 1e3:g}-D{wound.coil * 1e3:g}-n{wound.turns:g}",
@@ -141,7 +141,7 @@ class Miss:
     reason: str
 
 
-def nearest(misses: Sequence[Miss]) -> str:
+def describe_nearest(misses: Sequence[Miss]) -> str:
     """Return the choices that miss least, and what, in one line."""
     best = sorted(misses, key=lambda miss: miss.share)[:3]
     left = len(misses) - len(best)
@@ -218,7 +218,7 @@ def as_stated(spring: HelicalSpring) -> dict[str, Any]:
     }
 
 
-def stiffest(
+def stiffest_rates(
     spring_type: type[HelicalSpring],  # kind of the springs
     deflection: FloatArray,  # (n,): how far they are stretched or turned
     # widest, room: float or (n,): largest outer diameter, and length with the loops of one that is stretched [m]
@@ -231,7 +231,7 @@ def stiffest(
     Examples
     --------
     >>> from cfmkit.stock.springs.torsion_springs import HelicalTorsionSpring
-    >>> (rate,) = stiffest(HelicalTorsionSpring, np.array([1.0]), 5e-3, 30e-3)
+    >>> (rate,) = stiffest_rates(HelicalTorsionSpring, np.array([1.0]), 5e-3, 30e-3)
     >>> bool(slimmest_spring(HelicalTorsionSpring, 0.98 * rate, 1.0, 30e-3).outer_diameter <= 5e-3)
     True
     """

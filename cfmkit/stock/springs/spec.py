@@ -1,4 +1,4 @@
-"""Springs on offer in `design.catalogue`: a list, a file, or the generic series."""
+"""Specification of springs: those of `design.catalogue` (list, file, generic series), and wire of built-in ones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cfmkit.specs.units.table import is_unit
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue
 from cfmkit.stock.springs.extension_springs import ExtensionSpring
 from cfmkit.stock.springs.kinds import HELICAL_KINDS, list_kinds
-from cfmkit.stock.springs.offers import GENERIC_SERIES, Offer, generic
+from cfmkit.stock.springs.offers import GENERIC_SERIES, Offer, generic_series
 from cfmkit.stock.springs.support_spec import SpringSupport
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireOutOfRange
 from cfmkit.tables.lab_columns import split_header
@@ -155,7 +155,7 @@ def check_rate(wound: HelicalSpring, stated: float) -> None:
 def check_initial_tension(spring_type: type[HelicalSpring], wound: HelicalSpring | None, tension: float) -> None:
     """Raise `ValueError` for an initial tension [N] that a kind of spring, or one of this wire, cannot have."""
     if tension and not spring_type.has_initial_tension:
-        tight = list_kinds(other for other in HELICAL_KINDS.values() if other.has_initial_tension)
+        tight = list_kinds(kind for kind in HELICAL_KINDS.values() if kind.has_initial_tension)
         raise ValueError(f"'initial_tension' is of {tight} springs; this is of kind {spring_type.kind!r}")
     if wound is None or not tension:
         return
@@ -239,7 +239,7 @@ class CatalogueSpring(WireLimits, SpringSupport):
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
         rate_key, wound = self.spring_type.rate_key, self.wound
-        for key in {other.rate_key for other in HELICAL_KINDS.values()} - {rate_key}:
+        for key in {kind.rate_key for kind in HELICAL_KINDS.values()} - {rate_key}:
             if getattr(self, key) is not None:
                 raise ValueError(f"a spring of kind {self.kind!r} has no {key!r}")
         stated_sizes = [self.wire, self.coil, self.turns]
@@ -393,14 +393,14 @@ def support_of(offer: Offer) -> dict[str, Any]:
     return {"seats": seats, "guide_rod": offer.guide_rod, "guide_tube": offer.guide_tube}
 
 
-def block_of(offer: Offer, **own: Any) -> dict[str, Any]:
+def block_of(offer: Offer, **keys: Any) -> dict[str, Any]:
     """Return the block of a spring on offer that is built in, with keys of its own; what is None is left out."""
     common = {"name": offer.name, "wound": wire_of(offer), "life": offer.life} | support_of(offer)
-    return {key: value for key, value in (common | own).items() if value is not None}
+    return {key: value for key, value in (common | keys).items() if value is not None}
 
 
 Catalogue = Annotated[tuple[CatalogueSpring, ...] | str, WrapValidator(_resolve_file)]
-"""The type of a key that lists springs: blocks, a CSV file beside the specification, or ``generic``."""
+"""The type of a key that lists springs: blocks, a CSV file beside the specification, or ``generic_series``."""
 
 
 def offers(
@@ -414,7 +414,7 @@ def offers(
     if isinstance(catalogue, DataSource):
         catalogue = tuple(_read_file(catalogue))
     if isinstance(catalogue, str):
-        return tuple(item for spring_type in spring_types for item in generic(spring_type))
+        return tuple(item for spring_type in spring_types for item in generic_series(spring_type))
     return tuple(item.offer for item in catalogue if item.spring_type in spring_types)
 
 
@@ -424,12 +424,12 @@ _COMMA_PATTERN = re.compile(r"([+-]?[0-9]*),([0-9]+)")
 
 def _read_file(source: DataSource) -> list[CatalogueSpring]:
     """Return the springs of a CSV: columns are the keys of a catalogue's spring, with units: ``stiffness [N/mm]``."""
-    lines = _lines(source)
+    lines = _read_lines(source)
     separator = max(";\t|,", key=lines[0].count) if lines else ","
     rows = csv.reader(lines, delimiter=separator, strict=True)
     springs: list[CatalogueSpring] = []
     try:
-        heads = _heads(next(rows, []), source)
+        heads = _read_heads(next(rows, []), source)
         for cells in filter(any, ([cell.strip() for cell in row] for row in rows)):
             springs.append(_spring_of_row(heads, cells, separator))
             check_names(springs)
@@ -445,7 +445,7 @@ def _spring_of_row(heads: Sequence[Head], cells: Sequence[str], separator: str) 
     if len(cells) != len(heads):
         raise ValueError(f"has {len(cells)} cells, but the header has {len(heads)}")
     named_cells = ((*head, cell) for head, cell in zip(heads, cells, strict=True) if head and cell)
-    block = {name: _cell(name, cell, unit, separator) for name, unit, cell in named_cells}
+    block = {name: _read_cell(name, cell, unit, separator) for name, unit, cell in named_cells}
     try:
         return CatalogueSpring.model_validate(block)
     except ValidationError as error:
@@ -455,7 +455,7 @@ def _spring_of_row(heads: Sequence[Head], cells: Sequence[str], separator: str) 
         raise ValueError(f"{place}: {reported}") from None
 
 
-def _lines(source: DataSource) -> list[str]:
+def _read_lines(source: DataSource) -> list[str]:
     """Return the lines of a file, without the empty ones before the header."""
     try:
         text, _ = decode_file(source.path.read_bytes(), str(source))
@@ -464,7 +464,7 @@ def _lines(source: DataSource) -> list[str]:
     return "\n".join(lines_of(text)).lstrip("\n ;,|\t\ufeff").splitlines(keepends=True)
 
 
-def _heads(cells: Sequence[str], source: DataSource) -> list[Head]:
+def _read_heads(cells: Sequence[str], source: DataSource) -> list[Head]:
     """Return name and unit of each column; None for a remark, such as a price, which is not read."""
     allowed = [name for name in CatalogueSpring.model_fields if name != "fatigue"]  # a block, which no cell holds
     columns: list[Head] = []
@@ -482,7 +482,7 @@ def _heads(cells: Sequence[str], source: DataSource) -> list[Head]:
     return columns
 
 
-def _cell(name: str, cell: str, unit: str | None, separator: str) -> object:
+def _read_cell(name: str, cell: str, unit: str | None, separator: str) -> object:
     """Return a cell as a specification would say it."""
     if name == "counts":
         return tuple(int(word) if word.isdigit() else word for word in cell.split())

@@ -57,7 +57,7 @@ class SpringSupport(Model):
         stated = ["seats"] if self.seats != "fixed-fixed" else []
         stated += [key for key in ("guide_rod", "guide_tube") if getattr(self, key) is not None]
         if stated and not spring_type.needs_guide:
-            buckling = list_kinds(other for other in HELICAL_KINDS.values() if other.needs_guide)
+            buckling = list_kinds(kind for kind in HELICAL_KINDS.values() if kind.needs_guide)
             raise ValueError(
                 f"{stated[0]!r} is for {buckling} springs, which buckle; this is of kind {spring_type.kind!r}"
             )

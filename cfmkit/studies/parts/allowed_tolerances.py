@@ -57,12 +57,12 @@ class LimitsAlong:
         share = ((errors - self.offsets[at]) / np.diff(self.offsets)[at])[:, None]
         return np.asarray((1.0 - share) * self.changes[at] + share * self.changes[at + 1])
 
-    def and_at(self, other: LimitsAlong | None) -> LimitsAlong:
+    def merge(self, earlier: LimitsAlong | None) -> LimitsAlong:
         """Return the same with what is known at other errors, too."""
-        if other is None:
+        if earlier is None:
             return self
-        offsets, at = np.unique(np.concatenate([self.offsets, other.offsets]), return_index=True)
-        return LimitsAlong(offsets, np.concatenate([self.changes, other.changes])[at])
+        offsets, at = np.unique(np.concatenate([self.offsets, earlier.offsets]), return_index=True)
+        return LimitsAlong(offsets, np.concatenate([self.changes, earlier.changes])[at])
 
 
 def limits_along_errors(
@@ -85,8 +85,8 @@ def limits_along_errors(
         offsets = factor * ERRORS_TRIED * parameter.spread.standard_deviation
         values = parameter.spread.nominal + offsets
         tried = (offsets != 0.0) & (tight.low <= values) & (values <= tight.high)
-        near = numbers_of_parts(spec, {parameter.path: values[tried]}, rows, run)
-        numbers_by_offset = dict(zip(offsets[tried].tolist(), near, strict=True))
+        part_numbers = numbers_of_parts(spec, {parameter.path: values[tried]}, rows, run)
+        numbers_by_offset = dict(zip(offsets[tried].tolist(), part_numbers, strict=True))
         moved = {
             offset: numbers - middle for offset, numbers in sorted(numbers_by_offset.items()) if numbers is not None
         }
@@ -141,7 +141,7 @@ def factors_that_keep(
         return lambda f: good(others + along[k](f * errors[:, k]))
 
     alone = np.array([_largest(share_alone(k), wanted) for k in range(len(ones))])
-    shape = _shape(rows, np.array([moved.std(axis=0) for moved in stated]).T, costs)
+    shape = _proportion(rows, np.array([moved.std(axis=0) for moved in stated]).T, costs)
     together = _largest(lambda f: share(f * ones), wanted)
     allocated = _largest(lambda f: share(np.minimum(f * shape, MAX_TOLERANCE_FACTOR)), wanted)
     return ToleranceFactors(
@@ -158,10 +158,10 @@ def allowed_tolerances(
 ) -> ToleranceFactors:
     """Return the factors on the tolerances; limits are solved again where these now end, and all solutions count."""
     factors = np.ones(len(parts.parameters))
-    known: tuple[LimitsAlong | None, ...] = (None,) * len(factors)
+    earlier_limits: tuple[LimitsAlong | None, ...] = (None,) * len(factors)
     for _ in range(MAX_SOLUTIONS):
         rows, seen = limits_along_errors(parts, nominal, factors)
-        known = along = tuple(limit.and_at(before) for limit, before in zip(seen, known, strict=True))
+        earlier_limits = along = tuple(limit.merge(before) for limit, before in zip(seen, earlier_limits, strict=True))
         answer = factors_that_keep(rows, along, errors[:N_ROUGH], costs, wanted)
         ends = np.where(np.isfinite(answer.allocated), answer.allocated, factors)
         ends = np.clip(ends, LEAST_FACTOR, 1.0 if answer.perfect < wanted else MAX_TOLERANCE_FACTOR)
@@ -184,13 +184,13 @@ def _largest(share: Callable[[float], float], wanted: float) -> float:
     return low
 
 
-def _shape(rows: FloatArray, moved: FloatArray, costs: FloatArray) -> FloatArray:
+def _proportion(rows: FloatArray, moved: FloatArray, costs: FloatArray) -> FloatArray:
     """Return in which proportion tolerances of least cost stand, their mean 1; moved (m, d): what each adds."""
     spread = np.sqrt((moved**2).sum(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
-        near = np.where(spread > 0, np.exp(-0.5 * np.clip(rows / spread, 0.0, 30.0) ** 2), 0.0)
+        closeness = np.where(spread > 0, np.exp(-0.5 * np.clip(rows / spread, 0.0, 30.0) ** 2), 0.0)
     # what a limit loses counts as often as it is missed
-    weights = near / near.sum() if near.sum() > 0 else np.full(len(rows), 1.0 / len(rows))
+    weights = closeness / closeness.sum() if closeness.sum() > 0 else np.full(len(rows), 1.0 / len(rows))
     scaled = np.where(spread[:, None] > 0, (moved / np.maximum(spread, 1e-300)[:, None]) ** 2, 0.0)
     adds = np.maximum(weights @ scaled, 1e-9)
     ratios: FloatArray = (costs / costs.max() / adds) ** (1.0 / 3.0)

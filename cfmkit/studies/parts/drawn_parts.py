@@ -19,7 +19,7 @@ import numpy as np
 
 from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
-from cfmkit.metrics import split_name, window_of, windows_judged
+from cfmkit.metrics import split_name, warn_of_uncovered_windows, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Quantity
 from cfmkit.specs.further_metrics import OF_MANY_PARTS
@@ -102,7 +102,7 @@ def analyze_parts(parts: Parts, values: FloatArray, nominal: Result, run: Run, w
 def _why_lacking(part: Spec, run: Run) -> str:
     """Return what a part's analysis says of a window beyond its curve; empty where something else is the matter."""
     try:
-        result = windows_judged(family(part.family).analyze(part, run))
+        result = warn_of_uncovered_windows(family(part.family).analyze(part, run))
     except CfmError as error:
         return str(error)
     return next((warning.message for warning in result.warnings if warning.name == "window_outside"), "")
@@ -178,7 +178,7 @@ class Yields:
     trimmed: Share  # the same parts after a trim
     frozen: Share | None  # without common errors; None if there are none
     common: tuple[str, ...]  # the paths of those
-    each: tuple[Share, ...]  # of parts that meet one requirement
+    requirement_shares: tuple[Share, ...]  # of parts that meet one requirement
     before: Share | None  # of the specification that the design began with
     why: str = ""  # why there is none of that
     # how many of the parts have a curve, but no value for a requirement, and why the first has none
@@ -204,9 +204,9 @@ class Yields:
     def as_json(self) -> dict[str, Any]:
         """Return the block `yield` of metrics.json."""
         requirements = self.parts.spec.part_requirements
-        each = [
+        outcomes = [
             {"metric": requirement.metric} | share.as_json()
-            for requirement, share in zip(requirements, self.each, strict=True)
+            for requirement, share in zip(requirements, self.requirement_shares, strict=True)
         ]
         return self.after.as_json() | {
             "seed": self.parts.seed,
@@ -214,7 +214,7 @@ class Yields:
             "with_common_frozen": (self.frozen or self.after).as_json(),
             "after_trim": self.trimmed.as_json(),
             "common": list(self.common),
-            "requirements": each,
+            "requirements": outcomes,
         }
 
     def sentence(self) -> str:
@@ -234,10 +234,10 @@ class Yields:
             without = f"without the errors of the whole part ({', '.join(self.common)})"
             reported += f"; {percent(self.frozen.value)} {without}"
         reported += f"; {percent(self.trimmed.value)} after a trim of the force"
-        worst = min(range(len(self.each)), key=lambda k: self.each[k].value)
-        if self.each[worst].value < 1.0:
+        worst = min(range(len(self.requirement_shares)), key=lambda k: self.requirement_shares[k].value)
+        if self.requirement_shares[worst].value < 1.0:
             metric = self.parts.spec.part_requirements[worst].metric
-            reported += f"; most are lost by {metric}, which {percent(1.0 - self.each[worst].value)} miss"
+            reported += f"; most are lost by {metric}, which {percent(1.0 - self.requirement_shares[worst].value)} miss"
         return reported
 
 

@@ -1,4 +1,4 @@
-"""Parts near a design, without drawing one to be solved: which share is good, and which forces to expect.
+"""Linear estimates of the parts near a design: which share is good, and a test plan with the forces to expect.
 
 The estimate is of first order and takes a few solutions: it says whether a design is worth drawing parts of, no more.
 
@@ -63,7 +63,7 @@ def near_parts(parts: Parts, middle: FloatArray, numbers: Numbers, exact: FloatA
         return NearParts(middle, exact)
 
     def analyze_shifted(k: int, value: float) -> FloatArray:
-        return _finite(numbers, parts.spec.replace({parts.paths[k]: value}, as_made=True))
+        return _require(numbers, parts.spec.replace({parts.paths[k]: value}, as_made=True))
 
     step = SIGMA_STEP * parts.deviations
     derivatives = differentiate(analyze_shifted, np.column_stack([parts.nominal - step, parts.nominal + step]))
@@ -71,7 +71,7 @@ def near_parts(parts: Parts, middle: FloatArray, numbers: Numbers, exact: FloatA
     return NearParts(middle, derivatives if exact is None else np.concatenate([exact, derivatives]))
 
 
-def _finite(numbers: Numbers, part: Spec) -> FloatArray:
+def _require(numbers: Numbers, part: Spec) -> FloatArray:
     try:
         return _complete(numbers(part))
     except CfmError as error:
@@ -102,7 +102,7 @@ def efforts_of_parts(parts: Parts, places: FloatArray, branch: str, run: Run) ->
     """
 
     def efforts(part: Spec) -> FloatArray | None:
-        sampled = rr.sampled_of(part, places, run)
+        sampled = rr.sample_part(part, places, run)
         return None if sampled is None else sampled.effort.get(branch)
 
     exact = rr.exact_derivatives(parts.spec, places, parts.paths)
@@ -110,7 +110,7 @@ def efforts_of_parts(parts: Parts, places: FloatArray, branch: str, run: Run) ->
     slopes = np.array(columns).T if len(columns) == len(parts.paths) and all(c is not None for c in columns) else None
     if slopes is None:
         _refuse_many(parts)
-    return near_parts(parts, _finite(efforts, parts.spec), efforts, slopes)
+    return near_parts(parts, _require(efforts, parts.spec), efforts, slopes)
 
 
 @dataclass(frozen=True)
@@ -130,8 +130,8 @@ def expected_shares(result: Result, parts: Parts, run: Run) -> ExpectedShares:
     Raises Unknown if it would take long, or a part near the design has no curve.
     """
     spec, places = result.spec, rr.places_of(result)
-    quick = rr.quickly_sampled(spec, places)
-    first = rr.sampled_on_curves(result, places, ()) if quick is None else quick
+    quick = rr.sample_quickly(spec, places)
+    first = rr.sample_curves(result, places, ()) if quick is None else quick
     if first is None:
         raise Unknown("the design cannot be followed at a few poses")
     rows = rr.rows_of(result, first, places)
@@ -143,7 +143,7 @@ def expected_shares(result: Result, parts: Parts, run: Run) -> ExpectedShares:
     if rows.metrics or slopes is None:
         _refuse_many(parts, quick=not rows.metrics)
     if rows.metrics and (thin := _thin_curve(result)) is not None:
-        count, numbers = len(rows.metrics), _finite(lambda part: _numbers(part, rows, run, quick is None), thin)
+        count, numbers = (len(rows.metrics), _require(lambda part: _numbers(part, rows, run, quick is None), thin))
         if np.allclose(numbers[-count:], middle[-count:], rtol=SAME_RTOL, atol=0.0):
             parts, middle = replace(parts, spec=thin), np.concatenate([middle[: len(middle) - len(numbers)], numbers])
     parts_near = near_parts(parts, middle, lambda part: _numbers(part, rows, run, slopes is None), slopes)
@@ -252,7 +252,7 @@ def expected_forces(result: Result, run: Run) -> str:
         parts, whence = Parts.from_expected_errors(result.spec, run.seed)
         if parts is None:
             return ""
-        places = _places(result)
+        places = _places_to_test(result)
         parts_near = efforts_of_parts(parts, places, result.curve.branches[0], run)
     except (CfmError, Unknown):
         return ""
@@ -274,12 +274,13 @@ def expected_forces(result: Result, run: Run) -> str:
     make = "make the part in geometry/" if family(result.spec.family).outline else "make the part"
     verb = "displace to" if curve.motion_dimension == "length" else "turn to"
     return (
-        f"{make}, {_to_measure(parts, weight)}, {verb} {_list_names(at)}, and expect {_list_names(expected)}: "
-        f"each range holds for {100 * NAMED_PARTS_SHARE:.0f} % of parts {whence} (linear estimate)"
+        f"{make}, {_list_what_to_measure(parts, weight)}, {verb} {_list_names(at)}, and expect "
+        f"{_list_names(expected)}: each range holds for "
+        f"{100 * NAMED_PARTS_SHARE:.0f} % of parts {whence} (linear estimate)"
     )
 
 
-def _to_measure(parts: Parts, weight: FloatArray) -> str:
+def _list_what_to_measure(parts: Parts, weight: FloatArray) -> str:
     """Return what to measure, of parameters that move the force by `weight` (d,): the first few dimensions.
 
     Then what else is among as many of all parameters.
@@ -315,7 +316,7 @@ def _list_names(items: list[str]) -> str:
     return ", ".join(items[:-1]) + (" and " if len(items) > 1 else "") + items[-1]
 
 
-def _places(result: Result) -> FloatArray:
+def _places_to_test(result: Result) -> FloatArray:
     """Return the two ends of the window, or the middle and the end of the travel."""
     window, motion = window_of(result), result.curve.motion
     least, most = float(motion.min()), float(motion.max())

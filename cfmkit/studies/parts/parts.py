@@ -18,7 +18,7 @@ from cfmkit.families import family
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.study_spec import Sensitivity, Tolerance
 from cfmkit.stock.materials import MATERIALS_BY_NAME
-from cfmkit.stock.processes import PROCESSES_BY_NAME, SPRING_RATE, usual
+from cfmkit.stock.processes import PROCESSES_BY_NAME, SPRING_RATE, usual_process
 from cfmkit.studies.parts.uncertain_values import correlations, draw, groups, parameters_of, values_at
 from cfmkit.studies.variations import CannotVary, leaf
 
@@ -65,7 +65,7 @@ def assume_errors(spec: Spec, process: str | None = None) -> Assumed | None:
     if not kinds:
         return None
     accuracy, (shared, owned) = accuracy_of(spec, process), _materials(spec)
-    band = next((found for block in shared if (found := _band(block))), None)
+    band = next((known_band for block in shared if (known_band := _band(block))), None)
     rates = {path: float(spec.get_value(path)) for path, kind in kinds.items() if kind == "rate"}
     made = {path: kind for path, kind in kinds.items() if kind != "rate"}
     return Assumed(accuracy, made, band, any(map(_band, owned)), rates)
@@ -76,7 +76,7 @@ def accuracy_of(spec: Spec, process: str | None = None) -> ProcessAccuracy:
     named = process or getattr(getattr(spec, "design", None), "process", None)
     if named:
         return PROCESSES_BY_NAME[named]
-    usually = [usual(entry.name, entry.modulus) for group in _materials(spec) for entry in group]
+    usually = [usual_process(entry.name, entry.modulus) for group in _materials(spec) for entry in group]
     # one process makes the whole part: that of the material that is made least exactly
     accuracy = max(usually, key=lambda entry: entry.thickness, default=PROCESSES_BY_NAME[OF_PLATES])
     private = process_of_part(spec)
@@ -157,7 +157,7 @@ class Parts:
         if not stated:
             return None
         try:
-            return cls.from_block(spec, _block(stated, design.correlated), *_count_and_seed(spec, design, seed))
+            return cls.from_block(spec, _make_block(stated, design.correlated), *_count_and_seed(spec, design, seed))
         except SpecError as error:
             raise SpecError(
                 [replace(problem, path=_to_design_path(problem.path)) for problem in error.problems]
@@ -181,7 +181,7 @@ class Parts:
         """Return the parts that a process is assumed to make, for a specification some of whose values err by it."""
         design = getattr(spec, "design", None)
         count_and_seed = _count_and_seed(spec, design, seed) if isinstance(design, DesignKeys) else (0, seed)
-        return cls.from_block(spec, _block(tolerances(spec)), *count_and_seed)
+        return cls.from_block(spec, _make_block(tolerances(spec)), *count_and_seed)
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -225,7 +225,7 @@ class Parts:
         return [*many, *((k,) for k in range(len(self.parameters)) if k not in taken)]
 
 
-def _block(stated: dict[str, Any], correlated: tuple[Any, ...] = ()) -> Sensitivity:
+def _make_block(stated: dict[str, Any], correlated: tuple[Any, ...] = ()) -> Sensitivity:
     return Sensitivity.model_construct(method="tolerance", parameters=stated, correlated=correlated, metrics=())
 
 

@@ -40,7 +40,7 @@ from cfmkit.studies.parts.requirement_rows import (
     numbers_of,
     numbers_of_parts,
     requirement_rows,
-    sampled_of,
+    sample_part,
     stated_places,
 )
 from cfmkit.studies.parts.share import Share
@@ -138,7 +138,7 @@ class PartNumbers:
 
     def _follows(self, x: FloatArray, errors: FloatArray, reached: tuple[float, ...]) -> bool:
         try:
-            return sampled_of(self.variant(x, errors), self.rows.places, self.run, reached) is not None
+            return sample_part(self.variant(x, errors), self.rows.places, self.run, reached) is not None
         except CfmError:
             return False
 
@@ -198,7 +198,7 @@ def free_of(requested: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
 
 def _range_of(spec: Spec, path: str, ends: tuple[str, str]) -> tuple[float, float]:
     key = leaf(type(spec), path)
-    low, high = (float(key.read(_plain(key.kind, end))[0]) for end in ends)
+    low, high = (float(key.read(_read_bound(key.kind, end))[0]) for end in ends)
     if not low < high:
         raise CannotVary(f"[{ends[0]}, {ends[1]}] is not a range: the first must be smaller than the second")
     try:
@@ -210,7 +210,7 @@ def _range_of(spec: Spec, path: str, ends: tuple[str, str]) -> tuple[float, floa
     return low, high
 
 
-def _plain(kind: str, text: str) -> Any:
+def _read_bound(kind: str, text: str) -> Any:
     from cfmkit.specs.units import read_number
 
     return read_number(text) if kind == "number" else text
@@ -297,7 +297,7 @@ def _with_margins(
             break
         asked, x = min(MOST_ASKED, max(moved.share, asked) + 0.5 * short), moved.x
     assert best is not None
-    return _largest(problem, numbers, start, best) if largest and _misses(best[1], problem) else best
+    return _find_largest_yield(problem, numbers, start, best) if largest and _misses(best[1], problem) else best
 
 
 def _misses(good: int, problem: RobustProblem) -> bool:
@@ -305,7 +305,7 @@ def _misses(good: int, problem: RobustProblem) -> bool:
     return Share(good, 0, N_CHECKED_PARTS).excludes(problem.share)
 
 
-def _largest(
+def _find_largest_yield(
     problem: RobustProblem, numbers: PartNumbers, start: FloatArray, best: tuple[RobustResult, int]
 ) -> tuple[RobustResult, int]:
     """Return the design with the largest yield that is found where the requested one is not.
@@ -336,7 +336,7 @@ def _finish_design(design: Design, part: PartNumbers, moved: RobustResult, good:
     """Return the design with its values moved, or why there is none, and what the search says of it."""
     x, spec, worst = moved.x, part.build_spec(moved, problem), part.costliest(moved, problem)
     if _misses(good, problem):
-        return _impossible(design, part, good, worst, problem)
+        return _explain_no_design(design, part, good, worst, problem)
     solved = f"{good} of {N_CHECKED_PARTS} solved parts meet them; largest contributor: {worst}"
     reported = (
         f"{len(x)} values moved in {moved.steps} steps: yield about {100 * moved.began:.3g} % before, "
@@ -359,7 +359,7 @@ def _finish_design(design: Design, part: PartNumbers, moved: RobustResult, good:
     return replace(design, spec=spec, search={**design.search, **about}, notes=(*design.notes, ("margins", reported)))
 
 
-def _impossible(design: Design, part: PartNumbers, good: int, worst: str, problem: RobustProblem) -> Design:
+def _explain_no_design(design: Design, part: PartNumbers, good: int, worst: str, problem: RobustProblem) -> Design:
     """Return why no design was found: the largest yield, and what stands in its way."""
     value = 100.0 * good / N_CHECKED_PARTS
     wanted = f"{100 * problem.share:.4g} % of parts are good"

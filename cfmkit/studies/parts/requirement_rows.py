@@ -47,7 +47,7 @@ NARROW_WINDOW_SHARE = 0.02  # a window that is a smaller share of the whole span
 
 @dataclass(frozen=True)
 class RequirementRows:
-    """Requirements as rows of what is seen of a part."""
+    """Requirements as inequalities in a part's values (efforts, stresses, metrics): matrix @ values + constant >= 0."""
 
     places: FloatArray  # (p,) poses at which effort and stress are looked at [m or rad]
     branches: tuple[str, ...]  # of the curve
@@ -146,7 +146,7 @@ class _RowsOfMargins:
         if not len(at) or not np.isfinite(values).all():
             return None
         columns, sign = (first + at).tolist(), float(np.sign(values.mean())) or 1.0
-        return _OF_EFFORT[name](_View(columns, values, sign, self.places[at], self.nominal.target), limits)
+        return _OF_EFFORT[name](_WindowEffort(columns, values, sign, self.places[at], self.nominal.target), limits)
 
     def rows_of(self) -> RequirementRows:
         """Return all rows."""
@@ -161,7 +161,7 @@ class _RowsOfMargins:
 
 
 @dataclass(frozen=True)
-class _View:
+class _WindowEffort:
     """The effort on one branch in one window: its columns, its values in the design and its sign."""
 
     columns: list[int]
@@ -182,33 +182,33 @@ class _View:
         return np.asarray(weights / widths.sum())
 
 
-_Lines = list[tuple[dict[int, float], float]]
+_Inequalities = list[tuple[dict[int, float], float]]
 
 
-def _pairs(view: _View, above: float, below: float) -> _Lines:
+def _pairs(view: _WindowEffort, above: float, below: float) -> _Inequalities:
     """Return sign (above F_j - below F_i) >= 0 for all pairs."""
     return [({i: -view.sign * below, j: view.sign * above}, 0.0) for i in view.columns for j in view.columns if i != j]
 
 
-def _half_band(view: _View, limits: Bounds) -> _Lines | None:
+def _half_band(view: _WindowEffort, limits: Bounds) -> _Inequalities | None:
     return None if limits.max is None or limits.min else _pairs(view, 1.0 + limits.max, 1.0 - limits.max)
 
 
-def _ripple(view: _View, limits: Bounds) -> _Lines | None:
+def _ripple(view: _WindowEffort, limits: Bounds) -> _Inequalities | None:
     return None if limits.max is None or limits.min else _pairs(view, 1.0, 1.0 - limits.max)
 
 
-def _from_target(view: _View, limits: Bounds) -> _Lines | None:
+def _from_target(view: _WindowEffort, limits: Bounds) -> _Inequalities | None:
     if limits.max is None or limits.min or not view.target:
         return None
     reach, target = limits.max * abs(view.target), view.target
     return [({i: -sign}, reach + sign * target) for i in view.columns for sign in (1.0, -1.0)]
 
 
-def _from_mean(view: _View, limits: Bounds) -> _Lines | None:
+def _from_mean(view: _WindowEffort, limits: Bounds) -> _Inequalities | None:
     if limits.max is None or limits.min:
         return None
-    lines: _Lines = []
+    lines: _Inequalities = []
     for i in view.columns:
         for sign in (1.0, -1.0):
             row = {
@@ -219,25 +219,25 @@ def _from_mean(view: _View, limits: Bounds) -> _Lines | None:
     return lines
 
 
-def _mean(view: _View, limits: Bounds) -> _Lines:
+def _mean(view: _WindowEffort, limits: Bounds) -> _Inequalities:
     row = dict(zip(view.columns, view.weights.tolist(), strict=True))
-    lines: _Lines = [] if limits.min is None else [(row, -limits.min)]
+    lines: _Inequalities = [] if limits.min is None else [(row, -limits.min)]
     return lines if limits.max is None else [*lines, ({j: -w for j, w in row.items()}, limits.max)]
 
 
-def _largest(view: _View, limits: Bounds) -> _Lines:
+def _largest(view: _WindowEffort, limits: Bounds) -> _Inequalities:
     top = view.columns[int(view.values.argmax())]
-    lines: _Lines = [] if limits.max is None else [({i: -1.0}, limits.max) for i in view.columns]
+    lines: _Inequalities = [] if limits.max is None else [({i: -1.0}, limits.max) for i in view.columns]
     return lines if limits.min is None else [*lines, ({top: 1.0}, -limits.min)]
 
 
-def _smallest(view: _View, limits: Bounds) -> _Lines:
+def _smallest(view: _WindowEffort, limits: Bounds) -> _Inequalities:
     bottom = view.columns[int(view.values.argmin())]
-    lines: _Lines = [] if limits.min is None else [({i: 1.0}, -limits.min) for i in view.columns]
+    lines: _Inequalities = [] if limits.min is None else [({i: 1.0}, -limits.min) for i in view.columns]
     return lines if limits.max is None else [*lines, ({bottom: -1.0}, limits.max)]
 
 
-_OF_EFFORT: Mapping[str, Callable[[_View, Bounds], _Lines | None]] = {
+_OF_EFFORT: Mapping[str, Callable[[_WindowEffort, Bounds], _Inequalities | None]] = {
     "half_band": _half_band,
     "force_ripple": _ripple,
     "deviation_from_target": _from_target,
@@ -284,7 +284,7 @@ def places_of(nominal: Result) -> FloatArray:
 def requirement_rows(nominal: Result, spec: Spec, run: Run) -> RequirementRows | None:
     """Return the requirements on a specification, whose result is known; None if it is not followed at a few poses."""
     places = places_of(nominal)
-    first = sampled_of(spec, places, run)
+    first = sample_part(spec, places, run)
     return None if first is None else rows_of(nominal, first, places)
 
 
@@ -296,27 +296,27 @@ def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> RequirementR
     return builder.rows_of()
 
 
-def sampled_of(spec: Spec, places: FloatArray, run: Run, reached: tuple[float, ...] = ()) -> Sampled | None:
+def sample_part(spec: Spec, places: FloatArray, run: Run, reached: tuple[float, ...] = ()) -> Sampled | None:
     """Return effort and stress of a part at places: by the family's quick way, else from its analysis.
 
     Where its curve ends a little earlier they are those at its end; None if it does not get to what must be reached.
     """
-    sampled = quickly_sampled(spec, places)
+    sampled = sample_quickly(spec, places)
     if sampled is not None:
         return sampled
-    return sampled_on_curves(family(spec.family).analyze(spec, run), places, reached)
+    return sample_curves(family(spec.family).analyze(spec, run), places, reached)
 
 
-def quickly_sampled(spec: Spec, places: FloatArray) -> Sampled | None:
+def sample_quickly(spec: Spec, places: FloatArray) -> Sampled | None:
     """Return effort and stress of a part at places by the family's quick way; None if it has none."""
     quick = family(spec.family).sample
     return None if quick is None else quick(spec, places)
 
 
-def sampled_on_curves(result: Result, places: FloatArray, reached: tuple[float, ...]) -> Sampled | None:
-    """Return effort and stress at places of the curves of a part, as `sampled_of` does."""
+def sample_curves(result: Result, places: FloatArray, reached: tuple[float, ...]) -> Sampled | None:
+    """Return effort and stress at places of the curves of a part, as `sample_part` does."""
     branches = SingleRow(result).branches
-    if result.status is not Status.COMPLETE or not _get_to(branches, places, reached).all():
+    if result.status is not Status.COMPLETE or not _reach(branches, places, reached).all():
         return None
     if any((np.diff(curves.samples.motion[0]) <= 0).any() for curves in branches.values()):
         return None
@@ -328,7 +328,7 @@ def sampled_on_curves(result: Result, places: FloatArray, reached: tuple[float, 
     return Sampled({name: values[0] for name, values in effort.items()}, largest)
 
 
-def _get_to(branches: Mapping[str, CurveRows], places: FloatArray, reached: tuple[float, ...]) -> NDArray[np.bool_]:
+def _reach(branches: Mapping[str, CurveRows], places: FloatArray, reached: tuple[float, ...]) -> NDArray[np.bool_]:
     """Return which curves have points, and get to all places that must be reached, on every branch."""
     slack = 1e-9 * float(places[-1] - places[0])
     is_reached = np.array([bool(branches)])
@@ -376,11 +376,11 @@ def numbers_in(seen: Sampled) -> FloatArray:
 
 
 def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float, ...] = ()) -> FloatArray | None:
-    """Return what rows look at of a part, (q,); None if it has no such numbers; `reached`: see `sampled_of`."""
-    sampled, result = quickly_sampled(spec, rows.places), None
+    """Return what rows look at of a part, (q,); None if it has no such numbers; `reached`: see `sample_part`."""
+    sampled, result = sample_quickly(spec, rows.places), None
     if sampled is None:
-        result = _looked_at(spec, rows, run)
-        sampled = sampled_on_curves(result, rows.places, reached)
+        result = _analyze_part(spec, rows, run)
+        sampled = sample_curves(result, rows.places, reached)
     if not _has_columns(sampled, rows):
         return None
     if not rows.metrics:
@@ -432,7 +432,7 @@ def _numbers_in_rows(
             numbers = np.hstack([*sampled[0].values(), *sampled[1], noted.values])
             good = solved.complete & np.isfinite(numbers).all(axis=1)
             good[list(noted.odd)] = False
-            is_reached = _get_to(solved.branches, rows.places, reached)
+            is_reached = _reach(solved.branches, rows.places, reached)
             for row in np.flatnonzero(good).tolist():
                 yield int(members[row]), numbers[row] if is_reached[row] else None
 
@@ -440,9 +440,9 @@ def _numbers_in_rows(
 def numbers_of_known(result: Result, quick: Sampled | None, rows: RequirementRows) -> FloatArray | None:
     """Return `numbers_of` a part whose analysis is known: nothing is solved again; stated windows must be reached.
 
-    `quick`: what `quickly_sampled` says of it at the places of the rows; None of a family without a quick way.
+    `quick`: what `sample_quickly` says of it at the places of the rows; None of a family without a quick way.
     """
-    sampled = sampled_on_curves(result, rows.places, stated_places(result.spec)) if quick is None else quick
+    sampled = sample_curves(result, rows.places, stated_places(result.spec)) if quick is None else quick
     if not _has_columns(sampled, rows):
         return None
     return np.concatenate([numbers_in(sampled), metrics_in(result, rows)]) if rows.metrics else numbers_in(sampled)
@@ -463,7 +463,7 @@ def _has_columns(sampled: Sampled | None, rows: RequirementRows) -> TypeGuard[Sa
     return sampled is not None and tuple(sampled.effort) == rows.branches and len(sampled.stress) == rows.stresses
 
 
-def _looked_at(spec: Spec, rows: RequirementRows, run: Run) -> Result:
+def _analyze_part(spec: Spec, rows: RequirementRows, run: Run) -> Result:
     """Return the analysis of a part, with the sizes of its box if rows look at them."""
     record = family(spec.family)
     return record.with_envelope(record.analyze(spec, run), [metric.name for metric in rows.metrics])
@@ -471,7 +471,7 @@ def _looked_at(spec: Spec, rows: RequirementRows, run: Run) -> Result:
 
 def metrics_of_part(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray | None:
     """Return the last of these numbers alone, metrics of a whole analysis; None of a part without a curve."""
-    result = _looked_at(spec, rows, run)
+    result = _analyze_part(spec, rows, run)
     return metrics_in(result, rows) if result.curves else None
 
 

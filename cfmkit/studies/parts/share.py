@@ -1,4 +1,4 @@
-"""A yield, counted in parts, and its confidence intervals.
+"""A yield counted in parts, with its confidence intervals, and the interval of a difference of two yields.
 
 Reference
 ---------

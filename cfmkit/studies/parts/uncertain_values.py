@@ -183,9 +183,9 @@ def _group_faults(block: Sensitivity, paths: Sequence[str]) -> Iterator[tuple[Pl
     for index, group in enumerate(block.correlated):
         for number, name in enumerate(group.parameters):
             if not _members(name, paths):
-                known = ", ".join(block.parameters)
+                stated_names = ", ".join(block.parameters)
                 place = ("sensitivity", "correlated", index, "parameters", number)
-                yield place, f"{name!r} is not among the parameters: {known}"
+                yield place, f"{name!r} is not among the parameters: {stated_names}"
         if len({k for name in group.parameters for k in _members(name, paths)}) == 1:
             yield ("sensitivity", "correlated", index), "a correlation needs at least two parameters"
     try:

@@ -1,4 +1,4 @@
-"""Samples through the engine: points in, outputs out, every row kept for results.csv."""
+"""Evaluates the samples of a sensitivity study by the engine; every row is kept for results.csv."""
 
 from __future__ import annotations
 

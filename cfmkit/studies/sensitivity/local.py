@@ -114,7 +114,7 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     half = (setup.ends[:, 1] - setup.ends[:, 0]) / 2.0
     points = sample(setup.values, half)
     count = len(half)
-    exact = _exact(setup)
+    exact = _known_derivatives(setup)
     width = len(setup.study.metrics) + len(setup.study.spec.part_requirements)
     outputs = np.full((count, 2, N_STEP_LEVELS, width), np.nan)
     if not _all_known(setup, exact):
@@ -134,7 +134,7 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     return Findings(setup, evaluator, tuple(index_lines), points=points, outputs=outputs)
 
 
-def _exact(setup: Setup) -> Mapping[str, Mapping[str, float]]:
+def _known_derivatives(setup: Setup) -> Mapping[str, Mapping[str, float]]:
     """Return the derivatives that the family knows in closed form: metric -> path -> SI value."""
     gradient = family(setup.study.spec.family).gradient
     if gradient is None or setup.study.design:

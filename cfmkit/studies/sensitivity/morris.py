@@ -26,7 +26,7 @@ from cfmkit.studies.sensitivity.result_types import (
     IndexLine,
     analyze_complete,
     lines_of,
-    problem,
+    salib_problem,
 )
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def sample(
     from SALib.sample import morris
 
     generator = np.random.default_rng([seed, start])
-    points = morris.sample(problem(parameters), count, num_levels=N_GRID_LEVELS, seed=generator)
+    points = morris.sample(salib_problem(parameters), count, num_levels=N_GRID_LEVELS, seed=generator)
     return np.asarray(points).reshape(count, parameters + 1, parameters)
 
 
@@ -73,7 +73,7 @@ def analyze(points: FloatArray, outputs: FloatArray, seed: int) -> Analysis:
 
     count = points.shape[2]
     indices = morris.analyze(
-        problem(count),
+        salib_problem(count),
         points.reshape(-1, count),
         outputs.ravel(),
         num_resamples=N_RESAMPLES,

@@ -55,12 +55,12 @@ def analyze_complete(
     return unstated_indices(names, count) if np.isnan(outputs).any() else analyze(outputs)
 
 
-def problem(count: int) -> dict[str, Any]:
+def salib_problem(count: int) -> dict[str, Any]:
     """Return a unit cube as SALib wants it described."""
     return {"num_vars": count, "names": [str(k) for k in range(count)], "bounds": [[0.0, 1.0]] * count}
 
 
-def varies_not(outputs: FloatArray) -> bool:
+def is_constant(outputs: FloatArray) -> bool:
     """Return whether all outputs are the same, but for rounding."""
     return bool(np.ptp(outputs) <= CONSTANT_OUTPUT_RTOL * np.abs(outputs).max())
 
@@ -112,7 +112,7 @@ class Findings:
             return ()
         columns = self.outputs.reshape(-1, self.outputs.shape[-1]).T
         pairs = zip(self.setup.study.metrics, columns, strict=False)
-        return tuple(metric.label for metric, column in pairs if varies_not(column))
+        return tuple(metric.label for metric, column in pairs if is_constant(column))
 
     @property
     def lacking(self) -> int:

@@ -114,7 +114,7 @@ class Setup:
         mine = [
             requirement
             for requirement in self.study.spec.part_requirements
-            if _note_ends(requirement) == (metric.name, metric.over)
+            if _metric_and_window(requirement) == (metric.name, metric.over)
         ]
         return tuple(Bounds.from_requirement(requirement, metric.dimension) for requirement in mine)
 
@@ -136,7 +136,7 @@ def prepare(
     samples = block.samples or METHOD_NAMES[block.method].default_samples
     parts = Parts.from_block(spec, block, samples, chosen)
     parameters, paths = parts.parameters, parts.paths
-    _suits(spec, block, parameters)
+    _check_method(spec, block, parameters)
     groups = together(block, paths)
     method = method_named(block.method)
     refuse_too_many(method.count_points(samples, len(paths), len(groups)), most)
@@ -144,11 +144,11 @@ def prepare(
     result = _solve_nominal(study)
     study = replace(study, metrics=_metrics(spec, block, result.curves[0] if result.curves else None))
     study, nominal, unvalued = _with_nominal(study, result)
-    warnings = (*unvalued, *_cautions(spec, block, parameters, samples))
+    warnings = (*unvalued, *_list_cautions(spec, block, parameters, samples))
     return Setup(block, parts, study, nominal, groups, warnings)
 
 
-def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) -> None:
+def _check_method(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) -> None:
     """Raise if method and parameters do not go together."""
     if block.method == "inverse" and not spec.part_requirements:
         lacking = "finds the tolerances that keep a yield: give 'requirements' that a part meets or misses"
@@ -170,7 +170,7 @@ def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) ->
         )
 
 
-def _note_ends(requirement: Requirement) -> tuple[str, Ends | None]:
+def _metric_and_window(requirement: Requirement) -> tuple[str, Ends | None]:
     return requirement.metric, requirement.over
 
 
@@ -178,7 +178,7 @@ def _metrics(spec: Spec, block: Sensitivity, sample: Curve | None) -> tuple[Metr
     """Return the metrics that are requested; else those of the requirements, over their windows; else all."""
     if block.metrics or not spec.part_requirements:
         return _numeric(metrics_of(spec, block.metrics, sample), block)
-    wanted = dict.fromkeys(map(_note_ends, spec.part_requirements))
+    wanted = dict.fromkeys(map(_metric_and_window, spec.part_requirements))
     plain = {metric.name: metric for metric in metrics_of(spec, [name for name, _ in wanted], sample)}
     motion = sample.motion_dimension if sample is not None else "length"
     labels = {
@@ -242,7 +242,9 @@ def _valueless(study: Study, result: Result) -> Iterator[tuple[Metric, Quantity]
             yield metric, item
 
 
-def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...], samples: int) -> Iterator[Finding]:
+def _list_cautions(
+    spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...], samples: int
+) -> Iterator[Finding]:
     if block.correlated and not method_named(block.method).draws_parts:
         reported = f"{block.method} varies every parameter by itself: 'correlated' is for the method tolerance"
         yield Finding("correlation_not_used", reported)
@@ -251,10 +253,10 @@ def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...],
         yield Finding("unbalanced", f"{samples} is not a power of two: Sobol sequences are balanced at 64, 128, 256")
     if method_named(block.method).draws_parts and not spec.part_requirements:
         yield Finding("no_requirements", "without requirements there is no yield, only distributions")
-    yield from _followers(spec, parameters)
+    yield from _warn_of_derived_values(spec, parameters)
 
 
-def _followers(spec: Spec, parameters: tuple[Parameter, ...]) -> Iterator[Finding]:
+def _warn_of_derived_values(spec: Spec, parameters: tuple[Parameter, ...]) -> Iterator[Finding]:
     """Yield what is derived from a parameter: not a deviation of one made part, but another part each time."""
     resolve = family(spec.family).resolve
     base = dict(resolve(spec).leaves())

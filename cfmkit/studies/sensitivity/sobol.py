@@ -24,10 +24,10 @@ from cfmkit.studies.sensitivity.result_types import (
     Index,
     IndexLine,
     analyze_complete,
+    is_constant,
     lines_of,
-    problem,
+    salib_problem,
     unstated_indices,
-    varies_not,
 )
 
 if TYPE_CHECKING:
@@ -72,13 +72,13 @@ def analyze(outputs: FloatArray, seed: int) -> Analysis:
         Of the bootstrap.
     """
     count = outputs.shape[1] - 2
-    if varies_not(outputs):
+    if is_constant(outputs):
         return unstated_indices(INDEX_NAMES, count)
     from SALib.analyze import sobol
 
     # SALib takes a seed of zero for none.
     indices = sobol.analyze(
-        problem(count), outputs.ravel(), calc_second_order=False, num_resamples=N_RESAMPLES, seed=seed + 1
+        salib_problem(count), outputs.ravel(), calc_second_order=False, num_resamples=N_RESAMPLES, seed=seed + 1
     )
     return tuple(
         _index(name, indices[key], indices[f"{key}_conf"]) for name, key in zip(INDEX_NAMES, ("S1", "ST"), strict=True)

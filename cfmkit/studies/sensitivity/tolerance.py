@@ -26,8 +26,8 @@ from cfmkit.studies.sensitivity.result_types import (
     Index,
     IndexLine,
     analyze_complete,
+    is_constant,
     lines_of,
-    varies_not,
 )
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def variance_drops(
 ) -> Analysis:
     """Return by which share the variance of an output falls when each group is tightened."""
     groups = outputs.shape[1] - 1
-    if len(outputs) < 2 or varies_not(outputs[:, 0]):
+    if len(outputs) < 2 or is_constant(outputs[:, 0]):
         gap = np.full(groups, np.nan)
         return (Index(VARIANCE_DROP, gap, gap, gap),)
     count, generator = len(outputs), np.random.default_rng([seed, 2])

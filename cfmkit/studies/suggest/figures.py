@@ -1,4 +1,4 @@
-"""The figure of what came of a request: all proposals to one scale in the envelope."""
+"""The picture of all proposals of a request: each as it is made, to one scale, in the envelope."""
 
 from __future__ import annotations
 
@@ -65,25 +65,25 @@ def to_one_scale(
         )
         if links:
             name.set_url(links[number])
-            _cover(ax, links[number])
+            _link_axes(ax, links[number])
     figure.text(
         0.02,
         1.0 - 5.0 / total,
-        "Proposals in the envelope, same scale" + _left_out(proposals),
+        "Proposals in the envelope, same scale" + _count_left_out(proposals),
         fontsize=NORMAL_FONT,
     )
     figure.text(0.02, 1.5 / total, _scale_reported(request), fontsize=SMALL_FONT, color=TEXT_GREY)
     return figure
 
 
-def _cover(ax: Axes, link: str) -> None:
+def _link_axes(ax: Axes, link: str) -> None:
     """Lay over axes what leads to a link where it is clicked."""
     from matplotlib.patches import Rectangle
 
     ax.add_patch(Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, alpha=0.0, zorder=9, url=link))
 
 
-def _left_out(proposals: Sequence[Proposal]) -> str:
+def _count_left_out(proposals: Sequence[Proposal]) -> str:
     """Return how many proposals a picture leaves to the table; nothing if it shows all."""
     more = len(proposals) - MAX_DRAWN_PROPOSALS
     return f" (the first {MAX_DRAWN_PROPOSALS}; {more} more in the table)" if more > 0 else ""

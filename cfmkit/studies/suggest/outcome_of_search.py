@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Answered:
+class FamilyAnswer:
     """Candidates of one family: how many it named and how many were made, or why there are none.
 
     Where no family has a mechanism, `nearest` says with which values of a key it would have one.
@@ -36,8 +36,8 @@ class Suggestions:
     request: Request
     # those that do all that is required, judged by the finest model of their family, the best first
     proposals: tuple[Proposal, ...]
-    near: tuple[Proposal, ...]  # those that miss one request, at most two a family
-    answers: tuple[Answered, ...]  # of every family that was asked
+    near_misses: tuple[Proposal, ...]  # those that miss one request, at most two a family
+    answers: tuple[FamilyAnswer, ...]  # of every family that was asked
     # family -> why nothing came of candidates, each reason once
     failed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     late: bool = False  # whether the time budget ended the search
@@ -58,7 +58,7 @@ class Suggestions:
             return ExitCode.OK
         reasons = [answer.offer.reason for answer in self.answers if answer.offer.reason]
         reasons += [reason for reasons_of_family in self.failed.values() for reason in reasons_of_family]
-        if self.bugs and not self.near and all(reason.startswith(BUG_PREFIX) for reason in reasons):
+        if self.bugs and not self.near_misses and all(reason.startswith(BUG_PREFIX) for reason in reasons):
             return ExitCode.BUG
         return ExitCode.PARTIAL if self.late or self.unjudged else ExitCode.NO_SOLUTION
 

@@ -52,7 +52,7 @@ from cfmkit.studies.suggest.yield_of_proposal import (
     GoodParts,
     MovedForYield,
     good_parts,
-    moved_for_yield,
+    move_for_yield,
     with_made_parts,
 )
 
@@ -79,8 +79,8 @@ MAX_CORRECTIONS = 2  # how often a part is corrected by its finest model: what i
 class ProposalJob:
     """A candidate of a family that is to be made and judged against a request before a deadline, in `time.time` [s].
 
-    `near`: what came of it, to be designed again with margins for the yield that is all it misses, or, where a finer
-    model is `pending`, to be corrected and judged by that one.
+    `earlier`: what came of it before, to be designed again with margins for the yield that is all it misses, or, where
+    a finer model is `pending`, to be corrected and judged by that one.
     """
 
     family: str
@@ -88,7 +88,7 @@ class ProposalJob:
     request: Request
     seed: int
     deadline: float | None = None
-    near: Proposal | None = None
+    earlier: Proposal | None = None
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class Proposal:
     pending: str = ""  # the finest model of its family that can run it and did not yet; empty if it did
     warnings: tuple[str, ...] = ()  # names of what its analysis warns of, with the number that counts
     seconds: float = 0.0  # that its analysis took
-    own: str = ""  # the model that its family designs with, where another one judged it: its yield is by that one
+    design_model: str = ""  # that of its family, where another one judged it: its yield is by that of the design
 
     @property
     def passes(self) -> bool:
@@ -147,7 +147,7 @@ class Proposal:
         return f"open: {', '.join(dict.fromkeys(topics))}" if topics else "meets"
 
     @property
-    def near(self) -> bool:
+    def is_near_miss(self) -> bool:
         """Whether it misses exactly one request."""
         return bool(self.text) and len(self.missed) == 1
 
@@ -163,7 +163,7 @@ class Proposal:
             "fails": list(self.fails), "message": self.message, "numbers": dict(self.numbers),
             "notes": list(self.notes), "movable": self.movable,
             "unjudged": list(self.unjudged), "model": self.model, "pending": self.pending,
-            "warnings": list(self.warnings), "seconds": self.seconds, "own": self.own,
+            "warnings": list(self.warnings), "seconds": self.seconds, "design_model": self.design_model,
         }  # fmt: skip
 
     @classmethod
@@ -182,10 +182,10 @@ def make_proposal(job: ProposalJob) -> Proposal:
     """Return what becomes of a candidate; what its design or model refuses is its message, a bug is raised."""
     candidate, clock = job.candidate, Clock(job.deadline)
     try:
-        if job.near is not None and job.near.pending and job.near.passes:
-            return _judge_by_finest_model(job, job.near, clock)
-        if job.near is not None:
-            return _with_margins(job, job.near, clock)
+        if job.earlier is not None and job.earlier.pending and job.earlier.passes:
+            return _judge_by_finest_model(job, job.earlier, clock)
+        if job.earlier is not None:
+            return _with_margins(job, job.earlier, clock)
         spec, reported = _design_candidate(job, clock)
         if spec is None:
             return Proposal(job.family, candidate.variant, message=reported)
@@ -232,46 +232,49 @@ FIDELITY_KEY = "analysis.fidelity"
 def use_own_model(proposal: Proposal) -> Spec:
     """Return a proposal's specification with the model of its design: faster, and enough for pictures."""
     spec = proposal.spec
-    return spec if proposal.own in ("", proposal.model) else spec.replace({FIDELITY_KEY: proposal.own})
+    model = proposal.design_model
+    return spec if model in ("", proposal.model) else spec.replace({FIDELITY_KEY: model})
 
 
-def _judge_by_finest_model(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
+def _judge_by_finest_model(job: ProposalJob, earlier: Proposal, clock: Clock) -> Proposal:
     """Return a proposal corrected and judged by the finest model of its family; the last of those that miss least."""
-    spec, best, correct = remove_end_stop(near.spec, job.request), None, job.candidate.correct
+    spec, best, correct = remove_end_stop(earlier.spec, job.request), None, job.candidate.correct
     aimed = replace(job.request, safety=MESH_MARGIN * job.request.safety)
     for _ in range(MAX_CORRECTIONS if correct else 1):
         if clock.late():
             break
-        made = correct(spec, aimed) if correct else spec.replace({FIDELITY_KEY: near.pending})
+        made = correct(spec, aimed) if correct else spec.replace({FIDELITY_KEY: earlier.pending})
         if clock.late():
             break
-        judged = judge_proposal(job.family, near.variant, made, job.request, job.seed, clock, near)
+        judged = judge_proposal(job.family, earlier.variant, made, job.request, job.seed, clock, earlier)
         if best is None or (judged.text and len(judged.missed) <= len(best.missed)):
             best = judged
         if judged.passes or not judged.text:
             break
         spec = remove_end_stop(use_own_model(judged), job.request)
-    return Proposal(job.family, near.variant, message=OUT_OF_TIME) if best is None else best
+    return Proposal(job.family, earlier.variant, message=OUT_OF_TIME) if best is None else best
 
 
-def _with_margins(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
+def _with_margins(job: ProposalJob, earlier: Proposal, clock: Clock) -> Proposal:
     """Return a proposal designed again for the required yield, or with what is missing of it."""
     if clock.late():
-        return Proposal(job.family, near.variant, message=OUT_OF_TIME)
+        return Proposal(job.family, earlier.variant, message=OUT_OF_TIME)
 
     def judge(spec: Spec) -> Proposal:
-        return judge_proposal(job.family, near.variant, spec, job.request, job.seed, clock)
+        return judge_proposal(job.family, earlier.variant, spec, job.request, job.seed, clock)
 
     redesigned = redesign_for_yield(
-        near, job.candidate, job.request, Run(job.seed, time_budget=clock.get_time_left()), judge
+        earlier, job.candidate, job.request, Run(job.seed, time_budget=clock.get_time_left()), judge
     )
     return (
-        redesigned if redesigned.good or not clock.late() else Proposal(job.family, near.variant, message=OUT_OF_TIME)
+        redesigned
+        if redesigned.good or not clock.late()
+        else Proposal(job.family, earlier.variant, message=OUT_OF_TIME)
     )
 
 
 def redesign_for_yield(
-    near: Proposal,  # which misses the yield alone
+    earlier: Proposal,  # which misses the yield alone
     candidate: Candidate,  # what it was made of
     request: Request,  # with a share of good parts
     run: Run,  # seed, and how long it may take
@@ -280,10 +283,10 @@ def redesign_for_yield(
     """Return a proposal of the required yield, else the best found, with what is missing of it."""
     clock = Clock.from_budgets(run.time_budget)
     wanted = asked = float(request.stated.min_yield or 0.0)
-    best, spec, last, obstacle = near, near.spec, None, ""
+    best, spec, last, obstacle = earlier, earlier.spec, None, ""
     for _ in range(MAX_YIELD_TRIES):
         run = replace(run, time_budget=clock.get_time_left())
-        moved = None if clock.late() else moved_for_yield(candidate, spec, request, asked, run)
+        moved = None if clock.late() else move_for_yield(candidate, spec, request, asked, run)
         if moved is None:
             break
         last, judged = moved, judge(moved.spec)
@@ -330,7 +333,7 @@ def judge_proposal(
     clock: Clock = UNLIMITED_CLOCK,  # late, no more parts are drawn
     # what its family's own model made of it, where another one is to judge it. Its share of good parts is kept: a solid
     # takes too long to be solved a hundred times
-    near: Proposal | None = None,
+    earlier: Proposal | None = None,
 ) -> Proposal:
     """Return a specification as a proposal: it is written with the request as its requirements, read, analysed, judged.
 
@@ -340,7 +343,7 @@ def judge_proposal(
     record = family(name)
     called = variant.replace(" ", "-").replace(",", "")
     # read back from its text: what is judged is what stands in the file
-    spec = add_process_and_materials(spec, request) if near is None else add_screws(record, spec)
+    spec = add_process_and_materials(spec, request) if earlier is None else add_screws(record, spec)
     spec = add_end_stop(round_to_process(spec, request, decimals_of(accuracy_of(spec))), request)
     plain = spec_of(name, dump(spec.replace({"design": None, "name": called})))
     begun = time.perf_counter()
@@ -370,16 +373,16 @@ def judge_proposal(
     numbers, movable = numbers_of(result, space, request), False
     warnings = {item.name: f"{item.name}: {item.short}" if item.short else item.name for item in result.warnings}
     if "wide_beam" in warnings and not misses:
-        coarser = written if near is None else written.replace({FIDELITY_KEY: near.model})
+        coarser = written if earlier is None else written.replace({FIDELITY_KEY: earlier.model})
         numbers["stiffening"] = raised = stiffening(coarser, record.analyze)
         warnings["wide_beam"] = f"wide_beam {100.0 * raised:+.2g} %"
         # what its finest model is still to correct may come down to the lower end of the band
         beyond = raised_out(request, request.low if pending else largest_force(request, result), raised)
         misses += [("force", text) for text in beyond]
-    if near is not None:
-        numbers["yield"] = near.numbers.get("yield")
+    if earlier is not None:
+        numbers["yield"] = earlier.numbers.get("yield")
         if request.stated.min_yield is not None:
-            warnings["yield"] = f"yield by the {near.model} model"
+            warnings["yield"] = f"yield by the {earlier.model} model"
     elif request.stated.min_yield is not None and len(misses) <= 1:
         parts: GoodParts = good_parts(replace(result, spec=written), request, clock, draw=not misses)
         if parts.late:
@@ -393,7 +396,7 @@ def judge_proposal(
         notes=(*note_end_stop(request, result, numbers["depth"]), *too_thin(written), *_notes(space, result)),
         movable=movable, unjudged=tuple(list_unjudged(request, result)),
         model=model_of(name, written), pending=pending, warnings=tuple(warnings.values()), seconds=seconds,
-        own=near.model if near else "",
+        design_model=earlier.model if earlier else "",
     )  # fmt: skip
 
 
@@ -418,8 +421,8 @@ def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> d
     lost, mechanism = worst("hysteresis_area"), result.spec.get_value("mechanism")
     rubs = not hasattr(mechanism, "pins") or any(_friction(mechanism, name) for name in RUBBING_BLOCKS)
     means = {key: quantity.value for key, quantity in quantities.items() if key.partition("[")[0] == f"{kind}_mean"}
-    each = [value for key, value in means.items() if value is not None and ("[" in key or len(means) == 1)]
-    mean = float(np.mean(each)) if each else None
+    means_of_branches = [value for key, value in means.items() if value is not None and ("[" in key or len(means) == 1)]
+    mean = float(np.mean(means_of_branches)) if means_of_branches else None
     return {
         "mean": mean,
         "ripple": worst(f"{kind}_ripple"),

@@ -50,29 +50,29 @@ def edges(request: Request, names: Sequence[str], seed: int, clock: Clock) -> It
     Families that have candidates already, of which none is good, come first: a little more of any key may be enough.
     """
     relaxations = _relaxations(request)
-    reachable = [name for name in names if not clock.late() and _offer(request, name, seed)]
+    reachable = [name for name in names if not clock.late() and _list_candidates(request, name, seed)]
     yield from (Edge(name, key, 1.0) for name in reachable for key in relaxations)
     pairs = [(name, key) for name in names if name not in reachable for key in relaxations]
     left = [
         (name, key)
         for name, key in pairs
-        if not clock.late() and _offers(request, name, relaxations[key], LAST_FACTOR, seed)
+        if not clock.late() and _has_candidates(request, name, relaxations[key], LAST_FACTOR, seed)
     ]
     below = 1.0
     for factor in (*RELAXATION_FACTORS, LAST_FACTOR):
         for name, key in tuple(left):
             if clock.late():
                 return
-            if factor == LAST_FACTOR or _offers(request, name, relaxations[key], factor, seed):
+            if factor == LAST_FACTOR or _has_candidates(request, name, relaxations[key], factor, seed):
                 left.remove((name, key))
                 yield Edge(name, key, _bisect(request, name, relaxations[key], (below, factor), seed))
         below = factor
 
 
-def _offers(request: Request, name: str, relaxation: Relaxation, factor: float, seed: int) -> bool:
+def _has_candidates(request: Request, name: str, relaxation: Relaxation, factor: float, seed: int) -> bool:
     """Return True if a family has candidates for a request that is relaxed by a factor."""
     relaxed = relaxation(request, factor)
-    return relaxed is not None and bool(_offer(relaxed[0], name, seed))
+    return relaxed is not None and bool(_list_candidates(relaxed[0], name, seed))
 
 
 def _bisect(request: Request, name: str, relaxation: Relaxation, ends: tuple[float, float], seed: int) -> float:
@@ -80,7 +80,7 @@ def _bisect(request: Request, name: str, relaxation: Relaxation, ends: tuple[flo
     below, factor = ends
     for _ in range(N_HALVINGS):
         middle = (below * factor) ** 0.5
-        has_some = _offers(request, name, relaxation, middle, seed)
+        has_some = _has_candidates(request, name, relaxation, middle, seed)
         below, factor = (below, middle) if has_some else (middle, factor)
     return factor
 
@@ -97,10 +97,10 @@ def confirm(request: Request, seed: int, clock: Clock, edge: Edge) -> str | None
         if relaxed is None:
             return None
         # the sides that were just enough by the laws may be too little: then all of them
-        apart = sides_apart and relaxation is _larger
-        choices = [_only_needed(request, (edge.family, seed), relaxed), relaxed] if apart else [relaxed]
+        apart = sides_apart and relaxation is _enlarge_envelope
+        choices = [_keep_unneeded_sides(request, (edge.family, seed), relaxed), relaxed] if apart else [relaxed]
         for asked, reported in choices[:1] if choices[0] == choices[-1] else choices:
-            candidates = _offer(asked, edge.family, seed)
+            candidates = _list_candidates(asked, edge.family, seed)
             if (
                 candidates
                 and make_proposal(ProposalJob(edge.family, candidates[0], asked, seed, clock.deadline)).passes
@@ -118,19 +118,19 @@ def confirm(request: Request, seed: int, clock: Clock, edge: Edge) -> str | None
 
 def _relaxations(request: Request) -> dict[str, Relaxation]:
     """Return what may be relaxed of a request, by key."""
-    relaxations: dict[str, Relaxation] = {"envelope": _larger, request.kind: _weaker}
-    relaxations["travel" if request.kind == "force" else "angle"] = _shorter
+    relaxations: dict[str, Relaxation] = {"envelope": _enlarge_envelope, request.kind: _weaken_effort}
+    relaxations["travel" if request.kind == "force" else "angle"] = _shorten_travel
     relaxations["ripple"] = _relax_ripple
     if request.safety > 1.0:
-        relaxations["safety"] = _less_safe
+        relaxations["safety"] = _lower_safety
     if request.hysteresis is not None:
-        relaxations["hysteresis"] = _lossy
+        relaxations["hysteresis"] = _relax_hysteresis
     if request.adjustable is not None:
-        relaxations["adjustable"] = _less_adjustable
+        relaxations["adjustable"] = _narrow_adjustment
     return relaxations
 
 
-def _offer(request: Request, name: str, seed: int) -> Sequence[Candidate]:
+def _list_candidates(request: Request, name: str, seed: int) -> Sequence[Candidate]:
     """Return a family's candidates, those first that probably fit."""
     propose = family(name).propose
     if not propose:
@@ -140,7 +140,7 @@ def _offer(request: Request, name: str, seed: int) -> Sequence[Candidate]:
     return sorted(candidates, key=lambda candidate: candidate.doubtful)
 
 
-def _only_needed(request: Request, asked: tuple[str, int], relaxed: Relaxed) -> Relaxed:
+def _keep_unneeded_sides(request: Request, asked: tuple[str, int], relaxed: Relaxed) -> Relaxed:
     """Return a relaxed envelope of which those sides are as they were that need not be larger."""
     for side in reversed(range(len(request.envelope))):
         sides = tuple(
@@ -150,7 +150,7 @@ def _only_needed(request: Request, asked: tuple[str, int], relaxed: Relaxed) -> 
         if request.travel >= sides[1] and request.kind == "force":
             continue
         fewer = _resize_envelope(request, sides)
-        if _offer(fewer[0], *asked):
+        if _list_candidates(fewer[0], *asked):
             relaxed = fewer
     return relaxed
 
@@ -170,11 +170,11 @@ def _resize_envelope(request: Request, sides: Sequence[float]) -> Relaxed:
     return replace(request, envelope=tuple(side for side, _ in pairs)), " x ".join(text for _, text in pairs)
 
 
-def _larger(request: Request, factor: float) -> Relaxed:
+def _enlarge_envelope(request: Request, factor: float) -> Relaxed:
     return _resize_envelope(request, [factor * side for side in request.envelope])
 
 
-def _weaker(request: Request, factor: float) -> Relaxed | None:
+def _weaken_effort(request: Request, factor: float) -> Relaxed | None:
     if request.adjustable is not None:
         return None
     digits = 6 if request.banded else 3
@@ -188,7 +188,7 @@ def _weaker(request: Request, factor: float) -> Relaxed | None:
     return replace(request, target=target, low=low, high=high), middle
 
 
-def _shorter(request: Request, factor: float) -> Relaxed:
+def _shorten_travel(request: Request, factor: float) -> Relaxed:
     travel, text = _round_written(request.travel / factor, "length" if request.kind == "force" else "angle")
     return replace(request, travel=travel), text
 
@@ -198,17 +198,17 @@ def _relax_ripple(request: Request, factor: float) -> Relaxed | None:
     return (replace(request, ripple=share), text) if (share := read_quantity(text, "ratio")) < MAX_RIPPLE else None
 
 
-def _less_safe(request: Request, factor: float) -> Relaxed | None:
+def _lower_safety(request: Request, factor: float) -> Relaxed | None:
     text = f"{request.safety / factor:.3g}"
     return (replace(request, safety=float(text)), text) if float(text) >= 1.0 else None
 
 
-def _lossy(request: Request, factor: float) -> Relaxed | None:
+def _relax_hysteresis(request: Request, factor: float) -> Relaxed | None:
     text = percent(factor * (request.hysteresis or 0.0))
     return (replace(request, hysteresis=share), text) if (share := read_quantity(text, "ratio")) < MAX_RIPPLE else None
 
 
-def _less_adjustable(request: Request, factor: float) -> Relaxed | None:
+def _narrow_adjustment(request: Request, factor: float) -> Relaxed | None:
     assert request.adjustable is not None
     pairs = [_round_written(request.target + (end - request.target) / factor, "force", 4) for end in request.adjustable]
     (low, first), (high, last) = pairs

@@ -138,10 +138,10 @@ def _require_box(request: Request, space: BoundingBox | None) -> Iterator[dict[s
         return
     width, height, depth = space.sides
     across, along = request.envelope[:2]
-    given = (along, across) if space.sideways else (across, along)
+    limits = (along, across) if space.sideways else (across, along)
     if request.kind == "torque":  # what turns may lie either way in the plane
-        given = (max(given), min(given)) if width >= height else (min(given), max(given))
-    sides = [*given, *((request.depth,) if request.depth is not None and depth is not None else ())]
+        limits = (max(limits), min(limits)) if width >= height else (min(limits), max(limits))
+    sides = [*limits, *((request.depth,) if request.depth is not None and depth is not None else ())]
     for name, most in zip(ENVELOPE_METRICS, sides, strict=False):
         yield {"metric": name, "max": format_short(most, "length", 12)}
 
@@ -270,21 +270,21 @@ def sides_outside(request: Request, space: BoundingBox | None) -> Iterator[str]:
         sides, envelope = sorted(sides), sorted(envelope)
     for name, need, have in zip(("across the travel", "along the travel"), sides, envelope, strict=True):
         if need > have * (1.0 + LENGTH_RTOL):
-            needed, given_side = _apart(need, have)
+            needed, given_side = _format_apart(need, have)
             yield f"needs {needed} {name}: {given_side} given"
     if request.depth is not None and space.depth is None:
         yield f"its depth is not known: {space.assumed}"
     elif request.depth is not None and space.depth is not None and space.depth > request.depth * (1.0 + LENGTH_RTOL):
-        needed, given_depth = _apart(space.depth, request.depth)
+        needed, given_depth = _format_apart(space.depth, request.depth)
         yield f"needs a depth of {needed}: {given_depth} given"
 
 
-def _apart(first: float, second: float) -> tuple[str, str]:
+def _format_apart(first: float, second: float) -> tuple[str, str]:
     """Return two lengths that differ with as many digits as it takes to see that they do.
 
     Examples
     --------
-    >>> _apart(0.012, 0.010), _apart(0.01000004, 0.010)
+    >>> _format_apart(0.012, 0.010), _format_apart(0.01000004, 0.010)
     (('12 mm', '10 mm'), ('10.00004 mm', '10 mm'))
     """
     for digits in range(4, 17):

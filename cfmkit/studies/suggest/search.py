@@ -1,4 +1,4 @@
-"""Collect candidates from every family, design them in rounds, and sort those that meet the requirements.
+"""Search of `suggest`: collects candidates of every family, makes them in rounds, orders those that meet the request.
 
 A round takes the next candidates of every family that has not enough proposals yet; what the next round takes depends
 on what came of the ones before, never on what finished first. So the same seed gives the same proposals however many
@@ -27,9 +27,9 @@ from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump
 from cfmkit.store.content_hashes_and_versions import code_stamp, stable_hash
 from cfmkit.studies.pool import give_up_at
-from cfmkit.studies.serial_and_cluster_executors import Lost, lost_to, surviving
+from cfmkit.studies.serial_and_cluster_executors import Lost, do_or_lose, lose_to_bug
 from cfmkit.studies.suggest.file_of_proposal import NO_END_STOP
-from cfmkit.studies.suggest.outcome_of_search import Answered, Suggestions
+from cfmkit.studies.suggest.outcome_of_search import FamilyAnswer, Suggestions
 from cfmkit.studies.suggest.proposal_making_and_judging import (
     ENDED_EARLY,
     OUT_OF_TIME,
@@ -106,7 +106,7 @@ def suggest(
     times, bugs = _Times.from_budget(run.time_budget, reserve), list[str]()
     answers, unasked = _answers(request, run, times.asking, bugs)
     queues = {answer.family: list(answer.offer.candidates) for answer in answers}
-    making = _Making(run, times, sum(map(len, queues.values())), bugs)
+    making = _MadeCandidates(run, times, sum(map(len, queues.values())), bugs)
     turn, cut, enough = 0, unasked, ENOUGH_PROPOSALS if request.stated.min_yield is None else ENOUGH_WITH_PARTS
     while not making.late() and (
         batch := list(_next(queues, making.done, ROUND_SIZES[min(turn, len(ROUND_SIZES) - 1)], enough))
@@ -122,13 +122,13 @@ def suggest(
     if not cut and not any(proposal.passes for proposal in done):
         answers, complete = _with_nearest(answers, request, run, times.without, bugs)
         remote = complete and not any(answer.nearest for answer in answers)
-    passing = distinct([proposal for proposal in done if proposal.passes])
+    passing = name_apart([proposal for proposal in done if proposal.passes])
     return Suggestions(
         request,
         tuple(order_proposals([proposal for proposal in passing if proposal.good], prefer)),
         tuple(_list_near_misses(done, request)),
         tuple(replace(proposal, made=counts[proposal.family]) for proposal in answers),
-        _failures(done),
+        _list_failures(done),
         cut or (making.late() and bool(list(_next(queues, done, 1, enough)))),
         making.reused,
         tuple(bugs),
@@ -145,7 +145,7 @@ def surviving_until(run: Run, deadline: float | None, bugs: list[str]) -> Execut
     executor = give_up_at(run.executor, deadline)
 
     def collect_bugs(work: Work, jobs: Iterator[Any], stopping: Stopping) -> Iterator[tuple[Any, Any]]:
-        for job, outcome in executor(partial(surviving, work), jobs, stopping):
+        for job, outcome in executor(partial(do_or_lose, work), jobs, stopping):
             if isinstance(outcome, Lost) and outcome.bug:
                 bugs.append(outcome.bug)
             yield job, outcome
@@ -153,7 +153,7 @@ def surviving_until(run: Run, deadline: float | None, bugs: list[str]) -> Execut
     return collect_bugs
 
 
-class _Making:
+class _MadeCandidates:
     """The candidates that were made, in the order in which they were requested."""
 
     def __init__(self, run: Run, times: _Times, total: int, bugs: list[str]) -> None:
@@ -186,7 +186,7 @@ class _Making:
                 # What ended early, crashed, or lost its process is not kept: it may succeed next time.
                 if not isinstance(outcome, Lost) and proposal.message != ENDED_EARLY:
                     notes.add(keys[index], proposal.as_record())
-            self._tried += jobs[index].near is None
+            self._tried += jobs[index].earlier is None
             made = (self._tried + self.reused) / max(self._total, 1)
             count = sum(proposal.good for proposal in self.done)
             run.progress(min(0.99, made), f"{count} proposal{'s' * (count != 1)}")
@@ -198,14 +198,14 @@ class _Making:
 
     def _take(self, job: ProposalJob, proposal: Proposal) -> None:
         """Keep what became of a candidate, in place of the near miss that it was designed again for."""
-        if job.near is None:
+        if job.earlier is None:
             self.done.append(proposal)
             self._jobs.append(job)
             return
-        at = next(k for k, proposal in enumerate(self.done) if proposal is job.near)
-        failed = replace(job.near, movable=False)
-        if job.near.passes and proposal.message:  # of its finest model, which cannot follow it
-            failed = replace(failed, text="", message=f"{job.near.pending} model: {proposal.message}")
+        at = next(k for k, proposal in enumerate(self.done) if proposal is job.earlier)
+        failed = replace(job.earlier, movable=False)
+        if job.earlier.passes and proposal.message:  # of its finest model, which cannot follow it
+            failed = replace(failed, text="", message=f"{job.earlier.pending} model: {proposal.message}")
         self.done[at] = proposal if proposal.text else failed
 
     def select_for_finest(self, enough: int) -> list[ProposalJob]:
@@ -214,7 +214,7 @@ class _Making:
         for name in dict.fromkeys(job.family for job in self._jobs):
             mine = [(job, proposal) for job, proposal in zip(self._jobs, self.done, strict=True) if job.family == name]
             lacking = enough - sum(proposal.settled for _, proposal in mine)
-            waiting = [replace(job, near=proposal) for job, proposal in mine if proposal.passes and proposal.pending]
+            waiting = [replace(job, earlier=proposal) for job, proposal in mine if proposal.passes and proposal.pending]
             rows.append(waiting[: max(lacking, 0)])
         longest = max(map(len, rows), default=0)
         return [row[k] for k in range(longest) for row in rows if k < len(row)]
@@ -227,13 +227,13 @@ class _Making:
             lacking = enough - sum(proposal.passes for _, proposal in mine)
             movable = [(job, proposal) for job, proposal in mine if proposal.movable]
             movable.sort(key=lambda pair: -float(pair[1].numbers["yield"] or 0.0))
-            jobs += [replace(job, near=proposal) for job, proposal in movable[: max(lacking, 0)]]
+            jobs += [replace(job, earlier=proposal) for job, proposal in movable[: max(lacking, 0)]]
         return jobs
 
 
 def _with_nearest(
-    answers: list[Answered], request: Request, run: Run, deadline: float | None, bugs: list[str]
-) -> tuple[list[Answered], bool]:
+    answers: list[FamilyAnswer], request: Request, run: Run, deadline: float | None, bugs: list[str]
+) -> tuple[list[FamilyAnswer], bool]:
     """Return answers with the nearest requests that a family could meet, and whether the time sufficed for all."""
     families = tuple(answer.family for answer in answers)
     key = stable_hash({"nearest": repr(request), "of": families, "seed": run.seed, "code": code_stamp()})[:32]
@@ -251,7 +251,7 @@ def _with_nearest(
                     keys.add(edge.key)
                     named.setdefault(edge.family, {}).setdefault(edge.key, outcome)
         except Exception as error:  # the laws of a family have a bug: what was found is kept
-            bugs.append(lost_to(error).bug)
+            bugs.append(lose_to_bug(error).bug)
         if clock.late():
             complete = False
         else:
@@ -272,7 +272,7 @@ def _proposal_or_loss(job: ProposalJob, outcome: Proposal | Lost) -> Proposal:
     )
 
 
-def _answers(request: Request, run: Run, deadline: float | None, bugs: list[str]) -> tuple[list[Answered], bool]:
+def _answers(request: Request, run: Run, deadline: float | None, bugs: list[str]) -> tuple[list[FamilyAnswer], bool]:
     """Return what the families have to say, in their order, and whether the time was up before all had."""
     asked = list(names())
     plain = Run(run.seed)
@@ -285,14 +285,14 @@ def _answers(request: Request, run: Run, deadline: float | None, bugs: list[str]
             timed_out = outcome.status is Status.TIMEOUT
             late |= timed_out
             outcome = FamilyOffer(reason=UNANSWERED_MESSAGE if timed_out else outcome.message)
-        answers.append(Answered(name, outcome))
+        answers.append(FamilyAnswer(name, outcome))
     return [answer for answer in answers if answer.offer.candidates or answer.offer.reason], late
 
 
 def _ask_family(request: Request, run: Run, name: str) -> FamilyOffer:
     try:
         record = family(name)
-    except Unusable:  # of another package; `families.skipped` says why
+    except Unusable:  # of another package; `families.list_skipped` says why
         return FamilyOffer()
     return offer_of(record, request, run)
 
@@ -344,7 +344,7 @@ def _key(job: ProposalJob) -> str:
         "spec": candidate.spec.model_dump(mode="json"), "suggest": repr(job.request), "seed": job.seed,
         "stated": job.request.stated.as_written(),
         "code": code_stamp(),
-        "again": job.near and job.near.text, "reserve": candidate.reserve,
+        "again": job.earlier and job.earlier.text, "reserve": candidate.reserve,
     }  # fmt: skip
     return stable_hash(content)[:32]
 
@@ -356,14 +356,14 @@ def _name_refinement(function: Any) -> str:
     return f"{function.__module__}.{function.__qualname__}" if function else ""
 
 
-def distinct(proposals: Sequence[Proposal]) -> list[Proposal]:
+def name_apart(proposals: Sequence[Proposal]) -> list[Proposal]:
     """Return proposals whose names tell them apart: equal ones get their size in the plane, then a number.
 
     Examples
     --------
     >>> from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
     >>> sizes = ({"across": 0.034, "along": 0.051}, {"across": 0.069, "along": 0.023})
-    >>> [one.variant for one in distinct([Proposal("cam", "2 springs", numbers=size) for size in sizes])]
+    >>> [one.variant for one in name_apart([Proposal("cam", "2 springs", numbers=size) for size in sizes])]
     ['2 springs, 34 x 51 mm', '2 springs, 69 x 23 mm']
     """
     count = Counter((proposal.family, proposal.variant) for proposal in proposals)
@@ -431,7 +431,7 @@ def _list_near_misses(done: Sequence[Proposal], request: Request) -> list[Propos
         family_misses = [
             proposal
             for proposal in done
-            if proposal.family == name and proposal.near and _nearly_fits(proposal, request)
+            if proposal.family == name and proposal.is_near_miss and _nearly_fits(proposal, request)
         ]
         near_misses += sorted(family_misses, key=lambda proposal: measure(proposal, "ripple"))[:2]
     return near_misses
@@ -445,11 +445,11 @@ def _nearly_fits(proposal: Proposal, request: Request) -> bool:
     return all(side <= MAX_OVERSIZE * most for side, most in zip(sides, allowed_sides, strict=True))
 
 
-def _failures(done: Sequence[Proposal]) -> dict[str, tuple[str, ...]]:
+def _list_failures(done: Sequence[Proposal]) -> dict[str, tuple[str, ...]]:
     """Return why nothing came of candidates, by family."""
     reasons: dict[str, tuple[str, ...]] = {}
     for proposal in done:
-        if not proposal.passes and not proposal.near:
+        if not proposal.passes and not proposal.is_near_miss:
             reported = proposal.message or "; ".join(proposal.missed)
             reasons[proposal.family] = tuple(dict.fromkeys((*reasons.get(proposal.family, ()), reported)))
     return reasons

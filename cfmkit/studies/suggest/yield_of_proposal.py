@@ -103,18 +103,18 @@ def good_parts(
             None, "its yield is not known: the errors that the process causes in its dimensions are not known"
         )
     parts = Parts.from_block(result.spec, result.spec.sensitivity, N_DRAWN, result.spec.sensitivity.seed or 0)
-    first = _first_order(result, parts)
-    most = 1.0 if first is None else _most(first, assumed, request)
+    first = _estimate_shares(result, parts)
+    most = 1.0 if first is None else _largest_possible_yield(first, assumed, request)
     if first is not None and first.good.value < wanted:
         text = _report_yield(first.good.value, f"made by {assumed.process.name}, linear estimate", wanted)
-        return GoodParts(first.good.value, text + _cures(first, assumed, most, wanted), movable=most >= wanted)
+        return GoodParts(first.good.value, text + _remedy(first, assumed, most, wanted), movable=most >= wanted)
     if not draw:
         return GoodParts(None if first is None else first.good.value)
     drawn = _draw_parts(result, parts, assumed, wanted, clock)
     return replace(drawn, movable=first is not None and bool(drawn.missed) and most >= wanted)
 
 
-def _most(first: ExpectedShares, assumed: Assumed, request: Request) -> float:
+def _largest_possible_yield(first: ExpectedShares, assumed: Assumed, request: Request) -> float:
     """Return the largest yield of any shape, by the modulus alone, which no shape makes any surer.
 
     A force that goes with a modulus between E0 and E1, all equally likely, is within [F0, F1] for a share of
@@ -126,7 +126,7 @@ def _most(first: ExpectedShares, assumed: Assumed, request: Request) -> float:
     return min(1.0, (1.0 - request.low / request.high) * high / (high - low))
 
 
-def _cures(first: ExpectedShares, assumed: Assumed, most: float, wanted: float) -> str:
+def _remedy(first: ExpectedShares, assumed: Assumed, most: float, wanted: float) -> str:
     """Return what a yield would be without errors that a whole part has in common, and how one gets there."""
     better = {"once the modulus is measured": first.measured, "after a trim of each part's force": first.trimmed}
     least = first.good.value + 0.005
@@ -142,7 +142,7 @@ def _cures(first: ExpectedShares, assumed: Assumed, most: float, wanted: float) 
     )
 
 
-def _first_order(result: Result, parts: Parts) -> ExpectedShares | None:
+def _estimate_shares(result: Result, parts: Parts) -> ExpectedShares | None:
     """Return the shares of good parts; None if only drawn parts can say them."""
     try:
         return expected_shares(result, parts, Run())
@@ -175,7 +175,7 @@ def _report_yield(share: float, made: str, wanted: float) -> str:
     return f"yield {percent(share)} {made}, wanted at least {percent(wanted)}"
 
 
-def moved_for_yield(candidate: Candidate, spec: Spec, request: Request, asked: float, run: Run) -> MovedForYield | None:
+def move_for_yield(candidate: Candidate, spec: Spec, request: Request, asked: float, run: Run) -> MovedForYield | None:
     """Return a proposal with the largest share of good parts that is found to first order, up to what is asked.
 
     Parameters

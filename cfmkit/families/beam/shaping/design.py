@@ -1,4 +1,4 @@
-"""`design: {optimise: ...}`: from a specification to the task, from the best audited start to a specification.
+"""Method `design.optimise`: builds the task, writes the best audited design as a specification, or says what blocks it.
 
 Where no start meets all limits: which of them block, and the nearest values for which there would be a shape.
 """
@@ -51,7 +51,7 @@ def optimise_shape(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     plan = StartBudget(drawn=wanted.drawn, clock=Clock.from_budgets(wanted.time_budget, run.time_budget))
     result = explore(task, plan, (wanted.starts, wanted.widened), identity_of(spec, run.seed), run)
     tables = {"starts": lambda: starts_table(task, result)}
-    best = _best(spec, task, result, plan)
+    best = _choose_best(spec, task, result, plan)
     if isinstance(best, Design):
         return replace(best, tables=tables)
     drawn = scatter_within_tolerances(task, best.candidate, wanted.tolerances, run.seed)
@@ -136,13 +136,13 @@ def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
     )
 
 
-def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Judged | Design:
+def _choose_best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Judged | Design:
     """Return the best design that analysis and audit confirm, or why there is none."""
     candidates = [(candidate, result.audits.get(index)) for index, candidate in rank(task, result.designs)]
     if not candidates:
         some = list(result.shapes.values())
         if not some:
-            return _nothing(result, plan)
+            return _explain_no_design(result, plan)
         if plan.late():
             said = (
                 f"none of {len(some)} starts met all limits in the time allowed: increase it "
@@ -175,7 +175,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Ju
     return fallback
 
 
-def _nothing(result: Explored, plan: StartBudget) -> Design:
+def _explain_no_design(result: Explored, plan: StartBudget) -> Design:
     if result.lost:
         return Design(None, Status.CRASHED, f"no start was completed: {'; '.join(result.lost)}")
     if result.missing or plan.late():
@@ -296,7 +296,7 @@ def held_by(task: Task, candidate: ShapeCandidate) -> tuple[str, ...]:
     return (*held, *(design_limits.list_active_rows(view.list_limits(sloped=True), AT_LIMIT) if view else ()))
 
 
-def _stress(task: Task, slack: float) -> dict[str, str]:
+def _nearest_stress(task: Task, slack: float) -> dict[str, str]:
     factor = task.safety_factor / (1 + slack)
     if factor >= 1:
         return {"mechanism.safety_factor": f"at most {factor:.4g}"}
@@ -304,19 +304,19 @@ def _stress(task: Task, slack: float) -> dict[str, str]:
     return {"mechanism.material.yield_strength": f"at least {format_short(strength, 'stress')}, without safety factor"}
 
 
-def _force(task: Task, slack: float) -> dict[str, str]:
+def _nearest_force(task: Task, slack: float) -> dict[str, str]:
     if task.limits.force_min is not None:
         return {"design.optimise.force.min": f"at most {format_short(task.limits.force_min * (1 - slack), 'force')}"}
     return {"design.optimise.force.tolerance": f"at least {task.limits.force_tolerance + slack:.3g}"}
 
 
-def _clearance(task: Task, slack: float) -> dict[str, str]:
+def _nearest_clearance(task: Task, slack: float) -> dict[str, str]:
     thick = max(thickest_of(beam.section) for beam in task.network.beams.values())
     gap = ((task.limits.clearance or 0.0) + thick) * (1 - slack) - thick
     return {"design.optimise.limits.clearance": f"at most {format_short(max(0.0, gap), 'length')}"}
 
 
-def _box(key: str) -> Callable[[Task, float], dict[str, str]]:
+def _nearest_box(key: str) -> Callable[[Task, float], dict[str, str]]:
     def nearest(task: Task, slack: float) -> dict[str, str]:
         more = format_short(slack * task.size, "length")
         return {f"design.optimise.limits.{key}": f"wider by {more} on the sides that hold"}
@@ -334,9 +334,9 @@ def _scale_limit(
 
 
 NEAREST_LIMITS: dict[str, Callable[[Task, float], dict[str, str]]] = {
-    "stress": _stress,
-    "envelope": _box("envelope"),
-    "deformed_envelope": _box("deformed_envelope"),
+    "stress": _nearest_stress,
+    "envelope": _nearest_box("envelope"),
+    "deformed_envelope": _nearest_box("deformed_envelope"),
     "max_length_ratio": _scale_limit(
         "max_length_ratio", lambda limits, s: 1 / max(1e-3, 1 / (limits.length_ratio or 1.0) - s), "at least", "count"
     ),
@@ -344,7 +344,7 @@ NEAREST_LIMITS: dict[str, Callable[[Task, float], dict[str, str]]] = {
         "min_slenderness", lambda limits, s: (limits.slenderness or 0.0) * (1 - s), "at most", "count"
     ),
     "min_radius": _scale_limit("min_radius", lambda limits, s: (limits.radius or 0.0) * (1 - s), "at most", "length"),
-    "clearance": _clearance,
-    "force": _force,
+    "clearance": _nearest_clearance,
+    "force": _nearest_force,
 }
 """For each limit what it would have to be if it gives way by an amount in its own scale."""

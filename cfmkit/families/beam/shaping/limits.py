@@ -41,7 +41,7 @@ _REFINEMENT_FACTOR = 3  # a whole number, so that the points at which the force 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A design in the poses of a window that begins at `start` [m]: what goal and limits look at."""
+    """A design in the poses of a window that begins at `start` [m], by which objective and limits are evaluated."""
 
     response: Response
     poses: PosePlan

@@ -1,4 +1,4 @@
-"""All starts of a design: each searched, the best of them widened and audited, and what orders them.
+"""All starts of a shape search: runs and ranks them, widens and audits the best, and scatters it within its tolerances.
 
 For the widest window each start is searched twice: over the requested window, and over one that begins farther. Most
 starts end in one family of shapes, and what is flattest over the requested window seldom is in another one whose window
@@ -27,10 +27,10 @@ from cfmkit.families.beam.shaping.search import (
     VIOLATION_TOL,
     ShapeCandidate,
     StartBudget,
-    nearer,
     refine,
+    search_far,
+    search_nearer,
     search_start,
-    searched_far,
     widen,
 )
 from cfmkit.families.beam.shaping.task_and_variables import Variables, segments_cross
@@ -84,7 +84,7 @@ def audit_design(task: Task, design: ShapeCandidate) -> Audit:
     return Audit(
         path.status is PathStatus.COMPLETE,
         bool(path.stable.all()),
-        sum(crossing(task, path, int(k)) for k in path.at_requested),
+        sum(has_crossing(task, path, int(k)) for k in path.at_requested),
         _least_gap(task, path),
     )
 
@@ -129,7 +129,7 @@ def _force_at_requested(task: Task, path: Path) -> FloatArray:
     return force
 
 
-def crossing(task: Task, path: Path, pose: int) -> bool:
+def has_crossing(task: Task, path: Path, pose: int) -> bool:
     """Return True if centre lines of different beams cross at a pose, or one crosses itself."""
     lines = {name: path.shape(name, pose) for name in task.network.beams}
     shared = {pair.beams: pair.joints for pair in pairs(task.network)}
@@ -234,10 +234,10 @@ def explore(
     if task.objective == "range":
         best = dict(list(rank(task, designs))[:wide])
         designs |= _found_in(jobs.run_stage("widenings", partial(_go_on, widen, started, best, plan), best))
-        distant = partial(searched_far, started, run.seed, plan=plan)
+        distant = partial(search_far, started, run.seed, plan=plan)
         far = _found_in(jobs.run_stage("starts over a wider window", distant, range(starts)))
         leaders = dict(sorted(_keep_within_limits(far), key=lambda item: item[1].objective)[:_N_LEADERS])
-        work = partial(_go_on, nearer, started, leaders, plan)
+        work = partial(_go_on, search_nearer, started, leaders, plan)
         led = _found_in(jobs.run_stage("widenings of the flattest of these", work, leaders))
         designs |= {index: design for index, design in led.items() if _better(task, design, designs.get(index))}
     if task.orders != started.orders:

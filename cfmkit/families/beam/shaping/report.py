@@ -1,4 +1,4 @@
-"""Report of a design: the results of its analysis, the audit, the effect of tolerances, and all starts.
+"""A shape design judged by its own analysis, written as a specification, and reported: audit, tolerances, all starts.
 
 A search never judges itself: force, window and stress that are reported of a design are those of the analysis of its
 specification, to the last digit.

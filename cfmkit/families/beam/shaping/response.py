@@ -1,4 +1,4 @@
-"""Response of the engine to one vector of design variables: force, centre lines and stresses, with exact slopes.
+"""Force, centre lines and stresses of a network at chosen poses for one vector of design variables, with exact slopes.
 
 It is asked at some poses: rest, some on the way, the window, the two that the paper compares. A search sees the force
 at those of the window, and the polynomial through them. Where the force bends more sharply than that polynomial can, it

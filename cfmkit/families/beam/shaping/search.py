@@ -128,7 +128,7 @@ def search_start(task: Task, seed: int, index: int, plan: StartBudget) -> ShapeC
     return polish(task, design if design.feasible else satisfy_limits(task, design, design.order, plan), plan)
 
 
-def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> ShapeCandidate | None:
+def search_far(task: Task, seed: int, index: int, plan: StartBudget) -> ShapeCandidate | None:
     """Return the random network of a start flattened in the finest order at once, over a window that begins farther.
 
     It begins halfway between rest and the requested window. What is flat over that seldom is the flattest over the
@@ -147,7 +147,7 @@ def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> ShapeC
     return design if hopeless else flatten(task, design, plan)
 
 
-def nearer(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandidate:
+def search_nearer(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandidate:
     """Return a design that was flattened over a window that begins farther, flattened and widened as any other."""
     far = evaluate_in_model(task, design)
     flat = far.feasible and far.objective <= task.half_band
@@ -315,7 +315,7 @@ def satisfy_limits(
         if z is None:
             return design
         optimum = minimize(program, z, program.bounds, plan.effort(plan.meeting, enough=0.0))
-        now, before = found_of(program, optimum, design.evaluations), design.violation
+        now, before = design_from_optimum(program, optimum, design.evaluations), design.violation
         design = now if now.violation < before else replace(design, evaluations=now.evaluations)
         if design.feasible or not design.violation < share * before or plan.late():
             break
@@ -334,12 +334,12 @@ def _minimise_objective(
     if z is None:
         return design
     optimum = minimize(program, z, program.bounds, plan.effort(steps, BAND_WEIGHT * enough))
-    now = found_of(program, optimum, design.evaluations)
+    now = design_from_optimum(program, optimum, design.evaluations)
     worse = design.feasible and not now.feasible
     return replace(design, evaluations=now.evaluations) if worse else now
 
 
-def found_of(program: Shaping, optimum: Optimum, before: int = 0) -> ShapeCandidate:
+def design_from_optimum(program: Shaping, optimum: Optimum, before: int = 0) -> ShapeCandidate:
     """Return an optimum as a design; its objective is measured anew, without the help of the goal's own variables."""
     variables, goal = program.variables, program.goal
     x, values = np.split(optimum.z, [variables.count])
@@ -394,7 +394,7 @@ def _widest(task: Task, design: ShapeCandidate, plan: StartBudget) -> ShapeCandi
         if z is None or plan.late():
             return design
         effort = plan.effort(plan.widening, violation=_REPAIRABLE_VIOLATION)
-        wide = found_of(program, minimize(program, z, program.bounds, effort), design.evaluations)
+        wide = design_from_optimum(program, minimize(program, z, program.bounds, effort), design.evaluations)
         now = _repair(task, wide, design, plan)
         gain, design = design.start - now.start, now
         if not gain > _MIN_WINDOW_GAIN * task.window[1]:

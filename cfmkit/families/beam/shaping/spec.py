@@ -1,4 +1,4 @@
-"""Block `design.optimise` of a beam mechanism."""
+"""Block `design.optimise` of a beam mechanism (what may vary, limits, objective, starts, tolerances); its checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A task for one order and one window as a program of `cfmkit.designing`: the goal's rows and those of all limits.
+"""A shape task as an optimisation program: three goals (flattest, widest, force ratio) with their rows and all limits'.
 
 Objectives: smooth forms with auxiliary variables beside the design variables. [Lan, eq. 1] compares the force at two
 displacements, F(a)/F(b) - 1. Nothing bounds that from below: a mechanism that snaps through between b and a reaches

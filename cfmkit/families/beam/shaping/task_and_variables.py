@@ -1,4 +1,4 @@
-"""Task of a shape design and its variables: the network, what may vary, the window, and what must hold.
+"""Task of a shape design (network, what may vary, window, limits), its variables and random draws, and beams' lengths.
 
 Variables are free node coordinates and shape coefficients. Angle and length of a beam follow from its chord: a shape is
 turned and scaled to fit between its nodes. So of eta = c0 + c1 u + ... only c1, c2, ... vary, and none of the closure

@@ -1,6 +1,6 @@
-"""Dynamics of a cam mechanism: two sides without symmetry, moved by a slider.
+"""Dynamics of a cam mechanism: forces for a given motion of its slider, on two sides without symmetry.
 
-`inverse` is the product route, `lagrange_multiplier_check` the paper's formulation and its check.
+`inverse` is the usual method; `nine_coordinate_multibody`, the paper's formulation, the other one ("multibody").
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ def motion(result: Result) -> Figure:
         Series(moved.static, "at rest", TEXT_GREY, True, prefer=0.1),
     ]
     ratio = [Series(force / moved.static, "in motion over at rest", LINE_BLUE, prefer=0.3)]
-    ranges = list(_regions(moved))
+    ranges = list(_mark_regions(moved))
     name = "4KA + slider's weight" if moved.build.right.loads.slider_weight else "4KA"
     level = Limit(constant, f"{name} = {value_text(constant, 'force')}")
     diagrams = [
@@ -77,12 +77,12 @@ def motion_force(result: Result) -> Figure:
 def motion_contact(result: Result) -> Figure:
     """Return the forces of the cam on the rollers, and those in the braces, over time."""
     moved: MotionSolution = result.state
-    history, ranges = moved.history, list(_regions(moved))
-    contact = _sides(history.contact, "on a roller", (LINE_BLUE, LINE_VERMILLION))
-    roller_end = _sides(history.brace, "brace, at the roller", (LINE_PURPLE, LINE_VERMILLION))
+    history, ranges = moved.history, list(_mark_regions(moved))
+    contact = _make_side_lines(history.contact, "on a roller", (LINE_BLUE, LINE_VERMILLION))
+    roller_end = _make_side_lines(history.brace, "brace, at the roller", (LINE_PURPLE, LINE_VERMILLION))
     slider_end = [
         Series(item.values, item.name, item.color, True, 0.25)
-        for item in _sides(history.pin, "brace, at the slider", (LINE_PURPLE, LINE_VERMILLION))
+        for item in _make_side_lines(history.pin, "brace, at the slider", (LINE_PURPLE, LINE_VERMILLION))
     ]
     limits = [*limits_on(result, "contact_force_max"), *limits_on(result, "contact_force_min")]
     diagrams = [
@@ -103,8 +103,8 @@ def motion_rollers(result: Result) -> Figure:
     """Return the speed of the slider and of the turning rollers over time."""
     moved: MotionSolution = result.state
     history = moved.history
-    speed = [Series(history.moment.speed, "", LINE_BLUE)]
-    spin = _sides(history.spin, "", (LINE_BLUE, LINE_VERMILLION))
+    speed = [Series(history.slider.speed, "", LINE_BLUE)]
+    spin = _make_side_lines(history.spin, "", (LINE_BLUE, LINE_VERMILLION))
     diagrams = [
         Diagram(history.times, TIME_SCALE, Scale("speed of the slider", "velocity"), speed),
         Diagram(history.times, TIME_SCALE, Scale("speed of a roller", "angular_velocity"), spin),
@@ -112,7 +112,7 @@ def motion_rollers(result: Result) -> Figure:
     return diagram_figure(Heading.from_result(result, "speed of the slider, and at which the rollers turn"), diagrams)
 
 
-def _sides(rows: FloatArray, name: str, colors: tuple[str, str]) -> list[Series]:
+def _make_side_lines(rows: FloatArray, name: str, colors: tuple[str, str]) -> list[Series]:
     """Return one line where both sides are alike, else one for each."""
     if not np.any(np.abs(rows[0] - rows[1]) > SIDE_RTOL * np.nanmax(np.abs(rows))):
         return [Series(rows[0], name, colors[0])]
@@ -123,16 +123,16 @@ def _sides(rows: FloatArray, name: str, colors: tuple[str, str]) -> list[Series]
     ]
 
 
-def _regions(moved: MotionSolution) -> Iterator[MarkedRange]:
+def _mark_regions(moved: MotionSolution) -> Iterator[MarkedRange]:
     """Yield the spans of time in which the roller lifts off, the cable is slack, or the roller is on the corner."""
     history = moved.history
     lost = (history.contact[0] <= 0) | (history.contact[1] <= 0)
-    yield from _spans(history.times, lost, "lift-off")
-    yield from _spans(history.times, (history.force <= 0) & ~lost, "slack cable")
-    yield from _spans(history.times, history.on_corner, "on the corner")
+    yield from _find_intervals(history.times, lost, "lift-off")
+    yield from _find_intervals(history.times, (history.force <= 0) & ~lost, "slack cable")
+    yield from _find_intervals(history.times, history.on_corner, "on the corner")
 
 
-def _spans(times: FloatArray, where: NDArray[np.bool_], text: str) -> Iterator[MarkedRange]:
+def _find_intervals(times: FloatArray, where: NDArray[np.bool_], text: str) -> Iterator[MarkedRange]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
     for index, (first, after) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
         yield MarkedRange(float(times[first]), float(times[after - 1]), "" if index else text)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.contact_pressure import worst
+from cfmkit.families.cam.contact_pressure import index_of_largest
 from cfmkit.families.cam.dynamics.machine_from_spec import slender_rod, solid_cylinder
 from cfmkit.families.cam.dynamics.scalar_results import contact_pressure
 from cfmkit.families.cam.findings import find_overstress, finding
@@ -32,7 +32,7 @@ INVERSE_OPTION = "analysis.dynamics.method=inverse"  # as ``--set`` takes it
 
 def findings_of(moved: MotionSolution) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
-    checks = (_pressure, _slack_cable, _find_held, _find_on_corner, _springs, _inertias, _friction, _sideways)
+    checks = (_overpressure, _slack_cable, _jams, _on_corner, _spring_limits, _odd_inertias, _no_friction, _no_weight)
     return tuple(warning for check in checks for warning in check(moved))
 
 
@@ -58,11 +58,13 @@ def runs_on_corner(parts: Build) -> Finding:
     )
 
 
-def _pressure(moved: MotionSolution) -> Iterator[Finding]:
+def _overpressure(moved: MotionSolution) -> Iterator[Finding]:
     pressed = contact_pressure(moved)
-    top = worst(pressed)
+    top = index_of_largest(pressed)
     reported = (
-        None if top is None else find_overstress(moved.spec.mechanism, float(pressed[top]), f"at {_moment(moved, top)}")
+        None
+        if top is None
+        else find_overstress(moved.spec.mechanism, float(pressed[top]), f"at {_instant(moved, top)}")
     )
     if reported:
         yield reported
@@ -74,48 +76,48 @@ def _slack_cable(moved: MotionSolution) -> Iterator[Finding]:
     if lost.any():
         yield finding(
             "slack_cable",
-            f"the force falls to {newton(float(np.nanmin(force)))}; it is not positive {_when(moved, lost)}: a "
-            "cable would go slack",
+            f"the force falls to {newton(float(np.nanmin(force)))}; it is not positive "
+            f"{_span_text(moved, lost)}: a cable would go slack",
         )
 
 
-def _find_held(moved: MotionSolution) -> Iterator[Finding]:
+def _jams(moved: MotionSolution) -> Iterator[Finding]:
     lost = ~np.isfinite(moved.history.force)
     if not lost.any():
         return
     if moved.build.machine.friction and moved.build.motion.stroke > 0:
-        yield finding("up_jam", f"a roller self-locks {_when(moved, lost)}: no force moves the slider there")
+        yield finding("up_jam", f"a roller self-locks {_span_text(moved, lost)}: no force moves the slider there")
     else:
         yield finding(
-            "dead_point", f"the slider has no leverage on a roller {_when(moved, lost)}: the force is unbounded"
+            "dead_point", f"the slider has no leverage on a roller {_span_text(moved, lost)}: the force is unbounded"
         )
 
 
-def _find_on_corner(moved: MotionSolution) -> Iterator[Finding]:
+def _on_corner(moved: MotionSolution) -> Iterator[Finding]:
     corner = moved.history.on_corner
     if corner.any():
-        yield finding("undercut", f"a roller pivots on the corner of its cam {_when(moved, corner)}")
+        yield finding("undercut", f"a roller pivots on the corner of its cam {_span_text(moved, corner)}")
 
 
-def _springs(moved: MotionSolution) -> Iterator[Finding]:
+def _spring_limits(moved: MotionSolution) -> Iterator[Finding]:
     elongation, limit = moved.history.elongation, moved.spec.mechanism.springs.max_elongation
     slack = elongation < -1e-12
     if slack.any():
         yield finding(
             "spring_slack",
             f"the springs are up to {mm(-float(elongation.min()))} shorter than their rest length "
-            f"{_when(moved, slack)}: they carry no force there",
+            f"{_span_text(moved, slack)}: they carry no force there",
         )
     if limit and elongation.max() > limit * (1 + 1e-9):
         over = elongation > limit
         yield finding(
             "spring_overstretched",
             f"the springs are stretched by {mm(float(elongation.max()))}, their limit is {mm(limit)}, "
-            f"exceeded {_when(moved, over)}",
+            f"exceeded {_span_text(moved, over)}",
         )
 
 
-def _inertias(moved: MotionSolution) -> Iterator[Finding]:
+def _odd_inertias(moved: MotionSolution) -> Iterator[Finding]:
     machine = moved.build.machine
     sides = ((machine.right, "right"), (machine.left, "left"))
     alike = machine.left.parts == machine.right.parts
@@ -146,7 +148,7 @@ def _mismatch(what: str, stated: float, expected: float, allowed: tuple[float, f
         )
 
 
-def _friction(moved: MotionSolution) -> Iterator[Finding]:
+def _no_friction(moved: MotionSolution) -> Iterator[Finding]:
     dynamics = moved.spec.analysis.dynamics
     if dynamics and dynamics.method == "multibody" and moved.spec.mechanism.rolling_friction:
         yield finding(
@@ -157,7 +159,7 @@ def _friction(moved: MotionSolution) -> Iterator[Finding]:
         )
 
 
-def _sideways(moved: MotionSolution) -> Iterator[Finding]:
+def _no_weight(moved: MotionSolution) -> Iterator[Finding]:
     dynamics, spec = moved.spec.analysis.dynamics, moved.spec
     if dynamics and dynamics.method == "multibody" and spec.gravity and directions(spec.mechanism.mounting)[1]:
         yield finding(
@@ -168,13 +170,13 @@ def _sideways(moved: MotionSolution) -> Iterator[Finding]:
         )
 
 
-def _when(moved: MotionSolution, where: NDArray[np.bool_]) -> str:
+def _span_text(moved: MotionSolution, where: NDArray[np.bool_]) -> str:
     """Return ``from 0.07 s (171.8 mm) to 0.09 s (195 mm)``: first and last of the marked points."""
     first, last = np.flatnonzero(where)[[0, -1]]
-    ends = [_moment(moved, int(index)) for index in (first, last)]
+    ends = [_instant(moved, int(index)) for index in (first, last)]
     many = "" if where[first : last + 1].all() else ", with gaps"
     return f"at {ends[0]}" if first == last else f"from {ends[0]} to {ends[1]}{many}"
 
 
-def _moment(moved: MotionSolution, index: int) -> str:
+def _instant(moved: MotionSolution, index: int) -> str:
     return f"{format_short(float(moved.history.times[index]), 'time')} ({mm(float(moved.displacement[index]))})"

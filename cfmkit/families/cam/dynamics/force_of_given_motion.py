@@ -1,4 +1,4 @@
-"""Dynamic analysis of a cam mechanism: the force that a given motion of its slider needs.
+"""Dynamic analysis of a cam mechanism: the force that a given motion of its slider needs, and where the motion ends.
 
 The curve is the force over the slider's displacement, in the order of time, with everything
 that happens at contacts, pins and springs beside it. The displacement is that of the quasi-static
@@ -22,11 +22,11 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.dynamics.findings import findings_of, leaves_profile, runs_on_corner
 from cfmkit.families.cam.dynamics.inverse import respond, statics
-from cfmkit.families.cam.dynamics.lagrange_multiplier_check import CornerContact, NineCoordinates, reactions
 from cfmkit.families.cam.dynamics.machine_from_spec import build, stated_motion
+from cfmkit.families.cam.dynamics.nine_coordinate_multibody import CornerContact, NineCoordinates, reactions
 from cfmkit.families.cam.dynamics.scalar_results import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.dynamics.solution import Build, History, MotionSolution
-from cfmkit.families.cam.findings import finding, rubbing_left_out
+from cfmkit.families.cam.findings import finding, warn_of_neglected_friction
 from cfmkit.families.cam.mechanism_from_spec import displacement_origin, flanks_cross, rollers_overlap
 from cfmkit.families.cam.statics import constant_force
 from cfmkit.families.findings import CannotBuild, mm, newton, no_result
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.lagrange_multiplier_check import Scheme
+    from cfmkit.families.cam.dynamics.nine_coordinate_multibody import Scheme
     from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.families.run_control import Run
@@ -53,7 +53,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     try:
         parts = build(spec)
         times, missing = _keep_inside(parts, spec)
-        end = ending(parts, times, _displacement(parts, 0.0))
+        end = find_ending(parts, times, _displacement(parts, 0.0))
         if end:
             times, missing = _times_until(end.time, times, spec), (end.finding, *missing)
         moved = _solve_motion(spec, parts, times)
@@ -71,7 +71,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         message=message,
         curves=(_curve(moved),),
         values=values_of(moved),
-        warnings=(*missing, *findings_of(moved), *rubbing_left_out(spec, "the dynamic model")),
+        warnings=(*missing, *findings_of(moved), *warn_of_neglected_friction(spec, "the dynamic model")),
         travel=_requested_ends(parts),
         target=spec.design.force if spec.design else constant_force(parts.right),
         allowable_stress=allowable_stress(spec.mechanism),
@@ -109,10 +109,10 @@ def _solve_motion(spec: CamSpec, parts: Build, times: FloatArray) -> MotionSolut
     low, high = parts.machine.span
     upward = parts.motion.stroke > 0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        history = _history(spec, parts, times)
-        static = statics(parts.machine, np.clip(history.moment.position, low, high), upward).force
-    displacement = _displacement(parts, history.moment.position)
-    return MotionSolution(_as_run(spec, parts), parts, history, static, displacement)
+        history = _compute_history(spec, parts, times)
+        static = statics(parts.machine, np.clip(history.slider.position, low, high), upward).force
+    displacement = _displacement(parts, history.slider.position)
+    return MotionSolution(_with_explicit_defaults(spec, parts), parts, history, static, displacement)
 
 
 def _requested_ends(parts: Build) -> tuple[float, float]:
@@ -121,7 +121,7 @@ def _requested_ends(parts: Build) -> tuple[float, float]:
     return start, end
 
 
-def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
+def _compute_history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
     if stated_motion(spec).closed:
         return inverse_history(parts.machine, parts.motion, times)
     try:
@@ -131,7 +131,7 @@ def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
         raise CannotBuild(warning) from None
 
 
-def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
+def _with_explicit_defaults(spec: CamSpec, parts: Build) -> CamSpec:
     """Return the spec with the defaults of the analysis made explicit."""
     resolved, masses = parts.right.spec, spec.mechanism.masses
     analysis = spec.analysis.model_copy(update={"fidelity": "dynamic", "gravity": spec.gravity})
@@ -152,11 +152,11 @@ def _compare_with_slow(moved: MotionSolution) -> FloatArray:
 
 
 def _curve(moved: MotionSolution) -> Curve:
-    history, moment = moved.history, moved.history.moment
+    history, slider = moved.history, moved.history.slider
     extra = {
         "time": Column(history.times, "time"),
-        "speed": Column(moment.speed, "velocity"),
-        "acceleration": Column(moment.acceleration, "acceleration"),
+        "speed": Column(slider.speed, "velocity"),
+        "acceleration": Column(slider.acceleration, "acceleration"),
         "static_force": Column(moved.static, "force"),
         "force_over_slow": Column(_compare_with_slow(moved), "ratio"),
     }
@@ -185,7 +185,7 @@ def inverse_history(machine: Machine, motion: Cycloid, times: FloatArray) -> His
     response = respond(machine, motion.evaluate(times))
     return History(
         times=times,
-        moment=response.moment,
+        slider=response.slider,
         force=response.force,
         contact=response.contact,
         traction=response.traction,
@@ -212,7 +212,7 @@ def multibody_history(
     center, contact, traction, roller_pin, slider_pin, spin = reactions(model, trajectory)
     return History(
         times=trajectory.times,
-        moment=motion.evaluate(trajectory.times),
+        slider=motion.evaluate(trajectory.times),
         force=trajectory.force,
         contact=contact,
         traction=traction,
@@ -238,7 +238,7 @@ class MotionEnding:
     finding: Finding
 
 
-def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | None:
+def find_ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | None:
     """Return where a motion becomes impossible; None if it never does.
 
     It is looked at at times (n,) [s]; `origin` added to a slider position gives the displacement [m].
@@ -248,7 +248,7 @@ def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | Non
     margins = _margins(machine, motion.evaluate(times))
     first: tuple[int, str] | None = None
     for name, margin in margins.items():
-        lost = margin < -_slack(name, margin, machine)
+        lost = margin < -_margin_tolerance(name, margin, machine)
         if name == "spring_slack":
             lost &= np.maximum.accumulate(~lost)  # springs that are slack from the start on tighten later
         if lost.any() and (first is None or int(np.argmax(lost)) < first[0]):
@@ -271,10 +271,10 @@ def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | Non
     return MotionEnding(low, _describe_ending(name, margins, machine, f"at {format_short(low, 'time')} ({mm(place)})"))
 
 
-def _margins(machine: Machine, moment: tuple[FloatArray, FloatArray, FloatArray]) -> Mapping[str, FloatArray]:
+def _margins(machine: Machine, slider: tuple[FloatArray, FloatArray, FloatArray]) -> Mapping[str, FloatArray]:
     """Return what must not be negative, by the name of the finding that says so, (n,) each."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        response = respond(machine, moment)  # type: ignore[arg-type]
+        response = respond(machine, slider)  # type: ignore[arg-type]
     radius, center = machine.parts.roller_radius, response.at.center
     touching = (center + 1j * radius * response.at.tangent).real
     return {
@@ -285,7 +285,7 @@ def _margins(machine: Machine, moment: tuple[FloatArray, FloatArray, FloatArray]
     }
 
 
-def _slack(name: str, margin: FloatArray, machine: Machine) -> float:
+def _margin_tolerance(name: str, margin: FloatArray, machine: Machine) -> float:
     if name == "lift_off":
         return CONTACT_FORCE_RTOL * float(np.nanmax(np.abs(margin), initial=0.0))
     return 1e-12 * max(machine.springs.rest_length, 1.0)

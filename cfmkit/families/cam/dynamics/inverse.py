@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.dynamics.axis_springs import AxisGap
-from cfmkit.families.cam.dynamics.roller_curves_and_motion import Moment
+from cfmkit.families.cam.dynamics.roller_curves_and_motion import SliderState
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,8 +44,8 @@ if TYPE_CHECKING:
 class Kinematics(NamedTuple):
     """Both sides (right, left; x outwards) at n positions of the slider, each (2, n); ' is d/d(slider).
 
-    `center` C [m], `tangent` t, `brace` d [m], `lever` Re(conj(d) t) [m]; `way` sigma',
-    `bend` sigma'' [1/m]; `first` C', `second` C'' [1/m]; `swing`, `sway`: first and second
+    `center` C [m], `tangent` t, `brace` d [m], `lever` Re(conj(d) t) [m]; `arc_slope` sigma',
+    `arc_bend` sigma'' [1/m]; `center_slope` C', `center_bend` C'' [1/m]; `angle_slope`, `angle_bend`: first and second
     derivative of the brace's angle [rad/m, rad/m^2].
     """
 
@@ -53,12 +53,12 @@ class Kinematics(NamedTuple):
     tangent: ComplexArray
     brace: ComplexArray
     lever: FloatArray
-    way: FloatArray
-    bend: FloatArray
-    first: ComplexArray
-    second: ComplexArray
-    swing: FloatArray
-    sway: FloatArray
+    arc_slope: FloatArray
+    arc_bend: FloatArray
+    center_slope: ComplexArray
+    center_bend: ComplexArray
+    angle_slope: FloatArray
+    angle_bend: FloatArray
 
 
 class MovingLoads(NamedTuple):
@@ -80,9 +80,9 @@ class MovingLoads(NamedTuple):
 class MotionResponse:
     """Forces and speeds of a motion; rows of (2, n) arrays are right and left, x outwards."""
 
-    # machine, moment: what was asked
+    # machine, slider: what was asked
     machine: Machine
-    moment: Moment
+    slider: SliderState
     at: Kinematics  # how the sides follow the slider
     force: FloatArray  # (n,) on the slider, upwards [N]
     # contact, traction, (2, n): normal and tangential force of the cam on a roller [N]; traction along the way up
@@ -96,7 +96,7 @@ class MotionResponse:
     @cached_property
     def spin(self) -> FloatArray:
         """Speed at which each roller turns, positive on the way up, (2, n) [rad/s]."""
-        spin: FloatArray = self.at.way * self.moment.speed / self.machine.parts.roller_radius
+        spin: FloatArray = self.at.arc_slope * self.slider.speed / self.machine.parts.roller_radius
         return spin
 
     @cached_property
@@ -122,15 +122,15 @@ class MotionResponse:
     def mass(self) -> FloatArray:
         """Mass that moved with the slider would have the same kinetic energy, (n,) [kg]."""
         parts, at = self.machine.parts, self.at
-        roller = (parts.roller_mass + parts.roller_inertia / parts.roller_radius**2) * at.way**2
-        brace = parts.brace_mass * np.abs(at.first + 1j) ** 2 / 4.0 + parts.brace_inertia * at.swing**2
+        roller = (parts.roller_mass + parts.roller_inertia / parts.roller_radius**2) * at.arc_slope**2
+        brace = parts.brace_mass * np.abs(at.center_slope + 1j) ** 2 / 4.0 + parts.brace_inertia * at.angle_slope**2
         total: FloatArray = self.machine.slider_mass + (roller + brace).sum(axis=0)
         return total
 
     @cached_property
     def energy(self) -> FloatArray:
         """Kinetic and potential energy, (n,) [J]."""
-        parts, machine, position = self.machine.parts, self.machine, self.moment.position
+        parts, machine, position = self.machine.parts, self.machine, self.slider.position
         center = self.at.center.imag
         lifted = parts.roller_mass * center + parts.brace_mass * (center + position) / 2.0
         height = machine.slider_mass * position + lifted.sum(axis=0)
@@ -138,24 +138,24 @@ class MotionResponse:
         if machine.sideways:
             outward = (parts.roller_mass + 0.5 * parts.brace_mass) * self.at.center.real
             potential = potential - machine.sideways * (outward[0] - outward[1])
-        total: FloatArray = potential + self.mass * self.moment.speed**2 / 2.0
+        total: FloatArray = potential + self.mass * self.slider.speed**2 / 2.0
         return total
 
 
-def respond(machine: Machine, moment: Moment) -> MotionResponse:
+def respond(machine: Machine, slider: SliderState) -> MotionResponse:
     """Return the forces of a motion of the slider, at positions within ``machine.span``.
 
     Speeds are of one sign: rolling resistance acts against the motion, also where it begins and ends.
     """
-    parts, stances = machine.parts, machine.stances(moment.position)
-    at = kinematics(stances, moment.position, parts.brace_length)
-    loads = _loads(machine, parts, at, moment)
+    parts, stances = machine.parts, machine.stances(slider.position)
+    at = kinematics(stances, slider.position, parts.brace_length)
+    loads = _loads(machine, parts, at, slider)
     free = loads.springs - parts.roller_mass * loads.roller - loads.rolling * at.tangent
     middle = parts.brace_mass * loads.middle
     balance = parts.brace_inertia * loads.turning + _cross(at.brace, 0.5 * middle - free)
     traction = loads.rolling
     if machine.friction:
-        resistance = -machine.friction if moment.speed.sum() < 0 else machine.friction
+        resistance = -machine.friction if slider.speed.sum() < 0 else machine.friction
         lever = at.lever + resistance * _cross(at.brace, at.tangent)
         contact = np.where(lever < 0, -balance / lever, np.nan)  # else friction holds the roller
         free, traction = free - resistance * contact * at.tangent, traction + resistance * contact
@@ -164,16 +164,16 @@ def respond(machine: Machine, moment: Moment) -> MotionResponse:
     roller_pin = free - 1j * contact * at.tangent
     slider_pin = middle - roller_pin
     up = slider_pin.imag
-    force = machine.slider_mass * (moment.acceleration + machine.gravity) + (up[0] + up[1])
+    force = machine.slider_mass * (slider.acceleration + machine.gravity) + (up[0] + up[1])
     on_corner = stances[0].on_corner | stances[1].on_corner
-    return MotionResponse(machine, moment, at, force, contact, -traction, roller_pin, slider_pin, on_corner)
+    return MotionResponse(machine, slider, at, force, contact, -traction, roller_pin, slider_pin, on_corner)
 
 
 def statics(machine: Machine, position: FloatArray, upward: bool = True) -> MotionResponse:
     """Return the forces at rest at positions of the slider [m]; rolling resistance as on the way up, or down."""
     still = np.zeros(position.shape)
     creep = still if upward else still - np.finfo(float).tiny
-    return respond(machine, Moment(position, creep, still))
+    return respond(machine, SliderState(position, creep, still))
 
 
 def kinematics(stances: tuple[Stance, Stance], position: FloatArray, length: FloatArray) -> Kinematics:
@@ -185,29 +185,31 @@ def kinematics(stances: tuple[Stance, Stance], position: FloatArray, length: Flo
     product = brace.conj() * tangent  # its real part is Re(conj(d) t), its imaginary part -Re(conj(d) i t)
     lever = product.real
     ratio = brace.imag / lever
-    first = tangent * ratio
-    relative = first - 1j
+    center_slope = tangent * ratio
+    relative = center_slope - 1j
     bent = curvature * ratio * ratio
-    bend = (bent * product.imag - (relative.real**2 + relative.imag**2)) / lever
-    second = tangent * (bend + 1j * bent)
+    arc_bend = (bent * product.imag - (relative.real**2 + relative.imag**2)) / lever
+    center_bend = tangent * (arc_bend + 1j * bent)
     square = length * length
-    swing, sway = _cross(brace, relative) / square, _cross(brace, second) / square
-    return Kinematics(center, tangent, brace, lever, ratio, bend, first, second, swing, sway)
+    angle_slope, angle_bend = _cross(brace, relative) / square, _cross(brace, center_bend) / square
+    return Kinematics(
+        center, tangent, brace, lever, ratio, arc_bend, center_slope, center_bend, angle_slope, angle_bend
+    )
 
 
-def _loads(machine: Machine, parts: SideParts, at: Kinematics, moment: Moment) -> MovingLoads:
-    push, square = moment.acceleration, moment.speed * moment.speed
+def _loads(machine: Machine, parts: SideParts, at: Kinematics, slider: SliderState) -> MovingLoads:
+    push, square = slider.acceleration, slider.speed * slider.speed
     lift: Any = 1j * machine.gravity
     if machine.sideways:  # to the right is outwards on the right, inwards on the left
         lift = lift - machine.sideways * np.array([[1.0], [-1.0]])
-    roller = at.first * push + at.second * square + lift
+    roller = at.center_slope * push + at.center_bend * square + lift
     middle: ComplexArray = 0.5 * (roller + (1j * push + lift))
-    along = at.way * push + at.bend * square
-    pull = machine.springs.force(AxisGap.from_outward_axes(at.center, at.first * moment.speed))
+    along = at.arc_slope * push + at.arc_bend * square
+    pull = machine.springs.force(AxisGap.from_outward_axes(at.center, at.center_slope * slider.speed))
     return MovingLoads(
         roller=roller,
         middle=middle,
-        turning=at.swing * push + at.sway * square,
+        turning=at.angle_slope * push + at.angle_bend * square,
         rolling=parts.roller_inertia / parts.roller_radius**2 * along,
         springs=np.array([pull, pull.conj()]),  # the left roller sees the opposite force in a mirror
     )

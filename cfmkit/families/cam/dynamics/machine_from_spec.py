@@ -1,4 +1,4 @@
-"""From a cam specification to a machine that can be moved."""
+"""From a cam specification to the machine of the dynamic models: sides, masses, inertias, springs, motion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def build(spec: CamSpec) -> Build:
     lift = cam_start_height(right.profile) if motion.origin == "cam-start" else 0.0
     machine = _machine(spec, (right, left), lift)
     for name, side in (("right", machine.right), ("left", machine.left)):
-        _check(name, side)
+        _check_leverage(name, side)
     return Build(right, left, machine, Cycloid(motion.slider_position, motion.stroke, motion.time), lift)
 
 
@@ -99,7 +99,7 @@ def solid_cylinder(mass: float, radius: float) -> float:
     return mass * radius**2 / 2.0
 
 
-def _check(name: str, side: Side) -> None:
+def _check_leverage(name: str, side: Side) -> None:
     try:
         _ = side.span
     except NoTrack:

@@ -1,4 +1,4 @@
-"""Moving parts: two sides, each with its roller's track, a slider and springs; and how the slider is moved.
+"""Machine of the dynamic cam models (two sides with their rollers' tracks, slider, springs), and the slider's motion.
 
 The slider's pin is on the axis at i S, the roller's centre C on its track, the brace between them: |C - i S| = L. The
 track may be turned about the origin (a slider that deviates from the axis of the cam, or a flank cut at a wrong angle).
@@ -77,7 +77,7 @@ class Machine:
         return right, right if self.left.runs_like(self.right) else self.left.stance(position)
 
 
-class Moment(NamedTuple):
+class SliderState(NamedTuple):
     """Slider position [m], speed [m/s] and acceleration [m/s^2], each (n,) or a number."""
 
     position: Any
@@ -86,7 +86,7 @@ class Moment(NamedTuple):
 
     def __repr__(self) -> str:
         """Return the three, each with a short text."""
-        return f"Moment{tuple(brief(array) for array in self)}"
+        return f"SliderState{tuple(brief(array) for array in self)}"
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Cycloid:
         """Return `points` equal steps from beginning to end [s]."""
         return np.linspace(0.0, self.time, points)
 
-    def evaluate(self, times: FloatArray | np.float64) -> Moment:
+    def evaluate(self, times: FloatArray | np.float64) -> SliderState:
         """Return position, speed and acceleration at times between 0 and `time` [s].
 
         Examples
@@ -114,7 +114,7 @@ class Cycloid:
         turn = (2.0 * np.pi) * share
         sine, speed = np.sin(turn), self.stroke / self.time
         position = self.start + self.stroke * (share - sine / (2.0 * np.pi))
-        return Moment(position, speed * (1.0 - np.cos(turn)), (2.0 * np.pi * speed / self.time) * sine)
+        return SliderState(position, speed * (1.0 - np.cos(turn)), (2.0 * np.pi * speed / self.time) * sine)
 
 
 class Stance(NamedTuple):

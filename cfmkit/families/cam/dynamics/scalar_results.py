@@ -44,7 +44,7 @@ def _shared_values(moved: MotionSolution) -> dict[str, float]:
 
 def _compute_values(moved: MotionSolution) -> dict[str, float]:
     history, machine = moved.history, moved.build.machine
-    moving = respond(machine, history.moment)
+    moving = respond(machine, history.slider)
     ratio = history.force / moved.static
     pressed = contact_pressure(moved)
     return {
@@ -52,9 +52,9 @@ def _compute_values(moved: MotionSolution) -> dict[str, float]:
         "contact_force_min": -_largest(-history.contact),
         "brace_force_max": _largest(history.brace),
         "roller_speed_max": _largest(np.abs(history.spin)),
-        "slider_speed_max": _largest(np.abs(history.moment.speed)),
-        "slider_acceleration_max": _largest(np.abs(history.moment.acceleration)),
-        "dead_weight_peak": _largest(np.abs(history.moment.acceleration)) / STANDARD_GRAVITY,
+        "slider_speed_max": _largest(np.abs(history.slider.speed)),
+        "slider_acceleration_max": _largest(np.abs(history.slider.acceleration)),
+        "dead_weight_peak": _largest(np.abs(history.slider.acceleration)) / STANDARD_GRAVITY,
         "moving_mass_max": _largest(moving.mass),
         "force_peak_over_static": _largest(ratio) - 1.0,
         "force_dip_under_static": 1.0 + _largest(-ratio),
@@ -74,7 +74,7 @@ def contact_pressure(moved: MotionSolution) -> FloatArray:
         return np.full(len(history.times), np.nan)
     machine = moved.build.machine
     low, high = machine.span
-    stances = machine.stances(np.clip(history.moment.position, low, high))
+    stances = machine.stances(np.clip(history.slider.position, low, high))
     radius, bend = machine.parts.roller_radius, np.array([stance.curvature for stance in stances])
     with np.errstate(divide="ignore", invalid="ignore"):
         curvature = 1.0 / (radius * (1.0 - bend * radius))
@@ -85,14 +85,14 @@ def contact_pressure(moved: MotionSolution) -> FloatArray:
 def slow_force(moved: MotionSolution) -> FloatArray:
     """Return the force of the same motion within one second, at the same places [N]."""
     scale = moved.build.motion.time / SLOW_DURATION
-    position, speed, acceleration = moved.history.moment
-    moment = moved.history.moment._replace(speed=speed * scale, acceleration=acceleration * scale**2)
-    return respond(moved.build.machine, moment._replace(position=position)).force
+    position, speed, acceleration = moved.history.slider
+    slider = moved.history.slider._replace(speed=speed * scale, acceleration=acceleration * scale**2)
+    return respond(moved.build.machine, slider._replace(position=position)).force
 
 
 def _angle_effect(moved: MotionSolution) -> float:
     """Return how much larger the force at the end is, at rest, than with flanks at the right angles."""
-    machine, end = moved.build.machine, moved.history.moment.position[-1:]
+    machine, end = moved.build.machine, moved.history.slider.position[-1:]
     right = replace(machine, right=replace(machine.right, angle=0.0), left=replace(machine.left, angle=0.0))
     if right == machine:
         return 0.0

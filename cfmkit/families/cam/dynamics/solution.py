@@ -1,4 +1,4 @@
-"""Solution of a cam mechanism in motion."""
+"""Solution of a cam mechanism in motion: its machine, and its forces and speeds over time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, Moment
+    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, SliderState
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.families.cam.statics import Assembly
 
@@ -22,7 +22,7 @@ class History(ShortRepr):
     """Forces and speeds of a motion."""
 
     times: FloatArray  # (n,) [s]
-    moment: Moment  # position, speed and acceleration of the slider
+    slider: SliderState  # position, speed and acceleration of the slider
     force: FloatArray  # (n,) on the slider, upwards [N]
     # contact, traction, (2, n): normal and tangential force of the cam on a roller [N]
     contact: FloatArray

@@ -106,20 +106,20 @@ def cut_cam(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
     if not law.undercuts(roller_radius):
         return profile
     if law.constant:
-        cusp = _crossing(lambda x: law.curvature_radius(x) - roller_radius, x0, end)
+        cusp = _find_root(lambda x: law.curvature_radius(x) - roller_radius, x0, end)
     else:  # a path that may become hollow has a curvature through zero
-        cusp = _crossing(lambda x: 1.0 / roller_radius - 1.0 / law.curvature_radius(x), x0, end)
+        cusp = _find_root(lambda x: 1.0 / roller_radius - 1.0 / law.curvature_radius(x), x0, end)
 
     def clear_of_start(x: float) -> float:
         cx, cy = profile.flank(x)
         return np.hypot(cx - x0, cy) - roller_radius
 
-    contact = _crossing(clear_of_start, cusp, end)
+    contact = _find_root(clear_of_start, cusp, end)
     cx, cy = profile.flank(contact)
     return CamProfile(path, roller_radius, end, CamCorner((cx, cy), contact, cusp))
 
 
-def _crossing(function: Callable[[Any], Any], low: Any, high: Any) -> Any:
+def _find_root(function: Callable[[Any], Any], low: Any, high: Any) -> Any:
     try:
         return root_between(function, low, high)
     except ValueError:

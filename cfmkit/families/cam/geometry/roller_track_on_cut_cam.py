@@ -159,7 +159,7 @@ class Track:
         self._is_shifted = agree(np.not_equal(self.shift, 0.0))
         self._follows_law = not (self._is_shifted or self.is_turned) and agree(np.equal(brace_length, law.brace_length))
         self._is_ideal = self._follows_law and law.is_ideal
-        self._limits(x_first)
+        self._set_limits(x_first)
 
     def _pivot_range(self) -> tuple[Any, Any]:
         """Return the angles of the contact normal between which the roller turns about the corner [rad]."""
@@ -167,7 +167,7 @@ class Track:
         law = self.profile.path.law
         return np.arctan2(law.rest_half_width - xc, yc), np.arctan(law.slope(self.profile.start))
 
-    def _limits(self, x_first: Any) -> None:
+    def _set_limits(self, x_first: Any) -> None:
         """Set the slider positions at which pieces begin and end."""
         pivots = self.profile.corner is not None
         at_corner, rate = self._evaluate_corner(self._pivots[0]) if pivots else self._evaluate_flank(self.profile.start)
@@ -177,24 +177,24 @@ class Track:
         # because the slider would fall beyond, before the flank does.
         self.start = self.dead_point = at_corner
         if pivots and agree(self._evaluate_corner(self._pivots[1])[1] > 0):
-            self.flank_range, self.turns_back = self._rising(skip=False)
+            self.flank_range, self.turns_back = self._find_rising_part(skip=False)
             self.corner_end = self._evaluate_flank(self.flank_range[0])[0]
-            self.dead_point = at_corner if agree(rate >= 0) else self._collinear()
+            self.dead_point = at_corner if agree(rate >= 0) else self._collinear_position()
         else:
-            self.flank_range, self.turns_back = self._rising(skip=True)
+            self.flank_range, self.turns_back = self._find_rising_part(skip=True)
             low = self._evaluate_flank(self.flank_range[0])[0]
             self.dead_point, self.corner_end = low if agree(low < self.start) else self.start, self.start
         self.end = self._evaluate_flank(self.flank_range[1])[0]
         if fails(self.end - self.start <= 1e-11 * self.brace_length):
             raise NoTrack("dead", x_first)
 
-    def _collinear(self) -> Any:
+    def _collinear_position(self) -> Any:
         """Return the slider position at which brace and roller are in line over the corner [m]."""
         xc, yc = self._corner_point
         across = self.brace_length - self.radius
         return yc + ((across - xc) * (across + xc)) ** 0.5
 
-    def _rising(self, skip: bool) -> tuple[tuple[Any, Any], bool]:
+    def _find_rising_part(self, skip: bool) -> tuple[tuple[Any, Any], bool]:
         """Return the path coordinates between which the slider rises on the flank, and whether it falls beyond.
 
         With `skip`, a part at the beginning on which it falls is left out.
@@ -235,17 +235,19 @@ class Track:
         """Return how far the roller's centre is from the slider's axis [m]."""
         return self.profile.offset_points(u, self.shift)[0]
 
-    def _slider(self, x: Real, y: Real | float) -> Real:
+    def _slider_position(self, x: Real, y: Real | float) -> Real:
         return y + ((self.brace_length - x) * (self.brace_length + x)) ** 0.5
 
     def _evaluate_flank(self, u: Real) -> tuple[Real, Real]:
         """Return slider position and its derivative along the flank."""
         law = self.profile.path.law
         if self._follows_law:
-            return self._slider(u, self.profile.path.height(u)), law.slope(u) - brace_tangent(u, law.brace_length)
+            return self._slider_position(u, self.profile.path.height(u)), law.slope(u) - brace_tangent(
+                u, law.brace_length
+            )
         x, y = self.profile.offset_points(u, self.shift)
         rate = (law.slope(u) - brace_tangent(x, self.brace_length)) * (1.0 + self.shift / law.curvature_radius(u))
-        return self._slider(x, y), rate
+        return self._slider_position(x, y), rate
 
     def _evaluate_corner(self, turn: float) -> tuple[float, float]:
         """Return slider position, and the sign of its derivative, while the roller pivots on the corner."""
@@ -265,7 +267,7 @@ class Track:
     def _flank_states(self, slider: FloatArray) -> TrackStates:
         law, u = self.profile.path.law, self._flank_parameter(slider)
         x = u + self.shift * self.profile.normal(u)[0] if self._is_shifted else u
-        height = self._slider(x, 0.0)
+        height = self._slider_position(x, 0.0)
         # Where the path is nearly vertical y follows from the slider far better than from x.
         y, tangent = slider - height, x / height
         slope = law.slope(u, tangent if self._follows_law else None)
@@ -342,18 +344,18 @@ class Track:
         xc, yc = self._corner_point
         sin, cos = np.sin(turn), np.cos(turn)
         x = xc + self.radius * sin
-        return self._slider(x, yc - self.radius * cos), x, sin / cos
+        return self._slider_position(x, yc - self.radius * cos), x, sin / cos
 
     def _flank_piece(self, u: Real) -> tuple[Real, Real, Real]:
         x, y = self.profile.offset_points(u, self.shift) if self._is_shifted else (u, self.profile.path.height(u))
-        return self._slider(x, y), x, self.profile.path.law.slope(u)
+        return self._slider_position(x, y), x, self.profile.path.law.slope(u)
 
     def _flank_parameter(self, slider: FloatArray) -> FloatArray:
         """Return the path coordinate of the contact on the flank."""
         law = self.profile.path.law
         low, high = self.flank_range
         if self._is_ideal:
-            travel = np.maximum(slider - self._slider(law.rest_half_width, 0.0), 0.0)
+            travel = np.maximum(slider - self._slider_position(law.rest_half_width, 0.0), 0.0)
             return np.minimum(np.maximum(law.position(travel), low), high)
         zero, places, excess = self._guide
         root = np.sqrt(np.maximum(slider - zero, 0.0))
@@ -398,9 +400,9 @@ class TurnedTrack(Track):
     def _axis_distance(self, u: Any) -> Any:
         return self.turn_about(*self.profile.offset_points(u, self.shift)).real
 
-    def _slider(self, x: Any, y: Any) -> Any:
+    def _slider_position(self, x: Any, y: Any) -> Any:
         at = self.turn_about(x, y)
-        return super()._slider(at.real, at.imag)
+        return super()._slider_position(at.real, at.imag)
 
     def _evaluate_flank(self, u: Any) -> tuple[Any, Any]:
         line = self.profile.parallel(u, self.shift)
@@ -413,9 +415,9 @@ class TurnedTrack(Track):
         at = self.turn_about(xc + self.radius * np.sin(turn), yc - self.radius * np.cos(turn))
         direction = cmath.exp(1j * turn) * self.turn
         rate = direction.imag - direction.real * brace_tangent(at.real, self.brace_length)
-        return super()._slider(at.real, at.imag), rate
+        return super()._slider_position(at.real, at.imag), rate
 
-    def _collinear(self) -> Any:
+    def _collinear_position(self) -> Any:
         corner = self.turn_about(*self._corner_point)
         across = self.brace_length - self.radius
         return corner.imag + ((across - corner.real) * (across + corner.real)) ** 0.5

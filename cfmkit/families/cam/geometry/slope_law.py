@@ -124,6 +124,7 @@ class SlopeLaw:
         return self._rise(x), self.slope_factor * 3.0 * self.brace_length**2 * x / (across * across * across**0.5)
 
     def _rise(self, x: Real) -> Real:
+        """Return dp/dx [1/m]."""
         across = (self.brace_length - x) * (self.brace_length + x)
         return self.slope_factor * (1.0 / self.force_constant + self.brace_length**2 / (across * across**0.5))
 

@@ -14,7 +14,7 @@ __getattr__, __all__ = lazy_names(
         "equilibrium_path": "Chain PressingEnd",
         "flexure_sizing": "rotations",
         "flexures_as_beam_network": (
-            "FLEXURE_BEAMS STRIP_BEAM Elasticity Flexure Strip flexure_ends flexure_network joints spread"
+            "FLEXURE_BEAMS STRIP_BEAM Elasticity Flexure Strip flexure_ends flexure_network joints stations"
         ),
     },
 )

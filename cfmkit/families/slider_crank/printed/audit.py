@@ -45,7 +45,7 @@ class FinishedStrip:
     overstress: float  # largest stress over the allowed one where the stroke is given; 1 where the stress ends it
 
 
-def judge(
+def judge_strip(
     values: FloatArray,  # (n,): numbers of the form
     search_result: FoundStrip,  # the search that they come from
     # ripple as a share and stress [Pa] that end the stroke, where it is what is sought
@@ -74,7 +74,7 @@ def judge(
         return None
     return FinishedStrip(
         strip,
-        _shares(form, values),
+        _list_station_shares(form, values),
         (task.start, stroke),
         float(np.abs(ratio[inside]).max()),
         _rms(chain_force(solution, task.start, stroke), task.force * task.share(_even_places(task.start, stroke))),
@@ -108,7 +108,7 @@ def _end_of_stroke(solution: Solution, ratio: FloatArray, ripple: float | None, 
     return min(ends)
 
 
-def _shares(form: Form, values: FloatArray) -> tuple[tuple[float, ...], ...] | None:
+def _list_station_shares(form: Form, values: FloatArray) -> tuple[tuple[float, ...], ...] | None:
     if not form.per_piece:
         return form.shares or None
     ends = np.cumsum((0, *form.per_piece))
@@ -142,7 +142,7 @@ def _find_active_limits(
     if ripple is not None:
         for sign, name in ((1.0, "upper"), (-1.0, "lower")):
             off = np.where(inside, sign * ratio, -np.inf)
-            peaks = [k for k in np.flatnonzero(off > (1.0 - ACTIVE_LIMIT_SHARE) * ripple).tolist() if _peak(off, k)]
+            peaks = [k for k in np.flatnonzero(off > (1.0 - ACTIVE_LIMIT_SHARE) * ripple).tolist() if _is_peak(off, k)]
             if peaks:
                 places = ", ".join(mm(float(solution.travel[k])) for k in peaks)
                 reasons.append(f"{name} edge of the band at {places}")
@@ -153,6 +153,6 @@ def _find_active_limits(
     return reasons
 
 
-def _peak(values: FloatArray, k: int) -> bool:
+def _is_peak(values: FloatArray, k: int) -> bool:
     """Return whether a value is not below its neighbours."""
     return all(values[k] >= values[j] for j in (k - 1, k + 1) if 0 <= j < len(values))

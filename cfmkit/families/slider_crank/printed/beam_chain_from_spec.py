@@ -18,7 +18,7 @@ from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
     flexure_network,
     joints,
     kink,
-    spread,
+    stations,
 )
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def strip_of(mechanism: Mechanism) -> Strip:
             "give [] for a piece without stations"
         )
     else:
-        places = spread(line, beam.shares)
+        places = stations(line, beam.shares)
     return Strip(line, beam.width, np.array(beam.values) + beam.offset, places)
 
 

@@ -21,7 +21,7 @@ from cfmkit.families.findings import mm, mpa, newton, percent, refusals_answered
 from cfmkit.families.rows import with_values
 from cfmkit.families.slider_crank.findings import finding, unreachable
 from cfmkit.families.slider_crank.linkage import linkage_of, resolve
-from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge
+from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge_strip
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, elasticity, pins_of
 from cfmkit.families.slider_crank.printed.flexure_sizing import design_flexures
 from cfmkit.families.slider_crank.printed.model import analyze, slider_reach
@@ -75,7 +75,7 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         return Design(None, Status.INVALID, "a part that is pressed needs 'design.force'")
     try:
         spec = resolve(spec)
-        return design_flexures(spec) if wanted.beam is None else _strip(spec, run)
+        return design_flexures(spec) if wanted.beam is None else _design_strip(spec, run)
     except InputError as problem:
         return Design(None, Status.INVALID, str(problem))
 
@@ -87,7 +87,7 @@ def _strip_design(spec: SliderCrankSpec) -> tuple[CrankDesign, StripDesign]:
     return spec.design, spec.design.beam
 
 
-def _strip(spec: SliderCrankSpec, run: Run) -> Design:
+def _design_strip(spec: SliderCrankSpec, run: Run) -> Design:
     _, wanted = _strip_design(spec)
     task = task_of(spec)
     form, ranges = form_of(spec, task)
@@ -104,15 +104,15 @@ def _strip(spec: SliderCrankSpec, run: Run) -> Design:
             return kept or strip
         if not strip.descent.feasible:
             return kept or infeasible(strip)
-        judged = judge(round_within_bounds(strip.values, ranges, FORM_DECIMALS), strip, limits, pins)
+        judged = judge_strip(round_within_bounds(strip.values, ranges, FORM_DECIMALS), strip, limits, pins)
         if judged is None:
-            refused = _not_pressed(strip)
+            refused = _unpressed_strip(strip)
             continue
         if allowed is not None:
             allowed /= max(1.0, judged.overstress)
         reported = _report(_with_finished_strip(spec, judged, wanted.shape == "uniform"), judged.window, run)
         if not reported.keeps(*limits):
-            refused = _not_kept(reported, judged.window, limits)
+            refused = _broken_limit(reported, judged.window, limits)
             continue
         kept = _make_design(strip, judged, reported)
         if (
@@ -162,7 +162,7 @@ def _report(spec: SliderCrankSpec, window: tuple[float, float], run: Run) -> Rep
     return Reported(spec, deviation, rms, stress, result.message)
 
 
-def _not_kept(reported: Reported, window: tuple[float, float], limits: tuple[float | None, float | None]) -> Design:
+def _broken_limit(reported: Reported, window: tuple[float, float], limits: tuple[float | None, float | None]) -> Design:
     """Return which limit a strip breaks in its analysis that it kept in the search."""
     (ripple, stress), missed = limits, []
     if reported.rms is None:
@@ -178,7 +178,7 @@ def _not_kept(reported: Reported, window: tuple[float, float], limits: tuple[flo
     return unreachable(text)
 
 
-def _not_pressed(strip: FoundStrip) -> Design:
+def _unpressed_strip(strip: FoundStrip) -> Design:
     """Return that a strip keeps its limits at the places of its search only."""
     over = f"from {mm(strip.program.task.start)} to {mm(strip.program.stroke(strip.descent.z))}"
     text = f"{over} the strip found keeps its band, or has its force, at the places of the search only"
@@ -192,7 +192,7 @@ def _search_of(strip: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
     }
     if _has_uniform_strip(strip):
         text = "longest travel that a strip of one thickness reaches within the band and the stress"
-        numbers["one_thickness_travel"] = (_one_thickness(strip), "length", text)
+        numbers["one_thickness_travel"] = (_uniform_stroke(strip), "length", text)
     return search_values(numbers, "beam", judged.window)
 
 
@@ -206,7 +206,7 @@ def _has_uniform_strip(strip: FoundStrip) -> bool:
     )
 
 
-def _one_thickness(strip: FoundStrip) -> float:
+def _uniform_stroke(strip: FoundStrip) -> float:
     """Return the stroke of a strip of one thickness [m]."""
     return 0.0 if strip.uniform is None else 0.01 * float(strip.uniform.z[-1])
 
@@ -360,7 +360,7 @@ def _analyse_strip(spec: SliderCrankSpec, task: StripTask, section: tuple[float,
     reported = _report(
         with_values(spec, {"analysis.points": min(spec.analysis.points, MAX_ANALYSIS_POINTS)}), window, run
     )
-    return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _not_kept(reported, window, limits)
+    return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _broken_limit(reported, window, limits)
 
 
 def _four_digits(value: float, up: bool) -> float:
@@ -404,7 +404,7 @@ def _message(strip: FoundStrip, judged: FinishedStrip, reported: Reported) -> st
     compared = ""
     if _has_uniform_strip(strip):
         within = percent(max(strip.program.task.ripple, COARSE_RIPPLE))
-        compared = f"; one thickness reaches {mm(_one_thickness(strip))} within {within}"
+        compared = f"; one thickness reaches {mm(_uniform_stroke(strip))} within {within}"
     shown = judged.active[:MAX_NAMED_LIMITS]
     more = f" and {len(judged.active) - MAX_NAMED_LIMITS} more" if len(judged.active) > MAX_NAMED_LIMITS else ""
     held = f"; limited by {', '.join(shown)}{more}" if shown else ""

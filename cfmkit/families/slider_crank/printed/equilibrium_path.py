@@ -1,6 +1,6 @@
-"""Pressing the slider of a chain: the path that starts at rest, and the branch on the other side.
+"""Equilibria of a chain (crank and coupler as beams) whose slider is pressed: from rest, or bent to the other side.
 
-A nearly straight chain yields like a column: within the first micrometres the force rises to a buckling load and
+A nearly straight chain buckles like a column: within the first micrometres the force rises to a buckling load and
 stays there. Ordinary steps from rest jump over that corner, onto a higher mode with ten times the force, so the first
 step is a hundred-thousandth of the travel and every point must be stable. Two cases cannot be reached from rest: the
 chain that is straight, or so nearly that rounding decides, and the branch to which a kinked chain does not go by
@@ -64,7 +64,7 @@ class PressingEnd(Enum):
 
 
 @dataclass(frozen=True, repr=False)
-class Pressed(ShortRepr):
+class PressedChain(ShortRepr):
     """The equilibria of a pressed chain."""
 
     path: Path  # converged points only
@@ -126,7 +126,7 @@ class Chain(ShortRepr):
         travel: FloatArray,  # (n,): from the unloaded position, increasing [m]; may start with 0
         side: int = 0,  # 1, -1, or 0 for the side of the kink (left where there is none)
         tolerance: float = ANALYSIS_TOLERANCE,  # as in `cfmkit.elastica.Control`
-    ) -> Pressed:
+    ) -> PressedChain:
         """Return the equilibria at travels on one side, that of the kink unless asked otherwise."""
         taut = np.flatnonzero(self._reach(travel) > (1.0 + 1e-9) * self.reach)
         if len(taut):
@@ -164,7 +164,7 @@ class Chain(ShortRepr):
 
     def _trace_from_helper(
         self, helper: FloatArray, drive: Displacement, wanted: int, tolerance: float, is_other_side: bool
-    ) -> Pressed:
+    ) -> PressedChain:
         """Return the equilibria nearest to those of a chain that is kinked to the side wanted.
 
         The branch to which the kink does not lead begins with a limit point: nothing before it, nor rest, is on it.
@@ -173,19 +173,19 @@ class Chain(ShortRepr):
         if helper_path.status is not PathStatus.COMPLETE:
             return self._classify_ending(helper_path, wanted, helped=True)
         path = solve_near_known_path(helper_path, self.build(self.points), drive)
-        first = _beginning(path, drive) if is_other_side else 0
+        first = _first_complete_point(path, drive) if is_other_side else 0
         if is_other_side and 0 < first < len(drive.points):
-            path = _from_its_limit(part_of(path, path.requested >= first), drive.points[:first])
+            path = _start_at_limit_point(part_of(path, path.requested >= first), drive.points[:first])
             text = f"with its kink the other way the chain has an equilibrium only from {path.drive[0] * 1e3:.4g} mm on"
-            return Pressed(path, PressingEnd.STARTS_LATE, text, wanted)
+            return PressedChain(path, PressingEnd.STARTS_LATE, text, wanted)
         return self._classify_ending(path, wanted)
 
-    def _classify_ending(self, path: Path, wanted: int, helped: bool = False) -> Pressed:
+    def _classify_ending(self, path: Path, wanted: int, helped: bool = False) -> PressedChain:
         """Return the outcome with its ending: a curve that is not the one requested is never passed on as such."""
         ending, message = _ENDING_BY_STATUS.get(path.status, PressingEnd.NOT_CONVERGED), path.message
         if helped or not len(path.at_requested):
             ending = PressingEnd.NOT_CONVERGED if ending is PressingEnd.COMPLETE else ending
-            return Pressed(path, ending, message)
+            return PressedChain(path, ending, message)
         sides = self._sides(path, wanted)
         side = int(sides[-1])
         stable = path.stable[path.at_requested]
@@ -195,7 +195,7 @@ class Chain(ShortRepr):
         chain_like = abs(self.kink) <= FRAME_OFFSET * self.length
         if ending is PressingEnd.COMPLETE and side != wanted and (chain_like or wanted != self.side):
             return self._cut_before_crossing(path, sides, wanted)
-        return Pressed(path, ending, message, side)
+        return PressedChain(path, ending, message, side)
 
     def _sides(self, path: Path, wanted: int) -> FloatArray:
         """Return to which side the chain is bent at the requested points: the side wanted, or the other one.
@@ -215,15 +215,15 @@ class Chain(ShortRepr):
             sides[:] = -wanted  # it went there at once, whatever its kink says
         return sides
 
-    def _cut_before_crossing(self, path: Path, sides: FloatArray, wanted: int) -> Pressed:
+    def _cut_before_crossing(self, path: Path, sides: FloatArray, wanted: int) -> PressedChain:
         """Return what there is before the chain bends to the other side: nothing where it does so at once."""
         first = int(np.flatnonzero(sides == wanted)[-1]) + 1 if (sides == wanted).any() else 0
         if first < MIN_CURVE_POINTS:
-            return Pressed(path, PressingEnd.WRONG_BRANCH, PressingEnd.WRONG_BRANCH.value, -wanted)
+            return PressedChain(path, PressingEnd.WRONG_BRANCH, PressingEnd.WRONG_BRANCH.value, -wanted)
         places = path.drive[path.at_requested][first - 1 : first + 1] * 1e3
         text = f"between {places[0]:.4g} and {places[1]:.4g} mm {PressingEnd.CROSSES.value}"
         kept = part_of(path, np.isin(path.requested, path.requested[path.at_requested][:first]))
-        return Pressed(kept, PressingEnd.CROSSES, text, wanted)
+        return PressedChain(kept, PressingEnd.CROSSES, text, wanted)
 
 
 _ENDING_BY_STATUS = {
@@ -233,7 +233,7 @@ _ENDING_BY_STATUS = {
 }
 
 
-def _beginning(path: Path, drive: Displacement) -> int:
+def _first_complete_point(path: Path, drive: Displacement) -> int:
     """Return the number of the first point from which on nothing is missing, rest not counted."""
     is_there = np.zeros(len(drive.points), dtype=bool)
     is_there[path.requested] = True
@@ -241,13 +241,13 @@ def _beginning(path: Path, drive: Displacement) -> int:
     return int(np.flatnonzero(~is_there)[-1]) + 1 if not is_there.all() else 0
 
 
-def _from_its_limit(
+def _start_at_limit_point(
     path: Path,  # without the first of the points that were requested
     # (m,): the travels that were requested before it begins [m]; those behind the limit point are found on the way
     missing: FloatArray,
 ) -> Path:
     """Return a path that is followed back to the limit point that it begins with, which becomes its first point."""
-    spots = _followed_back(path)
+    spots = _follow_back(path)
     if not spots:
         return path
     free, drive = np.array([spot.x for spot in spots[::-1]]), np.array([spot.drive for spot in spots[::-1]])
@@ -265,7 +265,7 @@ def _from_its_limit(
     return before.take(np.argsort(before.at.drive, kind="stable")).append(path)
 
 
-def _followed_back(path: Path) -> list[PathEquilibrium]:
+def _follow_back(path: Path) -> list[PathEquilibrium]:
     """Return equilibria from the first point of a path back to a limit point of its travel, in this order."""
     rest_equations, y, drive = equations(path.mesh), path.free[0], float(path.at.drive[0])
     beside = rest_equations.solve(y, drive * (1.0 + SLOPE_STEP))  # tells the slope
@@ -304,10 +304,10 @@ def _trace(network: Network, drive: Displacement, tolerance: float) -> Path:
 N_LINE_PIECES = 60  # straight pieces of the line that are looked at for crossings
 
 
-def kept_clear(
-    pressed: Pressed,  # any outcome
+def cut_at_contact(
+    pressed: PressedChain,  # any outcome
     thickness: float,  # at the ends of the chain [m]: nearer than this the slider's end touches the anchor
-) -> Pressed:
+) -> PressedChain:
     """Return the outcome up to where the chain meets its anchor, or itself."""
     places = pressed.path.at_requested.tolist()
     if not places:

@@ -1,4 +1,4 @@
-"""Warnings about printed slider-cranks."""
+"""Warnings about printed slider-cranks: when each is raised, and its sentence with numbers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica import hindered_curling
-from cfmkit.families.findings import format_at_most, mm, mpa, newton, stiffer, too_soft
+from cfmkit.families.findings import describe_wide_beam, format_at_most, mm, mpa, newton, wide_beam_in_short
 from cfmkit.families.rows import FindingRule
 from cfmkit.families.slider_crank.printed.scalar_results import stress_stroke
 
@@ -65,18 +65,18 @@ def _is_straight(solution: Solution) -> bool:
     return solution.chain.side == 0
 
 
-def _offset(solution: Solution) -> float:
+def _kink_size(solution: Solution) -> float:
     return abs(solution.chain.kink)
 
 
-def _made_sizes(solution: Solution) -> tuple[float, float]:
+def _process_limits(solution: Solution) -> tuple[float, float]:
     """Return the resolution of the process in the plane, and its thinnest wall [m]; 0 if not stated."""
     position, thinnest = _mechanism(solution).resolved
     return position or 0.0, thinnest or 0.0
 
 
 def _runs_in_long(solution: Solution) -> bool:
-    run_in, off = solution.run_in(0.98), _offset(solution)
+    run_in, off = solution.run_in(0.98), _kink_size(solution)
     is_long = run_in is not None and run_in > RUN_IN_SHARE * solution.travel[-1]
     return not _is_straight(solution) and is_long and off > 1e-3 * solution.chain.length
 
@@ -111,7 +111,7 @@ def _burdened_guide(solution: Solution) -> Sentence:
     )
 
 
-def _burden(solution: Solution) -> str:
+def _describe_burden_in_short(solution: Solution) -> str:
     _, side, share = _side_share(solution)
     return f"{newton(side)} on the guide, {100 * share:.0f} % of the force"
 
@@ -145,27 +145,28 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     ),
     FindingRule(
         "kink_too_small",
-        lambda solution: not _is_straight(solution) and _offset(solution) < _made_sizes(solution)[0],
+        lambda solution: not _is_straight(solution) and _kink_size(solution) < _process_limits(solution)[0],
         lambda solution: (
-            f"the kink of {mm(_offset(solution))} that determines the buckling side is smaller than the process can "
-            f"make ({mm(_made_sizes(solution)[0])}): the part may bend to the other side, with another force; 0.25 to "
-            "0.5 mm is safe",
+            f"the kink of {mm(_kink_size(solution))} that determines the buckling side is smaller than the process can "
+            f"make ({mm(_process_limits(solution)[0])}): the part may bend to the other side, with another force; 0.25 "
+            "to 0.5 mm is safe",
         ),
-        lambda solution: f"kink of {mm(_offset(solution))}, {mm(_made_sizes(solution)[0])} can be made",
+        lambda solution: f"kink of {mm(_kink_size(solution))}, {mm(_process_limits(solution)[0])} can be made",
     ),
     FindingRule(
         "long_run_in",
         _runs_in_long,
         lambda solution: (
-            f"with a kink of {mm(_offset(solution))} the force needs {mm(solution.run_in(0.98) or 0.0)} of travel to "
-            "reach 98 % of its level; a smaller kink shortens it",
+            f"with a kink of {mm(_kink_size(solution))} the force needs {mm(solution.run_in(0.98) or 0.0)} of travel "
+            "to reach 98 % of its level; a smaller kink shortens it",
         ),
     ),
     FindingRule(
         "too_thin",
-        lambda solution: solution.thinnest < _made_sizes(solution)[1],
+        lambda solution: solution.thinnest < _process_limits(solution)[1],
         lambda solution: (
-            f"the thinnest place is {mm(solution.thinnest)}, the process needs at least {mm(_made_sizes(solution)[1])}",
+            f"the thinnest place is {mm(solution.thinnest)}, the process needs at least "
+            f"{mm(_process_limits(solution)[1])}",
         ),
     ),
     FindingRule(
@@ -178,11 +179,11 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     ),
     FindingRule(
         "wide_beam",
-        lambda solution: bool(too_soft(*_hindered_share(solution))),
-        lambda solution: (too_soft(*_hindered_share(solution)), "mechanism.wide_beams=true"),
-        lambda solution: stiffer(_hindered_share(solution)[0]),
+        lambda solution: bool(describe_wide_beam(*_hindered_share(solution))),
+        lambda solution: (describe_wide_beam(*_hindered_share(solution)), "mechanism.wide_beams=true"),
+        lambda solution: wide_beam_in_short(_hindered_share(solution)[0]),
     ),
-    FindingRule("side_force", _burdens_guide, _burdened_guide, _burden),
+    FindingRule("side_force", _burdens_guide, _burdened_guide, _describe_burden_in_short),
     FindingRule(
         "friction_left_out",
         lambda solution: bool(_left_out_friction(solution)),

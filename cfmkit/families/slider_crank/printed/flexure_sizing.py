@@ -94,7 +94,7 @@ _MIN_SLENDERNESS = 2.0  # length over thickness below which a flexure is none
 
 
 @dataclass(frozen=True)
-class Sized:
+class SizedFlexures:
     """Flexures, and what the beams made of the closed forms."""
 
     flexures: tuple[Flexure, ...]  # from the ground to the slider
@@ -147,7 +147,7 @@ def design_flexures(spec: SliderCrankSpec) -> Design:
     turn = np.abs(rotations(linkage, unloaded, np.array([stroke]), side)[:, 0])
     sheet, stays = sheet_of(spec.mechanism.part), wanted.flexures.length is not None
     first = (
-        one_width(rates, lengths, turn, made_of)
+        size_with_one_width(rates, lengths, turn, made_of)
         if sheet is None
         else size_for_width(rates, lengths, turn, made_of, sheet, stays)
     )
@@ -187,7 +187,7 @@ def design_flexures(spec: SliderCrankSpec) -> Design:
     )
 
 
-def one_width(
+def size_with_one_width(
     rates: FloatArray, lengths: Sequence[float], turn: FloatArray, made_of: Elasticity
 ) -> tuple[Flexure, ...]:
     """Return flexures of one width that have the rates [N m/rad] and bear the rotations [rad], by the closed forms.
@@ -234,7 +234,7 @@ def correct_flexures(
     force: FloatArray,
     exact: bool,  # whether to correct; else the factors are found only
     fixed: FixedWidth | None = None,  # how, where the width stays
-) -> Sized | None:
+) -> SizedFlexures | None:
     """Return flexures whose beams have a mean force and the allowable stress; None without equilibrium."""
     parts, factors = tuple(flexures), (1.0, 1.0)
     limit, (linkage, unloaded, side) = made_of.allowable_stress or np.inf, built_in
@@ -259,7 +259,7 @@ def correct_flexures(
             Flexure(part.length, part.thickness / by_stress, part.width / by_force * by_stress**3, part.before)
             for part in parts
         )
-    return Sized(parts, *factors, by_stress)
+    return SizedFlexures(parts, *factors, by_stress)
 
 
 FACTOR_PHRASES = (
@@ -286,7 +286,7 @@ def _write_flexures(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: flo
     return with_values(spec, {"mechanism.flexures": flexures, **analysis})
 
 
-def _message(sized: Sized, exact: bool) -> str:
+def _message(sized: SizedFlexures, exact: bool) -> str:
     parts = ", ".join(mm(flexure.thickness) for flexure in sized.flexures)
     done = "which the sizes are corrected for" if exact else "which the sizes are not corrected for"
     harder = format_short(sized.force_factor - 1.0, "ratio")

@@ -178,7 +178,7 @@ def taper_of(section: Section) -> Taper:
     return thickness if isinstance(thickness, Taper) else Taper(np.array([0.0, 1.0]), np.repeat(thickness, 2))
 
 
-def spread(
+def stations(
     corners: FloatArray,  # (k + 1, 2): the polyline [m]
     shares: Sequence[Sequence[float]],  # for every straight piece, shares of its length at which a place lies
 ) -> FloatArray:

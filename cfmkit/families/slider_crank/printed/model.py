@@ -19,7 +19,7 @@ from cfmkit.families.rows import findings_of_one, values_of_one, with_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import resolve, unloaded_linkage
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import chain_of, elasticity
-from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd, kept_clear
+from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd, cut_at_contact
 from cfmkit.families.slider_crank.printed.findings import FINDING_RULES
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import taper_of
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_QUANTITIES
@@ -68,7 +68,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     side = spec.analysis.side_sign
     stops, grid = spec.mechanism.end_stops, np.linspace(low, high, spec.analysis.points)
     pressed = chain.press(stops.mark_rows([grid])[0] if stops else grid, side)
-    pressed = kept_clear(pressed, _thickness(chain))
+    pressed = cut_at_contact(pressed, _thickness(chain))
     usable = len(pressed.travel) > 1 and pressed.ending is not PressingEnd.WRONG_BRANCH
     reported = (
         () if pressed.ending is PressingEnd.COMPLETE else (finding(_ENDING_NAMES[pressed.ending], pressed.message),)

@@ -72,7 +72,7 @@ def _draw_leg(spec: SliderCrankSpec, leg: Leg) -> Drawing:
         (*sharp_notes(sharp, fillet), *bare),
         Sheet(widest, tuple(regions)),
         tuple(_dimensions(leg.points)),
-        tuple(_facts(spec, leg)),
+        tuple(_title_block_lines(spec, leg)),
         sections=sections,
     )
 
@@ -154,7 +154,7 @@ def _dimensions(points: FloatArray) -> Iterator[DrawnDimension]:
         yield DrawnDimension("ends of the centre line", start, end, "y")
 
 
-def _facts(spec: SliderCrankSpec, leg: Leg) -> Iterator[tuple[str, str]]:
+def _title_block_lines(spec: SliderCrankSpec, leg: Leg) -> Iterator[tuple[str, str]]:
     """Yield what the piece is made of, and how thick it is along its centre line."""
     if spec.mechanism.material is not None:
         yield "material", spec.mechanism.material.words

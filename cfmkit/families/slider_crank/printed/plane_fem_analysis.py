@@ -1,7 +1,7 @@
 """A printed slider-crank as it is drawn, as a planar solid: flexures with their fillets, links that bend, or a strip.
 
 The pad at the ground is held and that at the slider moved from their faces on; widths are those of the flexures where
-they are. Poses stand close where the travel begins: a nearly straight chain yields within a thousandth of it. Nominal
+they are. Poses stand close where the travel begins: a nearly straight chain buckles within a thousandth of it. Nominal
 stresses of fillets are those of the flexures between rigid links, or of the strip.
 
 Assumes: plane stress. No contact, no plasticity.
@@ -179,7 +179,7 @@ def driven_part(spec: SliderCrankSpec) -> DrivenPart:
     """Return one leg with the travels that it is solved for."""
     from cfmkit.solid.adaptive_solution import DrivenPart
 
-    return DrivenPart("slider-crank", part_of(spec), spec.analysis.solid.error, tuple(_stops(spec)))
+    return DrivenPart("slider-crank", part_of(spec), spec.analysis.solid.error, tuple(_list_travels(spec)))
 
 
 def elastic_parts(spec: SliderCrankSpec) -> tuple[DrivenPart, ...]:
@@ -200,7 +200,7 @@ def elastic_networks(spec: SliderCrankSpec) -> tuple[DrivenNetwork, ...]:
     return (DrivenNetwork("slider-crank", chain.build(chain.points), drive),)
 
 
-def _stops(spec: SliderCrankSpec) -> list[float]:
+def _list_travels(spec: SliderCrankSpec) -> list[float]:
     """Return the travels to solve for [m]: rest, closer ones where the travel begins, and the ends of every window."""
     low, high = spec.analysis.travel or (0.0, 0.0)
     places = high * np.linspace(0.0, 1.0, spec.analysis.solid.poses) ** POSE_EXPONENT

@@ -1,7 +1,7 @@
-"""A printed slider-crank, pressed: what its values, findings and pictures need.
+"""Solution of a printed slider-crank that is pressed, and its force and stress at every travel as polynomials.
 
-A nearly straight chain yields within a thousandth of its travel: over the logarithm of the travel its force is a row of
-Chebyshev polynomials, each on a panel of its own. A panel whose polynomial has not converged is halved, and the chain
+A nearly straight chain buckles within a thousandth of its travel: over the logarithm of the travel its force is a row
+of Chebyshev polynomials, each on its panel. A panel whose polynomial has not converged is halved, and the chain
 is pressed again at the nodes of the halves. Below the first node the force is proportional to the travel.
 """
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.end_stops import EndStops
-    from cfmkit.families.slider_crank.printed.equilibrium_path import Chain, Pressed
+    from cfmkit.families.slider_crank.printed.equilibrium_path import Chain, PressedChain
     from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.numerics.interpolation import ChebyshevPanels
@@ -134,7 +134,7 @@ class Solution(ShortRepr):
     """A chain with its equilibria; forces of all legs together, stresses of one."""
 
     chain: Chain  # what is pressed
-    pressed: Pressed  # the outcome
+    pressed: PressedChain  # the outcome
     material: Elasticity  # with the stress allowed
     legs: int  # equal ones on one slider
     window: tuple[float, float]  # where metrics are taken [m]

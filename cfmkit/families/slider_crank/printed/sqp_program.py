@@ -31,7 +31,7 @@ from cfmkit.elastica.results.equilibria_near_known_path import drive_slope, solv
 from cfmkit.elastica.results.path import N_PLACES
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.printed.equilibrium_path import FIRST_STEP
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, STRIP_BEAM, Strip, spread
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, STRIP_BEAM, Strip, stations
 from cfmkit.numerics.interpolation import differentiation, interpolation
 
 if TYPE_CHECKING:
@@ -97,10 +97,10 @@ class Form:
     def places(self, x: FloatArray, corners: FloatArray) -> FloatArray:
         """Return the stations as fractions of the length."""
         if not self.per_piece:
-            return spread(corners, self.shares) if self.shares else np.linspace(0.0, 1.0, self.count)
+            return stations(corners, self.shares) if self.shares else np.linspace(0.0, 1.0, self.count)
         ends = np.cumsum((0, *self.per_piece))
         shares = np.real(x[self.count : self.count + self.placed])
-        return spread(corners, [shares[a:b].tolist() for a, b in itertools.pairwise(ends)])
+        return stations(corners, [shares[a:b].tolist() for a, b in itertools.pairwise(ends)])
 
     def is_ordered(self, x: FloatArray, corners: FloatArray) -> bool:
         """Return whether stations that vary come one after the other."""
@@ -132,7 +132,7 @@ class State:
 
     path: Path  # its equilibria
     force: FloatArray  # (p,) [N]
-    watched: Watched  # where the stress is looked at
+    watched: WatchedStress  # where the stress is looked at
 
     @cached_property
     def stress(self) -> FloatArray:
@@ -150,7 +150,7 @@ class StripProgram(DesignProgram):
 
     task: StripTask
     form: Form
-    known: Path | None = None
+    last_path: Path | None = None
     _last: tuple[FloatArray, State] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -199,15 +199,15 @@ class StripProgram(DesignProgram):
         if path is None:
             return None
         built = self._build_state(path)
-        self.known, self._last = path, (z.copy(), built)
+        self.last_path, self._last = path, (z.copy(), built)
         return built
 
     def _path(self, network: Network, travel: FloatArray) -> Path | None:
         """Return the equilibria near the last ones, else from rest."""
         drive = Displacement(SLIDER_NODE, self.task.direction, travel)
-        if self.known is not None:
+        if self.last_path is not None:
             with suppress(InputError):  # stations that move can change how finely the strip is cut
-                path = solve_near_known_path(self.known, network, drive)
+                path = solve_near_known_path(self.last_path, network, drive)
                 if path.status is PathStatus.COMPLETE:
                     return path
         return _trace(network, drive)
@@ -365,7 +365,7 @@ _MAX_NEWTON_STEPS = 8
 
 
 @dataclass(frozen=True)
-class Watched:
+class WatchedStress:
     """From bending and axial stress at the samples of the last points to the stress looked at."""
 
     # bending, axial, (4, r, rows): to the tops of r pieces, with the signs: both add up on the side where they have the
@@ -385,7 +385,7 @@ class Watched:
 def stress_places(
     path: Path,  # its equilibria at the requested points
     spots: FloatArray,  # (p,): places of these points in a variable in which the stress is smooth
-) -> Watched:
+) -> WatchedStress:
     """Return where the stress of a strip is looked at."""
     sections, last = path.sections(STRIP_BEAM), path.at_requested[-N_STRESS_POINTS:]
     beam = path.network.beams[STRIP_BEAM]
@@ -394,7 +394,7 @@ def stress_places(
     place = sections.place[0].reshape(-1, N_PLACES)
     tops = [_tops(sections.bending_stress[k], sections.axial_stress[k], place, breaks) for k in last]
     between = interpolation(spots[-N_STRESS_POINTS:], np.linspace(spots[-N_STRESS_POINTS], spots[-1], N_STRESS_PLACES))
-    return Watched(np.array([top[0] for top in tops]), np.array([top[1] for top in tops]), between)
+    return WatchedStress(np.array([top[0] for top in tops]), np.array([top[1] for top in tops]), between)
 
 
 def _tops(bending: FloatArray, axial: FloatArray, place: FloatArray, breaks: FloatArray) -> FloatArray:

@@ -251,8 +251,8 @@ class StripSearch:
         """Return the stroke [cm] or the ripple [%] that a search begins with."""
         if self.task.goal != "stroke":
             return 2.0
-        known = self.uniform if self.uniform is not None and np.isfinite(self.uniform.violation) else None
-        return 100.0 * self.task.stroke if known is None else float(known.z[-1])
+        usable = self.uniform if self.uniform is not None and np.isfinite(self.uniform.violation) else None
+        return 100.0 * self.task.stroke if usable is None else float(usable.z[-1])
 
     def add_goal(self, x: FloatArray, goal: float) -> FloatArray:
         """Return the variables of a search: numbers of a form, and what is sought unless that is no variable."""
@@ -292,7 +292,7 @@ def search(
     means = run if starts > 1 else replace(run, executor=Run().executor)  # one alone is not worth a process
     outcome = run_stage(Stage(OneStart(work.descend, clock), tuple(range(starts)), identity), means, clock, tell)
     if not outcome.records:
-        return _nothing(outcome.lost)
+        return _explain_no_strip(outcome.lost)
     strips = [_with_its_ripple(work.read(outcome.records[number])) for number in sorted(outcome.records)]
     best = min(strips, key=lambda strip: _rank(strip.descent))
     unsure = not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM)
@@ -316,7 +316,7 @@ def _with_its_ripple(strip: FoundStrip) -> FoundStrip:
     return replace(strip, descent=replace(descent, z=z, objective=answer[0], constraints=answer[1]))
 
 
-def _nothing(lost: tuple[str, ...]) -> Design:
+def _explain_no_strip(lost: tuple[str, ...]) -> Design:
     """Return why no start led to anything."""
     if lost:
         return Design(None, Status.CRASHED, f"no start was completed: {'; '.join(lost)}")

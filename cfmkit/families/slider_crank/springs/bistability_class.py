@@ -47,7 +47,7 @@ DROP_TOL = 1e-3  # a drop so near to 1 may be on either side of it in a mechanis
 
 
 @dataclass(frozen=True, repr=False)
-class Classified(ShortRepr):
+class StabilityClasses(ShortRepr):
     """The classes of m curves."""
 
     kind: NDArray[np.intp]  # (m,), index into `CLASS_NAMES`
@@ -68,7 +68,7 @@ def classify(
     tolerance: FloatArray,
     # pair of (m, 1): where the effort is wanted constant: if it is, the stiffness is zero even without any fall
     window: Ends | None,
-) -> Classified:
+) -> StabilityClasses:
     """Return the class of each curve."""
     place, value = curves.place, curves.value
     before, after = place <= start, place >= start
@@ -80,7 +80,7 @@ def classify(
     kind = np.where(drop > 2.0 * tolerance[:, 0], NEGATIVE_CLASS, np.where(falls, ZERO_CLASS, POSITIVE_CLASS))
     kind = np.where(unstable > 0, SNAP_THROUGH_CLASS, kind)
     kind = np.where(stable == 2, BISTABLE_CLASS, np.where(stable > 2, TRISTABLE_CLASS, kind))
-    return Classified(kind, drop, stable, unstable)
+    return StabilityClasses(kind, drop, stable, unstable)
 
 
 def _constant(curves: Monotone, window: Ends, tolerance: FloatArray) -> NDArray[np.bool_]:

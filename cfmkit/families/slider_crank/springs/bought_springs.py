@@ -24,7 +24,7 @@ from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.kinds import AXIAL_KINDS, TURNED_KINDS
-from cfmkit.stock.springs.offers import PIN_SHARE, Miss, Offer, guide_rod_for, nearest
+from cfmkit.stock.springs.offers import PIN_SHARE, Miss, Offer, describe_nearest, guide_rod_for
 from cfmkit.stock.springs.spec import block_of, offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse, orient_to_larger
 
@@ -52,10 +52,10 @@ def best_sets(goal: RateGoal, offered: Sequence[FloatArray], count: int = 1) -> 
         return []
     few = goal.select_rows(np.unique(np.linspace(0, len(goal.wanted) - 1, N_BOUND_PLACES).round().astype(int)))
     # limits of single rates are those of what is offered
-    search = _Sets(goal, replace(few, upper=np.full(len(offered), np.inf), lower=None), count)
-    search.begin(offered)
-    search.look([np.asarray(rates) for rates in offered])
-    return sorted(search.found, key=lambda pair: pair[0])
+    scan = _Sets(goal, replace(few, upper=np.full(len(offered), np.inf), lower=None), count)
+    scan.begin(offered)
+    scan.scan([np.asarray(rates) for rates in offered])
+    return sorted(scan.best, key=lambda pair: pair[0])
 
 
 @dataclass(frozen=True)
@@ -71,14 +71,14 @@ class SpringOption:
     def written(self) -> Bought:
         """The same as a specification has it, with a rod where it would buckle."""
         offer = self.offer
-        own: dict[str, object] = {"at": JOINT_NAMES[self.joint], "count": self.count}
+        keys: dict[str, object] = {"at": JOINT_NAMES[self.joint], "count": self.count}
         if offer.spring_type.needs_guide:
-            own |= {"loaded": offer.spring_type.kind, "free_length": offer.free_length}
+            keys |= {"loaded": offer.spring_type.kind, "free_length": offer.free_length}
             if offer.guide_tube is None and offer.wound is not None:
                 needed = self.deflection > offer.unguided
                 guides = offer.guide_rod is not None and offer.guide_rod >= offer.wound.thinnest_guide_rod
-                own["guide_rod"] = (offer.guide_rod if guides else guide_rod_for(offer.wound)) if needed else None
-        return Bought.model_validate(block_of(offer, **own))
+                keys["guide_rod"] = (offer.guide_rod if guides else guide_rod_for(offer.wound)) if needed else None
+        return Bought.model_validate(block_of(offer, **keys))
 
     @property
     def rate(self) -> float:
@@ -92,7 +92,7 @@ class SpringOption:
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenSet:
     """Springs for all joints: the options taken, the rates that they add up to, and the largest deviation."""
 
     options: tuple[SpringOption, ...]
@@ -100,26 +100,26 @@ class Chosen:
     deviation: float
 
 
-def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> Chosen:
+def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> ChosenSet:
     """Return the springs of the catalogue that hold the target best.
 
     Raises Infeasible if none can be used, or none keeps the tolerance; the message has the nearest three.
     """
     options, refused = _options(task, window)
     if not options:
-        reported = nearest(refused) if refused else "it lists none of the kind that 'design.springs' needs"
+        reported = describe_nearest(refused) if refused else "it lists none of the kind that 'design.springs' needs"
         raise finding.infeasible("no_spring_fits", f"no spring of the catalogue fits: {reported} ('design.catalogue')")
     tolerance = task.wanted.tolerance
     best = _sets(goal, options, 1)
     if best and (tolerance is None or best[0].deviation <= tolerance * (1 + 1e-9)):
         return best[0]
     misses = [_miss_of(chosen) for chosen in (_sets(goal, options, 3) if best else [])]
-    reported = nearest(misses) if misses else _none_together(task, refused)
+    reported = describe_nearest(misses) if misses else _none_together(task, refused)
     allowed = f", 'design.tolerance' allows {percent(tolerance)}" if tolerance and misses else ""
     raise finding.infeasible("no_spring_fits", f"no springs of the catalogue keep the target: {reported}{allowed}")
 
 
-def next_sets(task: SpringTask, goal: RateGoal, window: tuple[float, float], count: int) -> list[Chosen]:
+def next_sets(task: SpringTask, goal: RateGoal, window: tuple[float, float], count: int) -> list[ChosenSet]:
     """Return the sets of springs that hold the target best after the one that `choose` takes, within the tolerance."""
     most = np.inf if task.wanted.tolerance is None else task.wanted.tolerance * (1 + 1e-9)
     sets = _sets(goal, _options(task, window)[0], 1 + count)[1:]
@@ -132,13 +132,13 @@ def least_deviation(task: SpringTask, goal: RateGoal, window: tuple[float, float
     return sets[0].deviation if sets else np.inf
 
 
-def _sets(goal: RateGoal, options: list[SpringOption], count: int) -> list[Chosen]:
+def _sets(goal: RateGoal, options: list[SpringOption], count: int) -> list[ChosenSet]:
     """Return the sets of options that hold the target best."""
     least = np.zeros(len(JOINT_NAMES)) if goal.lower is None else goal.lower
     at = [_group_by_rate(options, joint, low) for joint, low in enumerate(least.tolist())]
     ranked = best_sets(goal, [np.array(sorted(joint_options)) for joint_options in at], count)
     return [
-        Chosen(
+        ChosenSet(
             tuple(
                 option
                 for joint_options, rate in zip(at, rates.tolist(), strict=True)
@@ -161,14 +161,14 @@ def _group_by_rate(options: list[SpringOption], joint: int, least: float) -> dic
     return {option.rate if option else 0.0: option for option in by_rate.values()}
 
 
-def _miss_of(chosen: Chosen) -> Miss:
+def _miss_of(chosen: ChosenSet) -> Miss:
     label = " + ".join(option.label for option in chosen.options) or "no spring"
     return Miss(label, chosen.deviation, f"off by {percent(chosen.deviation)}")
 
 
 def _none_together(task: SpringTask, refused: list[Miss]) -> str:
     """Return why no set does what is required beside the target: to let the force be trimmed."""
-    reported = f"; {nearest(refused)}" if refused else ""
+    reported = f"; {describe_nearest(refused)}" if refused else ""
     key = "anchor_travel" if task.wanted.anchor_travel is not None else "angle_travel"
     return f"none is stiff enough for 'design.adjustment' within 'design.{key}'{reported}"
 
@@ -239,12 +239,12 @@ class _Sets:
     goal: RateGoal
     few: RateGoal
     count: int
-    found: list[tuple[float, FloatArray]] = field(default_factory=list)
+    best: list[tuple[float, FloatArray]] = field(default_factory=list)
 
     @property
     def bound(self) -> float:
         """Return the deviation that a set must not exceed to be among the best."""
-        return self.found[-1][0] if len(self.found) == self.count else np.inf
+        return self.best[-1][0] if len(self.best) == self.count else np.inf
 
     def take(self, sets: FloatArray) -> None:
         """Take those of some sets (k, m) that are among the best."""
@@ -255,9 +255,9 @@ class _Sets:
             return
         off = np.abs(sets @ self.goal.matrix.T - self.goal.wanted).max(axis=1)
         for k in np.argsort(off, kind="stable")[: self.count].tolist():
-            is_known = any(np.array_equal(sets[k], other_set) for _, other_set in self.found)
+            is_known = any(np.array_equal(sets[k], other_set) for _, other_set in self.best)
             if off[k] <= self.bound and not is_known:
-                self.found = sorted([*self.found, (float(off[k]), sets[k])], key=lambda pair: pair[0])[: self.count]
+                self.best = sorted([*self.best, (float(off[k]), sets[k])], key=lambda pair: pair[0])[: self.count]
 
     def begin(self, offered: Sequence[FloatArray]) -> None:
         """Take the sets next to the best rates that could be had if every rate could: they bound all others."""
@@ -269,11 +269,11 @@ class _Sets:
             ]
             self.take(np.array(list(product(*neighbours))))
 
-    def look(self, offered: list[FloatArray]) -> None:
+    def scan(self, offered: list[FloatArray]) -> None:
         """Look at all sets of what is offered that may be among the best."""
         open_ = [k for k, rates in enumerate(offered) if len(rates) > 1]
         if len(open_) <= 2:
-            self._look_at_pairs(offered, open_)
+            self._search_pairs(offered, open_)
             return
         offered = self._restrict_to_bound(offered)
         if any(not len(rates) for rates in offered):
@@ -282,7 +282,7 @@ class _Sets:
         rates = offered[joint]
         # the middle first: the sooner a good set is found, the more is left out
         for rate in rates[np.argsort(np.abs(rates - 0.5 * (rates[0] + rates[-1])), kind="stable")]:
-            self.look([np.array([rate]) if k == joint else rates_of_joint for k, rates_of_joint in enumerate(offered)])
+            self.scan([np.array([rate]) if k == joint else rates_of_joint for k, rates_of_joint in enumerate(offered)])
 
     def _restrict_to_bound(self, offered: list[FloatArray]) -> list[FloatArray]:
         """Return what is left of each joint's rates if no place may be off by more than the bound."""
@@ -299,7 +299,7 @@ class _Sets:
             for rates_of_joint, (low, high) in zip(offered, limits + reach, strict=True)
         ]
 
-    def _look_at_pairs(self, offered: list[FloatArray], open_: list[int]) -> None:
+    def _search_pairs(self, offered: list[FloatArray], open_: list[int]) -> None:
         """Look at all sets in which at most two joints have more than one rate."""
         first, second = (open_ + [k for k in range(len(offered)) if k not in open_])[:2]
         fixed = np.array([rates_of_joint[0] for rates_of_joint in offered])

@@ -23,18 +23,18 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import resolve
 from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation, next_sets
 from cfmkit.families.slider_crank.springs.design_outcome import (
-    Solved,
+    ChosenSprings,
     active_bounds,
     audit,
-    cannot_hold,
     check_reach,
     describe_springs,
-    hopeless,
+    explain_hopeless,
+    explain_impossible_slope,
+    explain_no_window,
+    explain_too_wide,
     message,
-    not_proven,
-    nowhere,
     search_of,
-    too_far,
+    warn_not_proven,
 )
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import choose_preferred, least_squares, minimax, ranges
 from cfmkit.families.slider_crank.springs.rate_fit_task import FREE_LENGTH_KEYS, N_WINDOW_PLACES, task_of, with_lengths
@@ -74,11 +74,11 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
     solved = _compensate_friction(solved)
     design = _make_design(solved, search)
     others = range(N_NEXT_SETS if solved.bought else 0)
-    return replace(design, next_best=tuple(partial(_with_next, solved, rank) for rank in others))
+    return replace(design, next_best=tuple(partial(_design_next_set, solved, rank) for rank in others))
 
 
 @refusals_answered
-def _with_next(solved: Solved, rank: int) -> Design:
+def _design_next_set(solved: ChosenSprings, rank: int) -> Design:
     """Return the design with springs that are not the best of the catalogue, with the same lengths."""
     goal = solved.task.goal(solved.window, _places(solved.task.wanted))
     sets = [] if goal is None else next_sets(solved.task, goal, solved.window, N_NEXT_SETS)
@@ -92,13 +92,13 @@ def _with_next(solved: Solved, rank: int) -> Design:
     return _make_design(bought, None)
 
 
-def _make_design(solved: Solved, search: Lowest | None) -> Design:
+def _make_design(solved: ChosenSprings, search: Lowest | None) -> Design:
     """Return what was found as a design, audited."""
     wanted = solved.task.wanted
     solved = _keep_if_audited(audit(solved, _write_springs(solved)))
     warnings = (*describe_springs(solved), *alternatives(solved, search))
     if wanted.window is None and (search is not None or not solved.proven):
-        warnings = (*warnings, not_proven(solved, search is not None))
+        warnings = (*warnings, warn_not_proven(solved, search is not None))
     return Design(
         _write_springs(solved),
         Status.COMPLETE,
@@ -112,10 +112,10 @@ def _make_design(solved: Solved, search: Lowest | None) -> Design:
 MAX_ROUNDS = 40  # rounds in which springs and the friction that they cause are fitted to each other; some 10 are enough
 
 
-def _compensate_friction(solved: Solved) -> Solved:
+def _compensate_friction(solved: ChosenSprings) -> ChosenSprings:
     """Return springs that hold the target with the friction that they cause, on the way that the design names."""
     task = solved.task
-    if task.wanted.branch is None or not task.assembly.rubbing.there:
+    if task.wanted.branch is None or not task.assembly.rubbing.is_present:
         return solved
     for _ in range(MAX_ROUNDS):
         again = solve(replace(task, rates=solved.rates))
@@ -126,7 +126,7 @@ def _compensate_friction(solved: Solved) -> Solved:
     return solved
 
 
-def _keep_if_audited(solved: Solved) -> Solved:
+def _keep_if_audited(solved: ChosenSprings) -> ChosenSprings:
     """Return a design that keeps its tolerance where it was audited.
 
     A widest window whose springs are farther off between the places that the search looked at than its reserve allows
@@ -142,10 +142,10 @@ def _keep_if_audited(solved: Solved) -> Solved:
         again = audit(again, _write_springs(again))
         if again.deviation <= tolerance * BAND_EDGE_FACTOR:
             return again
-    raise Infeasible(*too_far(solved.task, solved.deviation))
+    raise Infeasible(*explain_too_wide(solved.task, solved.deviation))
 
 
-def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Solved, Lowest | None]:
+def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[ChosenSprings, Lowest | None]:
     """Return the best design, and the search that led to its lengths."""
     ranges = {name: ends for name in FREE_LENGTH_KEYS if (ends := getattr(wanted, name)) is not None}
     axes = {name: BoxAxis(low, high, log=name != "offset") for name, (low, high) in ranges.items()}
@@ -158,7 +158,7 @@ def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tup
         nonlocal count, best
         count += 1
         run.progress(1.0 - 1.0 / (1.0 + count / 200.0), f"{count} choices of lengths")
-        value = _height(spec, dict(zip(axes, place, strict=True)), best)
+        value = _score_lengths(spec, dict(zip(axes, place, strict=True)), best)
         best = min(best, value)
         return value
 
@@ -172,7 +172,7 @@ def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tup
     return solve(task_of(with_lengths(spec, dict(zip(axes, place, strict=True))))), best_lengths
 
 
-def _height(spec: SliderCrankSpec, lengths: dict[str, float], best: float) -> float:
+def _score_lengths(spec: SliderCrankSpec, lengths: dict[str, float], best: float) -> float:
     """Return what a choice of lengths is judged by: the deviation, or the width of the window with a minus.
 
     Lengths whose deviation with springs of any rate is above the `best` so far need no look at a catalogue.
@@ -206,7 +206,7 @@ def _places(wanted: CrankDesign) -> int | None:
     return None if wanted.objective == "least-squares" else N_WINDOW_PLACES
 
 
-def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
+def solve(task: SpringTask, tolerance: float | None = None) -> ChosenSprings:
     """Return the best springs for given lengths, for the design's tolerance or another one.
 
     Raises Infeasible if nothing keeps the tolerance, or the window cannot be reached.
@@ -215,7 +215,7 @@ def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
     if wanted.window is None:
         fitted, proven = widest_of_all(task, tolerance or wanted.tolerance or 0.0)
         if fitted is None:
-            raise Infeasible(nowhere(task))
+            raise Infeasible(explain_no_window(task))
         window = fitted.low, fitted.high
     else:
         window = wanted.window
@@ -228,25 +228,25 @@ def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
     if wanted.catalogue:
         picked = choose(task, goal, window)
         if picked.deviation > MAX_DEVIATION and wanted.tolerance is None:
-            raise Infeasible(hopeless(task, picked.deviation))
+            raise Infeasible(explain_hopeless(task, picked.deviation))
         rms, places = goal.rms(picked.rates), len(goal.wanted)
-        return Solved(task, window, picked.rates, picked.deviation, rms, proven, places, bought=picked.options)
+        return ChosenSprings(task, window, picked.rates, picked.deviation, rms, proven, places, bought=picked.options)
     rates = _best_rates(goal, wanted)
     if rates is None:
-        raise Infeasible(cannot_hold(task))
+        raise Infeasible(explain_impossible_slope(task))
     if not rates.any():
-        raise Infeasible(cannot_hold(task) if wanted.hold_stiffness else nowhere(task))
+        raise Infeasible(explain_impossible_slope(task) if wanted.hold_stiffness else explain_no_window(task))
     if wanted.slack:
         rates = chosen_rates(goal, rates, wanted, tolerance or wanted.tolerance)
     deviation = goal.deviation(rates)
     if deviation > MAX_DEVIATION and wanted.tolerance is None:
-        raise Infeasible(hopeless(task, deviation))
+        raise Infeasible(explain_hopeless(task, deviation))
     if wanted.window is not None and wanted.tolerance is not None and deviation > wanted.tolerance:
-        raise Infeasible(*too_far(task, deviation))
-    return Solved(task, window, rates, deviation, goal.rms(rates), proven, len(goal.wanted))
+        raise Infeasible(*explain_too_wide(task, deviation))
+    return ChosenSprings(task, window, rates, deviation, goal.rms(rates), proven, len(goal.wanted))
 
 
-def _write_springs(solved: Solved) -> SliderCrankSpec:
+def _write_springs(solved: ChosenSprings) -> SliderCrankSpec:
     """Return the spec with springs and lengths written in, and an analysis that looks where the design did."""
     spec, wanted = resolve(solved.task.spec), solved.task.wanted
     rates = dict(zip(JOINT_NAMES, solved.rates.tolist(), strict=True))
@@ -268,7 +268,7 @@ def _write_springs(solved: Solved) -> SliderCrankSpec:
     return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
 
 
-def _motion_to_show(solved: Solved) -> dict[str, tuple[float, float]]:
+def _motion_to_show(solved: ChosenSprings) -> dict[str, tuple[float, float]]:
     """Return the motion of the analysis, if it has to be another one to show all of the window, and nothing forbidden.
 
     Where none is requested, the joints' limits are those of the motion, too.
@@ -285,7 +285,7 @@ def _motion_to_show(solved: Solved) -> dict[str, tuple[float, float]]:
     return {name: (min(low, solved.window[0]), max(high, solved.window[1]))}
 
 
-def _reference(solved: Solved) -> float:
+def _reference(solved: ChosenSprings) -> float:
     """Return the place nearest to the middle of the window at which the effort is exactly the target."""
     from cfmkit.numerics.roots import bracketed_root
 
@@ -361,7 +361,7 @@ def _best_rates(goal: RateGoal, wanted: CrankDesign) -> FloatArray | None:
     return least_squares(goal) if wanted.objective == "least-squares" else minimax(goal)
 
 
-def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
+def alternatives(solved: ChosenSprings, search: Lowest | None) -> tuple[Finding, ...]:
     """Return how far rates and lengths may move without harm, if they may move far."""
     if solved.bought:
         return ()
@@ -375,7 +375,7 @@ def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
     return (finding("near_optima", text),)
 
 
-def _find_rate_ranges(solved: Solved) -> str:
+def _find_rate_ranges(solved: ChosenSprings) -> str:
     """Return the range of each rate with nearly the same deviation; empty if all are well determined."""
     goal = solved.task.goal(solved.window, N_PROGRAMME_PLACES)
     if goal is None:
@@ -392,7 +392,7 @@ def _find_rate_ranges(solved: Solved) -> str:
     return ", ".join(reported) if len(reported) > 1 else ""
 
 
-def _find_length_range(solved: Solved, search: Lowest | None) -> str:
+def _find_length_range(solved: ChosenSprings, search: Lowest | None) -> str:
     """Return the range of the first free length with nearly the same deviation; empty if it is well determined."""
     wanted = solved.task.wanted
     if search is None or wanted.window is None:

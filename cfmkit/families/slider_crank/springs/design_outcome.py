@@ -1,4 +1,4 @@
-"""A design that was found, or why there is none, in the user's words."""
+"""Outcome of a design of springs: the springs, their audit by the analysis, and sentences; or why there are none."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Solved:
+class ChosenSprings:
     """A design that was found."""
 
     task: SpringTask  # with the lengths chosen
@@ -45,7 +45,7 @@ class Solved:
         return float(places[0]), float(places[-1])
 
 
-def audit(solved: Solved, spec: SliderCrankSpec) -> Solved:
+def audit(solved: ChosenSprings, spec: SliderCrankSpec) -> ChosenSprings:
     """Return a design with the deviations that the analysis of its specification measures.
 
     Those from a line that is not level are none of its metrics: they stay what the search found at its places.
@@ -57,7 +57,7 @@ def audit(solved: Solved, spec: SliderCrankSpec) -> Solved:
         return solved
     names = ("deviation_from_curve", "rms_to_curve") if followed else ("deviation_from_target", "rms_to_target")
     branch = ""
-    if solved.task.assembly.rubbing.there:
+    if solved.task.assembly.rubbing.is_present:
         branch = solved.task.wanted.branch or "mean"
         if branch == "mean":  # no way of the curve is the mean of both
             return solved
@@ -69,7 +69,7 @@ def audit(solved: Solved, spec: SliderCrankSpec) -> Solved:
     return replace(solved, deviation=largest, rms=rms / target, exact=True)
 
 
-def _no_targets(text: str) -> Finding:
+def _infeasible_targets(text: str) -> Finding:
     return finding("infeasible_targets", text)
 
 
@@ -87,11 +87,11 @@ def check_reach(task: SpringTask, window: tuple[float, float]) -> None:
     )
 
 
-def cannot_hold(task: SpringTask) -> Finding:
+def explain_impossible_slope(task: SpringTask) -> Finding:
     """Return why a slope in the stretched position, or a trim, cannot be had."""
     wanted = task.wanted
     if wanted.angle_travel is not None and not wanted.hold_stiffness:
-        return _no_targets(
+        return _infeasible_targets(
             f"no springs give an adjustment of {format_short(wanted.adjustment or 0.0, 'force')} when the unloaded "
             f"angle is turned by {format_short(wanted.angle_travel, 'angle')}, within 'design.max_rates'; reduce "
             "'design.adjustment', or increase 'design.angle_travel'"
@@ -105,42 +105,42 @@ def cannot_hold(task: SpringTask) -> Finding:
     return finding("no_zero_stiffness", text)
 
 
-def nowhere(task: SpringTask) -> Finding:
+def explain_no_window(task: SpringTask) -> Finding:
     """Return why no window keeps the tolerance, or why no springs are better than none in the window."""
     window, drive = task.wanted.window, task.assembly.drive
     goal = task.goal(window) if window is not None else None
     if task.wanted.curve is not None:
-        return _no_targets(
+        return _infeasible_targets(
             "no springs come closer to 'design.target' than having none at all; change it, its window, or "
             "'design.springs'"
         )
     if goal is not None and drive == "torque" and (goal.matrix[:, :3] <= 0.0).all():
         text = "in the window torsion springs turn the crank the other way; request 'design.torque: "
-        return _no_targets(f"{text}{format_short(-task.wanted.size, 'torque')}'")
+        return _infeasible_targets(f"{text}{format_short(-task.wanted.size, 'torque')}'")
     if "slider" not in task.wanted.springs and drive == "torque":
         text = "torsion springs alone give no constant torque next to the stretched position"
         return finding("no_zero_stiffness", f"{text}; use the slider's, too, in 'design.springs'")
     if window is not None:
         text = f"in the window no springs come closer to a constant {drive} than having none at all"
-        return _no_targets(f"{text}; change 'design.{task.assembly.motion_name}' or 'design.springs'")
-    return _no_targets("no window keeps 'design.tolerance'; allow more, or change the lengths in 'mechanism'")
+        return _infeasible_targets(f"{text}; change 'design.{task.assembly.motion_name}' or 'design.springs'")
+    return _infeasible_targets("no window keeps 'design.tolerance'; allow more, or change the lengths in 'mechanism'")
 
 
-def hopeless(task: SpringTask, deviation: float) -> Finding:
+def explain_hopeless(task: SpringTask, deviation: float) -> Finding:
     """Return that even the best springs have nothing of a constant effort, and why."""
     assembly, text = task.assembly, f"even the best springs are off by {percent(deviation)}"
     if task.wanted.curve is not None:
         cure = "change it, its window, or the lengths in 'mechanism'"
-        return _no_targets(f"{text} of the largest of 'design.target'; {cure}")
+        return _infeasible_targets(f"{text} of the largest of 'design.target'; {cure}")
     text += f": that is no constant {assembly.drive}"
     if assembly.drive == "torque" and (assembly.stretched - assembly.start) * task.wanted.size <= 0.0:
         text += "; the stretched position does not lie ahead of the unloaded one, and the torque only rises there; "
         text += "change 'mechanism.unloaded_angle' (or 'unloaded_offset'), or the sign of 'design.torque'"
         return finding("no_zero_stiffness", text)
-    return _no_targets(f"{text}; narrow 'design.{assembly.motion_name}', or change the lengths in 'mechanism'")
+    return _infeasible_targets(f"{text}; narrow 'design.{assembly.motion_name}', or change the lengths in 'mechanism'")
 
 
-def too_far(task: SpringTask, deviation: float) -> tuple[Finding, dict[str, str]]:
+def explain_too_wide(task: SpringTask, deviation: float) -> tuple[Finding, dict[str, str]]:
     """Return that a window is too wide for its tolerance, and what would be feasible."""
     tolerance, name = task.wanted.tolerance or 0.0, f"design.{task.assembly.motion_name}"
     nearest = {"design.tolerance": f"{100 * deviation:.4g} %"}
@@ -150,10 +150,10 @@ def too_far(task: SpringTask, deviation: float) -> tuple[Finding, dict[str, str]
         low, high = (format_short(end, task.assembly.dimension) for end in (widest_window.low, widest_window.high))
         nearest[name] = f"[{low}, {high}]"
         text += f": a window that keeps it is {low} to {high}"
-    return _no_targets(text), nearest
+    return _infeasible_targets(text), nearest
 
 
-def active_bounds(solved: Solved, wanted: CrankDesign) -> tuple[str, ...]:
+def active_bounds(solved: ChosenSprings, wanted: CrankDesign) -> tuple[str, ...]:
     """Return the paths of the design whose limit is reached."""
     active = []
     for name in FREE_LENGTH_KEYS:
@@ -167,7 +167,7 @@ def active_bounds(solved: Solved, wanted: CrankDesign) -> tuple[str, ...]:
     return tuple(active)
 
 
-def describe_springs(solved: Solved) -> tuple[Finding, ...]:
+def describe_springs(solved: ChosenSprings) -> tuple[Finding, ...]:
     """Return what to say about springs that are not needed, and about those that would like to be stiffer."""
     if solved.bought:
         return ()  # which joint gets none is the choice of the catalogue's springs
@@ -184,9 +184,9 @@ def describe_springs(solved: Solved) -> tuple[Finding, ...]:
     return tuple(warnings)
 
 
-def not_proven(solved: Solved, of_lengths: bool) -> Finding:
+def warn_not_proven(solved: ChosenSprings, of_lengths: bool) -> Finding:
     """Return what to say about a widest window that may not be the widest of all."""
-    low, high = (_place(solved, end) for end in solved.window)
+    low, high = (_place_text(solved, end) for end in solved.window)
     if of_lengths:
         text = "is the widest window for the lengths chosen, which a local search compared: others may have wider ones"
     else:
@@ -195,21 +195,21 @@ def not_proven(solved: Solved, of_lengths: bool) -> Finding:
     return finding("window_not_proven", f"{low} to {high} {text}")
 
 
-def _place(solved: Solved, motion: float) -> str:
+def _place_text(solved: ChosenSprings, motion: float) -> str:
     return format_short(motion, solved.task.assembly.dimension)
 
 
-def message(solved: Solved) -> str:
+def message(solved: ChosenSprings) -> str:
     """Return the outcome in one sentence."""
     rms = f"rms {percent(solved.rms)}"
     if solved.exact:
-        low, high = (_place(solved, end) for end in solved.judged)
+        low, high = (_place_text(solved, end) for end in solved.judged)
         return f"off by at most {percent(solved.deviation)} ({rms}) over {low} to {high}"
-    low, high = (_place(solved, end) for end in solved.window)
+    low, high = (_place_text(solved, end) for end in solved.window)
     return f"off by at most {percent(solved.deviation)} ({rms}) at {solved.places} places of {low} to {high}"
 
 
-def search_of(solved: Solved) -> dict[str, Searched]:
+def search_of(solved: ChosenSprings) -> dict[str, Searched]:
     """Return what only the search knows: how far the springs are off a line at the places that it looked at.
 
     From a level line they are off by what the analysis measures, as ``deviation_from_target`` and ``rms_to_target``.

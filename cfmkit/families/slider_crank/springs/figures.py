@@ -188,8 +188,8 @@ def curve(result: Result) -> Figure:
     heading = f"{drive} over {over}: {_kind(solution)}"
     figure = curve_figure(result, None, heading)
     for ax in figure.axes:
-        _equilibria(ax, solution, lambda _motion, _energy: 0.0)
-        _band(ax, solution)
+        _mark_equilibria(ax, solution, lambda _motion, _energy: 0.0)
+        _shade_band(ax, solution)
     return figure
 
 
@@ -199,7 +199,7 @@ def _kind(solution: Solution) -> str:
     return name if name in ("bistable", "tristable", "snap-through") else f"{name} stiffness"
 
 
-def _band(ax: Axes, solution: Solution) -> None:
+def _shade_band(ax: Axes, solution: Solution) -> None:
     """Shade the constant band and name it; of a mechanism that snaps through it says nothing."""
     if is_plain() or np.isnan(solution.band[0][0]) or solution.classified.kind[0] > NEGATIVE_CLASS:
         return
@@ -213,7 +213,7 @@ def _band(ax: Axes, solution: Solution) -> None:
     place_labels(ax, [Label(text, LINE_BLUE, places, prefer=0.12)])
 
 
-def _equilibria(ax: Axes, solution: Solution, height: Callable[[float, float], float]) -> None:
+def _mark_equilibria(ax: Axes, solution: Solution, height: Callable[[float, float], float]) -> None:
     """Mark stable equilibria with a full, unstable ones with an open circle."""
     dimension = motion_scale(solution).dimension
     for item in solution.equilibria:
@@ -242,7 +242,7 @@ def energy(result: Result) -> Figure:
         ]
     diagram = Diagram(solution.motion[0], motion_scale(solution), Scale("energy", "energy"), series)
     figure = diagram_figure(Heading.from_result(result, "energy of the springs, and its minima"), [diagram])
-    _equilibria(figure.axes[0], solution, lambda _motion, height: float(to_border(height, "energy")))
+    _mark_equilibria(figure.axes[0], solution, lambda _motion, height: float(to_border(height, "energy")))
     _name_wells(figure.axes[0], solution)
     return figure
 
@@ -323,7 +323,7 @@ def linkage(result: Result) -> Figure:
         ax.tick_params(labelleft=stacked or number == 0, labelbottom=not stacked or last)
         ax.set_xlabel("x [mm]" if not stacked or last else "")
         ax.set_ylabel("y [mm]" if stacked or number == 0 else "")
-    place_labels(panels[0], _names(solution, keys[0], view))
+    place_labels(panels[0], _label_parts(solution, keys[0], view))
     _key_curve(figure, result, keys, (17.0, 20.0 + rows * (size[1] + parts.TITLE_HEIGHT), 138.0, KEY_ROOM - 12.0))
     return figure
 
@@ -374,7 +374,7 @@ def draw_linkage(solution: Solution, key: KeyPosition, ax: Axes, view: PanelView
     return ax
 
 
-def _names(solution: Solution, key: KeyPosition, view: PanelView) -> list[Label]:
+def _label_parts(solution: Solution, key: KeyPosition, view: PanelView) -> list[Label]:
     """Return the names of the parts."""
     crank = np.linspace(0.2, 0.8, 20)[:, None] * np.array(key.crank_pin)
     coupler = key.crank_pin + np.linspace(0.3, 0.8, 20)[:, None] * (np.array(key.slider_pin) - key.crank_pin)

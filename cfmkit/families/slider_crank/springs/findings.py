@@ -41,7 +41,7 @@ RUN_IN = 0.02  # an unloaded position nearer than this to the stretched one [rad
 ON_LIMIT = 1 + 1e-9  # a deflection that is beyond its limit by less than this share is on it
 
 
-def place(solution: Solution, motion: float) -> str:
+def place_text(solution: Solution, motion: float) -> str:
     """Return a place of the motion as the user reads it."""
     return format_short(motion, solution.assemblies[0].dimension)
 
@@ -49,7 +49,7 @@ def place(solution: Solution, motion: float) -> str:
 # --- friction and class ---------------------------------------------------------------------------------------------
 
 
-def _locks(number: int, name: str) -> Rule:
+def _make_lock_rule(number: int, name: str) -> Rule:
     """Return the rule on places of one of both ways where friction holds the mechanism."""
 
     def holds(solution: Solution) -> Any:
@@ -60,7 +60,7 @@ def _locks(number: int, name: str) -> Rule:
     def sentence(solution: Solution) -> Sentence:
         assert solution.friction_branches is not None
         held = solution.motion[0, ~np.isfinite(solution.friction_branches[number].effort[0])]
-        first, last = (place(solution, float(held[end])) for end in (0, -1))
+        first, last = (place_text(solution, float(held[end])) for end in (0, -1))
         return (
             f"on the way {name} the mechanism self-locks from {first} to {last}: the line of force runs inside "
             "the friction circles of the pins; use pins of smaller diameter or friction ('mechanism.pins'), or "
@@ -79,14 +79,14 @@ def _boundary(solution: Solution) -> Sentence:
     )
 
 
-def _knee(solution: Solution) -> FloatArray:
+def _knee_angles(solution: Solution) -> FloatArray:
     return solution.column(lambda assembly: assembly.knee)[:, 0]
 
 
 def _is_restless(solution: Solution) -> Any:
     inside = (solution.low <= solution.start) & (solution.start <= solution.high)
     only_slider = ~solution.assembly.rates.reshape(4, -1)[:3].any(axis=0)
-    return (solution.drive == "torque") & inside[:, 0] & only_slider & (_knee(solution) == 0)
+    return (solution.drive == "torque") & inside[:, 0] & only_slider & (_knee_angles(solution) == 0)
 
 
 # --- driven by a torque ---------------------------------------------------------------------------------------------
@@ -98,7 +98,7 @@ def _spring_winds_up(solution: Solution) -> NDArray[np.bool_]:
     return (solution.drive == "torque") & turns & (solution.assembly.rates.reshape(4, -1)[:2] > 0.0).any(axis=0)
 
 
-def _winding(solution: Solution) -> Sentence:
+def _describe_winding(solution: Solution) -> Sentence:
     rates = solution.assemblies[0].rates
     wound = [JOINTS_BY_NAME[name].words for name, rate in zip(JOINT_NAMES[:2], rates, strict=False) if rate > 0.0]
     return (
@@ -112,7 +112,7 @@ def _same_poses(rests: Sequence[float]) -> list[tuple[float, float]]:
     return [(a, b) for a in rests for b in rests if a < b and abs(math.remainder(b - a, FULL_TURN)) < 1e-6]
 
 
-def _rests_again(solution: Solution) -> Any:
+def _has_same_poses(solution: Solution) -> Any:
     again = np.zeros(len(solution), dtype=bool)
     if solution.drive == "torque" and (solution.high - solution.low > FULL_TURN - 2e-6).any():
         rows, places, stable, _ = solution.all_equilibria
@@ -121,7 +121,7 @@ def _rests_again(solution: Solution) -> Any:
     return again
 
 
-def _again(solution: Solution) -> Sentence:
+def _describe_same_poses(solution: Solution) -> Sentence:
     rests = [equilibrium.motion for equilibrium in solution.equilibria if equilibrium.stable]
     again = _same_poses(rests)
     different = len(set(rests) - {second for _, second in again})
@@ -135,11 +135,11 @@ def _again(solution: Solution) -> Sentence:
 
 
 def _starts_stretched(solution: Solution) -> Any:
-    return (solution.drive == "force") & (_knee(solution) == 0.0)
+    return (solution.drive == "force") & (_knee_angles(solution) == 0.0)
 
 
 def _is_nearly_stretched(solution: Solution) -> Any:
-    knee = _knee(solution)
+    knee = _knee_angles(solution)
     return (solution.drive == "force") & (knee != 0.0) & (np.abs(knee) < RUN_IN) & (solution.motion[:, 0] <= 0.0)
 
 
@@ -156,7 +156,7 @@ def _run_in_end(solution: Solution) -> str:
     return f"within {mm(float(motion[reaching[0]]))} it reaches 95 %" if len(reaching) else "it never reaches 95 %"
 
 
-def _run_in(solution: Solution) -> Sentence:
+def _describe_run_in(solution: Solution) -> Sentence:
     assembly, lead, until = solution.assemblies[0], _lead(solution), _run_in_end(solution)
     kink = abs(math.sin(lead)) * assembly.linkage.crank
     return (
@@ -171,7 +171,7 @@ def _nears_pole(solution: Solution) -> Any:
         return False
     end, span = solution.column(lambda assembly: assembly.reach[0]), solution.high - solution.low
     is_near = (solution.low < end + 0.01 * span) & (end < -1e-9 * span)
-    return (np.abs(_knee(solution)) >= RUN_IN) & is_near[:, 0]
+    return (np.abs(_knee_angles(solution)) >= RUN_IN) & is_near[:, 0]
 
 
 # --- reference and window -------------------------------------------------------------------------------------------
@@ -188,7 +188,7 @@ def _misses_reference(solution: Solution) -> Any:
 
 
 def _describe_reference(solution: Solution) -> str:
-    return f"the reference {place(solution, float(solution.reference[0, 0]))}"
+    return f"the reference {place_text(solution, float(solution.reference[0, 0]))}"
 
 
 def _efforts_in_window(solution: Solution) -> tuple[FloatArray, FloatArray]:
@@ -205,7 +205,7 @@ def _changes_sign(solution: Solution) -> Any:
     return (low < 0.0) & (high > 0.0)
 
 
-def _signs(solution: Solution) -> Sentence:
+def _describe_sign_change(solution: Solution) -> Sentence:
     high, low = (format_short(float(end[0]), solution.drive) for end in _efforts_in_window(solution))
     return (f"in the window the {solution.drive} changes sign: it goes from {low} to {high}",)
 
@@ -217,7 +217,7 @@ def _leaves_out_stretched(solution: Solution) -> Any:
     return ~((low <= solution.stretched) & (solution.stretched <= high))[:, 0]
 
 
-def _stretched_outside(solution: Solution) -> Sentence:
+def _describe_missing_stretched(solution: Solution) -> Sentence:
     low, high, stretched = (deg(float(at[0, 0])) for at in (*solution.window_or_motion, solution.stretched))
     return (
         f"the window {low} to {high} does not contain the stretched position {stretched}: only around it is the "
@@ -228,7 +228,7 @@ def _stretched_outside(solution: Solution) -> Sentence:
 # --- limits of springs ----------------------------------------------------------------------------------------------
 
 
-def _buckling(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | None:
+def _describe_buckling(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | None:
     """Return how a bought spring buckles that is deflected so far, and what guides it; None if it does not."""
     spring, key = spec.mechanism.springs.bought[number], f"mechanism.springs.bought.{number}"
     if spring.is_guided or not moved > spring.unguided * (1 + 1e-9):
@@ -240,7 +240,7 @@ def _buckling(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | No
     )
 
 
-def _binding(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | None:
+def _describe_binding(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | None:
     """Return how a bought spring that is wound up so far [rad] binds on its pin; None if it does not."""
     spring, pins = spec.mechanism.springs.bought[number], spec.mechanism.pins
     if spring.coil is None or pins is None or not np.isfinite(moved):
@@ -258,12 +258,12 @@ def _binding(spec: SliderCrankSpec, number: int, moved: float) -> Sentence | Non
 def _rules_on(number: int, spring: Bought) -> Iterator[Rule]:
     """Yield the rules on what the bought spring of a number cannot do."""
     if spring.spring_type.needs_guide:
-        yield _fails("spring_buckles", _buckling, number, spring)
+        yield _make_fault_rule("spring_buckles", _describe_buckling, number, spring)
     if spring.at != "slider":
-        yield _fails("spring_binds_on_pin", _binding, number, spring)
+        yield _make_fault_rule("spring_binds_on_pin", _describe_binding, number, spring)
 
 
-def _fails(name: str, describe_fault: Callable[..., Sentence | None], number: int, spring: Bought) -> Rule:
+def _make_fault_rule(name: str, describe_fault: Callable[..., Sentence | None], number: int, spring: Bought) -> Rule:
     """Return the rule on one fault of a bought spring."""
 
     def fault(solution: Solution, row: int) -> Sentence | None:
@@ -277,7 +277,7 @@ def _fails(name: str, describe_fault: Callable[..., Sentence | None], number: in
     )
 
 
-def _overturns(joint: int) -> Rule:
+def _make_limit_rule(joint: int) -> Rule:
     """Return the rule on a spring that is deflected beyond its limit."""
     name = JOINT_NAMES[joint]
 
@@ -297,14 +297,14 @@ def _overturns(joint: int) -> Rule:
 
 
 FINDING_RULES: tuple[Rule, ...] = (
-    _locks(0, "forth"),
-    _locks(1, "back"),
+    _make_lock_rule(0, "forth"),
+    _make_lock_rule(1, "back"),
     FindingRule(
         "second_stable_outside",
         lambda solution: (solution.classified.kind == SNAP_THROUGH_CLASS) & (solution.classified.unstable > 0),
         lambda solution: (
-            f"at {place(solution, float(solution.nearest(stable=False)[0][0]))} the mechanism snaps through, and the "
-            "motion ends before the next stable position; extend the motion to find it",
+            f"at {place_text(solution, float(solution.nearest(stable=False)[0][0]))} the mechanism snaps through, and "
+            "the motion ends before the next stable position; extend the motion to find it",
         ),
     ),
     FindingRule("class_boundary", lambda solution: np.abs(solution.classified.drop - 1.0) < DROP_TOL, _boundary),
@@ -316,8 +316,8 @@ FINDING_RULES: tuple[Rule, ...] = (
             "fourth power there, and the stiffness at rest is zero; add a torsion spring",
         ),
     ),
-    FindingRule("spring_winds_up", _spring_winds_up, _winding),
-    FindingRule("same_position_twice", _rests_again, _again),
+    FindingRule("spring_winds_up", _spring_winds_up, _describe_winding),
+    FindingRule("same_position_twice", _has_same_poses, _describe_same_poses),
     FindingRule(
         "stretched_start",
         _starts_stretched,
@@ -350,7 +350,7 @@ FINDING_RULES: tuple[Rule, ...] = (
         lambda solution: (
             _is_nearly_stretched(solution) & ~np.isnan(solution.rest[:, 0]) & (solution.motion[:, -1] >= 0.0)
         ),
-        _run_in,
+        _describe_run_in,
         lambda solution: f"the force begins at zero: {_run_in_end(solution)} of that at mid-travel",
     ),
     FindingRule(
@@ -375,8 +375,8 @@ FINDING_RULES: tuple[Rule, ...] = (
             "has no width; choose another reference",
         ),
     ),
-    FindingRule("effort_changes_sign", _changes_sign, _signs),
-    FindingRule("stretched_outside_window", _leaves_out_stretched, _stretched_outside),
+    FindingRule("effort_changes_sign", _changes_sign, _describe_sign_change),
+    FindingRule("stretched_outside_window", _leaves_out_stretched, _describe_missing_stretched),
 )
 """Findings of every mechanism, the gravest first."""
 NO_SPRING: Rule = FindingRule(
@@ -394,5 +394,5 @@ def rules_of(solution: Solution) -> tuple[Rule, ...]:
     return (
         *FINDING_RULES,
         *(rule for number, spring in enumerate(springs) for rule in _rules_on(number, spring)),
-        *(_overturns(joint) for joint in range(4)),
+        *(_make_limit_rule(joint) for joint in range(4)),
     )

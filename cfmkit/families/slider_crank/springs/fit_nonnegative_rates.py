@@ -134,6 +134,7 @@ def _peaks(residual: FloatArray, level: float) -> Any:
 
 
 def _minimax(goal: RateGoal) -> tuple[FloatArray, float] | None:
+    """Return the rates with the smallest largest deviation, and this; solved twice where it is tiny."""
     smallest = _smallest_deviation(goal)
     if smallest is None:
         return None

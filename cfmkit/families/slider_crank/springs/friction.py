@@ -46,7 +46,7 @@ def branch(assembly: Assembly, units: UnitCurves, direction: float) -> FrictionB
     angle, beta = units.angle, coupler_angle(link, units)
     turns = assembly.rates_over(units.turn) * units.turn
     on_coupler, on_crank = -turns[1] - turns[2], turns[1] - turns[0]
-    crank_rate, coupler_rate, slider_rate = _rates(assembly, angle, beta)
+    crank_rate, coupler_rate, slider_rate = _speeds(assembly, angle, beta)
     signs = [np.sign(direction * rate) for rate in (crank_rate, coupler_rate - crank_rate, coupler_rate)]
     rubbing, torque = assembly.rubbing, assembly.drive == "torque"
     sine, cosine = np.sin(beta), np.cos(beta)
@@ -76,7 +76,7 @@ def branch(assembly: Assembly, units: UnitCurves, direction: float) -> FrictionB
     return FrictionBranch(effort, pull[0] * cosine + pull[1] * sine, across, lost)
 
 
-def _rates(assembly: Assembly, angle: FloatArray, beta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _speeds(assembly: Assembly, angle: FloatArray, beta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return how crank and coupler turn and the slider moves along x with the motion."""
     link = assembly.linkage
     with np.errstate(divide="ignore", invalid="ignore"):

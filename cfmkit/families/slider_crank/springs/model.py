@@ -126,7 +126,7 @@ def solve_rows(variants: Variants) -> Iterator[tuple[NDArray[np.intp], SolvedRow
         if assembly.clip_motion(*asked) == asked:
             built[index] = spec, assembly, asked
             own_kind = repr(_kind(spec)) if kind is None else kind
-            key = own_kind, spec.target_curve, *_flags(assembly), is_wide(assembly, *asked)
+            key = own_kind, spec.target_curve, *_friction_kinds(assembly), is_wide(assembly, *asked)
             alike.setdefault(key, []).append(index)
     for members in alike.values():
         for start in range(0, len(members), ROWS_TOGETHER):
@@ -152,10 +152,10 @@ def _kind(spec: SliderCrankSpec) -> tuple[Any, ...]:
     return tuple(map(drop_numbers, (spec.mechanism, spec.analysis, spec.design)))
 
 
-def _flags(assembly: Assembly) -> tuple[bool, ...]:
+def _friction_kinds(assembly: Assembly) -> tuple[bool, ...]:
     """Return what rubs: it decides which formulas hold."""
     rubbing = assembly.rubbing
-    return rubbing.there, rubbing.guide.friction > 0, rubbing.pin > 0
+    return rubbing.is_present, rubbing.guide.friction > 0, rubbing.pin > 0
 
 
 def _solution(specs: Sequence[SliderCrankSpec], assemblies: Sequence[Assembly], motions: Sequence[Ends]) -> Solution:
@@ -198,7 +198,7 @@ def _shortfalls(assembly: Assembly, asked: Ends, run: Ends) -> Iterator[Finding]
     poles = [(pole, end) for unbound, pole, end, wanted in ends if unbound and end != wanted]
     if assembly.drive == "torque":
         if beyond or poles:
-            yield _dead_point(assembly, asked, reach)
+            yield _explain_dead_point(assembly, asked, reach)
         return
     if beyond:
         yield finding(
@@ -210,7 +210,7 @@ def _shortfalls(assembly: Assembly, asked: Ends, run: Ends) -> Iterator[Finding]
         yield find_unbounded(poles)
 
 
-def _dead_point(assembly: Assembly, asked: Ends, reach: Ends) -> Finding:
+def _explain_dead_point(assembly: Assembly, asked: Ends, reach: Ends) -> Finding:
     whole = asked[1] - asked[0] >= FULL_TURN * (1 - 1e-9)
     return finding(
         "no_full_turn" if whole else "coupler_dead_point",

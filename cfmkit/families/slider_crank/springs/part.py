@@ -38,7 +38,7 @@ def part_over_motion(result: Result) -> PosedPart:
         direction=0.0,
         depth=depth,
         pieces=3 + _count_springs(spec.mechanism.springs, rates),
-        assumed=f"links {2e3 * eye_and_hole(spec)[0]:.3g} mm wide; {_sizes(spec.mechanism.springs)}{why}",
+        assumed=f"links {2e3 * eye_and_hole(spec)[0]:.3g} mm wide; {_describe_coils(spec.mechanism.springs)}{why}",
         rubbing=joining.rubbing,
         faults=joining.faults,
     )
@@ -90,7 +90,7 @@ def height_of(name: str, coil: HelicalSpring, turn: float) -> float:
     return coil.outer_diameter if name == "slider" else coil.room_for(turn)
 
 
-def _sizes(springs: Springs) -> str:
+def _describe_coils(springs: Springs) -> str:
     coils = [coil for name in JOINT_NAMES[:3] for coil in springs.coils_at(name)]
     if not coils:
         return "springs at pins have no size"

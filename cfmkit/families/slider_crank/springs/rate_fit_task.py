@@ -128,7 +128,7 @@ class SpringTask:
     def _evaluate_friction(self, places: FloatArray) -> FloatArray | float:
         """Return what friction adds to the effort with the springs of the last round, over the target."""
         wanted = self.wanted.branch
-        if self.rates is None or wanted is None or not self.assembly.rubbing.there:
+        if self.rates is None or wanted is None or not self.assembly.rubbing.is_present:
             return 0.0
         rubbed = replace(self.assembly, rates=self.rates * self.spec.mechanism.sets)
         ways = {"load": (1.0,), "unload": (-1.0,), "mean": (1.0, -1.0)}[wanted]
@@ -172,6 +172,7 @@ class SpringTask:
         return replace(goal, wanted=line, held=(row, slope))
 
     def _upper(self) -> FloatArray:
+        """Return the largest rates, 0 for springs that are not used."""
         most, used = self.wanted.max_rates, self.wanted.springs
         caps = [None if most is None else getattr(most, name) for name in JOINT_NAMES]
         limits = [math.inf if cap is None else cap for cap in caps]

@@ -107,20 +107,20 @@ class _Everywhere:
         while queue:
             low, high = queue.popleft()
             wanted = self.width * (1.0 + MIN_WIDTH_GAIN)
-            if low + wanted > self.last or not self._may(low, min(high, self.last - wanted), wanted):
+            if low + wanted > self.last or not self._may_begin(low, min(high, self.last - wanted), wanted):
                 continue
             if self.left <= 0:
                 self.finished = False
                 break
             middle = 0.5 * (low + high)
             if middle + wanted <= self.last and self._keeps(middle, middle + wanted):
-                best = middle, self._end(middle, middle + wanted)
+                best = middle, self._find_end(middle, middle + wanted)
                 self.width = best[1] - best[0]
             if high - low > 0.5 * self.width * (MIN_WIDTH_GAIN if best else 1.0):
                 queue += [(low, middle), (middle, high)]
         return best
 
-    def _may(self, low: float, high: float, width: float) -> bool:
+    def _may_begin(self, low: float, high: float, width: float) -> bool:
         """Return whether a window of a width may begin in an interval: its part common to all of them must keep."""
         return low + width <= high or self._keeps(high, low + width)
 
@@ -130,7 +130,7 @@ class _Everywhere:
         goal = self.task.goal((low, high), N_SEARCH_PLACES)
         return goal is not None and can_keep(goal, self.tolerance)
 
-    def _end(self, low: float, high: float) -> float:
+    def _find_end(self, low: float, high: float) -> float:
         """Return where the widest window from its beginning ends: double, then halve."""
         step, bad = high - low, math.inf
         while high < self.last and bad - high > 0.25 * MIN_WIDTH_GAIN * (high - low):

@@ -159,7 +159,7 @@ def _force_per_degree(solution: Solution) -> FloatArray:
         return np.asarray(np.radians(1.0) * np.where(rates > 0.0, rates * per_rate, 0.0).sum(axis=0))
 
 
-def _drop(solution: Solution) -> FloatArray:
+def _effort_drop(solution: Solution) -> FloatArray:
     is_there = np.abs(solution.effort).max(axis=1) > solution.effort_error
     return np.where(is_there, solution.classified.drop, np.nan)
 
@@ -194,7 +194,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "ratio",
         "largest fall of the effort after a peak, as a fraction of the peak, on the way from the unloaded position; "
         "from 1 on there is a second equilibrium",
-        _drop,
+        _effort_drop,
         "the effort is zero within its numerical error",
     ),
     "stable_positions": ScalarQuantity(

@@ -25,7 +25,7 @@ from cfmkit.families.largest_next_to_samples import finite_samples
 from cfmkit.families.rows import PlacesKept, rows_of, stack
 from cfmkit.families.slider_crank.springs.bistability_class import (
     CLASS_NAMES,
-    Classified,
+    StabilityClasses,
     classify,
     find_effort_signs,
     scale_factors,
@@ -244,7 +244,7 @@ class Solution(ShortRepr):
     @cached_property
     def friction_branches(self) -> tuple[FrictionBranch, FrictionBranch] | None:
         """The curves with friction, forth and back; None if nothing rubs."""
-        if not self.assemblies[0].rubbing.there:
+        if not self.assemblies[0].rubbing.is_present:
             return None
         units = self.unit_spring_curves
         return branch(self.assembly, units, 1.0), branch(self.assembly, units, -1.0)
@@ -298,7 +298,7 @@ class Solution(ShortRepr):
         return monotone(grid, effort, slope, self.assembly.efforts)
 
     @cached_property
-    def classified(self) -> Classified:
+    def classified(self) -> StabilityClasses:
         """Classes, drops and numbers of equilibria."""
         return classify(self.curve, self.start, self.rest, self.tolerance, self.window)
 

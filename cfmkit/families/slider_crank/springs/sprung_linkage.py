@@ -53,9 +53,9 @@ class Rubbing:
     mirrored: bool = False  # whether a mirrored pair keeps the guide free of load
 
     @property
-    def there(self) -> bool:
+    def is_present(self) -> bool:
         """Whether anything rubs."""
-        return bool(self.pin) or self.guide.there
+        return bool(self.pin) or self.guide.is_present
 
 
 @dataclass(frozen=True, repr=False)

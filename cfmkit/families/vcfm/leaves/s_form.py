@@ -1,4 +1,6 @@
-"""An inclined leaf between a wall and a guided shuttle that bends into an S: large motion, small strain.
+"""Closed form of an inclined leaf that bends into an S between wall and guided shuttle: force, curvature, bent line.
+
+Large motion, small strain.
 
 The leaf is a beam-column in a frame that turns with its chord: both ends make the angle alpha with the chord, the axial
 force P follows from how much shorter the chord is than the leaf, and the shear V from the end slopes. One root,
@@ -11,8 +13,6 @@ All arguments here are dimensionless: lengths over L, forces over E I/L^2. Again
 Li and Li (2022), Table I, the force is off by 0.004 N of 2.2 before buckling, and by 0.009 N up to 6 mm.
 
 [A] S. Awtar, A. Slocum, ASME J. Mech. Des. 129 (2007) 625: the beam constraint model, here without truncation.
-
-The deformed centre line of a leaf by the closed forms, for pictures.
 """
 
 from __future__ import annotations

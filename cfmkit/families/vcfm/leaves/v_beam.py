@@ -246,6 +246,7 @@ class VBeam(LeafLaw):
 
 
 def _buckled_form(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:
+    """Return force [N] and largest stress [Pa] of the buckled form."""
     force, at = critical_force(strip), pose(strip.angle, travel / strip.length)
     # (2 pi/L) sqrt(alpha^2 + 4 r) with r = shortening - P/EA - alpha^2/4: the tilt drops out
     curvature = 4.0 * np.pi / strip.length * np.sqrt(np.maximum(at.shortening - force / strip.axial, 0.0))
@@ -255,6 +256,7 @@ def _buckled_form(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:
 
 
 def _bent_form(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:
+    """Return force [N] and largest stress [Pa] of the S form."""
     unit = strip.bending / strip.length**2
     form = s_force(strip.angle, strip.thickness / strip.length, travel / strip.length)
     axial = np.abs(4.0 * form.z * unit) / strip.area

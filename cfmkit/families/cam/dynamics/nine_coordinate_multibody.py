@@ -16,8 +16,8 @@ The rows of the closure and of rolling act where roller and flank touch, so that
 pushes the roller with -(lambda_x, lambda_y) - lambda_roll (dx/dy, 1). The pins follow from the
 balance of roller and brace. Left vectors are given as on the right, in a mirror.
 
-This is a check on `cfmkit.families.cam.dynamics.inverse`, which needs no integration. It has
-no rolling resistance, like the paper's model, and starts beyond the corner of an undercut cam.
+`cfmkit.families.cam.dynamics.inverse` needs no integration. This model has
+no rolling resistance, like the paper's, and starts beyond the corner of an undercut cam.
 
 Everything works for one vector of coordinates and for many, (..., 9).
 
@@ -237,7 +237,7 @@ class NineCoordinates:
     def __init__(self, machine: Machine) -> None:
         """Describe each flank as a line x(y)."""
         self.machine = machine
-        self.chains = (_chain(machine.right, 1.0), _chain(machine.left, -1.0))
+        self.chains = (_make_side_chain(machine.right, 1.0), _make_side_chain(machine.left, -1.0))
 
     def run(self, motion: Cycloid, points: int, scheme: Scheme | None = None, first: int | None = None) -> Trajectory:
         """Return the motion and its multipliers at equally spaced times, or at the `first` of them only.
@@ -256,13 +256,13 @@ class NineCoordinates:
         residual = self.residual(coordinates, postures)
         driven[:, HOLONOMIC_ROWS] = -scheme.stabilisation / motion.time * residual[:, HOLONOMIC_ROWS]
         driven[:, DRIVE_ROW] = speed - scheme.stabilisation / motion.time * (coordinates[:, 0] - position)
-        velocities = _solve(jacobian, driven)
+        velocities = _solve_systems(jacobian, driven)
         needed = -self.quadratic(postures, velocities)
         needed[:, DRIVE_ROW] += push
-        accelerations = _solve(jacobian, needed)
+        accelerations = _solve_systems(jacobian, needed)
         applied = self.compute_forces(coordinates, velocities, postures)
         inertia = np.einsum("nij,nj->ni", self.mass(coordinates, postures), accelerations)
-        multipliers = _solve(np.swapaxes(jacobian, 1, 2), applied - inertia)
+        multipliers = _solve_systems(np.swapaxes(jacobian, 1, 2), applied - inertia)
         worst = float(np.abs(residual[:, HOLONOMIC_ROWS]).max())
         return Trajectory(times, coordinates, velocities, accelerations, multipliers, worst, postures)
 
@@ -392,12 +392,12 @@ class NineCoordinates:
             right = -beta * self.residual(x, postures)
             right[ROLLING_ROWS] = 0.0
             right[DRIVE_ROW] = speed - beta * (x[0] - position)
-            return _solve(self.jacobian(postures), right), np.array(last_contacts)
+            return _solve_systems(self.jacobian(postures), right), np.array(last_contacts)
 
         return rate
 
 
-def _chain(side: Side, hand: float) -> SideChain:
+def _make_side_chain(side: Side, hand: float) -> SideChain:
     distance = side.track.shift - side.parts.roller_radius
     line = FlankLine(side.track.profile, distance, side.angle, side.height)
     return SideChain(hand, side.parts.brace_length, side.parts.roller_radius, line)
@@ -408,7 +408,7 @@ def _angle(hand: float, direction: complex) -> float:
     return float(np.angle(direction if hand > 0 else -direction.conjugate()))
 
 
-def _solve(matrices: FloatArray, right: FloatArray) -> FloatArray:
+def _solve_systems(matrices: FloatArray, right: FloatArray) -> FloatArray:
     solution: Any = np.linalg.solve(matrices, right[..., None])[..., 0]
     return np.asarray(solution, dtype=np.float64)
 
@@ -425,6 +425,7 @@ def reactions(model: NineCoordinates, trajectory: Trajectory) -> tuple[NDArray[A
 
 
 def _react(model: NineCoordinates, trajectory: Trajectory, index: int, springs: ComplexArray) -> tuple[Any, ...]:
+    """Return roller centre, contact force, traction, forces on the brace and spin of one side, (n,) each."""
     chain, posture, parts = model.chains[index], trajectory.postures[index], model.sides[index].parts
     i, j, _, roll = chain.rows
     multipliers, column, steep = trajectory.multipliers, chain.columns.start, chain.hand * posture.flank.first
