@@ -76,24 +76,24 @@ class Explanation:
     criterion: float  # Schwarz's, smaller is better
 
     @cached_property
-    def _places(self) -> list[int]:
+    def _error_indices(self) -> list[int]:
         return [k for k, item in enumerate(self.calibration.parameters) if not item.path.startswith(DATA_PREFIX)]
 
     @property
     def errors(self) -> tuple[FitParameter, ...]:
         """Fitted errors of the part, without the zeros of the recording."""
-        return tuple(self.calibration.parameters[k] for k in self._places)
+        return tuple(self.calibration.parameters[k] for k in self._error_indices)
 
     @property
     def values(self) -> FloatArray:
         """Fitted values of the errors, (n,) [SI]."""
-        values: FloatArray = self.calibration.fit.values[self._places]
+        values: FloatArray = self.calibration.fit.values[self._error_indices]
         return values
 
     @property
     def covariance(self) -> FloatArray:
         """Covariance of these values, the zeros of the recording being unknown, too, (n, n) [SI]."""
-        covariance: FloatArray = self.calibration.fit.covariance[np.ix_(self._places, self._places)]
+        covariance: FloatArray = self.calibration.fit.covariance[np.ix_(self._error_indices, self._error_indices)]
         return covariance
 
     @property
@@ -117,7 +117,7 @@ class Explanation:
     def sentences(self) -> Iterator[str]:
         """Each error in words, with its 95 % interval."""
         half = self.calibration.fit.half_widths()
-        for k, value in zip(self._places, self.values, strict=True):
+        for k, value in zip(self._error_indices, self.values, strict=True):
             item = self.calibration.parameters[k]
             shown = value - item.start if is_thickness(item) else value
             stated = "than drawn" if is_thickness(item) else f"stated {item.format_value(item.start)}"
@@ -173,11 +173,11 @@ def _joint_parameter(spec: Spec, kind: str, paths: tuple[str, ...]) -> FitParame
         return FitParameter(first, dimension, start, *ends, start, paths, by_factor=True)
     if kind == "friction":
         return FitParameter(first, dimension, start, 0.0, 0.5, max(start, 0.01), paths)
-    most = LARGEST_THICKNESS_ERROR * _thinnest(spec, paths)
+    most = LARGEST_THICKNESS_ERROR * _smallest_thickness(spec, paths)
     return FitParameter(first, dimension, start, start - most, start + most, 0.2 * most, paths)
 
 
-def _thinnest(spec: Spec, paths: tuple[str, ...]) -> float:
+def _smallest_thickness(spec: Spec, paths: tuple[str, ...]) -> float:
     """Return the smallest thickness of those at some paths, or beside them where they are errors from zero."""
     values = [float(spec.get_value(path)) for path in paths]
     if min(values) > 0.0:
