@@ -98,7 +98,7 @@ def _short_page(document: Document, width: int, spare: int) -> Iterator[TextLine
     tables = [text for table in document.tables if table.most != 0 for text in _table_lines(table, width)]
     follow = _file_lines(document.files, width)
     if document.next:
-        follow.append(whole_line(_leading_word("next", Tone.GOOD), document.next))
+        follow.append(whole_line(_label("next", Tone.GOOD), document.next))
     needed = _most_of_headline(document.headline)
     spare -= len(notes) + len(tables) + len(follow)
     warnings = _warning_lines(document.warnings, width, max(spare - needed, min(len(document.warnings), 2)))
@@ -112,20 +112,18 @@ def _most_of_headline(rows: Sequence[ValueRow]) -> int:
     return max(required, min(MIN_FACTS, -(-len(rows) // 2)))
 
 
-def _leading_word(word: str, tone: str = Tone.LABEL) -> Span:
+def _label(word: str, tone: str = Tone.LABEL) -> Span:
     return Span(f"{' ' * INDENT_COLUMNS}{word:<{WORD_COLUMNS}}" + ("" if len(word) < WORD_COLUMNS else " "), tone)
 
 
 def _note_lines(note: Note, width: int) -> list[TextLine]:
     room = width - INDENT_COLUMNS - WORD_COLUMNS
     if note.is_command:
-        return [whole_line(_leading_word(note.word, note.tone), note.text)]
+        return [whole_line(_label(note.word, note.tone), note.text)]
     if note.whole:
         lines = textwrap.wrap(note.text, room, break_long_words=False, break_on_hyphens=False) or [""]
-        return [
-            whole_line(_leading_word(note.word if not at else "", note.tone), text) for at, text in enumerate(lines)
-        ]
-    return [_with_remedy(_leading_word(note.word, note.tone), "", note.short or note.text, note.remedy, room)]
+        return [whole_line(_label(note.word if not at else "", note.tone), text) for at, text in enumerate(lines)]
+    return [_with_remedy(_label(note.word, note.tone), "", note.short or note.text, note.remedy, room)]
 
 
 def _with_remedy(word: Span, name: str, text: str, remedy: str, room: int) -> TextLine:
@@ -151,11 +149,11 @@ def _warning_lines(warnings: Sequence[WarningEntry], width: int, most: int) -> l
     for at, warning in enumerate(shown):
         word = f"{'warning' if len(warnings) == 1 else f'warnings {len(warnings)}'}" if not at else ""
         remedy = warning.options[0] if warning.options else ""
-        lines.append(_with_remedy(_leading_word(word, Tone.BAD), f"{warning.name}: ", warning.short, remedy, room))
+        lines.append(_with_remedy(_label(word, Tone.BAD), f"{warning.name}: ", warning.short, remedy, room))
     if rest := warnings[len(shown) :]:
         names = ", ".join(dict.fromkeys(warning.name for warning in rest))
         text = shortened_to_clause(f"and {len(rest)} more (-v): {names}", room)
-        lines.append(whole_line(_leading_word("" if shown else f"warnings {len(warnings)}", Tone.BAD), text))
+        lines.append(whole_line(_label("" if shown else f"warnings {len(warnings)}", Tone.BAD), text))
     return lines
 
 
@@ -303,7 +301,7 @@ def _file_lines(files: Written | None, width: int) -> list[TextLine]:
         if len(text) + GAP_COLUMNS + len(MORE_TEXT) <= room
         else ""
     )
-    return [whole_line(_leading_word("files", Tone.GOOD), text, Span(more, Tone.FAINT))]
+    return [whole_line(_label("files", Tone.GOOD), text, Span(more, Tone.FAINT))]
 
 
 # --- everything -------------------------------------------------------------------------------------------------------

@@ -1,5 +1,4 @@
-"""Errors with which a part was made (modulus, thickness, friction, rates), as far as its recording can tell them:
-fitted, compared, and in words.
+"""Errors with which a part was made (modulus, thickness, friction, rates), fitted to its recording and compared.
 
 Candidates are what errs in a part of that family: the moduli of its materials, one error of thickness all over the
 part, one coefficient of friction, and the rates of springs. All sets of them are fitted, with the zero of the force,
@@ -330,14 +329,14 @@ def _fit_sets(
                 fit = fit_samples(before, curves, (*chosen, *zeros), "linear", FIT_TOLERANCE)
             except CfmError:  # no such part exists, or none that could be measured so
                 continue
-            level = min(level, _schwarz_criterion(fit, before, 1.0))
+            level = min(level, _criterion(fit, before, 1.0))
             yield fit
         if count and level >= best - STRONG_EVIDENCE:
             return
         best = level
 
 
-def _squared_unusual_errors(fit: Calibration, expected: Assumed | None) -> float:
+def _penalty(fit: Calibration, expected: Assumed | None) -> float:
     """Return the squares of fitted errors over what is usual of material and process, added up."""
     total = 0.0
     for item, value in zip(fit.parameters, fit.fit.values, strict=True):
@@ -350,7 +349,7 @@ def _squared_unusual_errors(fit: Calibration, expected: Assumed | None) -> float
     return total
 
 
-def _schwarz_criterion(fit: Calibration, before: Comparison, inflation: float) -> float:
+def _criterion(fit: Calibration, before: Comparison, inflation: float) -> float:
     """Return Schwarz's criterion, residuals counting as one in groups of `inflation`."""
     residuals = fit.fit.residuals
     count, level = len(residuals), float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
@@ -366,10 +365,7 @@ def _rank_explanations(fits: list[Calibration], before: Comparison, expected: As
     """
     closest = min(fits, key=lambda fit: float(fit.fit.residuals @ fit.fit.residuals))
     inflation = closest.fit.inflation
-    ranked = [
-        Explanation(fit, _schwarz_criterion(fit, before, inflation) + _squared_unusual_errors(fit, expected))
-        for fit in fits
-    ]
+    ranked = [Explanation(fit, _criterion(fit, before, inflation) + _penalty(fit, expected)) for fit in fits]
     return sorted(ranked, key=lambda item: item.criterion)
 
 

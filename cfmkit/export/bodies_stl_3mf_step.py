@@ -273,16 +273,12 @@ def threemf_bytes(name: str, bodies: Sequence[Body]) -> bytes:
 def _model_xml(name: str, bodies: Sequence[Body]) -> str:
     lines = [f'{_XML_HEADER}<model unit="millimeter" xml:lang="en-US" xmlns="{_CORE_NAMESPACE}">', "<resources>"]
     for number, body in enumerate(bodies, start=1):
-        lines += [
-            f'<object id="{number}" type="model" name="{name}-{number}"><mesh>',
-            *_mesh_xml(body),
-            "</mesh></object>",
-        ]
+        lines += [f'<object id="{number}" type="model" name="{name}-{number}"><mesh>', *_mesh(body), "</mesh></object>"]
     items = "".join(f'<item objectid="{number}"/>' for number in range(1, len(bodies) + 1))
     return "\n".join([*lines, "</resources>", f"<build>{items}</build></model>", ""])
 
 
-def _mesh_xml(body: Body) -> Iterator[str]:
+def _mesh(body: Body) -> Iterator[str]:
     yield "<vertices>"
     for x, y, z in to_border(body.points, "length").tolist():
         yield f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>'

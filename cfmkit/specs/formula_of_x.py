@@ -58,13 +58,13 @@ def formula(text: str) -> Callable[[FloatArray], FloatArray]:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ValueError(f"{quote(text)} is not a formula; write e.g. '1.5*(1 - cos(pi*x/12))'") from None
     try:
-        _evaluate(tree, np.ones(1))
+        _value(tree, np.ones(1))
     except RecursionError:
         raise ValueError(f"{quote(text)} is nested too deep for a formula") from None
 
     def function(x: FloatArray) -> FloatArray:
         with np.errstate(all="ignore"):
-            return np.broadcast_to(np.asarray(_evaluate(tree, x), dtype=float), np.shape(x)).copy()
+            return np.broadcast_to(np.asarray(_value(tree, x), dtype=float), np.shape(x)).copy()
 
     return function
 
@@ -86,17 +86,17 @@ def slope(text: str) -> Callable[[FloatArray], FloatArray]:
 
     def function(x: FloatArray) -> FloatArray:
         with np.errstate(all="ignore"):
-            return np.broadcast_to(np.asarray(_derive(tree, x), dtype=float), np.shape(x)).copy()
+            return np.broadcast_to(np.asarray(_slope(tree, x), dtype=float), np.shape(x)).copy()
 
     return function
 
 
-def _derive(node: ast.expr, x: FloatArray) -> Any:
+def _slope(node: ast.expr, x: FloatArray) -> Any:
     """Return the derivative of a formula that `formula` accepts, by the rules of calculus."""
     if isinstance(node, ast.UnaryOp):
-        return _UNARY_OPERATORS[type(node.op)](_derive(node.operand, x))
+        return _UNARY_OPERATORS[type(node.op)](_slope(node.operand, x))
     if isinstance(node, ast.BinOp):
-        u, v, du, dv = _evaluate(node.left, x), _evaluate(node.right, x), _derive(node.left, x), _derive(node.right, x)
+        u, v, du, dv = _value(node.left, x), _value(node.right, x), _slope(node.left, x), _slope(node.right, x)
         if isinstance(node.op, ast.Add | ast.Sub):
             return _BINARY_OPERATORS[type(node.op)](du, dv)
         if isinstance(node.op, ast.Mult):
@@ -108,8 +108,8 @@ def _derive(node: ast.expr, x: FloatArray) -> Any:
         return by_base + by_power
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         inner, slopes = (
-            [_evaluate(argument, x) for argument in node.args],
-            [_derive(argument, x) for argument in node.args],
+            [_value(argument, x) for argument in node.args],
+            [_slope(argument, x) for argument in node.args],
         )
         if len(inner) == 2:
             first = inner[0] <= inner[1] if node.func.id == "min" else inner[0] >= inner[1]
@@ -118,24 +118,22 @@ def _derive(node: ast.expr, x: FloatArray) -> Any:
     return 1.0 if isinstance(node, ast.Name) and node.id == "x" else 0.0
 
 
-def _evaluate(node: ast.expr, x: FloatArray) -> Any:
+def _value(node: ast.expr, x: FloatArray) -> Any:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
         return _to_float(node.value)
     if isinstance(node, ast.Name) and node.id in ("x", "pi"):
         return x if node.id == "x" else np.pi
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY_OPERATORS:
         with np.errstate(all="ignore"):
-            return np.asarray(
-                _BINARY_OPERATORS[type(node.op)](np.asarray(_evaluate(node.left, x)), _evaluate(node.right, x))
-            )
+            return np.asarray(_BINARY_OPERATORS[type(node.op)](np.asarray(_value(node.left, x)), _value(node.right, x)))
     if isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY_OPERATORS:
-        return _UNARY_OPERATORS[type(node.op)](_evaluate(node.operand, x))
+        return _UNARY_OPERATORS[type(node.op)](_value(node.operand, x))
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _NUMPY_FUNCTIONS:
         wanted = 2 if node.func.id in ("min", "max") else 1
         if len(node.args) != wanted or node.keywords:
             raise ValueError(f"{node.func.id}() takes {wanted} value{'s' if wanted > 1 else ''}")
         with np.errstate(all="ignore"):
-            return _NUMPY_FUNCTIONS[node.func.id](*(_evaluate(argument, x) for argument in node.args))
+            return _NUMPY_FUNCTIONS[node.func.id](*(_value(argument, x) for argument in node.args))
     reported = quote(ast.unparse(node))
     raise ValueError(
         f"{reported} is unknown here; a formula may hold numbers, x, pi, + - * / ** and {', '.join(_NUMPY_FUNCTIONS)}"

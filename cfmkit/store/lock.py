@@ -97,9 +97,7 @@ class FolderLock:
     def check(self) -> None:
         """Raise if the lock file was removed or replaced, and another run may be at work."""
         file = self._folder / self.name
-        present = (
-            self._soft.is_lock_held_by_us if self._soft else not self.name or _has_its_name(self._descriptor, file)
-        )
+        present = self._soft.is_lock_held_by_us if self._soft else not self.name or _is_named(self._descriptor, file)
         if not present:
             raise OutputError(f"{quote_path(file)} was removed during the run: another run may be in the folder")
 
@@ -143,8 +141,8 @@ def _lock(file: Path, folder: Path) -> int:
                 _close_without_locks(descriptor, file)
                 return -1
             if not locked:
-                raise _folder_in_use(folder, *_read_signature(descriptor))
-            if _has_its_name(descriptor, file):
+                raise _refusal(folder, *_read_signature(descriptor))
+            if _is_named(descriptor, file):
                 _sign(descriptor, file)
                 _descriptors.add(descriptor)
                 return descriptor
@@ -183,7 +181,7 @@ def _close_without_locks(descriptor: int, file: Path) -> None:
 
 def _unlock(descriptor: int, file: Path) -> None:
     """Remove a lock file that this process holds, unless it has lost its name, and close it."""
-    ours = os.fstat(descriptor) if _has_its_name(descriptor, file) else None
+    ours = os.fstat(descriptor) if _is_named(descriptor, file) else None
     if ours is not None:
         safe_disk_changes.discard(file)
     _descriptors.discard(descriptor)
@@ -201,7 +199,7 @@ def _lock_softly(file: Path, folder: Path) -> Any:
         soft.acquire(timeout=SOFT_LOCK_TIMEOUT, poll_interval=SOFT_LOCK_TIMEOUT / 10)
     except filelock.Timeout:
         cure = f"if no run is there any more, remove {quote_path(file)} or add --no-lock"
-        raise _folder_in_use(folder, *_read_soft_signature(file), cure) from None
+        raise _refusal(folder, *_read_soft_signature(file), cure) from None
     _report_soft_locks(os.path.dirname(folder))
     return soft
 
@@ -212,7 +210,7 @@ def _report_soft_locks(folder: str) -> None:
     _STORE_LOG.warning(message, quote_path(folder), SOFT_LOCK)
 
 
-def _has_its_name(descriptor: int, file: Path) -> bool:
+def _is_named(descriptor: int, file: Path) -> bool:
     """Return whether the open file still has its name."""
     with contextlib.suppress(OSError):
         return os.path.samestat(os.fstat(descriptor), os.lstat(file))
@@ -249,9 +247,7 @@ def _read_soft_signature(file: Path) -> tuple[str, str]:
     return "", ""
 
 
-def _folder_in_use(
-    folder: Path, process: str, host: str, cure: str = "wait for it or give another --out"
-) -> FolderInUse:
+def _refusal(folder: Path, process: str, host: str, cure: str = "wait for it or give another --out") -> FolderInUse:
     place = f" on {quote_path(host)}" if host and host != platform.node() else ""
     who = f"process {process}{place}" if process.isdigit() else "another process"
     return FolderInUse(f"{quote_path(folder)} is in use by a live run ({who}); {cure}")
