@@ -40,10 +40,10 @@ def _shorten_words(text: str) -> str:
 
 def visible(text: str) -> str:
     """Return text on one line, escaped where it cannot be seen: no name may command a terminal."""
-    return text if text.isprintable() else "".join(char if char.isprintable() else _escape(char) for char in text)
+    return text if text.isprintable() else "".join(char if char.isprintable() else _escape_char(char) for char in text)
 
 
-def _escape(char: str) -> str:
+def _escape_char(char: str) -> str:
     return f"\\x{ord(char):02x}" if ord(char) < 256 else f"\\u{ord(char):04x}"
 
 

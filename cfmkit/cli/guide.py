@@ -44,10 +44,10 @@ def pages() -> tuple[GuidePage, ...]:
     files = {path.stem: path for path in sorted(shipped_folder("docs", "tutorial.md").glob("*.md"))}
     listed = re.findall(r"^(\w+)$", files["index"].read_text(encoding="utf-8"), re.M)
     names = dict.fromkeys(["index", *(name for name in listed if name in files), *files])
-    return tuple(GuidePage(name, _title(files[name]), files[name]) for name in names)
+    return tuple(GuidePage(name, _read_title(files[name]), files[name]) for name in names)
 
 
-def _title(path: Path) -> str:
+def _read_title(path: Path) -> str:
     with path.open(encoding="utf-8") as lines:
         return next((line[2:].strip().replace("`", "") for line in lines if line.startswith("# ")), path.stem)
 
@@ -170,7 +170,7 @@ def _score_sections(phrase: str) -> list[PageSection]:
         (compile_phrases([phrase]), 1.0),
         *((compile_phrases([target]), SYNONYM_WEIGHT) for target in words_for_synonym(phrase)),
     ]
-    rated = (_score(name, heading, text, wanted) for name, heading, text in _read_sections())
+    rated = (_score_section(name, heading, text, wanted) for name, heading, text in _read_sections())
     return [section for section in rated if section.score > 0]
 
 
@@ -193,7 +193,7 @@ def _mask_comments(block: re.Match[str]) -> str:
     return re.sub(r"^#", " #", block[0], flags=re.M)
 
 
-def _score(name: str, heading: str, text: str, wanted: Sequence[tuple[re.Pattern[str], float]]) -> PageSection:
+def _score_section(name: str, heading: str, text: str, wanted: Sequence[tuple[re.Pattern[str], float]]) -> PageSection:
     score, shown = 0.0, ""
     for phrase, weight in wanted:
         count = len(phrase.findall(text))

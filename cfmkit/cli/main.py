@@ -87,14 +87,14 @@ def _run(words: list[str]) -> ExitCode:
         if not sys.warnoptions:
             # Libraries warn about their own affairs; what concerns the user is in the results.
             warnings.simplefilter("ignore")
-        return _answer(words, terminal)
+        return _run_command(words, terminal)
     except Stopped as stop:
         return fail(stop, terminal)
     except Exception as error:
         return _report_error(Stopped.last or error, terminal)
 
 
-def _answer(words: list[str], terminal: Terminal) -> ExitCode:
+def _run_command(words: list[str], terminal: Terminal) -> ExitCode:
     call = parse(program(_accept_global_options, HELP_TEXT, HELP_EPILOG), words)
     if call is None:
         streams.write_output("")

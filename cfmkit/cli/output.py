@@ -40,7 +40,7 @@ def write_output(text: str) -> None:
     Raises OutputError if it cannot be written for another reason: a full disk behind a redirection.
     """
     try:
-        _write(sys.stdout, text)
+        _write_and_flush(sys.stdout, text)
     except BrokenPipeError:
         discard_output(sys.stdout)
     except OSError as error:
@@ -51,7 +51,7 @@ def write_output(text: str) -> None:
 def write_error(text: str) -> None:
     """Write to standard error, if that is possible; unprintable characters are escaped."""
     try:
-        _write(sys.stderr, "\n".join(map(visible, text.split("\n"))))
+        _write_and_flush(sys.stderr, "\n".join(map(visible, text.split("\n"))))
     except OSError:
         discard_output(sys.stderr)
 
@@ -77,7 +77,7 @@ def can_encode_all(stream: TextIO) -> bool:
     return (stream.encoding or "").lower().replace("-", "") == "utf8"
 
 
-def _write(stream: TextIO, text: str) -> None:
+def _write_and_flush(stream: TextIO, text: str) -> None:
     stream.write(text)
     stream.flush()
 
@@ -175,7 +175,7 @@ class ProgressLines:
     """A line on standard error now and then, with the time that is left."""
 
     def __init__(self) -> None:
-        self._start = self._reported = time.monotonic()
+        self._start_bar = self._reported = time.monotonic()
         self._most = 0.0
 
     def report(self, fraction: float, text: str) -> None:
@@ -183,7 +183,7 @@ class ProgressLines:
         now, self._most = time.monotonic(), max(self._most, fraction)
         if now - self._reported >= LINE_EVERY and 0.0 < self._most < 1.0:
             self._reported = now
-            left = (now - self._start) * (1.0 - self._most) / self._most
+            left = (now - self._start_bar) * (1.0 - self._most) / self._most
             time_left = f", {duration(left)} left" if self._most >= FIRST_ESTIMATE else ""
             write_error(f"{100 * self._most:.0f} %{time_left}: {text}\n")
 
@@ -211,7 +211,7 @@ class Bar:
     def show(self, done: int, total: int, text: str) -> None:
         """Show how many of how many things are done."""
         if self._progress is None:
-            self._start(total)
+            self._start_bar(total)
         self._progress.update(self._task, completed=done, total=total, description=text)
 
     def close(self) -> None:
@@ -220,7 +220,7 @@ class Bar:
             self._progress.stop()
             self._progress = None
 
-    def _start(self, total: int) -> None:
+    def _start_bar(self, total: int) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 

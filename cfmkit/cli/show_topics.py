@@ -68,7 +68,7 @@ def list_skipped_families(name: str | None) -> tuple[str, ...]:
     return families.list_skipped() if whole else ()
 
 
-def _page(title: str, text: str, sections: Iterable[Section], data: Mapping[str, Sequence[Record]]) -> Document:
+def _make_page(title: str, text: str, sections: Iterable[Section], data: Mapping[str, Sequence[Record]]) -> Document:
     def blocks() -> Iterator[Block]:
         yield TextLine((Span(title, Tone.LABEL), Span(f"  {text}")))
         for section in sections:
@@ -102,14 +102,14 @@ def overview() -> Document:
         ("anything else by its name, such as", by_name, columns),
     )
     text = "explains one of these, or a word by its meaning (creep, BOM); `cfmkit show FAMILY --figure` draws a family"
-    return _page("cfmkit show", text, sections, {"families": mechanisms, "topics": topics})
+    return _make_page("cfmkit show", text, sections, {"families": mechanisms, "topics": topics})
 
 
 def units_page() -> Document:
     """Return the closed list of units, and the dimensions with the unit that files are written in."""
     text = "Case-sensitive; combine with *, / and ^: N*mm/rad, kg/m^3. Zero needs no unit."
     data = {kind: TOPIC_KINDS[kind].records() for kind in ("units", "dimensions")}
-    return _page("units", text, [(kind, data[kind], TOPIC_KINDS[kind].fields) for kind in data], data)
+    return _make_page("units", text, [(kind, data[kind], TOPIC_KINDS[kind].fields) for kind in data], data)
 
 
 def metrics_page() -> Document:
@@ -120,13 +120,13 @@ def metrics_page() -> Document:
         "in N*mm over deg. `cfmkit show FAMILY` lists what a family adds."
     )
     records = _metric_records("force")
-    return _page("metrics", text, (("", records, METRIC_FIELDS),), {"metrics": records})
+    return _make_page("metrics", text, (("", records, METRIC_FIELDS),), {"metrics": records})
 
 
 def references_page() -> Document:
     """Return the papers behind all families, and their BibTeX."""
     records = references()
-    shown = _page("references", "", (("", records, TOPIC_KINDS["references"].fields),), {})
+    shown = _make_page("references", "", (("", records, TOPIC_KINDS["references"].fields),), {})
     bibtex = {record.name: text for record in families.records() if (text := record.bibtex)}
     page = (*shown.body, *(block for text in bibtex.values() for block in (line(""), Verbatim(text.strip() + "\n"))))
     return Document({"references": records, "bibtex": bibtex}, page)
@@ -148,7 +148,7 @@ def stock_page() -> Document:
         "Sizes for `part.stock: metric` and `inch`, as far as a text with them was read: sheets by material, bearings "
         "by their bore. Materials that are missing have no series here, and their sheets are not rounded."
     )
-    return _page("stock", text, (("", records, columns),), {"stock": records})
+    return _make_page("stock", text, (("", records, columns),), {"stock": records})
 
 
 def family_page(name: str) -> Document:
@@ -175,7 +175,7 @@ def family_page(name: str) -> Document:
     starts = f"`cfmkit new {name}` starts a file" if record.file("template.yaml") else ""
     drawn = f"`cfmkit show {name} --figure` draws it with its dimensions named" if record.file(DRAWING_FILE) else ""
     commands = "; ".join(filter(None, (starts, drawn)))
-    return _page(name, f"{record.summary}. {commands}" if commands else record.summary, sections, data)
+    return _make_page(name, f"{record.summary}. {commands}" if commands else record.summary, sections, data)
 
 
 READ_FIRST = {name: place for place, name in enumerate(("mechanism", "design", "analysis", "requirements"))}
@@ -223,7 +223,7 @@ def find_page(name: str) -> Document | None:
     if not sections:
         return None
     data = {heading: records for heading, records, _ in sections}
-    page = _page(name, "", sections, data)
+    page = _make_page(name, "", sections, data)
     papers = {paper.name: paper.bibtex for record in families.records() for paper in record.papers}
     bibtex = [papers[entry["name"]] for entry in data.get("references", ())]
     more = (block for text in bibtex for block in (line(""), Verbatim(text + "\n")))
@@ -426,7 +426,7 @@ TOPIC_KINDS: Mapping[str, TopicKind] = {
 TOPIC_HEADINGS: Mapping[str, tuple[str, Callable[[], Document]]] = {
     "units": ("the units that a spec may use, and those that files are written in", units_page),
     "metrics": ("the constant-force metrics: name, unit, definition", metrics_page),
-    "materials": ("the named materials, with scatter and source", lambda: _page(*materials_page_parts())),
+    "materials": ("the named materials, with scatter and source", lambda: _make_page(*materials_page_parts())),
     "stock": ("sizes of sheets, wire, pins, bearings and screws that are sold", stock_page),
     "references": ("the papers behind the families", references_page),
 }

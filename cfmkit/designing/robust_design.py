@@ -1,5 +1,4 @@
-"""Robust design: values for which most parts meet all limits, by linear estimate or on drawn parts; the costliest
-errors.
+"""Robust design: values for which most parts meet all limits, by linear estimate or on drawn parts; costliest errors.
 
 A limit is a row of numbers of a part, such as the force at some poses, that must be at least zero. Near a design the
 numbers move in proportion to its values and to the errors of its parts. So the numbers of drawn parts are known by

@@ -33,8 +33,8 @@ def document_of(
         title=message(entries),
         summary=f"{reused} reused" if reused else "",
         verdict=_count_changes(compared) if compared else "",
-        tables=(PageTable("", columns, tuple(_row(entry) for entry in entries)), *_warnings(entries)),
-        notes=(*_missed_notes(entries), *(_changes(compared) if compared else ())),
+        tables=(PageTable("", columns, tuple(_summary_row(entry) for entry in entries)), *_warnings(entries)),
+        notes=(*_missed_notes(entries), *(_change_notes(compared) if compared else ())),
         files=files,
     )
 
@@ -58,7 +58,7 @@ def _missed_notes(entries: Sequence[Entry]) -> Iterator[Note]:
             yield Note("missed", f"{visible(entry.spec)}: {reported}", tone=Tone.BAD, whole=True)
 
 
-def _changes(compared: BatchComparison) -> Iterator[Note]:
+def _change_notes(compared: BatchComparison) -> Iterator[Note]:
     """Yield the values that changed since an earlier batch, those beyond the tolerance first."""
     beyond = compared.changes_beyond_tolerance
     text = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
@@ -71,7 +71,7 @@ def _changes(compared: BatchComparison) -> Iterator[Note]:
         yield Note("missing", f"not in this batch: {', '.join(map(visible, compared.gone))}", tone=Tone.BAD, whole=True)
 
 
-def _row(entry: Entry) -> tuple[str | Span, ...]:
+def _summary_row(entry: Entry) -> tuple[str | Span, ...]:
     word = outcome(entry)
     good = word == "ok"
     tone = Tone.GOOD if good else Tone.FAINT if entry.skipped else Tone.BAD

@@ -103,14 +103,14 @@ def junit(
     """Return the XML document."""
     root = Element("testsuites", name="cfmkit batch")
     for entry in entries:
-        root.append(_suite(entry))
+        root.append(_test_suite(entry))
     _set_counts_and_time(root, list(root))
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def _suite(entry: Entry) -> Element:
+def _test_suite(entry: Entry) -> Element:
     suite = Element("testsuite", name=clean(entry.spec))
     suite.extend([_solution_case(entry), *_requirement_cases(entry)])
     _set_counts_and_time(suite, [suite])
@@ -126,13 +126,13 @@ def _set_counts_and_time(element: Element, suites: Sequence[Element]) -> None:
     element.set("time", f"{sum(float(case.get('time', 0)) for case in cases):.3f}")
 
 
-def _case(entry: Entry, name: str, seconds: float = 0.0) -> Element:
+def _test_case(entry: Entry, name: str, seconds: float = 0.0) -> Element:
     place = {"classname": clean(entry.folder.replace(".", "_")), "name": clean(name), "file": clean(entry.spec)}
     return Element("testcase", place | {"time": f"{seconds:.3f}"})
 
 
 def _solution_case(entry: Entry) -> Element:
-    case = _case(entry, "solved", entry.seconds)
+    case = _test_case(entry, "solved", entry.seconds)
     if entry.skipped:
         case.append(Element("skipped", message=clean(entry.message)))
     elif entry.code not in PASSED_CODES:
@@ -157,7 +157,7 @@ def _requirement_cases(entry: Entry) -> Iterator[Element]:
     for requirement in entry.requirements:
         name = requirement_name(requirement)
         names[name] = names.get(name, 0) + 1
-        case = _case(entry, name if names[name] == 1 else f"{name} (again, {names[name]})")
+        case = _test_case(entry, name if names[name] == 1 else f"{name} (again, {names[name]})")
         if entry.code not in (*PASSED_CODES, ExitCode.PARTIAL):
             case.append(Element("skipped", message="there is no solution to measure"))
         elif not requirement["ok"]:

@@ -322,10 +322,7 @@ def _beginning(text: str, limit: int) -> str:
     if len(text) <= limit:
         return text
     ends = [
-        at
-        for mark in ("; ", ": ", ". ", ", ", " (")
-        for at in _find_all(text, mark)
-        if MIN_CLAUSE_LENGTH <= at <= limit
+        at for mark in ("; ", ": ", ". ", ", ", " (") for at in _find(text, mark) if MIN_CLAUSE_LENGTH <= at <= limit
     ]
     whole = [at for at in ends if text.count("(", 0, at) == text.count(")", 0, at)]
     if whole:
@@ -336,7 +333,7 @@ def _beginning(text: str, limit: int) -> str:
     return text[:cut] if cut > 0 else text[:limit]
 
 
-def _find_all(text: str, mark: str) -> Iterator[int]:
+def _find(text: str, mark: str) -> Iterator[int]:
     """Yield the index of each occurrence of a mark in a text."""
     at = text.find(mark)
     while at >= 0:

@@ -95,7 +95,7 @@ def document_of(
     return Document(
         exit_code=report.exit_code,
         title=" ".join(spec.name.split()),
-        summary=_summary(report),
+        summary=_mean_effort_in_words(report),
         verdict=verdict_of(report),
         headline=headline_of(report),
         metrics=metrics_of(report),
@@ -109,13 +109,13 @@ def document_of(
 def verdict_of(report: Report) -> str:
     """Return how a run ended, in a few words."""
     missed, count = len(report.missed), len(report.requirements)
-    met = f"{missed} of {count} requirements missed" if missed else _all_met(count)
+    met = f"{missed} of {count} requirements missed" if missed else _say_all_met(count)
     if not report.status.usable:
         return name_in_words(report.status.key)
     return met if report.status.exit_code is ExitCode.OK else f"partial, {met}"
 
 
-def _all_met(count: int) -> str:
+def _say_all_met(count: int) -> str:
     if count == 0:
         return "no requirements"
     return "requirement met" if count == 1 else f"all {count} requirements met"
@@ -123,13 +123,13 @@ def _all_met(count: int) -> str:
 
 def warning_of(item: Finding, command: RunCommand | None = None) -> WarningEntry:
     """Return a finding as a warning of the page, with its remedies as commands."""
-    options = tuple(_option(cure, command) for cure in item.cures)
+    options = tuple(_remedy_as_options(cure, command) for cure in item.cures)
     commands = tuple(command.with_remedy(cure) if command else command_line(*_set_options(cure)) for cure in item.cures)
     short = shortened_to_clause(item.short or item.message, MAX_WARNING_LENGTH - len(item.name) - 2)
     return WarningEntry(item.name, short, item.message, options, commands)
 
 
-def _option(cure: str | tuple[str, ...], command: RunCommand | None) -> str:
+def _remedy_as_options(cure: str | tuple[str, ...], command: RunCommand | None) -> str:
     """Return a remedy as options; with the verb where it is another one than that of the run."""
     first = cure if isinstance(cure, str) else cure[0]
     is_other_verb = first.startswith("design.") and command is not None and command.verb != "design"
@@ -220,7 +220,7 @@ def shown_window(report: Report) -> Window | None:
     return shorten_window(Window(*shared.pop()), report.result) if len(shared) == 1 else None
 
 
-def _summary(report: Report) -> str:
+def _mean_effort_in_words(report: Report) -> str:
     """Return the mean effort over the window; "" without a curve."""
     result = report.result
     if not result.status.usable or not result.curves:
@@ -246,8 +246,8 @@ def headline_of(report: Report) -> tuple[ValueRow, ...]:
         return ()
     spec = report.result.spec
     judged = spec.requirements if len(report.requirements) == len(spec.requirements) else spec.part_requirements
-    required = [_required_row(report, *pair) for pair in zip(judged, report.requirements, strict=True)]
-    return (*required, *_facts(report))
+    required = [_requirement_row(report, *pair) for pair in zip(judged, report.requirements, strict=True)]
+    return (*required, *_fact_rows(report))
 
 
 def metrics_of(report: Report) -> tuple[ValueRow, ...]:
@@ -313,15 +313,15 @@ def value_and_bounds(outcome: Outcome) -> tuple[str, str]:
     return value, bounds.removeprefix("allowed ").removeprefix("required ")
 
 
-def _facts(report: Report) -> Iterator[ValueRow]:
+def _fact_rows(report: Report) -> Iterator[ValueRow]:
     """Yield what is not required and matters most: stress and size, then what the family leads with."""
     spec = report.result.spec
     shown = {split_name(outcome.metric)[0] for outcome in report.requirements}
     shown |= {f"{report.result.curve.kind}_mean"} if report.result.curves else set()
-    if (stress := _stress(report, shown)) is not None:
+    if (stress := _stress_row(report, shown)) is not None:
         yield stress
         shown |= {"stress_max", "allowable_stress", "safety_factor"}
-    if (size := _size(report)) is not None:
+    if (size := _size_row(report)) is not None:
         yield size
     if spec.target_curve is not None:
         shown |= {"force_ripple", "torque_ripple"}
@@ -335,12 +335,12 @@ def _facts(report: Report) -> Iterator[ValueRow]:
         )
     ):
         if name not in shown and _has_value(report, name):
-            text = _stroke(report) if name == "usable_stroke" else branches(report, name, report.metrics)
+            text = _stroke_in_words(report) if name == "usable_stroke" else branches(report, name, report.metrics)
             about = report.metrics[name].definition
             yield ValueRow(SHORT_LABELS.get(name, words(name)), text + _remark(report, name), about=about)
 
 
-def _stress(report: Report, shown: set[str]) -> ValueRow | None:
+def _stress_row(report: Report, shown: set[str]) -> ValueRow | None:
     """Return the largest stress beside what is allowed, with the safety factor where no requirement says it."""
     if not _has_value(report, "stress_max") or "stress_max" in shown:
         return None
@@ -356,7 +356,7 @@ def _stress(report: Report, shown: set[str]) -> ValueRow | None:
     return ValueRow("stress", text, about=report.metrics["stress_max"].definition)
 
 
-def _size(report: Report) -> ValueRow | None:
+def _size_row(report: Report) -> ValueRow | None:
     """Return the box that the mechanism stays in, and of how many parts it is."""
     space = family(report.result.spec.family).envelope(report.result)
     if space is None:
@@ -375,13 +375,13 @@ def _remark(report: Report, name: str) -> str:
     """Return of which stress a safety factor is, by which rule a stress is allowed, and how far a model is known."""
     allowed = report.result.allowable_stress
     if name == "allowable_stress":
-        return _rule(report)
+        return _stress_rule_in_words(report)
     if name == "safety_factor" and allowed is not None and "allowable_stress" not in report.metrics:
-        return f", of {format_short(allowed, 'stress')}{_rule(report)}{_explain_low_safety(report)}"
+        return f", of {format_short(allowed, 'stress')}{_stress_rule_in_words(report)}{_explain_low_safety(report)}"
     return _explain_low_safety(report, name) if name.endswith("safety_factor") else ""
 
 
-def _rule(report: Report) -> str:
+def _stress_rule_in_words(report: Report) -> str:
     """Return by which rule a stress is allowed, where the mechanism says how much of its strength may be used."""
     try:
         return f" (yield strength / {report.result.spec.get_value('mechanism.safety_factor'):.4g})"
@@ -397,7 +397,7 @@ def _explain_low_safety(report: Report, name: str = "safety_factor") -> str:
     return f" (stress overestimated by up to {100 * share:.2g} %)" if 1 / (1 + share) <= factor < 1 else ""
 
 
-def _stroke(report: Report) -> str:
+def _stroke_in_words(report: Report) -> str:
     """Return the usable stroke with its ends."""
     stroke, start, end = (report.metrics[name] for name in ("usable_stroke", "usable_start", "usable_end"))
     text = short_value(stroke)
@@ -434,7 +434,7 @@ def _format_window(report: Report, name: str, window: Window | None) -> str:
     return span(window.lo, window.hi, curve.motion_dimension) if split_name(name)[0] in windowed else ""
 
 
-def _required_row(report: Report, requirement: Requirement, outcome: Outcome) -> ValueRow:
+def _requirement_row(report: Report, requirement: Requirement, outcome: Outcome) -> ValueRow:
     base, branch = split_name(outcome.metric)
     label = SHORT_LABELS[base] + (f" on {branch}" if branch else "") if base in SHORT_LABELS else words(outcome.metric)
     over = Window(*outcome.over) if outcome.over else None

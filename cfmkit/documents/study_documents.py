@@ -178,7 +178,7 @@ def sensitivity_document(findings: Findings, files: Written | None = None) -> Do
         verdict=_yield_verdict(findings),
         headline=tuple(_yield_rows(findings)),
         tables=tuple(_ranking_tables(findings)),
-        notes=tuple(_notes(findings)),
+        notes=tuple(_sensitivity_notes(findings)),
         warnings=tuple(warning_of(item) for item in warnings(findings)),
         files=files,
     )
@@ -198,7 +198,7 @@ def _yield_verdict(findings: Findings) -> str:
     )
 
 
-def _notes(findings: Findings) -> Iterator[Note]:
+def _sensitivity_notes(findings: Findings) -> Iterator[Note]:
     for outcome in findings.setup.nominal.outcomes:
         if not outcome.ok:
             yield Note("missed", f"by the nominal values: {outcome.sentence}", tone=Tone.BAD)

@@ -45,12 +45,12 @@ def document_of(
         exit_code=code,
         title="suggest",
         summary=head,
-        tables=tuple(_tables(record)),
+        tables=tuple(_proposal_tables(record)),
         notes=(
             *notes,
             *_common_notes(proposals),
             *_miss_notes(record["near_misses"]),
-            *(_incomplete(proposals, files) if files else ()),
+            *(_incomplete_notes(proposals, files) if files else ()),
         ),
         warnings=tuple(
             WarningEntry(warning["name"], warning["message"], warning["message"]) for warning in record["warnings"]
@@ -67,8 +67,8 @@ def _export_command(proposals: Sequence[Mapping[str, Any]], files: Written) -> s
     return command_line("cfmkit", "export", str(Path(files.folder) / proposals[0]["folder"] / "design.yaml"))
 
 
-def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
-    columns = _columns(record)
+def _proposal_tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
+    columns = _filled_columns(record)
     heads = (
         GridColumn("", False),
         *(GridColumn(head, head == "variant", COLUMN_RANKS.get(head, 0)) for head in columns),
@@ -142,7 +142,7 @@ def _join_numbers(numbers: Sequence[int]) -> str:
     return ", ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0]) for run in runs)
 
 
-def _incomplete(proposals: Sequence[Mapping[str, Any]], files: Written) -> Iterator[Note]:
+def _incomplete_notes(proposals: Sequence[Mapping[str, Any]], files: Written) -> Iterator[Note]:
     bare = [proposal["folder"] for proposal in proposals if f"{proposal['folder']}/metrics.json" not in files.files]
     if bare:
         text = (
@@ -160,21 +160,21 @@ def _family_without_proposal(record: Mapping[str, Any]) -> tuple[str, str]:
     )
 
 
-def _columns(record: Mapping[str, Any]) -> dict[str, Callable[[Mapping[str, Any]], str]]:
+def _filled_columns(record: Mapping[str, Any]) -> dict[str, Callable[[Mapping[str, Any]], str]]:
     """Return the columns of the table, each with the text of its cell; those that no proposal fills are left out."""
     block, listed = record["suggest"], (*record["proposals"], *record["unjudged"], *record["near_misses"])
     kind, unit = ("torque", "N*mm") if "torque" in block else ("force", "N")
     columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
         "variant": lambda proposal: str(proposal["variant"]),
-        kind: lambda proposal: _cell(proposal["mean"], lambda value: f"{value:.4g} {unit}"),
-        "ripple": lambda proposal: _cell(proposal["ripple"], lambda value: f"{100 * value:.2g} %"),
-        "size": _size,
-        "safety": lambda proposal: _cell(proposal["safety_factor"], lambda value: f"{value:.3g}"),
+        kind: lambda proposal: _value_cell(proposal["mean"], lambda value: f"{value:.4g} {unit}"),
+        "ripple": lambda proposal: _value_cell(proposal["ripple"], lambda value: f"{100 * value:.2g} %"),
+        "size": _size_in_words,
+        "safety": lambda proposal: _value_cell(proposal["safety_factor"], lambda value: f"{value:.3g}"),
     }
     for name, key in (("hysteresis", "hysteresis"), ("yield", "yield"), ("life", "cycles")):
         if key in block or any(proposal[name] is not None for proposal in listed):
             shown = (lambda value: f"{value:.2g}") if name == "life" else (lambda value: f"{100 * value:.3g} %")
-            columns[name] = partial(_value, name, shown)
+            columns[name] = partial(_proposal_cell, name, shown)
     columns |= {
         "parts": lambda proposal: NO_VALUE if proposal["parts"] is None else str(proposal["parts"]),
         "verdict": lambda proposal: str(proposal["verdict"]),
@@ -183,14 +183,14 @@ def _columns(record: Mapping[str, Any]) -> dict[str, Callable[[Mapping[str, Any]
     return {name: cell for name, cell in columns.items() if any(cell(proposal) not in empty for proposal in listed)}
 
 
-def _value(name: str, shown: Callable[[float], str], proposal: Mapping[str, Any]) -> str:
-    return _cell(proposal[name], shown)
+def _proposal_cell(name: str, shown: Callable[[float], str], proposal: Mapping[str, Any]) -> str:
+    return _value_cell(proposal[name], shown)
 
 
-def _cell(value: float | None, shown: Callable[[float], str]) -> str:
+def _value_cell(value: float | None, shown: Callable[[float], str]) -> str:
     return NOT_JUDGED if value is None else shown(value)
 
 
-def _size(proposal: Mapping[str, Any]) -> str:
+def _size_in_words(proposal: Mapping[str, Any]) -> str:
     sides = [proposal[side] for side in ("across", "along", "depth") if proposal[side] is not None]
     return "x".join(f"{side:.3g}" for side in sides) + " mm"

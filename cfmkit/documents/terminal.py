@@ -98,7 +98,7 @@ def _short_page(document: Document, width: int, spare: int) -> Iterator[TextLine
     tables = [text for table in document.tables if table.most != 0 for text in _table_lines(table, width)]
     follow = _file_lines(document.files, width)
     if document.next:
-        follow.append(whole_line(_leading_word("next", Tone.GOOD), document.next))
+        follow.append(whole_line(_label("next", Tone.GOOD), document.next))
     needed = _most_of_headline(document.headline)
     spare -= len(notes) + len(tables) + len(follow)
     warnings = _warning_lines(document.warnings, width, max(spare - needed, min(len(document.warnings), 2)))
@@ -112,20 +112,18 @@ def _most_of_headline(rows: Sequence[ValueRow]) -> int:
     return max(required, min(MIN_FACTS, -(-len(rows) // 2)))
 
 
-def _leading_word(word: str, tone: str = Tone.LABEL) -> Span:
+def _label(word: str, tone: str = Tone.LABEL) -> Span:
     return Span(f"{' ' * INDENT_COLUMNS}{word:<{WORD_COLUMNS}}" + ("" if len(word) < WORD_COLUMNS else " "), tone)
 
 
 def _note_lines(note: Note, width: int) -> list[TextLine]:
     room = width - INDENT_COLUMNS - WORD_COLUMNS
     if note.is_command:
-        return [whole_line(_leading_word(note.word, note.tone), note.text)]
+        return [whole_line(_label(note.word, note.tone), note.text)]
     if note.whole:
         lines = textwrap.wrap(note.text, room, break_long_words=False, break_on_hyphens=False) or [""]
-        return [
-            whole_line(_leading_word(note.word if not at else "", note.tone), text) for at, text in enumerate(lines)
-        ]
-    return [_with_remedy(_leading_word(note.word, note.tone), "", note.short or note.text, note.remedy, room)]
+        return [whole_line(_label(note.word if not at else "", note.tone), text) for at, text in enumerate(lines)]
+    return [_with_remedy(_label(note.word, note.tone), "", note.short or note.text, note.remedy, room)]
 
 
 def _with_remedy(word: Span, name: str, text: str, remedy: str, room: int) -> TextLine:
@@ -151,11 +149,11 @@ def _warning_lines(warnings: Sequence[WarningEntry], width: int, most: int) -> l
     for at, warning in enumerate(shown):
         word = f"{'warning' if len(warnings) == 1 else f'warnings {len(warnings)}'}" if not at else ""
         remedy = warning.options[0] if warning.options else ""
-        lines.append(_with_remedy(_leading_word(word, Tone.BAD), f"{warning.name}: ", warning.short, remedy, room))
+        lines.append(_with_remedy(_label(word, Tone.BAD), f"{warning.name}: ", warning.short, remedy, room))
     if rest := warnings[len(shown) :]:
         names = ", ".join(dict.fromkeys(warning.name for warning in rest))
         text = shortened_to_clause(f"and {len(rest)} more (-v): {names}", room)
-        lines.append(whole_line(_leading_word("" if shown else f"warnings {len(warnings)}", Tone.BAD), text))
+        lines.append(whole_line(_label("" if shown else f"warnings {len(warnings)}", Tone.BAD), text))
     return lines
 
 
@@ -170,14 +168,14 @@ def _headline(rows: Sequence[ValueRow], width: int, most: int) -> Iterator[TextL
     if not required:
         half = min(most, -(-len(facts) // 2))
         required, facts = facts[:half], facts[half:]
-    left = _cells(required, width)
+    left = _row_spans(required, width)
     room, tall = width - _widest_line(left) - GAP_COLUMNS, min(max(len(left), MIN_FACTS), most)
-    fitting = [row for row in facts if _widest_line(_cells([row], width)) <= room]
-    right = _cells(fitting[:tall], width)
+    fitting = [row for row in facts if _widest_line(_row_spans([row], width)) <= room]
+    right = _row_spans(fitting[:tall], width)
     while right and _widest_line(right) > room:  # one has the longest label, another the longest value
         del right[-1]
     if facts[:2] != fitting[:2] or len(right) < min(2, tall, len(facts)):
-        below = _cells([*required, *facts[: max(MIN_FACTS, len(required)) if left else None]], width)[:most]
+        below = _row_spans([*required, *facts[: max(MIN_FACTS, len(required)) if left else None]], width)[:most]
         for cells in below:  # a number is never cut: at the margin the line goes on
             if len(cells) == 3 and _widest_line([cells]) > width:
                 yield TextLine((*cells[:1], Span(cells[1].text.partition("  ")[0].rstrip())))
@@ -193,7 +191,7 @@ def _headline(rows: Sequence[ValueRow], width: int, most: int) -> Iterator[TextL
         yield whole_line(*texts, *([Span(pad), *right[at]] if at < len(right) else []))
 
 
-def _cells(rows: Sequence[ValueRow], width: int) -> list[tuple[Span, ...]]:
+def _row_spans(rows: Sequence[ValueRow], width: int) -> list[tuple[Span, ...]]:
     """Return rows as spans: label, value with its window, bound and verdict, in columns."""
     texts = [_value_with_window(row) for row in rows]
     label = max([WORD_COLUMNS, *(len(row.label) + 2 for row in rows)])
@@ -225,7 +223,7 @@ def _drop_ranked_columns(table: PageTable, width: int) -> PageTable:
     """Return a table without the columns of the highest ranks, as many as it takes to fit a page."""
     while any(column.rank for column in table.columns):
         if (
-            sum(map(_least_columns, table.columns, _columns(table))) + INDENT_COLUMNS + 2 * (len(table.columns) - 1)
+            sum(map(_least_columns, table.columns, _cell_texts(table))) + INDENT_COLUMNS + 2 * (len(table.columns) - 1)
             <= width
         ):
             break
@@ -237,7 +235,7 @@ def _drop_ranked_columns(table: PageTable, width: int) -> PageTable:
     return table
 
 
-def _columns(table: PageTable) -> list[list[str]]:
+def _cell_texts(table: PageTable) -> list[list[str]]:
     """Return the texts of the cells of each column."""
     return [
         [getattr(row[at], "text", str(row[at])) for row in table.rows if at < len(row)]
@@ -256,7 +254,7 @@ def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
     table = _drop_ranked_columns(table, width)
     rows = table.rows if table.most is None else table.rows[: table.most]
     more, table = len(table.rows) - len(rows), table._replace(rows=rows)
-    texts = _columns(table)
+    texts = _cell_texts(table)
     heads = [column.head for column in table.columns]
     least = list(map(_least_columns, table.columns, texts))
     wide = [max(map(len, column), default=0) for column in texts]
@@ -303,7 +301,7 @@ def _file_lines(files: Written | None, width: int) -> list[TextLine]:
         if len(text) + GAP_COLUMNS + len(MORE_TEXT) <= room
         else ""
     )
-    return [whole_line(_leading_word("files", Tone.GOOD), text, Span(more, Tone.FAINT))]
+    return [whole_line(_label("files", Tone.GOOD), text, Span(more, Tone.FAINT))]
 
 
 # --- everything -------------------------------------------------------------------------------------------------------
@@ -367,7 +365,7 @@ def _print_block(block: Block, width: int, colours: bool, ascii_only: bool) -> s
 def _renderables(block: TextLine | Paragraph | CellGrid, width: int) -> Iterator[RenderableType]:
     """Yield what rich prints for a block; of a paragraph line by line."""
     if isinstance(block, CellGrid):
-        yield _table(block, width)
+        yield _rich_table(block, width)
     elif isinstance(block, Paragraph):
         lines = textwrap.wrap(block.text, width - LABEL_COLUMNS, break_long_words=False, break_on_hyphens=False) or [""]
         yield _rich_text(Span(f"{block.word:<{LABEL_COLUMNS}}", block.tone), Span(lines[0]), whole=True)
@@ -398,7 +396,7 @@ def _least_width(block: CellGrid, rows: Sequence[Sequence[Text]]) -> int:
     return widths
 
 
-def _table(block: CellGrid, width: int) -> RichTable:
+def _rich_table(block: CellGrid, width: int) -> RichTable:
     from rich.table import Table
 
     headed = any(column.head for column in block.columns)

@@ -1,5 +1,4 @@
-"""Strokes and cycles of a recording: split at reversals, robust against jitter, without the points at which it stood;
-the cycles that are measured.
+"""Strokes and cycles of a recording: split at reversals, robust against jitter and pauses; cycles that are measured.
 
 A reversal is where the motion turns back by more than a stated part of its range; an encoder that flickers does not.
 Where the machine stands (before the start, at a reversal, at the end) many points at one place would weigh on every

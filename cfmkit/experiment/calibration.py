@@ -94,7 +94,7 @@ class ModelCurves:
 
         Raises SpecError if they are not valid together.
         """
-        changes = self._changes(parameters, values)
+        changes = self._spec_changes(parameters, values)
         return self.spec.replace(changes, self.as_made) if changes else self.spec
 
     def solve_at(self, parameters: Sequence[FitParameter], values: FloatArray) -> Curve:
@@ -102,12 +102,12 @@ class ModelCurves:
 
         Raises CfmError if there is none.
         """
-        key = tuple(sorted(self._changes(parameters, values).items()))
+        key = tuple(sorted(self._spec_changes(parameters, values).items()))
         if key not in self._solved:
             self._solved[key] = analyze_part(self.spec_with(parameters, values)).curve
         return self._solved[key]
 
-    def _changes(self, parameters: Sequence[FitParameter], values: FloatArray) -> dict[str, float]:
+    def _spec_changes(self, parameters: Sequence[FitParameter], values: FloatArray) -> dict[str, float]:
         changes: dict[str, float] = {}
         for item, value in zip(parameters, values, strict=True):
             if not item.path.startswith(DATA_PREFIX):
@@ -181,7 +181,7 @@ def _compare_start(
     """Return the start beside the measurement, where the model exists for every zero that is tried."""
     result = analyze_part(spec)
     comparison = compare(result, source, window)
-    shift = next((item for item in parameters if _is_shift(item)), None)
+    shift = next((item for item in parameters if _is_motion_offset(item)), None)
     if shift is None:
         return comparison
     parts = [comparison.curve.select_branch(item.model_branch).motion for item in comparison.samples]
@@ -219,7 +219,7 @@ def _small_change(item: FitParameter) -> float:
     return step if item.start + step <= item.high else -min(step, item.start - item.low)
 
 
-def _is_shift(item: FitParameter) -> bool:
+def _is_motion_offset(item: FitParameter) -> bool:
     return item.path in (f"{DATA_PREFIX}displacement_offset", f"{DATA_PREFIX}angle_offset")
 
 
@@ -228,7 +228,7 @@ def _zeros_of(parameters: Sequence[FitParameter], values: FloatArray) -> Zeros:
     totals = {"effort": 0.0, "motion": 0.0, "drift": 0.0}
     for item, value in zip(parameters, values, strict=True):
         if item.path.startswith(DATA_PREFIX):
-            name = "motion" if _is_shift(item) else "drift" if item.path.endswith("drift") else "effort"
+            name = "motion" if _is_motion_offset(item) else "drift" if item.path.endswith("drift") else "effort"
             totals[name] = float(value)
     return Zeros(**totals)
 

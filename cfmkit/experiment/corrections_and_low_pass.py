@@ -55,10 +55,7 @@ def correct_recording(
     subtracted = [_reading_to_subtract(tare, recording.effort[:resting], "--tare", recording.kind)]
     subtracted.append(_reading_to_subtract(zero, recording.motion[:1], "--zero", recording.motion_dimension))
     signs = [-1.0 if word in flip else 1.0 for word in (effort, motion)]
-    notes = [
-        *_subtraction_notes((effort, motion), subtracted, recording.kind),
-        *(f"sign of the {word} reversed" for word in flip),
-    ]
+    notes = [*_notes((effort, motion), subtracted, recording.kind), *(f"sign of the {word} reversed" for word in flip)]
     if not notes:
         return recording
     return replace(
@@ -99,7 +96,7 @@ def _reading_to_subtract(value: str | float | None, resting: FloatArray, option:
         raise UsageError(f"{option}: {error}; or write {START_WORD!r} for the mean before the machine moves") from None
 
 
-def _subtraction_notes(words: tuple[str, str], subtracted: list[float], kind: str) -> list[str]:
+def _notes(words: tuple[str, str], subtracted: list[float], kind: str) -> list[str]:
     from cfmkit.specs.units import format_short
 
     dimensions = (kind, "length" if kind == "force" else "angle")

@@ -93,7 +93,7 @@ def measure_recording(
     Raises DataError if there is no stroke in the recording, a cycle that was chosen, or a filter that was named cannot
     be used; UsageError if another word stands for the filter, or for what is left out.
     """
-    _check_words(low_pass, leave_out)
+    _check_arguments(low_pass, leave_out)
     strokes, reached, passage, left_out = _strokes_and_findings(recording, leave_out, cycles)
     measured = strokes.measured
     warnings = (*warnings_of(recording, strokes), *left_out)
@@ -108,7 +108,7 @@ def measure_recording(
     if chosen is None:
         return plain
     try:
-        smooth = _smooth(recording, [stroke for cycle in measured for stroke in cycle], chosen)
+        smooth = _filter_strokes(recording, [stroke for cycle in measured for stroke in cycle], chosen)
     except DataError as problem:
         if low_pass != "default":
             raise DataError(f"{recording.name}: {problem}") from None
@@ -117,7 +117,7 @@ def measure_recording(
     return replace(plain, filtered=filtered, low_pass=chosen)
 
 
-def _check_words(low_pass: LowPass | str | None, leave_out: Collection[str]) -> None:
+def _check_arguments(low_pass: LowPass | str | None, leave_out: Collection[str]) -> None:
     if isinstance(low_pass, str) and low_pass != "default":
         raise UsageError(
             f"low_pass: {low_pass!r} is no filter; give 'default', None for no filter, or a LowPass "
@@ -210,7 +210,7 @@ def _default_filter(recording: Recording) -> LowPass:
     return LowPass(cutoff, recording.motion_dimension, DEFAULT_ORDER)
 
 
-def _smooth(recording: Recording, strokes: Sequence[Stroke], chosen: LowPass) -> FloatArray:
+def _filter_strokes(recording: Recording, strokes: Sequence[Stroke], chosen: LowPass) -> FloatArray:
     """Return the efforts with every stroke filtered by itself."""
     if chosen.per == "time" and recording.time is None:
         raise DataError("a cut-off in Hz needs a column with the time; give it in 1/mm or 1/deg instead")

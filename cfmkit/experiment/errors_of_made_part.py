@@ -1,5 +1,4 @@
-"""Errors with which a part was made (modulus, thickness, friction, rates), as far as its recording can tell them:
-fitted, compared, and in words.
+"""Errors with which a part was made (modulus, thickness, friction, rates), fitted to its recording and compared.
 
 Candidates are what errs in a part of that family: the moduli of its materials, one error of thickness all over the
 part, one coefficient of friction, and the rates of springs. All sets of them are fitted, with the zero of the force,
@@ -76,24 +75,24 @@ class Explanation:
     criterion: float  # Schwarz's, smaller is better
 
     @cached_property
-    def _places(self) -> list[int]:
+    def _error_indices(self) -> list[int]:
         return [k for k, item in enumerate(self.calibration.parameters) if not item.path.startswith(DATA_PREFIX)]
 
     @property
     def errors(self) -> tuple[FitParameter, ...]:
         """Fitted errors of the part, without the zeros of the recording."""
-        return tuple(self.calibration.parameters[k] for k in self._places)
+        return tuple(self.calibration.parameters[k] for k in self._error_indices)
 
     @property
     def values(self) -> FloatArray:
         """Fitted values of the errors, (n,) [SI]."""
-        values: FloatArray = self.calibration.fit.values[self._places]
+        values: FloatArray = self.calibration.fit.values[self._error_indices]
         return values
 
     @property
     def covariance(self) -> FloatArray:
         """Covariance of these values, the zeros of the recording being unknown, too, (n, n) [SI]."""
-        covariance: FloatArray = self.calibration.fit.covariance[np.ix_(self._places, self._places)]
+        covariance: FloatArray = self.calibration.fit.covariance[np.ix_(self._error_indices, self._error_indices)]
         return covariance
 
     @property
@@ -117,7 +116,7 @@ class Explanation:
     def sentences(self) -> Iterator[str]:
         """Each error in words, with its 95 % interval."""
         half = self.calibration.fit.half_widths()
-        for k, value in zip(self._places, self.values, strict=True):
+        for k, value in zip(self._error_indices, self.values, strict=True):
             item = self.calibration.parameters[k]
             shown = value - item.start if is_thickness(item) else value
             stated = "than drawn" if is_thickness(item) else f"stated {item.format_value(item.start)}"
@@ -173,11 +172,11 @@ def _joint_parameter(spec: Spec, kind: str, paths: tuple[str, ...]) -> FitParame
         return FitParameter(first, dimension, start, *ends, start, paths, by_factor=True)
     if kind == "friction":
         return FitParameter(first, dimension, start, 0.0, 0.5, max(start, 0.01), paths)
-    most = LARGEST_THICKNESS_ERROR * _thinnest(spec, paths)
+    most = LARGEST_THICKNESS_ERROR * _smallest_thickness(spec, paths)
     return FitParameter(first, dimension, start, start - most, start + most, 0.2 * most, paths)
 
 
-def _thinnest(spec: Spec, paths: tuple[str, ...]) -> float:
+def _smallest_thickness(spec: Spec, paths: tuple[str, ...]) -> float:
     """Return the smallest thickness of those at some paths, or beside them where they are errors from zero."""
     values = [float(spec.get_value(path)) for path in paths]
     if min(values) > 0.0:
@@ -330,14 +329,14 @@ def _fit_sets(
                 fit = fit_samples(before, curves, (*chosen, *zeros), "linear", FIT_TOLERANCE)
             except CfmError:  # no such part exists, or none that could be measured so
                 continue
-            level = min(level, _schwarz_criterion(fit, before, 1.0))
+            level = min(level, _criterion(fit, before, 1.0))
             yield fit
         if count and level >= best - STRONG_EVIDENCE:
             return
         best = level
 
 
-def _squared_unusual_errors(fit: Calibration, expected: Assumed | None) -> float:
+def _penalty(fit: Calibration, expected: Assumed | None) -> float:
     """Return the squares of fitted errors over what is usual of material and process, added up."""
     total = 0.0
     for item, value in zip(fit.parameters, fit.fit.values, strict=True):
@@ -350,7 +349,7 @@ def _squared_unusual_errors(fit: Calibration, expected: Assumed | None) -> float
     return total
 
 
-def _schwarz_criterion(fit: Calibration, before: Comparison, inflation: float) -> float:
+def _criterion(fit: Calibration, before: Comparison, inflation: float) -> float:
     """Return Schwarz's criterion, residuals counting as one in groups of `inflation`."""
     residuals = fit.fit.residuals
     count, level = len(residuals), float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
@@ -366,10 +365,7 @@ def _rank_explanations(fits: list[Calibration], before: Comparison, expected: As
     """
     closest = min(fits, key=lambda fit: float(fit.fit.residuals @ fit.fit.residuals))
     inflation = closest.fit.inflation
-    ranked = [
-        Explanation(fit, _schwarz_criterion(fit, before, inflation) + _squared_unusual_errors(fit, expected))
-        for fit in fits
-    ]
+    ranked = [Explanation(fit, _criterion(fit, before, inflation) + _penalty(fit, expected)) for fit in fits]
     return sorted(ranked, key=lambda item: item.criterion)
 
 

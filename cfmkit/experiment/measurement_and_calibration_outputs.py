@@ -157,7 +157,7 @@ def _count_rows(table: Table) -> int:
 
 def curves_table(source: MeasuredCurves) -> Table:
     """Return all cycles, raw and filtered, as one table in border units."""
-    curves = [_with_filtered(raw, number, source) for number, raw in enumerate(source.raw)]
+    curves = [_add_filtered(raw, number, source) for number, raw in enumerate(source.raw)]
     table = curve_table([replace(curve, label={}) for curve in curves])
     if len(curves) == 1:
         return table
@@ -165,7 +165,7 @@ def curves_table(source: MeasuredCurves) -> Table:
     return Table((TableColumn("cycle", cycle), *table.columns))
 
 
-def _with_filtered(raw: Curve, number: int, source: MeasuredCurves) -> Curve:
+def _add_filtered(raw: Curve, number: int, source: MeasuredCurves) -> Curve:
     if not source.filtered:
         return raw
     smooth = {f"{raw.kind}_filtered": Column(source.filtered[number].effort, raw.kind)}
@@ -284,10 +284,10 @@ def comparison_figures(
     comparison: Comparison, name: str, before: Comparison | None = None
 ) -> Mapping[str, Callable[[], Figure]]:
     """Return what draws the figure of a comparison: the curves overlaid."""
-    return {"data": partial(_overlay, comparison, before, name)}
+    return {"data": partial(_draw_overlay, comparison, before, name)}
 
 
-def _overlay(comparison: Comparison, before: Comparison | None, name: str) -> Figure:
+def _draw_overlay(comparison: Comparison, before: Comparison | None, name: str) -> Figure:
     from cfmkit.experiment.figures import overlay
 
     subject = "fitted model and measurement" if before else "model and measurement"

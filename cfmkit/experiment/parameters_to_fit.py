@@ -118,7 +118,7 @@ def _make_parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -
         raise UsageError(f"--fit: {problem}") from None
     if place.kind not in ("quantity", "number"):
         raise UsageError(f"--fit: {path!r} is not a number that varies continuously")
-    value = _value(spec, path)
+    value = _start_value(spec, path)
     dimension = place.quantity.dimensions[0] if place.quantity else "ratio"
     low, high = _spec_bounds(type(spec), path)
     asked_low, asked_high = bounds or (-math.inf, math.inf)
@@ -134,7 +134,7 @@ def _make_parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -
     return FitParameter(path, dimension, value, low, high, size)
 
 
-def _value(spec: Spec, path: str) -> float:
+def _start_value(spec: Spec, path: str) -> float:
     try:
         value: Any = spec.get_value(path)
     except KeyError:

@@ -60,12 +60,14 @@ def outlines(
     if not drawing.contours:
         raise GeometryError(f"the drawing {drawing.name!r} has no contours")
     tolerance = drawing.tolerance if tolerance is None else tolerance
-    outlined = tuple(_outline(contour, number, tolerance) for number, contour in enumerate(drawing.contours, start=1))
+    outlined = tuple(
+        _make_outline(contour, number, tolerance) for number, contour in enumerate(drawing.contours, start=1)
+    )
     check_outlines(outlined)
     return outlined
 
 
-def _outline(contour: Contour, number: int, tolerance: float) -> Outline:
+def _make_outline(contour: Contour, number: int, tolerance: float) -> Outline:
     name = f"contour {number} on layer {contour.layer!r}"
     if not contour.edges:
         raise GeometryError(f"{name} has no edges")

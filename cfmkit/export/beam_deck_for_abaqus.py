@@ -152,9 +152,7 @@ class _Lines:
             marks += np.linspace(left, right, max(4, math.ceil(share * MIN_ELEMENTS_PER_BEAM)) + 1)[1:].tolist()
         halves = np.interp(np.arange(2 * len(marks) - 1) / 2, np.arange(len(marks)), marks)
         start = np.array(beam_end_at(self.network, name, 0), float)
-        places = np.concatenate(
-            [[start], start + np.cumsum([_arc_length(fit, *half) for half in pairwise(halves)], axis=0)]
-        )
+        places = np.concatenate([[start], start + np.cumsum([_chord(fit, *half) for half in pairwise(halves)], axis=0)])
         middles = 0.5 * (np.array(marks[1:]) + np.array(marks[:-1]))
         arcs = [float(np.real(fit.arc(float(middle)))) for middle in middles]
         thickness = np.array([float(np.real(beam.section.thickness_at(arc, arc))) for arc in arcs])
@@ -304,7 +302,7 @@ def _node_line(number: int, place: tuple[float, float] | FloatArray) -> str:
     return f"{number}, {x:.10g}, {y:.10g}, 0"
 
 
-def _arc_length(fit: Fit, left: float, right: float) -> FloatArray:
+def _chord(fit: Fit, left: float, right: float) -> FloatArray:
     """Return the way along a fitted shape between two parameters (2,) [m]."""
     middle, half = 0.5 * (left + right), 0.5 * (right - left)
     t = middle + half * _GAUSS_NODES

@@ -89,7 +89,7 @@ def plates(
     layered = []
     for solid in solids:
         holes = [ring.exterior for contour, ring in rings if contour.hole and solid.contains(ring)]
-        layered.append(_faces(Polygon(solid.exterior, holes), sheet))
+        layered.append(_cut_into_faces(Polygon(solid.exterior, holes), sheet))
     return tuple(layered)
 
 
@@ -102,7 +102,7 @@ def volume(drawing: Drawing) -> float:
     return float(sum(face.area * thickness for plate in result for face, thickness in plate.faces))
 
 
-def _faces(part: Any, sheet: Sheet) -> LayeredPolygon:
+def _cut_into_faces(part: Any, sheet: Sheet) -> LayeredPolygon:
     """Return a part cut along the edges of the regions that lie in it."""
     from shapely import Polygon, prepare, set_precision, union_all
     from shapely.ops import polygonize
@@ -133,16 +133,16 @@ def bodies(layered: Sequence[LayeredPolygon]) -> tuple[Body, ...]:
 
     Raises GeometryError if a surface is not closed.
     """
-    return tuple(_body(plate) for plate in layered)
+    return tuple(_make_body(plate) for plate in layered)
 
 
-def _body(plate: LayeredPolygon) -> Body:
+def _make_body(plate: LayeredPolygon) -> Body:
     flat, corners, halves = _triangles(plate)
     levels = sorted({level for half in set(halves.tolist()) for level in (-half, half)})
     shell = _Shell(flat, np.array(levels))
     for triangle, half in zip(corners.tolist(), halves.tolist(), strict=True):
         shell.add_lid(triangle, half)
-    for start, end, below, above in _steps(corners, halves):
+    for start, end, below, above in _step_edges(corners, halves):
         shell.add_wall(start, end, below, above)
     return shell.build_body()
 
@@ -164,7 +164,7 @@ def _triangles(plate: LayeredPolygon) -> tuple[FloatArray, NDArray[np.int64], Fl
     return points, corners, np.concatenate(halves)
 
 
-def _steps(corners: NDArray[np.int64], halves: FloatArray) -> Iterator[tuple[int, int, float, float]]:
+def _step_edges(corners: NDArray[np.int64], halves: FloatArray) -> Iterator[tuple[int, int, float, float]]:
     """Yield the edges at which the body steps down to their right: start, end, height there and to the left [m]."""
     height: dict[tuple[int, int], float] = {}
     for (a, b, c), half in zip(corners.tolist(), halves.tolist(), strict=True):
@@ -273,16 +273,12 @@ def threemf_bytes(name: str, bodies: Sequence[Body]) -> bytes:
 def _model_xml(name: str, bodies: Sequence[Body]) -> str:
     lines = [f'{_XML_HEADER}<model unit="millimeter" xml:lang="en-US" xmlns="{_CORE_NAMESPACE}">', "<resources>"]
     for number, body in enumerate(bodies, start=1):
-        lines += [
-            f'<object id="{number}" type="model" name="{name}-{number}"><mesh>',
-            *_mesh_xml(body),
-            "</mesh></object>",
-        ]
+        lines += [f'<object id="{number}" type="model" name="{name}-{number}"><mesh>', *_mesh(body), "</mesh></object>"]
     items = "".join(f'<item objectid="{number}"/>' for number in range(1, len(bodies) + 1))
     return "\n".join([*lines, "</resources>", f"<build>{items}</build></model>", ""])
 
 
-def _mesh_xml(body: Body) -> Iterator[str]:
+def _mesh(body: Body) -> Iterator[str]:
     yield "<vertices>"
     for x, y, z in to_border(body.points, "length").tolist():
         yield f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>'
@@ -320,7 +316,7 @@ def _step_file(kernel: Any, name: str, cut: Sequence[Outline], sheet: Sheet) -> 
     wires = [(contour, kernel.Wire(_edges(kernel, contour))) for contour in cut]
     faces = [kernel.Face(wire) for contour, wire in wires if not contour.hole]
     holes = [kernel.Face(wire) for contour, wire in wires if contour.hole]
-    solids = [_solid(kernel, face, holes, sheet) for face in faces]
+    solids = [_solid_of_face(kernel, face, holes, sheet) for face in faces]
     if not solids or not all(solid.is_valid for solid in solids):
         raise GeometryError("the CAD kernel cannot make a valid body from the outline")
     whole = solids[0] if len(solids) == 1 else kernel.Compound(children=solids)
@@ -356,7 +352,7 @@ def _edges(kernel: Any, outline: Outline) -> list[Any]:
     return shapes
 
 
-def _solid(kernel: Any, face: Any, holes: Sequence[Any], sheet: Sheet) -> Any:
+def _solid_of_face(kernel: Any, face: Any, holes: Sequence[Any], sheet: Sheet) -> Any:
     """Return the body on z = 0 of one outline with its holes."""
     usual, regions = (
         float(sheet.thickness or 0.0),
@@ -376,7 +372,7 @@ def _solid(kernel: Any, face: Any, holes: Sequence[Any], sheet: Sheet) -> Any:
     whole = body = _prism(kernel, face, usual)
     thickest = usual
     for region in sorted(regions, key=lambda region: region.thickness):
-        stencil = _prism(kernel, _face(kernel, region), 2 * max(usual, region.thickness))
+        stencil = _prism(kernel, _region_face(kernel, region), 2 * max(usual, region.thickness))
         if not (whole & stencil):
             continue
         thickest = max(thickest, region.thickness)
@@ -392,7 +388,7 @@ def _prism(kernel: Any, face: Any, thickness: float) -> Any:
     return kernel.Solid.extrude(face, kernel.Vector(0, 0, height)).moved(kernel.Location((0.0, 0.0, -0.5 * height)))
 
 
-def _face(kernel: Any, region: Region) -> Any:
+def _region_face(kernel: Any, region: Region) -> Any:
     points = to_border(np.asarray(region.polygon), "length")
     ends = points[:-1] if np.array_equal(points[0], points[-1]) else points
     return kernel.Face(kernel.Wire.make_polygon([tuple(map(float, point)) for point in ends]))

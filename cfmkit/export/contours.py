@@ -226,7 +226,7 @@ class Contour:
     @property
     def extents(self) -> tuple[float, float, float, float]:
         """Smallest x and y, largest x and y of the edges' points [m]; arcs count as whole circles."""
-        corners = np.concatenate([_corners(edge) for edge in self.edges])
+        corners = np.concatenate([_rough_extreme_points(edge) for edge in self.edges])
         return (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
 
     @property
@@ -244,7 +244,7 @@ class Contour:
         return np.concatenate([piece[:-1] for piece in pieces])
 
 
-def _corners(edge: Edge) -> FloatArray:
+def _rough_extreme_points(edge: Edge) -> FloatArray:
     if isinstance(edge, Smooth):
         return edge.points
     if isinstance(edge, Line):
@@ -255,7 +255,7 @@ def _corners(edge: Edge) -> FloatArray:
 def _extreme_points(edge: Edge) -> FloatArray:
     """Return points (n, 2) [m] whose bounding box is that of an edge."""
     if not isinstance(edge, Arc):
-        return _corners(edge)
+        return _rough_extreme_points(edge)
     low, high = sorted((edge.start, edge.end))
     quarters = 0.5 * math.pi * np.arange(math.ceil(low / (0.5 * math.pi)), math.floor(high / (0.5 * math.pi)) + 1)
     angle = np.array([low, high, *quarters])

@@ -54,7 +54,7 @@ def dxf_bytes(drawn: Sequence[Outline], labels: Sequence[EngravedText] = ()) -> 
         for label in labels:
             _add_label(space, label)
         _show_all(document, to_border(np.vstack([flat_points(outline.chain) for outline in drawn]), "length"))
-        return _encode(document)
+        return _encode_document(document)
 
 
 def _add_layer(document: Any, name: str, look: LayerLook) -> None:
@@ -97,7 +97,7 @@ def _show_all(document: Any, points: Any) -> None:
     document.set_modelspace_vport(height=height, center=tuple(((low + high) / 2).tolist()))
 
 
-def _encode(document: Any) -> bytes:
+def _encode_document(document: Any) -> bytes:
     # ezdxf collects the classes in a set, whose order differs between processes
     document.classes.add_required_classes(document.dxfversion)
     for key in sorted(document.classes.classes):

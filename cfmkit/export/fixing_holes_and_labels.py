@@ -98,10 +98,10 @@ def engrave_labels(
     name: str,  # of the specification
 ) -> Drawing:
     """Return a drawing with a label on each of its parts that has a held or a driven piece."""
-    return replace(drawing, labels=tuple(_labels(drawing, name)))
+    return replace(drawing, labels=tuple(_make_labels(drawing, name)))
 
 
-def _labels(drawing: Drawing, name: str) -> Iterator[EngravedText]:
+def _make_labels(drawing: Drawing, name: str) -> Iterator[EngravedText]:
     from shapely import Polygon
 
     cut = [

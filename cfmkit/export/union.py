@@ -107,7 +107,7 @@ def merge_pieces(
     if holes:
         tracks = [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for ring in rings for edge in ring]
         tracks += [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for hole in holes for edge in hole.reverse_edges()]
-        left = _ring_area_shape(rings, size).difference(
+        left = _ring_area(rings, size).difference(
             _unite([area for hole in holes for area in hole.to_polygons(size)], size)
         )
         rings = [_edges_of_runs(runs, tolerance) for runs in _trace_rings(left, tracks, size)]
@@ -126,7 +126,7 @@ def _unite(areas: Sequence[FloatArray], size: float, *others: Any) -> Any:
     return union_all(shapes, grid_size=GRID_DISTANCE * size)
 
 
-def _ring_area_shape(rings: Sequence[Sequence[Edge]], size: float) -> Any:
+def _ring_area(rings: Sequence[Sequence[Edge]], size: float) -> Any:
     """Return the area that closed chains of edges bound, holes left out, as a geometry of shapely."""
     outer = [_ring_corners(ring, size) for ring in rings if _signed_ring_area(ring) > 0]
     inner = [_ring_corners(ring, size) for ring in rings if _signed_ring_area(ring) < 0]
@@ -368,7 +368,7 @@ def _round_chains(rings: Sequence[Sequence[Edge]], radius: float, size: float) -
                 areas.append(np.concatenate([xy(track.z[-1:]), around.corners]))
             elif turn < -TANGENT_ANGLE:  # an inside corner: beside edges shorter than the radius only it is near enough
                 areas.append(TracedEdge.from_edge(Arc(pair(track.z[-1]), radius, 0.0, 2.0 * math.pi), fine).corners)
-    reach = _unite(areas, size, _ring_area_shape(rings, size))
+    reach = _unite(areas, size, _ring_area(rings, size))
     tolerance = MAX_GRID_DISTANCES * GRID_DISTANCE * size
     touched = (_touch_edges(runs, radius, tolerance) for runs in _trace_rings(reach, ways, size))
     closed = (ring for ring in touched if ring and abs(ring[0].ends[0] - ring[-1].ends[1]) <= tolerance)
@@ -402,11 +402,7 @@ def _touch_edges(runs: Sequence[_Run], radius: float, tolerance: float) -> list[
     edges: list[Edge] = []
     around = zip(runs, [*runs[1:], runs[0]], [meetings[-1], *meetings[:-1]], meetings, strict=True)
     for run, following, before, after in around:
-        start, end, beyond = (
-            _touch_point(run, before.last),
-            _touch_point(run, after.first),
-            _touch_point(following, after.last),
-        )
+        start, end, beyond = (_touch(run, before.last), _touch(run, after.first), _touch(following, after.last))
         if run.track.moved and (abs(end - start) > tolerance or after.first - before.last > 1.0):
             edges.append(run.track.part(before.last, after.first, start, end))
         if abs(beyond - end) > tolerance:
@@ -429,7 +425,7 @@ def _center_between(start: complex, end: complex, place: complex, radius: float)
     return min(middle + aside, middle - aside, key=lambda center: abs(center - place))
 
 
-def _touch_point(run: _Run, u: float) -> complex:
+def _touch(run: _Run, u: float) -> complex:
     """Return where a cutter touches the part whose centre is at a parameter of a run."""
     edge = run.track.edge
     return run.track.foot(u) if run.track.moved or not isinstance(edge, Arc) else complex(*edge.center)

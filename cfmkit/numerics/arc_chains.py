@@ -165,19 +165,19 @@ def too_coarse(index: int, count: int, why: str) -> CoarseDataError:
 
 def cubic(p0: ComplexArray, t0: ComplexArray, p1: ComplexArray, t1: ComplexArray, f: FloatArray) -> ComplexArray:
     """Return the cubic between end points and unit tangents at fraction `f`."""
-    length = _speed(p0, t0, p1, t1)
+    length = _hermite_speed(p0, t0, p1, t1)
     g = 1 - f
     return np.asarray(p0 + (p1 - p0) * f * f * (3 - 2 * f) + length * f * g * (g * t0 - f * t1))
 
 
 def slope(p0: ComplexArray, t0: ComplexArray, p1: ComplexArray, t1: ComplexArray, f: FloatArray) -> ComplexArray:
     """Return the derivative of `cubic` by `f`."""
-    length = _speed(p0, t0, p1, t1)
+    length = _hermite_speed(p0, t0, p1, t1)
     g = 1 - f
     return np.asarray(6 * f * g * (p1 - p0) + length * (g * (1 - 3 * f) * t0 + f * (3 * f - 2) * t1))
 
 
-def _speed(p0: ComplexArray, t0: ComplexArray, p1: ComplexArray, t1: ComplexArray) -> FloatArray:
+def _hermite_speed(p0: ComplexArray, t0: ComplexArray, p1: ComplexArray, t1: ComplexArray) -> FloatArray:
     """Return the length of the end derivatives with which the cubic is nearly the circle where there is one."""
     return np.asarray(2 * np.abs(p1 - p0) / (1 + np.sqrt((1 + (t0.conj() * t1).real) / 2)))
 
@@ -196,7 +196,7 @@ def doubt(z: ComplexArray, t: ComplexArray) -> FloatArray:
         lens = np.tan(np.angle(chord / t[0]) / 2) - np.tan(np.angle(t[1] / chord) / 2)
         return np.asarray(np.abs(step / 2 * lens))
     before, after = step[:-1], step[1:]
-    miss, turn = _miss(z, t, before / (before + after))
+    miss, turn = _miss_of_neighbours(z, t, before / (before + after))
     corner = np.abs(turn - 2 * miss * (1 / before - 1 / after))
     off = np.zeros(len(step))
     off[1:] = np.abs(miss) / 16 * (after / before) ** 2 + corner * after
@@ -204,7 +204,7 @@ def doubt(z: ComplexArray, t: ComplexArray) -> FloatArray:
     return off
 
 
-def _miss(z: ComplexArray, t: ComplexArray, fraction: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _miss_of_neighbours(z: ComplexArray, t: ComplexArray, fraction: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return how far each inner sample lies to the left of the interpolant through its neighbours, and turns left."""
     ends = z[:-2], t[:-2], z[2:], t[2:]
     for _ in range(2):

@@ -54,9 +54,9 @@ class LeastSquares:
         At a bound, or where the residuals beyond are not finite, the difference is one-sided.
         """
         start = self.residuals(values)
-        return np.column_stack([self._column(values, start, k) for k in range(len(values))])
+        return np.column_stack([self._jacobian_column(values, start, k) for k in range(len(values))])
 
-    def _column(self, values: FloatArray, start: FloatArray, k: int) -> FloatArray:
+    def _jacobian_column(self, values: FloatArray, start: FloatArray, k: int) -> FloatArray:
         ends = []
         for sign in (1.0, -1.0):
             moved = np.array(values)

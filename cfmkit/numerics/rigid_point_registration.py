@@ -143,13 +143,13 @@ def register(
             moved = [turn_points(item, state[0], state[1:3]) for item in points]
             nearest = [feet(curve, item, u) for curve, item, u in zip(curves, moved, guess, strict=True)]
             guess = [*nearest]
-            rows, residuals, weights = _equations(curves, moved, nearest, weighted, state[3])
+            rows, residuals, weights = _linearised_rows(curves, moved, nearest, weighted, state[3])
             step = _weighted_step(rows[:, : 4 if width else 3], residuals - state[3], weights, size)
             state[:3] = state[0] + step[0], *turn_points(state[None, 1:3], step[0], step[1:3])[0]
             state[3] += step[3] if width else 0.0
             if np.abs(step[:3] * [size, 1.0, 1.0]).max() <= 1e-14 * size:
                 break
-    return _registration(state, points, curves, robust, width)
+    return _make_registration(state, points, curves, robust, width)
 
 
 def registered_where_it_is(
@@ -157,7 +157,7 @@ def registered_where_it_is(
 ) -> Registration:
     """Return points that are in the part's datum already: nothing is moved, outliers are those of `like`."""
     nearest = [feet(curve, item) for curve, item in zip(curves, points, strict=True)]
-    _, residuals, weights = _equations(curves, points, nearest, False, 0.0)
+    _, residuals, weights = _linearised_rows(curves, points, nearest, False, 0.0)
     cuts = np.cumsum([len(item) for item in points])[:-1]
     inside = np.split(weights, cuts)
     return Registration(
@@ -172,7 +172,7 @@ def registered_where_it_is(
     )
 
 
-def _equations(
+def _linearised_rows(
     curves: Sequence[SmoothCurve],
     moved: Sequence[FloatArray],
     parameters: Sequence[FloatArray],
@@ -215,12 +215,12 @@ def _weighted_step(rows: FloatArray, residuals: FloatArray, weights: FloatArray,
     return np.asarray(solution / scale)
 
 
-def _registration(
+def _make_registration(
     state: FloatArray, points: Sequence[FloatArray], curves: Sequence[SmoothCurve], robust: bool, width: bool
 ) -> Registration:
     moved = [turn_points(item, state[0], state[1:3]) for item in points]
     nearest = [feet(curve, item) for curve, item in zip(curves, moved, strict=True)]
-    rows, residuals, weights = _equations(curves, moved, nearest, robust, state[3])
+    rows, residuals, weights = _linearised_rows(curves, moved, nearest, robust, state[3])
     rows = rows[:, : 4 if width else 3]
     cuts = np.cumsum([len(item) for item in points])[:-1]
     errors, shares = np.split(residuals, cuts), np.split(weights, cuts)

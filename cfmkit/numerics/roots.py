@@ -214,7 +214,7 @@ def last_places(
     # What is known of both ends holds, whatever the last bit is here.
     heights[:, 0] = np.where(heights[:, 0] <= 0.0, heights[:, 0], 0.0)
     heights[:, -1] = np.where(heights[:, -1] <= 0.0, _FLOAT_TINY, heights[:, -1])
-    expected = _inverse(places, heights)
+    expected = _inverse_interpolation(places, heights)
     places, heights = (np.concatenate([values[:, :1], values, values[:, -1:]], axis=1) for values in (places, heights))
     for _ in range(MAX_BRACKETINGS):
         # The last place that holds, the first that does not, and their neighbours outside of these.
@@ -227,7 +227,7 @@ def last_places(
             break
         ends, least, places, heights, width = (values[going] for values in (ends, least, places, heights, width))
         share = (expected[going] - places[:, 1:2]) / width
-        share = np.where((share > 0.0) & (share < 1.0), share, _share(places, heights))
+        share = np.where((share > 0.0) & (share < 1.0), share, _expected_share(places, heights))
         # A step that is at least so long leads across the end, and so narrows the bracket from both sides.
         margin = np.minimum(0.5 * least / np.abs(width), 0.5)
         share = np.where((share > 0.0) & (share < 1.0), share + _OFFSETS_AROUND, _EVEN_GRID)
@@ -239,14 +239,14 @@ def last_places(
     return roots.reshape(inside.shape)
 
 
-def _inverse(places: FloatArray, heights: FloatArray) -> FloatArray:
+def _inverse_interpolation(places: FloatArray, heights: FloatArray) -> FloatArray:
     """Return where the polynomials through (height, place), (e, m), are at a height of zero, (e, 1)."""
     apart = heights[:, :, None] - heights[:, None, :] + np.eye(places.shape[1])
     weight = 1.0 / (apart.prod(axis=2) * heights)
     return np.asarray((weight * places).sum(axis=1, keepdims=True) / weight.sum(axis=1, keepdims=True))
 
 
-def _share(places: FloatArray, heights: FloatArray) -> FloatArray:
+def _expected_share(places: FloatArray, heights: FloatArray) -> FloatArray:
     """Return where between the second and the third of four places the end is expected; NaN: nothing is known."""
     (before, inner, far, beyond), (low, under, over, high) = (
         [values[:, k : k + 1] for k in range(4)] for values in (places, heights)

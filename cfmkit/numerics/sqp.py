@@ -163,14 +163,14 @@ class _Memory:
             self.point, self.answer = z.copy(), self.program.values(z)
             self.evaluations += 1
             if self.answer is not None:
-                self._keep(z, *self.answer)
+                self._keep_best(z, *self.answer)
             if self.best is not None and self.best[0] <= (0.0, self.effort.enough):
                 raise _Enough(SearchEnding.OPTIMUM)
         return self.answer
 
-    def _keep(self, z: FloatArray, objective: float, constraints: FloatArray) -> None:
+    def _keep_best(self, z: FloatArray, objective: float, constraints: FloatArray) -> None:
         excess = _largest_violation(constraints)
-        self._wait(excess)
+        self._stop_if_stalled(excess)
         rank = (0.0, objective) if excess <= self.effort.violation else (excess, objective)
         if self.best is None or self._is_better(rank):
             self.improved = self.evaluations
@@ -187,7 +187,7 @@ class _Memory:
             return rank[0] < (1.0 - _MIN_VIOLATION_FALL) * excess
         return rank[0] == 0 and rank[1] < objective - self.effort.tolerance
 
-    def _wait(self, excess: float) -> None:
+    def _stop_if_stalled(self, excess: float) -> None:
         patience = self.effort.patience
         if self.fell <= self.effort.violation or patience is None:
             return

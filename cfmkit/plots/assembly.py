@@ -127,7 +127,7 @@ def _draw_balloons(
     anchors: dict[int, tuple[float, float]] = {}
     for number in sorted(shapes, key=lambda entry: float(np.prod(np.ptp(shapes[entry], axis=0)))):  # small ones first
         for share in ANCHOR_SHARES:
-            anchors[number] = _anchor(shapes[number], share)
+            anchors[number] = _anchor_point(shapes[number], share)
             others = [place for entry, place in anchors.items() if entry != number]
             if all(math.dist(anchors[number], place) > neighbours for place in others):
                 break
@@ -146,7 +146,7 @@ def _draw_balloons(
             )  # fmt: skip
 
 
-def _anchor(outline: FloatArray, share: float) -> tuple[float, float]:
+def _anchor_point(outline: FloatArray, share: float) -> tuple[float, float]:
     """Return a point of a part: the middle of its box, or a share of the way from there to its upper right corner."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     middle = 0.5 * (low + high)

@@ -46,7 +46,7 @@ def bands_of(result: Result) -> tuple[Band, ...]:
         return ()
     kind = result.curves[0].kind
     wanted = [item for item in result.spec.requirements if _quantity_of_metric(item.metric, kind) in _BAND_LABELS]
-    bands = (_band(outcome, result) for outcome in check(wanted, result))
+    bands = (_band_of_outcome(outcome, result) for outcome in check(wanted, result))
     return tuple(band for band in bands if band is not None)
 
 
@@ -67,7 +67,7 @@ def _quantity_of_metric(metric: str, kind: str) -> str:
     return split_name(metric)[0].removeprefix(f"{kind}_")
 
 
-def _band(outcome: Outcome, result: Result) -> Band | None:
+def _band_of_outcome(outcome: Outcome, result: Result) -> Band | None:
     metric, branch = split_name(outcome.metric)
     metric = _quantity_of_metric(metric, outcome.kind)
     window = Window(*outcome.over) if outcome.over else None
@@ -89,7 +89,9 @@ def _band(outcome: Outcome, result: Result) -> Band | None:
         return None
     which = f" ({worst})" if worst and len(subjects) > 1 else ""
     start, stop = (float(end[0]) for end in next(iter(chosen.values())).ends)
-    return Band(*bounds, start, stop, _sentence(outcome, _BAND_LABELS[metric].format(outcome.kind) + which), outcome.ok)
+    return Band(
+        *bounds, start, stop, _describe_outcome(outcome, _BAND_LABELS[metric].format(outcome.kind) + which), outcome.ok
+    )
 
 
 def _band_of_ripple(spread: OneSpread, limit: float) -> BandNeed:
@@ -97,7 +99,7 @@ def _band_of_ripple(spread: OneSpread, limit: float) -> BandNeed:
     return (1.0 - limit) * high, high, (high - low) / high
 
 
-def _half_band(spread: OneSpread, limit: float) -> BandNeed:
+def _band_of_half_width(spread: OneSpread, limit: float) -> BandNeed:
     _, high, low = spread
     middle = 0.5 * (high + low)
     return (1.0 - limit) * middle, (1.0 + limit) * middle, (high - low) / high
@@ -116,7 +118,7 @@ _BAND_LABELS = {
     "deviation_from_mean": "deviation from mean",
     "deviation_from_target": "deviation from target",
 }  # metrics that are bands, and what they are called on a picture
-_BAND_RULES = {"ripple": _band_of_ripple, "half_band": _half_band, "deviation_from_mean": _band_about_mean}
+_BAND_RULES = {"ripple": _band_of_ripple, "half_band": _band_of_half_width, "deviation_from_mean": _band_about_mean}
 """Bounds of the band, and what ranks the branches."""
 
 
@@ -147,7 +149,7 @@ def _band_about_target(target: float | None, limit: float) -> Bounds | None:
     return low, high
 
 
-def _sentence(outcome: Outcome, name: str) -> str:
+def _describe_outcome(outcome: Outcome, name: str) -> str:
     """Return ``ripple (load) 3.1 % ≤ 5 %``, or that it is missed."""
     ends = (outcome.min, outcome.max)
     low, high = (None if bound is None else value_text(bound, outcome.dimension) for bound in ends)

@@ -105,8 +105,8 @@ def plot_curve(
     look = look or CurveLook()
     if is_plain():
         look = replace(look, bands=False, levels=(), regions=())
-    curves = _curves(source)
-    lines = _lines(curves)
+    curves = _as_curves(source)
+    lines = _lines_of_curves(curves)
     for line in lines:
         _draw_line(ax, line)
     if not curves:
@@ -153,38 +153,40 @@ def _draw_events(ax: Axes, curve: Curve) -> None:
         ax.plot(*at, linestyle="", marker="|", markersize=8.0, color=TEXT_GREY, zorder=3.5, gid="events")
 
 
-def _curves(source: Result | Curve | Sequence[Curve]) -> tuple[Curve, ...]:
+def _as_curves(source: Result | Curve | Sequence[Curve]) -> tuple[Curve, ...]:
     if isinstance(source, Result):
         return source.curves
     return (source,) if isinstance(source, Curve) else tuple(source)
 
 
-def _lines(curves: tuple[Curve, ...]) -> list[_Line]:
+def _lines_of_curves(curves: tuple[Curve, ...]) -> list[_Line]:
     """Return every branch of every curve: coloured by branch if there is one curve, else by curve."""
     if len(curves) == 1:
         names = curves[0].branches
         several = len(names) > 1
         return [
-            _line(curves[0], name, LINE_COLOURS[i % len(LINE_COLOURS)], name if several else "")
+            _line_of_branch(curves[0], name, LINE_COLOURS[i % len(LINE_COLOURS)], name if several else "")
             for i, name in enumerate(names)
         ]
     count = len(curves)  # of many, the first, the last and some between are named
-    colors, named = _colors(count), np.linspace(0, count - 1, min(count, MOST_NAMED)).astype(int)
+    colors, named = _choose_colors(count), np.linspace(0, count - 1, min(count, MOST_NAMED)).astype(int)
     lines = []
     for index, curve in enumerate(curves):
         first, *others = curve.branches
-        lines.append(_line(curve, first, colors[index], _curve_name(curve, index) if index in named else ""))
-        lines += [_line(curve, name, colors[index], "" if index else f"thin: {name}", faint=True) for name in others]
+        lines.append(_line_of_branch(curve, first, colors[index], _curve_name(curve, index) if index in named else ""))
+        lines += [
+            _line_of_branch(curve, name, colors[index], "" if index else f"thin: {name}", faint=True) for name in others
+        ]
     return lines
 
 
-def _line(curve: Curve, branch: str, color: str, name: str, faint: bool = False) -> _Line:
+def _line_of_branch(curve: Curve, branch: str, color: str, name: str, faint: bool = False) -> _Line:
     part = curve.select_branch(branch)
     motion, effort = to_border(part.motion, curve.motion_dimension), to_border(part.effort, curve.kind)
     return _Line(np.column_stack([motion, effort]), part.stable, color, name, faint)
 
 
-def _colors(count: int) -> list[str]:
+def _choose_colors(count: int) -> list[str]:
     """Return one colour per curve: the palette, or a scale of lightness where there are more curves than colours."""
     if count <= len(LINE_COLOURS):
         return list(LINE_COLOURS[:count])
@@ -204,7 +206,7 @@ def _curve_name(curve: Curve, index: int) -> str:
 
 def _draw_line(ax: Axes, line: _Line) -> None:
     """Draw a branch in runs of stable (solid) and unstable (dashed) points, each run joined to the next."""
-    for start, stop, stable in _runs(line.stable):
+    for start, stop, stable in _runs_by_stability(line.stable):
         look: Look = {"linestyle": "-" if stable else "--", "linewidth": 0.8 if line.faint else 1.4}
         ax.plot(*line.points[start:stop].T, color=line.color, zorder=3, **look)
     is_drawn = np.concatenate([[False], np.isfinite(line.points).all(axis=1), [False]])
@@ -213,7 +215,7 @@ def _draw_line(ax: Axes, line: _Line) -> None:
         ax.plot(*alone.T, color=line.color, linestyle="", marker=".", zorder=3)
 
 
-def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int, bool]]:
+def _runs_by_stability(stable: NDArray[np.bool_]) -> list[tuple[int, int, bool]]:
     """Return (start, stop, stable) of the runs; an unstable run reaches out to its stable neighbours."""
     edges = np.flatnonzero(np.diff(stable.astype(int))) + 1
     runs = [(start, stop, bool(stable[start])) for start, stop in pairwise([0, *edges.tolist(), len(stable)])]

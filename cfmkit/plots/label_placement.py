@@ -67,13 +67,13 @@ def place_labels(
     ground = _Ground(ax)
     lines = [ground.to_points(label.points) for label in labels]
     written = (
-        _write(ground, label, size, [line for k, line in enumerate(lines) if k != number])
+        _place_label(ground, label, size, [line for k, line in enumerate(lines) if k != number])
         for number, label in enumerate(labels)
     )
     return [text for text in written if text is not None]
 
 
-def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray]) -> Text | None:
+def _place_label(ground: _Ground, label: Label, size: float, others: list[FloatArray]) -> Text | None:
     if not label.text:
         return None
     points = ground.to_points(label.points)

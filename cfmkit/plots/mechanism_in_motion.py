@@ -93,7 +93,7 @@ def _merge_poses(poses: Sequence[ElementTree.Element], title: str) -> str:
     """Return poses as one: runs of what differs between pieces that all of them have, in the order of drawing."""
     ElementTree.register_namespace("", _SVG_NAMESPACE)
     ElementTree.register_namespace("xlink", _XLINK_NAMESPACE)
-    elements = [[_comparable_text(element) for element in _pieces(pose)] for pose in poses]
+    elements = [[_comparable_text(element) for element in _drawn_pieces(pose)] for pose in poses]
     common = _common_pieces(elements)
     body: list[str] = []
     at = [0] * len(elements)
@@ -116,7 +116,7 @@ def _merge_poses(poses: Sequence[ElementTree.Element], title: str) -> str:
     )
 
 
-def _pieces(pose: ElementTree.Element) -> list[ElementTree.Element]:
+def _drawn_pieces(pose: ElementTree.Element) -> list[ElementTree.Element]:
     """Return what is drawn, in order: paths, uses and texts that stand in no definition."""
     hidden = {id(inner) for block in pose.iter(f"{_SVG_TAG}defs") for inner in block.iter()}
     drawn = {f"{_SVG_TAG}{kind}" for kind in ("path", "use", "text", "image")}

@@ -62,7 +62,7 @@ def plate(ax: Axes, outlines: Iterable[FloatArray], gid: str = "plate") -> None:
         ax.add_artist(PathPatch(shape, facecolor=PLATE_COLOUR, edgecolor=TEXT_GREY, linewidth=0.7, zorder=1.2, gid=gid))
 
 
-def _line(ax: Axes, x: Any, y: Any, **look: Any) -> None:
+def _draw_line(ax: Axes, x: Any, y: Any, **look: Any) -> None:
     """Draw a line; the limits of the axes do not follow it: they are those of `to_scale`.
 
     `Axes.plot` takes four times as long, to find limits and units and the next colour.
@@ -75,7 +75,7 @@ def _line(ax: Axes, x: Any, y: Any, **look: Any) -> None:
 def edge(ax: Axes, points: FloatArray, gid: str, **options: Any) -> None:
     """Draw a chain of points (n, 2) as a line: a flank, a path."""
     look: Look = {"color": TEXT_INK, "linewidth": 0.9, "zorder": 1.6} | options
-    _line(ax, *mm(points).T, gid=gid, **look)
+    _draw_line(ax, *mm(points).T, gid=gid, **look)
 
 
 def roller(ax: Axes, center: Point, radius: float, gid: str = "roller", ghost: bool = False) -> None:
@@ -85,12 +85,12 @@ def roller(ax: Axes, center: Point, radius: float, gid: str = "roller", ghost: b
     (x, y), colour = mm(center), TEXT_GREY if ghost else TEXT_INK
     look: Look = {"facecolor": "none" if ghost else STEEL_COLOUR, "linestyle": "--" if ghost else "-"}
     ax.add_artist(Circle((x, y), float(mm(radius)), edgecolor=colour, linewidth=0.9, zorder=2.2, gid=gid, **look))
-    _line(ax, [x], [y], marker="o", markersize=2.2, color=colour, zorder=4)
+    _draw_line(ax, [x], [y], marker="o", markersize=2.2, color=colour, zorder=4)
 
 
 def link(ax: Axes, start: Point, end: Point, gid: str = "link") -> None:
     """Draw a rigid link between two pins."""
-    _line(
+    _draw_line(
         ax, *mm([start, end]).T, color=LINK_COLOUR, linewidth=2.0, marker="o", markersize=3.0,
         markerfacecolor="white", markeredgewidth=0.8, zorder=3, gid=gid,
     )  # fmt: skip
@@ -106,7 +106,7 @@ def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring"
     side = np.zeros(len(share))
     side[2:-2] = np.where(np.arange(len(share) - 4) % 2 == 0, 0.5, -0.5)
     points = a + np.outer(share, along) + np.outer(side, across)
-    _line(ax, *mm(points).T, color=SPRING_OCHRE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
+    _draw_line(ax, *mm(points).T, color=SPRING_OCHRE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
 
 
 def slider(ax: Axes, center: Point, size: float) -> None:
@@ -121,7 +121,7 @@ def slider(ax: Axes, center: Point, size: float) -> None:
 def axis_of_symmetry(ax: Axes, low: float, high: float) -> None:
     """Draw the vertical axis x = 0 as a dash-dotted line."""
     look: Look = {"color": TEXT_GREY, "linewidth": 0.6, "dashes": (9, 2.5, 1.5, 2.5)}
-    _line(ax, [0.0, 0.0], mm([low, high]), zorder=1.1, gid="axis", **look)
+    _draw_line(ax, [0.0, 0.0], mm([low, high]), zorder=1.1, gid="axis", **look)
 
 
 def force_arrow(ax: Axes, tail: Point, tip: Point, gid: str = "force") -> None:
@@ -166,7 +166,7 @@ def box_around(shown: Iterable[PosedBody], margins: tuple[float, float, float, f
 def contact(ax: Axes, point: Point, gid: str = "contact") -> None:
     """Mark a point of contact."""
     look: Look = {"marker": "o", "markersize": 3.2, "color": LINE_VERMILLION, "markeredgewidth": 0, "linestyle": ""}
-    _line(ax, *mm([point]).T, zorder=4.5, gid=gid, **look)
+    _draw_line(ax, *mm([point]).T, zorder=4.5, gid=gid, **look)
 
 
 def to_scale(ax: Axes, box: Box) -> None:

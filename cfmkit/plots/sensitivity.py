@@ -70,7 +70,7 @@ def draw_histogram(findings: Findings, number: int) -> Figure:
     allowed = () if is_plain() else setup.limits(metric)
     if not is_plain():
         place = (LEFT_MARGIN / width, 1.0 - (7.6 if has_titles() else 1.6) / height)
-        figure.text(*place, _summary(drawn, finite, allowed), va="top", size=SMALL_FONT, color=TEXT_INK)
+        figure.text(*place, _describe_sample(drawn, finite, allowed), va="top", size=SMALL_FONT, color=TEXT_INK)
     if len(finite):
         axes.hist(finite, _bin_borders(finite).tolist(), color=LINE_BLUE, alpha=0.85)
     axes.set_ylim(0, 1.22 * max(1.0, axes.get_ylim()[1]))
@@ -114,7 +114,7 @@ def _shade_allowed(axes: Axes, ends: list[float | None]) -> None:
             axes.annotate(f"{words} {end:.6g}", (end, 0.88), (side, 0), ha=align, color=TROUBLE_RED, **look)
 
 
-def _summary(drawn: FloatArray, finite: FloatArray, limits: tuple[Bounds, ...]) -> str:
+def _describe_sample(drawn: FloatArray, finite: FloatArray, limits: tuple[Bounds, ...]) -> str:
     """Return number, mean, deviation and the share inside the limits, in one line."""
     missing = len(drawn) - len(finite)
     reported = [f"{len(drawn)} parts" + (f", {missing} without a result" if missing else "")]
@@ -192,7 +192,7 @@ def _wrap_path(path: str, width: int) -> str:
     return "\n".join(textwrap.wrap(short(path), width))
 
 
-def _lines(findings: Findings, metric: str, index: str) -> list[IndexLine]:
+def _index_lines(findings: Findings, metric: str, index: str) -> list[IndexLine]:
     """Return one index of all parameters, in the order of the study."""
     return [line for line in findings.lines if (line.metric, line.index) == (metric, index)]
 
@@ -240,7 +240,7 @@ def _draw_bars(
 def draw_bars(findings: Findings, number: int) -> Figure:
     """Return the indices of one metric as bars with their intervals."""
     metric, kinds = findings.setup.study.metrics[number], BAR_CHARTS[findings.setup.method]
-    lines_of_kinds = [_lines(findings, metric.label, kind.index) for kind in kinds]
+    lines_of_kinds = [_index_lines(findings, metric.label, kind.index) for kind in kinds]
     order = _rank_parameters(lines_of_kinds[0])
     figure, axes = _bar_axes(len(order), _metric_title(findings, metric), len(kinds) > 1)
     height = 0.7 / len(kinds)
@@ -256,7 +256,7 @@ def draw_bars(findings: Findings, number: int) -> Figure:
 @apply_style
 def draw_gains(findings: Findings) -> Figure:
     """Return what the yield gains if a tolerance is halved."""
-    lines = _lines(findings, "yield", "yield_gain_when_halved")
+    lines = _index_lines(findings, "yield", "yield_gain_when_halved")
     order = _rank_parameters(lines)
     share = findings.all_met
     stated = share is not None and share.value == share.value
@@ -281,7 +281,7 @@ def _metric_title(findings: Findings, metric: Metric) -> str:
 def draw_oat(findings: Findings, number: int) -> Figure:
     """Return one metric over each parameter's range, and its values at the ends of the range."""
     metric, setup = findings.setup.study.metrics[number], findings.setup
-    swings = _lines(findings, metric.label, "swing")
+    swings = _index_lines(findings, metric.label, "swing")
     order = _rank_parameters(swings)
     room = max(60.0, _ROW_HEIGHT * len(order) + 10.0)
     figure = new_figure(190, room + 24)
@@ -326,7 +326,7 @@ def _label_with_unit(metric: Metric) -> str:
 def draw_morris(findings: Findings, number: int) -> Figure:
     """Return mean size and scatter of the effects: far right matters, high up is curved or interacts."""
     metric = findings.setup.study.metrics[number]
-    sizes, scatters = (_lines(findings, metric.label, name) for name in ("mu_star", "sigma"))
+    sizes, scatters = (_index_lines(findings, metric.label, name) for name in ("mu_star", "sigma"))
     figure = new_figure(160, 90)
     axes = axes_mm(figure, (20, 14, 84, 66))
     _write_head(figure, _metric_title(findings, metric))
@@ -337,7 +337,7 @@ def draw_morris(findings: Findings, number: int) -> Figure:
         if size.value is None or scatter.value is None:
             axes.plot([], [], linestyle="", label=f"{label}\n(not stated)")
             continue
-        ends, up = [factor * end for end in _numbers(size)[2:]], factor * scatter.value
+        ends, up = [factor * end for end in _as_floats(size)[2:]], factor * scatter.value
         look: Look = {"color": LINE_COLOURS[row % len(LINE_COLOURS)], "clip_on": False}
         axes.plot(factor * size.value, up, MARKER_SHAPES[row], label=label, linestyle="", ms=5, **look)
         axes.plot(ends, (up,) * 2, marker="|", markersize=4, linewidth=1.0, **look)
@@ -361,9 +361,9 @@ def draw_convergence(findings: Findings, number: int) -> Figure:
     figure = new_figure(160, 90)
     axes = axes_mm(figure, (18, 14, 86, 66))
     _write_head(figure, f"{_metric_title(findings, metric)}, convergence")
-    order = [findings.setup.paths[k] for k in _rank_parameters(_lines(findings, metric.label, "total_order"))]
+    order = [findings.setup.paths[k] for k in _rank_parameters(_index_lines(findings, metric.label, "total_order"))]
     for row, path in enumerate(order):
-        points = np.array([_numbers(line) for line in mine if line.parameter == path and line.value is not None])
+        points = np.array([_as_floats(line) for line in mine if line.parameter == path and line.value is not None])
         if not len(points):
             axes.plot([], [], linestyle="", label=f"{short(path)}\n(not stated)")
             continue
@@ -386,5 +386,5 @@ def _legend_beside(axes: Axes) -> None:
     axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), frameon=False, fontsize=SMALL_FONT)
 
 
-def _numbers(line: IndexLine) -> list[float]:
+def _as_floats(line: IndexLine) -> list[float]:
     return [np.nan if number is None else float(number) for number in (line.samples, line.value, line.low, line.high)]

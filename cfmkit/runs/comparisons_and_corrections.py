@@ -155,17 +155,17 @@ class CorrectedValue:
     @property
     def cells(self) -> tuple[str, str, str, str]:
         """Name, before, after and the interval of the prediction, as a page shows them."""
-        before = self._text(self.before)
+        before = self._format_value(self.before)
         if self.before_ends is not None:
-            before += f" ({self._span(self.before_ends)})"
-        predicted = "" if self.after_ends is None else self._span(self.after_ends)
-        return self.name, before, self._text(self.after), predicted
+            before += f" ({self._format_span(self.before_ends)})"
+        predicted = "" if self.after_ends is None else self._format_span(self.after_ends)
+        return self.name, before, self._format_value(self.after), predicted
 
-    def _text(self, value: float) -> str:
+    def _format_value(self, value: float) -> str:
         return format_short(value, self.dimension, 5)
 
-    def _span(self, ends: tuple[float, float]) -> str:
-        return f"{float(to_border(ends[0], self.dimension)):.4g} to {self._text(ends[1])}"
+    def _format_span(self, ends: tuple[float, float]) -> str:
+        return f"{float(to_border(ends[0], self.dimension)):.4g} to {self._format_value(ends[1])}"
 
     @property
     def numbers(self) -> dict[str, Any]:

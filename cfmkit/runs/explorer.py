@@ -144,7 +144,7 @@ class Explorer:
         written = f"{path}={slider.value + step:.12g} {slider.unit}".rstrip()
         try:
             moved = _requirement_sizes(api.analyze(self.spec([written])))
-            nominal = self._nominal
+            nominal = self._nominal_sizes
         except CfmError:
             return {"influence": 0.0}
         shares = [
@@ -153,7 +153,7 @@ class Explorer:
         return {"influence": max(shares, default=0.0) * RELATIVE_STEP * size / step}
 
     @cached_property
-    def _nominal(self) -> dict[str, tuple[float, float]]:
+    def _nominal_sizes(self) -> dict[str, tuple[float, float]]:
         return _requirement_sizes(api.analyze(self.spec()))
 
     def command(self, changes: Sequence[str]) -> str:
@@ -300,7 +300,7 @@ def _page_data(result: Result) -> dict[str, Any]:
         page["curve"] = {
             "x": f"{curve.motion_name} [{border_unit(motion)}]",
             "y": f"{curve.kind} [{border_unit(curve.kind)}]",
-            "branches": dict(_branches(curve)),
+            "branches": dict(_branch_points(curve)),
             "window": None if window is None else [border(end, motion) for end in (window.lo, window.hi)],
             "bands": [
                 {name: border(end, curve.kind) for name, end in (("low", band.low), ("high", band.high))}
@@ -326,7 +326,7 @@ def _requirement_sizes(result: AnalysisView) -> dict[str, tuple[float, float]]:
     return judged
 
 
-def _branches(curve: Curve) -> Iterator[tuple[str, list[list[float | None]]]]:
+def _branch_points(curve: Curve) -> Iterator[tuple[str, list[list[float | None]]]]:
     from cfmkit.specs.units import to_border
 
     for name in dict.fromkeys(curve.branches):

@@ -253,7 +253,7 @@ class _Scope(NamedTuple):
 
 
 @cache
-def _specification(scope: _Scope) -> Spec:
+def _make_spec(scope: _Scope) -> Spec:
     from cfmkit import api
     from cfmkit.runs.shipped_files import example
 
@@ -269,10 +269,10 @@ def _specification(scope: _Scope) -> Spec:
 
 
 @cache
-def _result(scope: _Scope) -> AnalysisView:
+def _analyze_example(scope: _Scope) -> AnalysisView:
     from cfmkit import api
 
-    return api.analyze(_specification(scope))
+    return api.analyze(_make_spec(scope))
 
 
 _BINARY_OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -322,12 +322,12 @@ def _value_of_node(node: ast.expr, scope: _Scope) -> Any:
         case ast.Call(func=ast.Name(id="changed"), args=[ast.Constant(value=str(change)), inner]):
             return _value_of_node(inner, scope._replace(changes=(*scope.changes, change)))
         case ast.Call(func=ast.Name(id="varied"), args=[ast.Constant(value=str(path))]):
-            return _varied_values(_specification(scope), path)
+            return _varied_values(_make_spec(scope), path)
         case ast.Call(func=ast.Name(id=name), args=args) if name in _MATH_FUNCTIONS:
             return _MATH_FUNCTIONS[name](*(_value_of_node(argument, scope) for argument in args))
         case ast.Call(func=ast.Name(id=column), args=[place, *branch]):
             return _value_on_curve(
-                _result(scope).curves[0], column, _value_of_node(place, scope), *map(ast.literal_eval, branch)
+                _analyze_example(scope).curves[0], column, _value_of_node(place, scope), *map(ast.literal_eval, branch)
             )
         case ast.Name() | ast.Attribute() | ast.Subscript():
             return _value_named(ast.unparse(node), scope)
@@ -337,8 +337,8 @@ def _value_of_node(node: ast.expr, scope: _Scope) -> Any:
 def _value_named(name: str, scope: _Scope) -> Any:
     """Return a value of the specification, or a metric."""
     if name.startswith(tuple(f"{block}." for block in _SPEC_BLOCKS)):
-        return _specification(scope).get_value(name.replace("[", ".").replace("]", ""))
-    metric = _result(scope).metrics.get(name)
+        return _make_spec(scope).get_value(name.replace("[", ".").replace("]", ""))
+    metric = _analyze_example(scope).metrics.get(name)
     if metric is None or metric.value is None:
         raise ValueError(f"{name} has no value")
     return metric.value

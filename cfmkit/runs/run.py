@@ -221,7 +221,7 @@ def carry_out(
     with RunFolder(wanted.out) as folder:
         folder.check(*COMMON_FILES, *(["report.html"] if wanted.page else []))
         with verb.running(folder, Run(wanted.seed, progress, wanted.time_budget)) as run:
-            report = _warn_of_replaced_options(_compute(verb, spec, run, document), spec, document)
+            report = _warn_of_replaced_options(_compute_report(verb, spec, run, document), spec, document)
         command = shlex.join(["cfmkit", *arguments])
         started = RunCommand(verb.name, wanted.spec, wanted.all_changes, verb.words, wanted.out)
         for name, data in files(report, wanted.plots, wanted.page, command, wanted.form, wanted.animate, started):
@@ -267,7 +267,7 @@ def _place_problem(document: YamlDocument, problem: Problem, options: Collection
     return document.problem(problem.path, problem.message)
 
 
-def _compute(verb: Verb, spec: Spec, run: Run, document: YamlDocument) -> Report:
+def _compute_report(verb: Verb, spec: Spec, run: Run, document: YamlDocument) -> Report:
     with placing(document):
         report = verb.compute(spec, run)
     if report.result.status is Status.INVALID:

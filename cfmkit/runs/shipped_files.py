@@ -59,10 +59,10 @@ def examples() -> tuple[Example, ...]:
     """
     root = folder()
     files = sorted(root.rglob("*.yaml"), key=lambda path: (len(path.parts), path))
-    return tuple(_example(path, root) for path in files)
+    return tuple(_read_example(path, root) for path in files)
 
 
-def _example(path: Path, root: Path) -> Example:
+def _read_example(path: Path, root: Path) -> Example:
     lines = path.read_text(encoding="utf-8").splitlines()
     named = (line.partition(":")[2].strip() for line in lines if line.startswith("family:"))
     head = takewhile(lambda line: line.startswith("#"), lines)

@@ -199,7 +199,7 @@ def _wanted_sizes(
     wanted = np.concatenate([np.minimum(share * _radius_at(ring, arc), largest) for ring, arc in pairs])
     for behind in (False, True):
         normals = np.concatenate([ring.normals(arc, behind) for ring, arc in pairs])
-        wanted = np.minimum(wanted, _thickness(rings, places, normals, across * largest) / across)
+        wanted = np.minimum(wanted, _ray_lengths(rings, places, normals, across * largest) / across)
     return places, wanted
 
 
@@ -222,7 +222,7 @@ def _radius_at(ring: Ring, arc: FloatArray) -> FloatArray:
     return np.asarray(np.where(vertex, ring.radii[line], inside))
 
 
-def _thickness(rings: tuple[Ring, ...], places: FloatArray, normals: FloatArray, reach: float) -> FloatArray:
+def _ray_lengths(rings: tuple[Ring, ...], places: FloatArray, normals: FloatArray, reach: float) -> FloatArray:
     """Return how far rays from places (m, 2) along normals run through material, (m,) [m]; infinite beyond `reach`."""
     starts = np.concatenate([ring.points for ring in rings])
     along = np.concatenate([np.roll(ring.points, -1, axis=0) - ring.points for ring in rings])

@@ -106,7 +106,7 @@ class Elements:
         """Return what holds the nodes in place (n, 2) [N], at displacements (n, 2) [m]."""
         gradient, volume = self._parent
         f, strain = self._evaluate_strain(gradient, moved)
-        return self._assemble_forces(_gradient_times_stress(f, volume * self.law(strain)[0]))
+        return self._assemble_forces(_times(f, volume * self.law(strain)[0]))
 
     def linearize(self, moved: FloatArray) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
         """Return forces (n, 2) [N], and the tangent as a function of a direction (n, 2), in which they change so.
@@ -120,12 +120,9 @@ class Elements:
 
         def apply_tangent(direction: FloatArray) -> FloatArray:
             df = self._evaluate_slopes(gradient, direction)
-            return self._assemble_forces(
-                _gradient_times_stress(df, s)
-                + _gradient_times_stress(f, np.einsum("ijk,jk->ik", d, _strain_change(f, df)))
-            )
+            return self._assemble_forces(_times(df, s) + _times(f, np.einsum("ijk,jk->ik", d, _strain_change(f, df))))
 
-        return self._assemble_forces(_gradient_times_stress(f, s)), apply_tangent
+        return self._assemble_forces(_times(f, s)), apply_tangent
 
     def tangent_energies(self, moved: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
         """Return first' K second of every element (m,) [N m], K its tangent at displacements; each (n, 2) [m]."""
@@ -133,7 +130,7 @@ class Elements:
         f, strain = self._evaluate_strain(gradient, moved)
         stress, modulus, _ = self.law(strain)
         df, dg = self._evaluate_slopes(gradient, first), self._evaluate_slopes(gradient, second)
-        energy = (df * _gradient_times_stress(dg, stress)).sum((0, 1))
+        energy = (df * _times(dg, stress)).sum((0, 1))
         energy += np.einsum("ik,ijk,jk->k", _strain_change(f, df), modulus, _strain_change(f, dg))
         return np.asarray((volume * energy).reshape(len(GAUSS_POINTS), -1).sum(0))
 
@@ -173,7 +170,7 @@ class Elements:
                 row = row.reshape(-1, points[1])[i:]  # from its own diagonal on
                 entries[first : first + len(row)] = row
                 first += len(row)
-        return self._assemble_forces(_gradient_times_stress(f, s)), self._tangent_pattern.assemble(entries)
+        return self._assemble_forces(_times(f, s)), self._tangent_pattern.assemble(entries)
 
     @cached_property
     def _tangent_pattern(self) -> Pattern:
@@ -227,7 +224,7 @@ def _strain_change(f: FloatArray, df: FloatArray) -> FloatArray:
     )
 
 
-def _gradient_times_stress(f: FloatArray, s: FloatArray) -> FloatArray:
+def _times(f: FloatArray, s: FloatArray) -> FloatArray:
     """Return F S (2, 2, k) of a gradient (2, 2, k) and a symmetric stress (3, k)."""
     return np.stack([f[:, 0] * s[0] + f[:, 1] * s[2], f[:, 0] * s[2] + f[:, 1] * s[1]], 1)
 

@@ -57,15 +57,15 @@ class PoseGuide:
 
     def interpolate(self, travel: float) -> Balance:
         """Return the coarse pose at one of its travels [m or rad] as one on this mesh: unknowns and their slope."""
-        if travel not in self._interpolated:
+        if travel not in self._interpolated_poses:
             pose = self.poses[travel]
             unknowns = self._interpolate(self.coarse.evaluate_displacements(pose), pose.unknowns)
             slope = self._interpolate(self.coarse.slope(pose), pose.slope)
-            self._interpolated[travel] = replace(pose, unknowns=unknowns, slope=slope, solved=False)
-        return self._interpolated[travel]
+            self._interpolated_poses[travel] = replace(pose, unknowns=unknowns, slope=slope, solved=False)
+        return self._interpolated_poses[travel]
 
     @cached_property
-    def _interpolated(self) -> dict[float, Balance]:
+    def _interpolated_poses(self) -> dict[float, Balance]:
         return {}
 
     @cached_property

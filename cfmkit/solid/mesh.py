@@ -85,7 +85,7 @@ def mesh(
     if (around := sum(float(ring.places[-1]) for ring in rings)) > size * MOST_NODES:
         raise _too_many_nodes(int(around / size))
     field = sizes(rings, size, share, across)
-    laid = [_boundary_nodes(ring, field, _crossings(ring, seams, field, seam_distance)) for ring in rings]
+    laid = [_boundary_nodes(ring, field, _seam_crossings(ring, seams, field, seam_distance)) for ring in rings]
     fixed = np.concatenate([ring.locate(arc) for ring, arc in zip(rings, laid, strict=True)])
     on_seams = [_points_on_seam(region, field, seam) for seam in seams]
     sewn = np.concatenate([np.zeros((0, 2)), *on_seams])
@@ -97,7 +97,7 @@ def mesh(
     for _ in range(MAX_HALVINGS):
         fixed = np.concatenate([ring.locate(arc) for ring, arc in zip(rings, laid, strict=True)])
         points = np.concatenate([fixed, *on_seams, inside])
-        corners = _triangles(region, points)
+        corners = _triangulate(region, points)
         missing = _missing_pieces(corners, laid)
         crossed = [_crossed_pieces(region, corners, points, seam, seam_distance) for seam in seams]
         if not any(len(pieces) for pieces in (*missing, *crossed)):
@@ -152,7 +152,7 @@ def _explain_crossing(shape: Any) -> GeometryError:
 MIN_CROSSING_SINE = 0.5  # sine of the angle at which a seam must cross an edge to begin at a node of it
 
 
-def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, tolerance: float) -> FloatArray:
+def _seam_crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, tolerance: float) -> FloatArray:
     """Return the arc lengths (k,) [m] at which a ring crosses or leaves seams, but for those next to its corners."""
     along = np.roll(ring.points, -1, axis=0) - ring.points
     crossings = []
@@ -236,7 +236,7 @@ def _sample_interior(region: Any, field: Sizes, random: np.random.Generator) -> 
     interior = [np.zeros((0, 2))]
     for size in least * 2.0 ** np.arange(int(np.ceil(np.log2(field.largest / least))) + 1):
         # one lattice for each octave of sizes, so that nothing is thinned to less than a quarter
-        points = _lattice(region.bounds, field, size)
+        points = _lattice_points(region.bounds, field, size)
         points = points[contains_xy(region, points)]
         wanted = field(points)
         kept = (wanted >= size) & (wanted < 2 * size) & (random.random(len(points)) < (size / wanted) ** 2)
@@ -249,7 +249,7 @@ def _sample_interior(region: Any, field: Sizes, random: np.random.Generator) -> 
 CELL_SIZE = 16  # side of the cells in which lattices are laid, in sizes: cells where no such size is wanted have none
 
 
-def _lattice(bounds: tuple[float, float, float, float], field: Sizes, size: float) -> FloatArray:
+def _lattice_points(bounds: tuple[float, float, float, float], field: Sizes, size: float) -> FloatArray:
     """Return a lattice of some size (k, 2) [m], wherever sizes below twice that may be wanted.
 
     Its cells are found by halving larger ones, so that one small fillet does not need small cells everywhere.
@@ -333,7 +333,7 @@ def _relax_points(region: Any, room: Spacing, fixed: FloatArray, inside: FloatAr
     field = room.field
     for _ in range(N_RELAXATIONS):
         points = np.concatenate([fixed, inside])
-        sides = _triangles(region, points)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        sides = _triangulate(region, points)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
         keys = np.sort(sides.min(axis=1) * len(points) + sides.max(axis=1))
         keys = keys[np.diff(keys, prepend=-1) > 0]  # a fifth of the time of numpy's unique
         bars = np.column_stack([keys // len(points), keys % len(points)])
@@ -352,7 +352,7 @@ def _relax_points(region: Any, room: Spacing, fixed: FloatArray, inside: FloatAr
     return inside
 
 
-def _triangles(region: Any, points: FloatArray) -> IntArray:
+def _triangulate(region: Any, points: FloatArray) -> IntArray:
     """Return Delaunay's triangles (m, 3) in the part, counter-clockwise."""
     from shapely import contains_xy
 

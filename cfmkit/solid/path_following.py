@@ -128,9 +128,7 @@ def follow(
     for item in follow_path(part, start, np.array(stops[1:]), options):
         if isinstance(item, PathEvent):
             if item.before == item.after:
-                path = replace(
-                    path, bifurcations=(*path.bifurcations, _meeting_of_curves(part, path, item, path.poses[-1])[0])
-                )
+                path = replace(path, bifurcations=(*path.bifurcations, _meet(part, path, item, path.poses[-1])[0]))
             else:
                 event = item
             continue
@@ -228,7 +226,7 @@ def _add_corner(part: FollowedPart, path: PosePath, event: PathEvent, pose: Bala
     place, width = event.drive, CORNER_WIDTH * (pose.travel - path.poses[0].travel)
     first, last = (part.pose(at) for at in event.within)
     if event.near is None:  # the mesh rounds it
-        place, effort, before, behind = _meeting_of_curves(part, path, event, pose)
+        place, effort, before, behind = _meet(part, path, event, pose)
         unknowns = first.unknowns + (place - first.travel) * first.slope
     else:
         corner, onto = part.pose(event.near), event.before < event.after
@@ -254,9 +252,7 @@ def _add_corner(part: FollowedPart, path: PosePath, event: PathEvent, pose: Bala
     return replace(path, poses=tuple(poses))
 
 
-def _meeting_of_curves(
-    part: FollowedPart, path: PosePath, event: PathEvent, later: Balance
-) -> tuple[float, float, float, float]:
+def _meet(part: FollowedPart, path: PosePath, event: PathEvent, later: Balance) -> tuple[float, float, float, float]:
     """Return travel and effort where the curves before and behind a rounded corner meet, and their stiffnesses."""
     assert event.within is not None
     first, last = (part.pose(at) for at in event.within)

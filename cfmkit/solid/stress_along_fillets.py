@@ -129,7 +129,7 @@ def stressed_fillets(
 def arcs(ring: Ring, number: int, radius: float) -> Iterator[FilletArc]:
     """Yield the arcs of a radius that turn towards the waste on a ring."""
     points, count = ring.points, len(ring.points)
-    centers, radii = _circles(points)
+    centers, radii = _circles_through(points)
     on = (ring.turns < 0) & (np.abs(radii - radius) <= RADIUS_RTOL * radius)
     if radius <= 0 or on.all():
         return
@@ -141,7 +141,7 @@ def arcs(ring: Ring, number: int, radius: float) -> Iterator[FilletArc]:
         yield FilletArc(number, centers[run].mean(axis=0), radius, read_only(ends))
 
 
-def _circles(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _circles_through(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return centre (n, 2) and radius (n,) [m] of the circle through each vertex and its two neighbours."""
     a, b = np.roll(points, 1, axis=0) - points, np.roll(points, -1, axis=0) - points
     twice = 2.0 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

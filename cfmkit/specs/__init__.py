@@ -1,6 +1,4 @@
-"""From text to a specification and back: YAML with places, quantities with units, the blocks that all families have,
-target curves, and metrics of the user.
-"""
+"""From text to a specification and back: YAML with places, units, blocks of all families, targets, own metrics."""
 
 from typing import TYPE_CHECKING
 

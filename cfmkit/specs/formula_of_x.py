@@ -107,7 +107,10 @@ def _slope(node: ast.expr, x: FloatArray) -> Any:
         by_power = np.where(np.asarray(dv) == 0, 0.0, np.power(np.asarray(u, dtype=float), v) * np.log(u) * dv)
         return by_base + by_power
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-        inner, slopes = [_value(argument, x) for argument in node.args], [_slope(argument, x) for argument in node.args]
+        inner, slopes = (
+            [_value(argument, x) for argument in node.args],
+            [_slope(argument, x) for argument in node.args],
+        )
         if len(inner) == 2:
             first = inner[0] <= inner[1] if node.func.id == "min" else inner[0] >= inner[1]
             return np.where(first, *slopes)
@@ -117,7 +120,7 @@ def _slope(node: ast.expr, x: FloatArray) -> Any:
 
 def _value(node: ast.expr, x: FloatArray) -> Any:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
-        return _number(node.value)
+        return _to_float(node.value)
     if isinstance(node, ast.Name) and node.id in ("x", "pi"):
         return x if node.id == "x" else np.pi
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY_OPERATORS:
@@ -137,7 +140,7 @@ def _value(node: ast.expr, x: FloatArray) -> Any:
     )
 
 
-def _number(value: int | float) -> float:
+def _to_float(value: int | float) -> float:
     """Return a number of a formula as a float; one that is too large for it is refused."""
     try:
         number = float(value)

@@ -55,7 +55,7 @@ def schema(
     shared = {
         f"{name}.{key}": _rename_references(block, name)
         for name, schema in schemas.items()
-        for key, block in _blocks(schema)
+        for key, block in _block_schemas(schema)
     }
     choices = [
         {key: value for key, value in _rename_references(schema, name).items() if key != "$defs"}
@@ -110,10 +110,10 @@ def _bounds_as_text(node: dict[str, Any], dimension: str) -> None:
 def keys(model: type[Spec]) -> tuple[Key, ...]:
     """Return every key that a specification of a family may have, in the order of its model."""
     whole = json_schema(model)
-    return tuple(_keys_below(whole, dict(_blocks(whole)), ""))
+    return tuple(_keys_below(whole, dict(_block_schemas(whole)), ""))
 
 
-def _blocks(whole: dict[str, Any]) -> Iterable[tuple[str, Any]]:
+def _block_schemas(whole: dict[str, Any]) -> Iterable[tuple[str, Any]]:
     blocks: dict[str, Any] = whole.get("$defs", {})
     return blocks.items()
 
@@ -135,7 +135,7 @@ def _keys_below(block: dict[str, Any], blocks: dict[str, Any], path: str) -> Ite
     required = block.get("required", ())
     for name, node in block.get("properties", {}).items():
         key_path = f"{path}.{name}" if path else name
-        key = _key(key_path, node, blocks, name in required)
+        key = _make_key(key_path, node, blocks, name in required)
         if path and "const" in node and not key.description:
             # the one word that makes a block the kind it is means what the block means
             key = replace(key, description=block.get("description", ""))
@@ -146,27 +146,27 @@ def _keys_below(block: dict[str, Any], blocks: dict[str, Any], path: str) -> Ite
 
 def _inner_blocks(node: dict[str, Any], blocks: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
     """Yield the blocks that may stand at a node, with ``[]`` if they stand in a list."""
-    for member in _members(node, blocks):
+    for member in _member_schemas(node, blocks):
         if "properties" in member:
             yield member, ""
         elif "items" in member:
-            yield from ((item, "[]") for item in _members(member["items"], blocks) if "properties" in item)
+            yield from ((item, "[]") for item in _member_schemas(member["items"], blocks) if "properties" in item)
         elif isinstance(named := member.get("additionalProperties"), dict):
-            yield from ((item, ".NAME") for item in _members(named, blocks) if "properties" in item)
+            yield from ((item, ".NAME") for item in _member_schemas(named, blocks) if "properties" in item)
 
 
-def _members(node: dict[str, Any], blocks: dict[str, Any]) -> list[dict[str, Any]]:
+def _member_schemas(node: dict[str, Any], blocks: dict[str, Any]) -> list[dict[str, Any]]:
     """Return what a node may be, references followed, nothing (null) left out."""
     if "$ref" in node:
         return [blocks[node["$ref"].rpartition("/")[2]]]
     choices = node.get("anyOf") or node.get("oneOf") or node.get("allOf")
     if choices:
-        return [member for choice in choices for member in _members(choice, blocks)]
+        return [member for choice in choices for member in _member_schemas(choice, blocks)]
     return [] if node.get("type") == "null" else [node]
 
 
-def _key(path: str, node: dict[str, Any], blocks: dict[str, Any], required: bool) -> Key:
-    members = _members(node, blocks)
+def _make_key(path: str, node: dict[str, Any], blocks: dict[str, Any], required: bool) -> Key:
+    members = _member_schemas(node, blocks)
     quantities = [member for member in members if "x-dimension" in member]
     default = node.get("default", _NO_VALUE)
     return Key(
@@ -195,7 +195,7 @@ def _kind_in_words(node: dict[str, Any], blocks: dict[str, Any]) -> str:
 
 def _items_in_words(node: dict[str, Any], blocks: dict[str, Any]) -> str:
     inner = node.get("prefixItems") or [node.get("items", {})]
-    kinds = dict.fromkeys(_kind_in_words(member, blocks) for item in inner for member in _members(item, blocks))
+    kinds = dict.fromkeys(_kind_in_words(member, blocks) for item in inner for member in _member_schemas(item, blocks))
     count = f"{len(inner)} x " if "prefixItems" in node else ""
     return count + " or ".join(kinds)
 

@@ -48,7 +48,7 @@ class Requirement(Model):
 
     @field_validator("metric")
     @classmethod
-    def _well_formed(cls, text: str) -> str:
+    def _require_form(cls, text: str) -> str:
         if not re.fullmatch(r"[a-z_0-9]+(\[([a-z_0-9-]+|[0-9.eE+-]+ ?[A-Za-z]+)\])?", text):
             raise ValueError(
                 "must be a metric's name, optionally with a branch in brackets: 'force_mean[load]', or a time: "
@@ -83,7 +83,7 @@ class Analysis(Model):
     )
 
     @model_validator(mode="after")
-    def _window_increases(self) -> Self:
+    def _require_increasing_window(self) -> Self:
         if self.window is not None and not ends_increase(self.window):
             raise ValueError("'window' must be increasing")
         return self
@@ -229,7 +229,7 @@ class Spec(Model):
         return "length"
 
     @model_validator(mode="after")
-    def _windows_are_of_the_motion(self) -> Self:
+    def _require_windows_of_motion(self) -> Self:
         right = DIMENSIONS_BY_NAME[self.motion]
         faults = {
             path: f"the curve runs over {right.phrase}: write its window in {right.unit}, or in shares of the travel: "
@@ -257,7 +257,7 @@ class Spec(Model):
         return target.curve(getattr(design, "force", None) or getattr(design, "torque", None))
 
     @model_validator(mode="after")
-    def _target_is_of_the_motion(self) -> Self:
+    def _require_target_of_motion(self) -> Self:
         right = "torque" if self.motion == "angle" else "force"
         faults: dict[tuple[str | int, ...], str] = {
             path: f"is a curve of {target.kind}, and this mechanism is driven by {right}"
@@ -374,7 +374,7 @@ ASSUMED_LAW = re.compile(r".*\.(fatigue|relaxation)(?=\.)")
 """Path of a block that a named material has without a word in the file."""
 
 
-def _contains(data: Any, parts: list[str]) -> bool:
+def _is_stated_at(data: Any, parts: list[str]) -> bool:
     """Return True if a block is stated at a path."""
     for part in parts:
         if isinstance(data, tuple | list) and part.isdigit() and int(part) < len(data):
@@ -390,7 +390,7 @@ def _stated_leaves(everything: Mapping[str, Any], stated: Mapping[str, Any]) -> 
     """Yield every numeric leaf as (dotted path, value), but for those of laws that a material has by its name alone."""
     for path, value in _numeric_leaves(everything, ""):
         law = ASSUMED_LAW.match(path)
-        if law is None or _contains(stated, law[0].split(".")):
+        if law is None or _is_stated_at(stated, law[0].split(".")):
             yield path, value
 
 

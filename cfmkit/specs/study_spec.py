@@ -37,7 +37,7 @@ class Sweep(Model):
     curves: bool = Field(False, description="keep the curve of every point in curves.csv")
 
     @model_validator(mode="after")
-    def _samples_where_drawn(self) -> Self:
+    def _require_samples_if_drawn(self) -> Self:
         if (self.combine in SAMPLE_KINDS) != (self.samples is not None):
             kinds = "' or '".join(SAMPLE_KINDS)
             raise ValueError(f"'samples' and 'combine: {kinds}' belong together: give both or neither")
@@ -54,7 +54,7 @@ class Tolerance(Model):
     truncate: MetricValue | None = Field(None, description="parts that deviate by more are rejected before assembly")
 
     @model_validator(mode="after")
-    def _one_distribution(self) -> Self:
+    def _require_one_distribution(self) -> Self:
         if (self.normal is None) == (self.uniform is None):
             raise ValueError("give either 'normal' (a standard deviation) or 'uniform' (a half width)")
         if self.truncate is not None and self.normal is None:

@@ -47,11 +47,11 @@ def stable_hash(
     >>> stable_hash({"a": 1, "b": [2.5]}) == stable_hash({"b": (2.5,), "a": 1})
     True
     """
-    text = json.dumps(_canonical(value), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    text = json.dumps(_make_canonical(value), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _canonical(value: Any) -> Any:
+def _make_canonical(value: Any) -> Any:
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, float):
@@ -61,11 +61,11 @@ def _canonical(value: Any) -> Any:
     if isinstance(value, Mapping):
         if odd := [key for key in value if not isinstance(key, str)]:
             raise CfmError(f"{odd[0]!r} is a key that is not a text: it has no identity")
-        return {key: _canonical(item) for key, item in value.items()}
+        return {key: _make_canonical(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_canonical(item) for item in value]
+        return [_make_canonical(item) for item in value]
     if hasattr(value, "tolist"):  # numpy's scalars and arrays, without importing numpy
-        return _canonical(value.tolist())
+        return _make_canonical(value.tolist())
     raise CfmError(f"a {type(value).__name__} has no identity: only texts, numbers and their collections have")
 
 

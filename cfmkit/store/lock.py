@@ -97,7 +97,7 @@ class FolderLock:
     def check(self) -> None:
         """Raise if the lock file was removed or replaced, and another run may be at work."""
         file = self._folder / self.name
-        present = self._soft.is_lock_held_by_us if self._soft else not self.name or _same(self._descriptor, file)
+        present = self._soft.is_lock_held_by_us if self._soft else not self.name or _is_named(self._descriptor, file)
         if not present:
             raise OutputError(f"{quote_path(file)} was removed during the run: another run may be in the folder")
 
@@ -127,7 +127,7 @@ def locks_wanted() -> bool:
 def has_native_locks(folder: Path) -> bool:
     """Return True if files in a folder can be locked by the operating system; the folder must be writable."""
     with tempfile.TemporaryFile(dir=folder) as file:
-        return _try(file.fileno()) is not None
+        return _try_to_lock(file.fileno()) is not None
 
 
 def _lock(file: Path, folder: Path) -> int:
@@ -136,13 +136,13 @@ def _lock(file: Path, folder: Path) -> int:
     while True:
         descriptor = safe_disk_changes.system.open(file, flags, 0o666)
         try:
-            locked = _try(descriptor)
+            locked = _try_to_lock(descriptor)
             if locked is None:
                 _close_without_locks(descriptor, file)
                 return -1
             if not locked:
-                raise _busy(folder, *_signature(descriptor))
-            if _same(descriptor, file):
+                raise _refusal(folder, *_read_signature(descriptor))
+            if _is_named(descriptor, file):
                 _sign(descriptor, file)
                 _descriptors.add(descriptor)
                 return descriptor
@@ -153,10 +153,10 @@ def _lock(file: Path, folder: Path) -> int:
         os.close(descriptor)
 
 
-def _try(descriptor: int) -> bool | None:
+def _try_to_lock(descriptor: int) -> bool | None:
     """Lock an open file; return False if another run has locked it, None if the file system has no locks."""
     try:
-        return bool(_filelock().lock_descriptor(descriptor, blocking=False))
+        return bool(_import_filelock().lock_descriptor(descriptor, blocking=False))
     except OSError as error:
         if error.errno in _NO_LOCKS:
             return None
@@ -164,7 +164,7 @@ def _try(descriptor: int) -> bool | None:
 
 
 @cache
-def _filelock() -> Any:
+def _import_filelock() -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that this Python has no locks is said once, by `_lock_softly`
         import filelock
@@ -181,7 +181,7 @@ def _close_without_locks(descriptor: int, file: Path) -> None:
 
 def _unlock(descriptor: int, file: Path) -> None:
     """Remove a lock file that this process holds, unless it has lost its name, and close it."""
-    ours = os.fstat(descriptor) if _same(descriptor, file) else None
+    ours = os.fstat(descriptor) if _is_named(descriptor, file) else None
     if ours is not None:
         safe_disk_changes.discard(file)
     _descriptors.discard(descriptor)
@@ -193,13 +193,13 @@ def _unlock(descriptor: int, file: Path) -> None:
 
 def _lock_softly(file: Path, folder: Path) -> Any:
     """Return the lock that is a file which exists as long as the run lives."""
-    filelock = _filelock()
+    filelock = _import_filelock()
     soft = filelock.SoftFileLock(file, thread_local=False)
     try:
         soft.acquire(timeout=SOFT_LOCK_TIMEOUT, poll_interval=SOFT_LOCK_TIMEOUT / 10)
     except filelock.Timeout:
         cure = f"if no run is there any more, remove {quote_path(file)} or add --no-lock"
-        raise _busy(folder, *_soft_signature(file), cure) from None
+        raise _refusal(folder, *_read_soft_signature(file), cure) from None
     _report_soft_locks(os.path.dirname(folder))
     return soft
 
@@ -210,7 +210,7 @@ def _report_soft_locks(folder: str) -> None:
     _STORE_LOG.warning(message, quote_path(folder), SOFT_LOCK)
 
 
-def _same(descriptor: int, file: Path) -> bool:
+def _is_named(descriptor: int, file: Path) -> bool:
     """Return whether the open file still has its name."""
     with contextlib.suppress(OSError):
         return os.path.samestat(os.fstat(descriptor), os.lstat(file))
@@ -227,7 +227,7 @@ def _sign(descriptor: int, file: Path) -> None:
         raise
 
 
-def _signature(descriptor: int) -> tuple[str, str]:
+def _read_signature(descriptor: int) -> tuple[str, str]:
     """Return process and computer that hold the lock; the owner signs right after locking: wait a little for it."""
     until = time.monotonic() + SIGNATURE_TIMEOUT
     while True:
@@ -238,7 +238,7 @@ def _signature(descriptor: int) -> tuple[str, str]:
         time.sleep(0.01)
 
 
-def _soft_signature(file: Path) -> tuple[str, str]:
+def _read_soft_signature(file: Path) -> tuple[str, str]:
     """Return process and computer that a soft lock names; empty texts if it is not readable."""
     with contextlib.suppress(OSError):
         lines = file.read_text("utf-8", errors="replace").splitlines()
@@ -247,7 +247,7 @@ def _soft_signature(file: Path) -> tuple[str, str]:
     return "", ""
 
 
-def _busy(folder: Path, process: str, host: str, cure: str = "wait for it or give another --out") -> FolderInUse:
+def _refusal(folder: Path, process: str, host: str, cure: str = "wait for it or give another --out") -> FolderInUse:
     place = f" on {quote_path(host)}" if host and host != platform.node() else ""
     who = f"process {process}{place}" if process.isdigit() else "another process"
     return FolderInUse(f"{quote_path(folder)} is in use by a live run ({who}); {cure}")

@@ -197,14 +197,14 @@ class RunFolder:
         self._clock = time.monotonic()
         try:
             with _defer_signals(), reporting(self.path, "use the folder"):
-                atexit.register(self._leave)
+                atexit.register(self._leave_folder)
                 self._create_and_lock()
                 self._take_over()
             self._owner = os.getpid()
             return self
         except BaseException:
             with _defer_signals():
-                self._leave()
+                self._leave_folder()
             raise
 
     def __exit__(
@@ -213,10 +213,10 @@ class RunFolder:
         """Drop what was not committed and unlock the folder; a signal that comes meanwhile acts afterwards."""
         try:
             with _defer_signals():
-                self._leave()
+                self._leave_folder()
         except BaseException:
             with _defer_signals():  # the signal may have come just before
-                self._leave()
+                self._leave_folder()
             raise
 
     def check(self, *names: str) -> None:
@@ -302,7 +302,7 @@ class RunFolder:
         """Remove what `atomic_write` left here in processes that have died."""
         for entry in os.scandir(self.path):
             match = _TEMPORARY_PATTERN.fullmatch(entry.name)
-            if match and not _alive(int(match[1])):
+            if match and not _is_alive(int(match[1])):
                 safe_disk_changes.discard(Path(entry.path))
 
     def _stage_file(self, name: str, data: Data) -> FileRecord:
@@ -350,7 +350,7 @@ class RunFolder:
             state = "is not open in this process, or was committed already"
             raise CfmError(f"cannot write to {quote_path(self.path)}: the run folder {state}")
 
-    def _leave(self) -> None:
+    def _leave_folder(self) -> None:
         """Drop the working folder, unlock, and remove what was created for nothing; once.
 
         It is called again at the end of the process for a folder that a signal has kept from being left: Python may act
@@ -361,7 +361,7 @@ class RunFolder:
             transaction.clear(self.path)
             self._lock.release()
             safe_disk_changes.remove_empty(self._created)
-        atexit.unregister(self._leave)
+        atexit.unregister(self._leave_folder)
 
 
 @contextmanager
@@ -388,7 +388,7 @@ def _defer_signals() -> Iterator[None]:
         yield
 
 
-def _alive(process: int) -> bool:
+def _is_alive(process: int) -> bool:
     """Return whether a process lives; on Windows False, where a signal to find out would reach it."""
     if os.name == "nt":
         return False

@@ -83,7 +83,7 @@ def execute(root: Path, plan: CommitPlan) -> None:
     except BaseException as error:
         with suppress(OSError, OutputError):
             _turn_back(root, plan)
-        if isinstance(error, OSError) and _pending(root):
+        if isinstance(error, OSError) and _has_plan(root):
             half = f"{quote_path(root)} is half-way between two runs; the next run into it repairs it"
             raise OutputError(f"cannot write {quote_path(root)}: {reason(error)}; {half}") from error
         raise
@@ -105,17 +105,17 @@ def recover(root: Path) -> None:
         if mode_of(run / UNDO_NAME) is not None:
             _roll_back(root, _read_plan(root, UNDO_NAME))
         elif mode_of(run / PLAN_NAME) is not None:
-            _resume(root, _read_plan(root, PLAN_NAME))
+            _resume_plan(root, _read_plan(root, PLAN_NAME))
     clear(root)
 
 
 def clear(root: Path) -> None:
     """Remove the working folder, unless it holds a plan that the next run has to finish."""
-    if mode_of(root / TRANSACTION_FOLDER) is not None and not _pending(root):
+    if mode_of(root / TRANSACTION_FOLDER) is not None and not _has_plan(root):
         safe_disk_changes.clear_folder(root / TRANSACTION_FOLDER)
 
 
-def _pending(root: Path) -> bool:
+def _has_plan(root: Path) -> bool:
     return any(mode_of(root / TRANSACTION_FOLDER / name) is not None for name in (PLAN_NAME, UNDO_NAME))
 
 
@@ -138,7 +138,7 @@ def _roll_forward(root: Path, plan: CommitPlan) -> None:
     for change in plan.changes:
         if change.name == MANIFEST_NAME:
             _sync_folders(touched)
-        _apply(root, change)
+        _apply_change(root, change)
         touched |= {root / parent for parent in _parents(change.name)}
     _sync_folders(touched)
     # Only now: undoing this would need new folders, which a full disk may refuse.
@@ -146,7 +146,7 @@ def _roll_forward(root: Path, plan: CommitPlan) -> None:
     safe_disk_changes.system.unlink(root / TRANSACTION_FOLDER / PLAN_NAME)
 
 
-def _apply(root: Path, change: Change) -> None:
+def _apply_change(root: Path, change: Change) -> None:
     """Put one new file in its place, or take one old file away, unless that is done already."""
     place, staged = root / change.name, root / TRANSACTION_FOLDER / NEW_FOLDER / change.name
     if change.new is None:
@@ -166,7 +166,7 @@ def _refuse_changed(root: Path, change: Change) -> None:
         raise OutputError(f"{quote_path(place)} was changed while a run was replacing it; {OVERWRITE_REMEDY}")
 
 
-def _resume(root: Path, plan: CommitPlan) -> None:
+def _resume_plan(root: Path, plan: CommitPlan) -> None:
     """Roll forward if every new file is there, as it is after any kill; else roll back."""
     hashes = (
         hash_in(root / TRANSACTION_FOLDER / NEW_FOLDER, change.name) or hash_in(root, change.name)
@@ -188,14 +188,14 @@ def _turn_back(root: Path, plan: CommitPlan) -> None:
 
 def _roll_back(root: Path, plan: CommitPlan) -> None:
     for change in reversed(plan.changes):
-        _restore(root, change)
+        _restore_file(root, change)
     remove_empty(root / name for name in plan.folders)
     with suppress(OSError):
         _sync_folders({root, *(root / parent for change in plan.changes for parent in _parents(change.name))})
     safe_disk_changes.system.unlink(root / TRANSACTION_FOLDER / UNDO_NAME)
 
 
-def _restore(root: Path, change: Change) -> None:
+def _restore_file(root: Path, change: Change) -> None:
     place, kept = root / change.name, root / TRANSACTION_FOLDER / OLD_FOLDER / change.name
     hash_there = hash_in(root, change.name)
     if change.old is None:

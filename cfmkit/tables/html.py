@@ -28,11 +28,11 @@ def html_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def first_rows(table: Table) -> str:
     """Return the first rows of a table, with a line that says how many there are."""
-    columns = [[_cell(cell) for cell in column.cells()[:MOST_ROWS]] for column in table.columns]
+    columns = [[_cell_text(cell) for cell in column.cells()[:MOST_ROWS]] for column in table.columns]
     rest = len(table) - MOST_ROWS
     more = f"<p>{rest} more rows</p>" if rest > 0 else ""
     return html_table(table.headers, zip(*columns, strict=True)) + more
 
 
-def _cell(value: object) -> str:
+def _cell_text(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else "" if value is None else str(value)

@@ -273,20 +273,20 @@ def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
             'with --units, e.g. --units "phi=deg,M=N*mm"'
         )
     if not complete:
-        raise DataError(_missing(numeric, columns, name))
-    candidates = {dimension: _candidates(numeric, dimension) for dimension in ("time", *complete[0])}
+        raise DataError(_describe_missing(numeric, columns, name))
+    candidates = {dimension: _role_candidates(numeric, dimension) for dimension in ("time", *complete[0])}
     times, motions = candidates["time"], [item for item in numeric if item.dimension == complete[0][0]]
     beside = [item for item in times if item.index < candidates[complete[0][0]][0].index]
     if len(times) == len(motions) > 1 and beside:
         candidates["time"] = beside[-1:]  # each displacement has its time
     if several := [candidates[dimension] for dimension in (*complete[0], "time") if len(candidates[dimension]) > 1]:
-        raise DataError(_choices(several, name))
+        raise DataError(_describe_choices(several, name))
     return {
         COLUMN_ROLES[dimension]: columns_found[0] for dimension, columns_found in candidates.items() if columns_found
     }
 
 
-def _candidates(columns: Sequence[ColumnInfo], dimension: str) -> list[ColumnInfo]:
+def _role_candidates(columns: Sequence[ColumnInfo], dimension: str) -> list[ColumnInfo]:
     """Return the columns that could be of a dimension's role: those of --units, else of the usual name, else all."""
     matching = [column for column in columns if column.dimension == dimension]
     matching = [column for column in matching if column.named_by_option] or matching
@@ -295,7 +295,7 @@ def _candidates(columns: Sequence[ColumnInfo], dimension: str) -> list[ColumnInf
     return named if len(matching) > 1 and named else matching
 
 
-def _choices(several: Sequence[Sequence[ColumnInfo]], name: str) -> str:
+def _describe_choices(several: Sequence[Sequence[ColumnInfo]], name: str) -> str:
     """Return what to choose from where several columns could have a role: of columns side by side the pairs."""
     titles = [column.name for candidates_of_role in several for column in candidates_of_role]
 
@@ -314,7 +314,7 @@ def _choices(several: Sequence[Sequence[ColumnInfo]], name: str) -> str:
     return f"{name}: {many}; choose with {options}"
 
 
-def _missing(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name: str) -> str:
+def _describe_missing(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name: str) -> str:
     """Return which of displacement and force there is not, and what to do."""
 
     def key(column: ColumnInfo) -> str:

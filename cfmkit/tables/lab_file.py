@@ -251,8 +251,8 @@ def tables_in(
     long = next((index for index in filled if len(lines[index]) > LONGEST_LINE), None)
     if long is not None:
         raise DataError(f"{name}: line {long + 1} has {len(lines[long])} characters; at most {LONGEST_LINE} are read")
-    shape = _shape(lines, filled, name)
-    runs = _runs(lines, filled, shape)
+    shape = _find_row_pattern(lines, filled, name)
+    runs = _find_runs(lines, filled, shape)
     enough = min(2, len(shape.numeric))
     long_ones = [run for run in runs if sum(shape.numbers_in(lines[index]) >= enough for index in run) >= FEWEST_ROWS]
     chosen = long_ones or [max(runs, key=len)]
@@ -264,10 +264,12 @@ def tables_in(
                 "remove the text, or the numbers that do not belong to the table"
             )
     starts = [0, *(run[-1] + 1 for run in chosen)]
-    return [_table(lines, shape, run, start, units or {}, name) for run, start in zip(chosen, starts, strict=False)]
+    return [
+        _make_table(lines, shape, run, start, units or {}, name) for run, start in zip(chosen, starts, strict=False)
+    ]
 
 
-def _shape(lines: list[str], filled: list[int], name: str) -> RowPattern:
+def _find_row_pattern(lines: list[str], filled: list[int], name: str) -> RowPattern:
     """Return how the numbers of a file are written."""
     # Most lines before the last few are data, whatever stands above and below them.
     middle = filled[len(filled) // 3 : max(len(filled) - 2, 1)] or filled
@@ -275,7 +277,7 @@ def _shape(lines: list[str], filled: list[int], name: str) -> RowPattern:
     quoted = any('"' in line for line in sample)
     dialects = [Dialect(separator, decimal, quoted) for separator in SEPARATOR_NAMES for decimal in ".,"]
     dialects = [item for item in dialects if item.separator != "," or item.decimal == "." or quoted]
-    scores = [(*_score(dialect, sample), dialect) for dialect in dialects]
+    scores = [(*_score_dialect(dialect, sample), dialect) for dialect in dialects]
     count, _, width, dialect = max(scores, key=lambda item: item[:2])
     if not count:
         _refuse_groups(sample, name)
@@ -296,7 +298,7 @@ def _is_data(cells: Sequence[str], dialect: Dialect) -> bool:
     return sum(map(dialect.is_number, cells)) >= 2
 
 
-def _score(dialect: Dialect, sample: list[str]) -> tuple[int, float, int]:
+def _score_dialect(dialect: Dialect, sample: list[str]) -> tuple[int, float, int]:
     """Return how many lines are data in this dialect, which part of their cells is numbers, and their width."""
     good = [cells for line in sample if _is_data(cells := dialect.cells(line), dialect)]
     if not good:
@@ -306,7 +308,7 @@ def _score(dialect: Dialect, sample: list[str]) -> tuple[int, float, int]:
     return count, sum(map(dialect.is_number, filled)) / len(filled), width
 
 
-def _runs(lines: list[str], filled: list[int], shape: RowPattern) -> list[list[int]]:
+def _find_runs(lines: list[str], filled: list[int], shape: RowPattern) -> list[list[int]]:
     """Return the unbroken runs of lines with numbers; an empty line ends one unless numbers in all places follow."""
     runs: list[list[int]] = []
     before = -2
@@ -321,11 +323,11 @@ def _runs(lines: list[str], filled: list[int], shape: RowPattern) -> list[list[i
     return runs
 
 
-def _table(
+def _make_table(
     lines: list[str], shape: RowPattern, run: list[int], start: int, units: Mapping[str, str], name: str
 ) -> LabTable:
     """Return one table with what the lines above it and its cells say of its columns."""
-    names, unit_row, header = _header(lines, shape, range(start, run[0]), run[0] + 1, name)
+    names, unit_row, header = _find_header(lines, shape, range(start, run[0]), run[0] + 1, name)
     rows = [shape.row(lines[index]) for index in run[:: max(len(run) // _N_SAMPLE_LINES, 1)]]
     beside = _unit_columns(rows, shape, names)
     inside = {k: next(standard_spelling(row[unit]) for row in rows if row[unit]) for k, unit in beside.items()}
@@ -353,7 +355,7 @@ def _unit_columns(rows: list[list[str]], shape: RowPattern, names: Sequence[str]
     return positions
 
 
-def _header(
+def _find_header(
     lines: list[str], shape: RowPattern, above: range, first_line: int, name: str
 ) -> tuple[list[str], list[str], int | None]:
     """Return the names, the units and the index of the line with the names."""

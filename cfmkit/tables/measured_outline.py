@@ -36,9 +36,9 @@ def read_sides(
     Raises DataError if there are no points, no units, or too few on a side.
     """
     name = path.name
-    points, table = _points(path)
+    points, table = _read_points(path)
     side = next((column for column in table.columns if column.name.lower() == "side"), None)
-    sides = np.where(points[:, 0] > 0, "right", "left") if side is None else _sides(table, side)
+    sides = np.where(points[:, 0] > 0, "right", "left") if side is None else _read_side_column(table, side)
     right, left = _order_points(points, sides == "right", name), _order_points(points, sides == "left", name)
     if right[:, 0].mean() < left[:, 0].mean():
         raise DataError(
@@ -55,7 +55,7 @@ def read_profile(
 
     Raises DataError if there are no units, fewer than two points, or places that do not increase.
     """
-    points, table = _points(path)
+    points, table = _read_points(path)
     back = np.flatnonzero(np.diff(points[:, 0]) <= 0)
     if len(points) < 2:
         raise DataError(f"{path.name}: a profile needs at least two points")
@@ -65,7 +65,7 @@ def read_profile(
     return points[:, 0], points[:, 1]
 
 
-def _points(path: Path) -> tuple[FloatArray, LabTable]:
+def _read_points(path: Path) -> tuple[FloatArray, LabTable]:
     """Return the points of a file [m] and its table."""
     name = path.name
     try:
@@ -75,12 +75,12 @@ def _points(path: Path) -> tuple[FloatArray, LabTable]:
     tables = tables_in(lines_of(text), name)
     if len(tables) > 1:
         raise DataError(f"{name}: there are {len(tables)} tables, where one is needed; split the file")
-    axes = [_axis(tables[0].columns, axis, name) for axis in "xy"]
+    axes = [_axis_column(tables[0].columns, axis, name) for axis in "xy"]
     table = tables[0].with_values(axes)
     return np.column_stack([table.numbers(axis) for axis in axes]), table
 
 
-def _axis(columns: Sequence[ColumnInfo], axis: str, name: str) -> ColumnInfo:
+def _axis_column(columns: Sequence[ColumnInfo], axis: str, name: str) -> ColumnInfo:
     """Return the column of a coordinate."""
     column_of_axis = next((column for column in columns if column.name.lower() == axis), None)
     if column_of_axis is None:
@@ -90,7 +90,7 @@ def _axis(columns: Sequence[ColumnInfo], axis: str, name: str) -> ColumnInfo:
     return column_of_axis
 
 
-def _sides(table: LabTable, column: ColumnInfo) -> NDArray[np.str_]:
+def _read_side_column(table: LabTable, column: ColumnInfo) -> NDArray[np.str_]:
     """Return the side of each point."""
     words = [text.lower() for text in table.texts(column)]
     number = next((number for number, word in enumerate(words) if word not in SIDE_WORDS), None)

@@ -131,7 +131,7 @@ def _frozen(values: Iterable[Any], *, numeric: bool) -> Values:
         if values.dtype.kind == "U":
             return tuple(text or None for text in values.tolist())
         values = values.tolist()
-    cells = tuple(map(_cell, values))
+    cells = tuple(map(_to_cell, values))
     kinds = set(map(type, cells))
     if kinds in ({float}, {float, type(None)}) or (numeric and kinds <= {type(None)}):
         return read_only([math.nan if cell is None else cell for cell in cells])
@@ -140,7 +140,7 @@ def _frozen(values: Iterable[Any], *, numeric: bool) -> Values:
     return cells
 
 
-def _cell(value: Any) -> Cell:
+def _to_cell(value: Any) -> Cell:
     """Return one value as a float, an int or a text; None if it is missing."""
     if value is None or isinstance(value, str):
         return str(value) if value else None
@@ -218,10 +218,10 @@ def border_values(
 def _stack_columns(parts: Sequence[Part]) -> list[TableColumn]:
     """Return every column that occurs in `parts`, one part below the other."""
     kinds = {name: column.dimension for columns, _ in parts for name, column in columns.items()}
-    return [border_column(name, _stack(name, kind, parts), kind) for name, kind in kinds.items()]
+    return [border_column(name, _stack_values(name, kind, parts), kind) for name, kind in kinds.items()]
 
 
-def _stack(name: str, kind: str, parts: Sequence[Part]) -> Any:
+def _stack_values(name: str, kind: str, parts: Sequence[Part]) -> Any:
     missing: Any = "" if kind == "text" else math.nan
     return np.concatenate([part[name].values if name in part else np.full(count, missing) for part, count in parts])
 

@@ -274,7 +274,7 @@ def test_the_doctor_compares_what_is_installed_with_what_is_needed(monkeypatch, 
 
 
 def test_the_doctor_knows_of_a_folder_without_file_locks(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr("cfmkit.store.lock._try", lambda _: None)
+    monkeypatch.setattr("cfmkit.store.lock._try_to_lock", lambda _: None)
     monkeypatch.chdir(tmp_path)
     assert main(["doctor"]) == 0
     printed = " ".join(capsys.readouterr().out.split())

@@ -229,7 +229,7 @@ def run(*_):
     except BaseException as error:
         raise ValueError("SchemaError: Stopped: terminated") from None
 
-main._answer = run
+main._run_command = run
 print(main.main(["show"]))
 """
 

@@ -7,7 +7,7 @@ import pytest
 
 from cfmkit.export import OutlinePiece, merge_pieces
 from cfmkit.solid.boundary_and_element_sizes import SIZE_GRADING, Ring, Sizes
-from cfmkit.solid.mesh import _lattice, mesh
+from cfmkit.solid.mesh import _lattice_points, mesh
 from cfmkit.solid.meshed_part import rings_of
 
 
@@ -21,7 +21,7 @@ def test_points_are_thrown_where_small_elements_are_wanted_and_nowhere_else():
     """One place of 1 um in a plate of 100 mm: cells of 16 um all over it would be 39 million."""
     spot, size = np.array([31e-3, 47e-3]), 1e-6
     field = Sizes(spot[None], np.array([size]), 1e-3)
-    points = _lattice((0.0, 0.0, 0.1, 0.1), field, size)
+    points = _lattice_points((0.0, 0.0, 0.1, 0.1), field, size)
     assert len(points) < 20_000
     wanted = np.hypot(*(points - spot).T) < size / SIZE_GRADING  # sizes below twice that: a lattice of equal triangles
     assert wanted.sum() == pytest.approx(np.pi / SIZE_GRADING**2 / np.sqrt(0.75), rel=0.05)

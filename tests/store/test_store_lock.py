@@ -251,7 +251,7 @@ def test_without_file_locks_a_forked_worker_neither_drops_nor_keeps_the_mark(tmp
 
 @pytest.fixture
 def no_locks(monkeypatch):
-    monkeypatch.setattr(lock, "_try", lambda _: None)
+    monkeypatch.setattr(lock, "_try_to_lock", lambda _: None)
 
 
 def test_without_file_locks_the_run_of_another_computer_is_believed_and_named(tmp_path, no_locks):
@@ -315,4 +315,4 @@ def test_no_process_is_asked_by_a_signal_whether_it_lives_where_that_would_reach
     """On Windows 0 is the number of Ctrl-C."""
     monkeypatch.setattr(os, "kill", lambda *_: pytest.fail("a signal was sent"))
     monkeypatch.setattr(run_folder.os, "name", "nt")
-    assert not run_folder._alive(os.getpid())
+    assert not run_folder._is_alive(os.getpid())

@@ -118,7 +118,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
         complaints=(
             *_batch_complaints(result, options, terminal),
             *list_unreached_options(result.entries, options.changes),
-            *(_annotations(result) if options.annotations else ()),
+            *(_annotation_lines(result) if options.annotations else ()),
         ),
         quiet_complaints=() if result.exit_code is ExitCode.OK else (message(result.entries),),
         errors=tuple({"message": line} for entry in result.entries for line in entry.errors),
@@ -139,7 +139,7 @@ def _read_tolerance(options: BatchOptions) -> float | None:
         raise UsageError(f"--compare-tolerance: {error}") from None
 
 
-def _annotations(result: BatchResult) -> Iterator[str]:
+def _annotation_lines(result: BatchResult) -> Iterator[str]:
     from cfmkit.documents.continuous_integration import workflow_commands
 
     return workflow_commands(result.entries, _place_of, result.compared.changes if result.compared else ())

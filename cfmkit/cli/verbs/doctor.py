@@ -40,7 +40,7 @@ def run(options: DoctorOptions, terminal: Terminal) -> Document:
         "versions": {"cfmkit": __version__, "python": platform.python_version(), "system": platform.platform()},
         "packages": list(_package_records()),
         "folders": [
-            {"name": what, "path": str(path), "writable": _writable(path)} for what, path in _folders().items()
+            {"name": what, "path": str(path), "writable": _writable(path)} for what, path in _folders_to_check().items()
         ],
         "locks": _lock_record(),
         "solver": _solver_record(),
@@ -48,7 +48,7 @@ def run(options: DoctorOptions, terminal: Terminal) -> Document:
         "caches": list(_cache_records()),
         "families": list(_family_records()),
     }
-    troubles = tuple(_troubles(report))
+    troubles = tuple(_trouble_lines(report))
     data = {"message": "; ".join(troubles) or "nothing is wrong", **report}
     warnings = [{"name": "doctor", "message": trouble} for trouble in troubles]
 
@@ -83,7 +83,7 @@ _USER_EXTRAS = ("cluster",)
 """Optional parts that a user may want; those for tests and development are no matter of an installation."""
 
 
-def _folders() -> Mapping[str, Path]:
+def _folders_to_check() -> Mapping[str, Path]:
     return {"output (the current folder)": Path.cwd(), "temporary files": Path(tempfile.gettempdir())}
 
 
@@ -144,7 +144,7 @@ def _family_records() -> Iterator[Record]:
             yield {"name": outcome.name, **about, "state": "ok", "reason": ""}
 
 
-def _troubles(report: Mapping[str, Any]) -> Iterator[str]:
+def _trouble_lines(report: Mapping[str, Any]) -> Iterator[str]:
     for record in report["packages"]:
         if record["version"] is None and not record["extra"]:
             yield f"the package {record['name']} is missing: install cfmkit again"

@@ -29,9 +29,9 @@ def run(options: SchemaOptions, terminal: Terminal) -> Document:
     from cfmkit.runs.editor_schema import schema
 
     if options.family is not None:
-        return _answer(schema([families.family(options.family)]))
-    return with_skipped_families(families.list_skipped(), _answer(schema(families.records())))
+        return _schema_document(schema([families.family(options.family)]))
+    return with_skipped_families(families.list_skipped(), _schema_document(schema(families.records())))
 
 
-def _answer(schema: dict[str, Any]) -> Document:
+def _schema_document(schema: dict[str, Any]) -> Document:
     return Document({"schema": schema}, (JsonText(schema),))

@@ -69,9 +69,9 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
         dimensions = {metric.name: metric.dimension for metric in work.study.metrics}
         page = study_documents.sweep_document(spec, reported, dimensions, code, reused=records.reused)
         varied = [item.path for item in work.plan.variables]
-        study.write_pages(page, work.study, varied, tables, partial(_pictures, records, summary))
+        study.write_pages(page, work.study, varied, tables, partial(_picture_makers, records, summary))
         finished = study.commit(page, work.study, options.seed, [records], reported)
-    return replace(finished, complaints=(*_complaints(records, code, options, document), *finished.complaints))
+    return replace(finished, complaints=(*_sweep_complaints(records, code, options, document), *finished.complaints))
 
 
 def request(options: SweepOptions) -> SweepRequest:
@@ -116,7 +116,7 @@ def exit_code(records: Records, summary: Summary) -> ExitCode:
     return summary.exit_code()
 
 
-def _complaints(records: Records, code: ExitCode, options: SweepOptions, document: YamlDocument) -> Iterator[str]:
+def _sweep_complaints(records: Records, code: ExitCode, options: SweepOptions, document: YamlDocument) -> Iterator[str]:
     from cfmkit.cli.failures import go_on
 
     if code is ExitCode.INVALID:
@@ -139,7 +139,7 @@ def _first_refusal(records: Records, document: YamlDocument) -> tuple[str, ...]:
     return (f"error    {reported}",)
 
 
-def _pictures(records: Records, summary: Summary) -> dict[str, Any]:
+def _picture_makers(records: Records, summary: Summary) -> dict[str, Any]:
     from cfmkit.studies.pictures import list_pictures  # imports matplotlib, which takes half a second
 
     return list_pictures(records, summary)

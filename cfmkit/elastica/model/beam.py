@@ -96,11 +96,13 @@ class Fit:
         places = edges[panel][..., None] + half[..., None] * (1 + _GAUSS_NODES)
         piece = np.searchsorted(self.course.breaks, edges[panel], side="right") - 1
         middles = 0.5 * (self.course.breaks[1:] + self.course.breaks[:-1])
-        found = lengths[panel]
-        for one in distinct(piece):
-            own = piece == one
-            found[own] += (self.course.speed(places[own], middles[one]) * _GAUSS_WEIGHTS).sum(axis=-1) * half[own]
-        return (found / lengths[-1]).reshape(np.shape(t))[()]
+        arc_lengths = lengths[panel]
+        for number in distinct(piece):
+            in_piece = piece == number
+            arc_lengths[in_piece] += (self.course.speed(places[in_piece], middles[number]) * _GAUSS_WEIGHTS).sum(
+                axis=-1
+            ) * half[in_piece]
+        return (arc_lengths / lengths[-1]).reshape(np.shape(t))[()]
 
     @cached_property
     def _arcs(self) -> tuple[Any, Any]:
@@ -150,14 +152,14 @@ def fit(
         raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
     course = beam.shape.course(distance)
     (cx, cy), length = _integral(course)
-    own = (cx * cx + cy * cy) ** 0.5
-    if not np.real(own) > 1e-9 * np.real(length):
+    shape_chord = (cx * cx + cy * cy) ** 0.5
+    if not np.real(shape_chord) > 1e-9 * np.real(length):
         raise InputError(f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted")
     gap = float(np.hypot(np.real(dx - cx), np.real(dy - cy)))
     if beam.closure == "raw":
         return _fix_breaks(Fit(0.0, 1.0, gap, length, course), beam, known)
     rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
-    scale = distance / own
+    scale = distance / shape_chord
     return _fix_breaks(Fit(rotation, scale, gap, length * scale, course), beam, known)
 
 
@@ -206,14 +208,14 @@ def _has_corner(course: FittedShape, t: float) -> bool:
 
 def _has_step(section: Section, station: float) -> bool:
     """Return True if the thickness jumps at a station."""
-    given = section.thickness
-    return isinstance(given, Taper) and bool(np.ptp(given.values[given.stations.real == station].real) > 0)
+    thickness = section.thickness
+    return isinstance(thickness, Taper) and bool(np.ptp(thickness.values[thickness.stations.real == station].real) > 0)
 
 
 def _station_step(beam: Beam, station: float) -> float:
     """Return the imaginary step of a station of a taper."""
-    given: Any = beam.section.thickness
-    steps = np.imag(given.stations[np.real(given.stations) == station])
+    taper: Any = beam.section.thickness
+    steps = np.imag(taper.stations[np.real(taper.stations) == station])
     if np.ptp(steps) > 0:
         raise InputError(
             f"both stations of a step in the thickness of the beam {beam.start}-{beam.end} must move alike: "

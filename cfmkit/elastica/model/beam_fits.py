@@ -42,7 +42,9 @@ class Bundle:
         places = self.spots[:, [(number[beam.start], number[beam.end]) for beam in rows[0]]]
         offsets = [(beam.start_offset, beam.end_offset) for row in rows for beam in row]
         # offsets of both ends of all beams, (d, beams, 2, 2) [m]; None if there are none
-        self.offsets = np.reshape(offsets, places.shape) if any(own != NO_OFFSETS for own in offsets) else None
+        self.offsets = (
+            np.reshape(offsets, places.shape) if any(end_offsets != NO_OFFSETS for end_offsets in offsets) else None
+        )
         if self.offsets is not None:
             places = places + self.offsets
         # beams with a polynomial angle and one thickness; `others` has the rest
@@ -58,10 +60,10 @@ class Bundle:
         shape, self.beams = reach.shape[:2], beams
         c = coefficients_of(beams).reshape(*shape, -1) + 0.0
         dx, dy, (cx, cy) = reach[..., 0], reach[..., 1], chords(c)
-        far, own = dx * dx + dy * dy, cx * cx + cy * cy
-        check_fits(beams, far, own)
-        self.drawn = dx, dy, cx, cy, far, own
-        rotation, self.length = direction(dx * cx + dy * cy, dy * cx - dx * cy), np.sqrt(far / own)
+        far, shape_squared = dx * dx + dy * dy, cx * cx + cy * cy
+        check_fits(beams, far, shape_squared)
+        self.drawn = dx, dy, cx, cy, far, shape_squared
+        rotation, self.length = direction(dx * cx + dy * cy, dy * cx - dx * cy), np.sqrt(far / shape_squared)
         self.raw = [beam.closure == "raw" for beam in beams]
         if any(self.raw):
             raw = np.reshape(self.raw, shape)
@@ -83,8 +85,8 @@ class Bundle:
         """Lengths of the shapes as given, (d, plain) [m]: the distance of the ends where they have none."""
         distance = np.sqrt(self.drawn[4])
         lengths: Any = [beam.shape.length for beam in self.beams]  # type: ignore[union-attr]
-        given = [far if length is None else length for far, length in zip(distance.flat, lengths, strict=True)]
-        return np.reshape(given, distance.shape)
+        shape_lengths = [far if length is None else length for far, length in zip(distance.flat, lengths, strict=True)]
+        return np.reshape(shape_lengths, distance.shape)
 
     def fit_of(self, number: int, name: str) -> Fit | None:
         """Return the fit of a plain beam of one of the networks, None of another."""
@@ -93,8 +95,8 @@ class Bundle:
             return None
         at = number, self.plain.index(beam)
         flat, length, first = number * len(self.plain) + at[1], self.length[at], self.nominal[at]
-        dx, dy, cx, cy, far, own = (drawn[at] for drawn in self.drawn)
-        scale = 1.0 if self.raw[flat] else np.sqrt(far) / (np.sqrt(own) * first)
+        dx, dy, cx, cy, far, shape_squared = (drawn[at] for drawn in self.drawn)
+        scale = 1.0 if self.raw[flat] else np.sqrt(far) / (np.sqrt(shape_squared) * first)
         gap = float(np.hypot(np.real(dx - first * cx), np.real(dy - first * cy)))
         course = self.beams[flat].shape.course(length / scale)
         return Fit(self.rotation[at], scale, gap, length, course)
@@ -102,17 +104,17 @@ class Bundle:
 
 def check_fits(
     beams: Sequence[Beam],  # plain ones
-    # far, own: (b,) in all: squares of the distance of the ends of each [m], and of those of its shape, over its length
+    # squares, (b,) in all: of the distance of the ends of each [m], and of that in its shape, over its length
     far: Any,
-    own: Any,
+    shape_squared: Any,
 ) -> None:
     """Refuse beams without length, and shapes that return to their start.
 
     Raises InputError if one cannot be fitted.
     """
-    if np.count_nonzero((far.real > 0) & (own.real > SHORTEST_CHORD**2)) == far.size:
+    if np.count_nonzero((far.real > 0) & (shape_squared.real > SHORTEST_CHORD**2)) == far.size:
         return
-    for beam, distance, chord in zip(beams, far.real.flat, own.real.flat, strict=True):
+    for beam, distance, chord in zip(beams, far.real.flat, shape_squared.real.flat, strict=True):
         if not distance > 0:
             raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
         if not chord > SHORTEST_CHORD**2:
@@ -136,9 +138,9 @@ def coils(beam: Beam) -> bool:
 
 def coefficients_of(beams: Sequence[Beam]) -> Any:
     """Return the coefficients of the angles of plain beams, (b, m)."""
-    given = [beam.shape.coefficients or (0.0,) for beam in beams]  # type: ignore[union-attr]
-    most = max(map(len, given))
-    return np.array([(*own, *(0.0,) * (most - len(own))) for own in given])
+    coefficients = [beam.shape.coefficients or (0.0,) for beam in beams]  # type: ignore[union-attr]
+    most = max(map(len, coefficients))
+    return np.array([(*row, *(0.0,) * (most - len(row))) for row in coefficients])
 
 
 def chords(coefficients: Any) -> tuple[Any, Any]:
@@ -160,8 +162,8 @@ def chords(coefficients: Any) -> tuple[Any, Any]:
 def rigidities_of(beams: Sequence[Beam]) -> Any:
     """Return bending rigidities and the compliances of stretching and shearing of plain beams, (3, b)."""
     sections = [beam.section for beam in beams]
-    known = {key: _rigidities(section) for key, section in {id(each): each for each in sections}.items()}
-    return np.array([known[id(section)] for section in sections]).T
+    rigidities = {key: _rigidities(section) for key, section in {id(section): section for section in sections}.items()}
+    return np.array([rigidities[id(section)] for section in sections]).T
 
 
 def _rigidities(s: Section) -> tuple[Any, Any, Any]:

@@ -97,15 +97,15 @@ class ObstacleEdge(ShortRepr):
 
     def lines(self, reach: float) -> list[FloatArray]:
         """Return its parts as points along them, (n, 2) each; endless ones are `reach` [m] long."""
-        found, last = [], len(self.length) - 1
+        polylines, last = [], len(self.length) - 1
         for number, (start, along, length) in enumerate(zip(self.start, self.along, self.length, strict=True)):
             low = -reach if number == 0 and not self.closed else 0.0
             high = length + reach if number == last and not self.closed else length
-            found.append(np.array([start + low * along, start + high * along]))
+            polylines.append(np.array([start + low * along, start + high * along]))
         for centre, radius, first, sweep, _ in self._arcs:
             angle = first + sweep * np.linspace(0.0, 1.0, 2 + math.ceil(POINTS_PER_TURN * abs(sweep) / math.tau))
-            found.append(centre + radius * np.column_stack([np.cos(angle), np.sin(angle)]))
-        return found
+            polylines.append(centre + radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+        return polylines
 
     def distance(self, places: Any) -> Distance:
         """Return the signed distance of places (..., 2) [m] from the nearest point of the outline.
@@ -114,7 +114,7 @@ class ObstacleEdge(ShortRepr):
         """
         places = np.asarray(places)
         parts = [*self._from_segments(places), *self._from_arcs(places)]
-        return parts[0][0] if len(parts) == 1 else Distance(*_choose_nearest(parts, [found for found, _ in parts]))
+        return parts[0][0] if len(parts) == 1 else Distance(*_choose_nearest(parts, [part for part, _ in parts]))
 
     def way_along(self, places: Any, offset: float) -> WayAlong:
         """Return how far places (..., 2) [m] are along the line at a distance from it: the obstacle to the right.
@@ -163,27 +163,27 @@ class ObstacleEdge(ShortRepr):
         return [*begins, *arc_begins]
 
     def _from_segments(self, places: Any) -> list[tuple[Distance, Any]]:
-        found, last = [], len(self.length) - 1
+        parts, last = [], len(self.length) - 1
         for number, (start, along, length) in enumerate(zip(self.start, self.along, self.length, strict=True)):
             normal = np.array([-along[1], along[0]])
-            way, slack = np.real((places - start) @ along), BESIDE_END * (1.0 + length)
-            ahead = np.full(way.shape, True) if number == 0 and not self.closed else way >= -slack
-            behind = np.full(way.shape, True) if number == last and not self.closed else way <= length + slack
+            place, slack = np.real((places - start) @ along), BESIDE_END * (1.0 + length)
+            ahead = np.full(place.shape, True) if number == 0 and not self.closed else place >= -slack
+            behind = np.full(place.shape, True) if number == last and not self.closed else place <= length + slack
             value = (places - start) @ normal
             flat = np.broadcast_to(normal, places.shape), np.zeros(value.shape)
-            found.append((Distance(value, *flat), ahead & behind))
-        return found
+            parts.append((Distance(value, *flat), ahead & behind))
+        return parts
 
     def _from_arcs(self, places: Any) -> list[tuple[Distance, Any]]:
-        found = []
+        parts = []
         for centre, radius, first, sweep, bulge in self._arcs:
             away = places - centre
             reach = np.sqrt((away * away).sum(axis=-1))
             safe = np.where(reach == 0, 1.0, reach)
             turned = _turn_along(away, first, sweep) % math.tau
-            near = (turned <= abs(sweep) + BESIDE_END) | (turned >= math.tau - BESIDE_END)
-            found.append((Distance(bulge * (reach - radius), bulge * away / safe[..., None], bulge / safe), near))
-        return found
+            beside = (turned <= abs(sweep) + BESIDE_END) | (turned >= math.tau - BESIDE_END)
+            parts.append((Distance(bulge * (reach - radius), bulge * away / safe[..., None], bulge / safe), beside))
+        return parts
 
 
 def _turn_along(away: Any, first: float, sweep: float) -> Any:
@@ -193,7 +193,7 @@ def _turn_along(away: Any, first: float, sweep: float) -> Any:
 
 def _choose_nearest(parts: list[tuple[Distance, Any]], values: Sequence[tuple[Any, ...]]) -> list[Any]:
     """Return the values of the part that is nearest to each place, of those beside which it lies."""
-    pick = np.array([np.where(near, np.abs(np.real(found.value)), np.inf) for found, near in parts]).argmin(axis=0)
+    pick = np.array([np.where(beside, np.abs(np.real(part.value)), np.inf) for part, beside in parts]).argmin(axis=0)
     chosen = []
     for rows in zip(*values, strict=True):
         stacked = np.array(rows)
@@ -263,15 +263,15 @@ def arc_edge(centre: Sequence[float], radius: float, start: float, end: float) -
 
 
 def _outline(start: Any, along: Any, length: Any, arcs: Sequence[Any], closed: bool = False) -> ObstacleEdge:
-    centre = np.array([one[0] for one in arcs], float).reshape(-1, 2)
-    radius, first, sweep, bulge = (np.array([one[k] for one in arcs], float) for k in range(1, 5))
+    centre = np.array([arc[0] for arc in arcs], float).reshape(-1, 2)
+    radius, first, sweep, bulge = (np.array([arc[k] for arc in arcs], float) for k in range(1, 5))
     starts, ways = np.asarray(start, float).reshape(-1, 2), np.asarray(along, float).reshape(-1, 2)
     return ObstacleEdge(starts, ways, np.asarray(length, float), centre, radius, first, sweep, bulge, closed)
 
 
-def _turn(one: FloatArray, other: FloatArray) -> float:
+def _turn(first: FloatArray, second: FloatArray) -> float:
     """Return the angle from one unit vector to another [rad]."""
-    return math.atan2(float(one[0] * other[1] - one[1] * other[0]), float(one @ other))
+    return math.atan2(float(first[0] * second[1] - first[1] * second[0]), float(first @ second))
 
 
 class _Force:

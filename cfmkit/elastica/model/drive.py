@@ -145,8 +145,8 @@ def find_driven_node(network: Network, drive: Drive) -> DrivenNode | None:
     if isinstance(drive, Loading):
         return None
     if drive.node not in network.nodes or network.is_moved_by_link(drive.node):
-        known = ", ".join(name for name in network.nodes if not network.is_moved_by_link(name))
-        raise InputError(f"{drive.node!r} cannot be driven: nodes that are not moved by a link are {known}")
+        movable = ", ".join(name for name in network.nodes if not network.is_moved_by_link(name))
+        raise InputError(f"{drive.node!r} cannot be driven: nodes that are not moved by a link are {movable}")
     support = network.nodes[drive.node].support
     if isinstance(drive, Rotation):
         if support.rotation:
@@ -154,11 +154,11 @@ def find_driven_node(network: Network, drive: Drive) -> DrivenNode | None:
         return DrivenNode(drive.node, 2, 1.0)
     if not support.along and not support.across:
         return DrivenNode(drive.node, FRAME_OF_DRIVE, 1.0)
-    for held, other, offset, turn in (
+    for held, is_other_held, offset, turn in (
         (support.along, support.across, 0, 0.0),
         (support.across, support.along, 1, np.pi / 2),
     ):
-        if not held and other and same_direction(drive.direction, support.direction + turn):
+        if not held and is_other_held and same_direction(drive.direction, support.direction + turn):
             along = math.cos(drive.direction.real - support.direction.real - turn)
             return DrivenNode(drive.node, offset, math.copysign(1.0, along))
     direction = np.degrees(np.real(drive.direction))

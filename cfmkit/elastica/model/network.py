@@ -251,16 +251,16 @@ def spring_ends(spring: Spring) -> list[str]:
     return [end for end in (spring.start, spring.end) if end is not None]
 
 
-def same_direction(one: float, other: float) -> bool:
+def same_direction(first: float, second: float) -> bool:
     """Return True if two directions [rad] are parallel, in either sense."""
-    between = one.real - other.real
+    between = first.real - second.real
     return math.isfinite(between) and abs(math.sin(between)) < 1e-12
 
 
 def apart(network: Network, node: str) -> bool:
     """Return True if a node is away from its master."""
-    one, other = network.nodes[node], network.nodes[network.master_of(node)]
-    return bool(one.x != other.x or one.y != other.y)
+    place, master_place = network.nodes[node], network.nodes[network.master_of(node)]
+    return bool(place.x != master_place.x or place.y != master_place.y)
 
 
 def swings_with_master(network: Network, node: str) -> bool:

@@ -31,8 +31,8 @@ class Taper:
 
     def __post_init__(self) -> None:
         for name in ("stations", "values"):
-            given = np.asarray(getattr(self, name))
-            object.__setattr__(self, name, read_only(given, given.dtype if given.dtype.kind == "c" else float))
+            values = np.asarray(getattr(self, name))
+            object.__setattr__(self, name, read_only(values, values.dtype if values.dtype.kind == "c" else float))
         s = self.stations
         if s.ndim != 1 or s.shape != self.values.shape or len(s) < 2:
             raise InputError("a taper needs as many values as stations, at least two of each")

@@ -164,9 +164,9 @@ class Spline:
 
         def angle(t: Any, inside: float) -> Any:
             v = velocity(t, inside)
-            near = np.interp(np.real(t), places, turns)
+            nearby_angle = np.interp(np.real(t), places, turns)
             raw = direction(v[..., 0], v[..., 1])
-            return raw + 2 * np.pi * np.round((near - raw.real) / (2 * np.pi))
+            return raw + 2 * np.pi * np.round((nearby_angle - raw.real) / (2 * np.pi))
 
         def speed(t: Any, inside: float) -> Any:
             v = velocity(t, inside)
@@ -188,7 +188,7 @@ def _spline_velocity(knots: Any, points: Any) -> AngleLaw:
     for i in range(1, n - 1):
         a[i, i - 1 : i + 2] = gap[i], 2 * (gap[i - 1] + gap[i]), gap[i - 1]
         b[i] = 3 * (gap[i] * slope[i - 1] + gap[i - 1] * slope[i])
-    for row, one, two, s1, s2 in (
+    for row, end_gap, two, s1, s2 in (
         (0, gap[0], gap[1], slope[0], slope[1]),
         (-1, gap[-1], gap[-2], slope[-1], slope[-2]),
     ):
@@ -196,16 +196,16 @@ def _spline_velocity(knots: Any, points: Any) -> AngleLaw:
         if n == 3:
             a[row, row], a[row, inner], b[row] = 1.0, 1.0, 2 * s1
             continue
-        both = one + two
+        both = end_gap + two
         a[row, row], a[row, inner] = two, both
-        b[row] = ((one + 2 * both) * two * s1 + one**2 * s2) / both
+        b[row] = ((end_gap + 2 * both) * two * s1 + end_gap**2 * s2) / both
     ends = np.linalg.solve(a, b)
 
     def velocity(t: Any, inside: float) -> Any:
-        own = min(int(np.searchsorted(knots.real, inside, side="right")) - 1, n - 2)
+        k = min(int(np.searchsorted(knots.real, inside, side="right")) - 1, n - 2)
         at = np.real(t)
         i = np.clip(np.searchsorted(knots.real, at, side="right") - 1, 0, n - 2)
-        i = np.where((at >= knots.real[own] - _PARAMETER_TOL) & (at <= knots.real[own + 1] + _PARAMETER_TOL), own, i)
+        i = np.where((at >= knots.real[k] - _PARAMETER_TOL) & (at <= knots.real[k + 1] + _PARAMETER_TOL), k, i)
         u = ((t - knots[i]) / gap[i])[..., None]
         return 6 * u * (1 - u) * slope[i] + (1 - u) * (1 - 3 * u) * ends[i] + u * (3 * u - 2) * ends[i + 1]
 

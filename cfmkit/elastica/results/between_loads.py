@@ -43,9 +43,9 @@ class BetweenLoads(BetweenPoints):
 
     def _spots(self, y: FloatArray, wanted: FloatArray, near: FloatArray) -> tuple[SolvedStates, FloatArray]:
         goals = wanted - self.rest / self.unit_of_motion
-        each = [self._spot(*guess) for guess in zip(y, near, goals, strict=True)]
-        ways = np.array([np.nan if spot is None else spot.drive for spot in each])
-        return self._equations.collect(each), ways
+        solved = [self._spot(*guess) for guess in zip(y, near, goals, strict=True)]
+        ways = np.array([np.nan if spot is None else spot.drive for spot in solved])
+        return self._equations.collect(solved), ways
 
     def _spot(self, y: FloatArray, near: float, goal: float) -> PathEquilibrium | None:
         border = Border(self.row, goal)

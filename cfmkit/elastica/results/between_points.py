@@ -427,7 +427,7 @@ class BetweenPoints(ShortRepr):
         branch, stretches, drive = self.path.branch[self._order], self._stretch, self.own_drive
         names, corners = list(dict.fromkeys(self.path.branch.tolist())), {}
         width = float(drive[-1] - drive[0])
-        near = NEXT_TO_POINT * width
+        slack = NEXT_TO_POINT * width
         for right in (np.flatnonzero(np.diff(stretches)) + 1).tolist():
             if right in self._contacts:
                 corners[int(stretches[right])] = Corner(
@@ -435,7 +435,7 @@ class BetweenPoints(ShortRepr):
                 )
                 continue
             before, behind = drive[right - 1], drive[right]
-            inner_events = self._events[(self._events >= before - near) & (self._events <= behind + near)]
+            inner_events = self._events[(self._events >= before - slack) & (self._events <= behind + slack)]
             if len(inner_events) != 1:
                 continue
             ranks = [names.index(branch[right - 1]), names.index(branch[right])]

@@ -69,30 +69,30 @@ def _compute_along_path(path: EquilibriumPath, node: str, direction: float) -> t
     loose = replace(mesh, attachments=mesh.attachments._replace(frame=frame), free=np.sort(np.append(kept, y)))
     loose = make_inextensible(loose, np.flatnonzero(mesh.floored))
     cos, sin = new @ old, old[0] * new[1] - old[1] * new[0]
-    found = np.empty((len(path), 2))
+    condensed = np.empty((len(path), 2))
     for k, (state, drive) in enumerate(zip(path.at.z, path.at.drive.tolist(), strict=True)):
         z = state.copy()
         z[x], z[y] = cos * z[x] + sin * z[y], cos * z[y] - sin * z[x]
-        found[k] = _condense(equations(replace(loose, base=z - drive * mesh.rate)), z, drive, y)
-    path.cross_stiffnesses[node, direction] = read_only(found[:, 0]), read_only(found[:, 1])
+        condensed[k] = _condense(equations(replace(loose, base=z - drive * mesh.rate)), z, drive, y)
+    path.cross_stiffnesses[node, direction] = read_only(condensed[:, 0]), read_only(condensed[:, 1])
     return path.cross_stiffnesses[node, direction]
 
 
-def _condense(own: NumpyEquations, z: FloatArray, drive: float, across: int) -> tuple[float, float]:
+def _condense(system: NumpyEquations, z: FloatArray, drive: float, across: int) -> tuple[float, float]:
     """Return the stiffness of one unknown while all others follow it, and the sign of the determinant of those.
 
     nan where a force is open, as that along a straight beam that cannot stretch and is held at both ends.
     """
-    free = own.mesh.free
+    free = system.mesh.free
     push = (free == across).astype(float)
-    if not own.follows:  # else no directions are counted
+    if not system.follows:  # else no directions are counted
         with contextlib.suppress(np.linalg.LinAlgError):
-            (moved,), unstable = own.resolve(z[free], drive, push[None])
+            (moved,), unstable = system.resolve(z[free], drive, push[None])
             give = float(push @ moved)
             if np.abs(moved).max() < MAX_FLEXIBILITY * abs(give):
                 return 1.0 / give, (-1.0) ** (unstable - (give < 0))
     rest = push == 0
-    tangent = own.linearise(z[free], drive).tangent
+    tangent = system.linearise(z[free], drive).tangent
     (row,), column, kept = tangent[~rest][:, rest], tangent[rest][:, ~rest][:, 0], tangent[np.ix_(rest, rest)]
     stiffness, sign = float(tangent[~rest, ~rest][0]), float(np.linalg.slogdet(kept)[0])
     with contextlib.suppress(np.linalg.LinAlgError):

@@ -45,8 +45,8 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
     for number, name in enumerate(names):
         section, fitted = path.network.beams[name].section, mesh.fits[name]
         for element in elements_of(mesh, name):
-            own = slice(element * len(places), (element + 1) * len(places))
-            moment, thickness = all_states.moment[..., own], all_states.thickness[..., own]
+            of_element = slice(element * len(places), (element + 1) * len(places))
+            moment, thickness = all_states.moment[..., of_element], all_states.thickness[..., of_element]
             left, right = mesh.elements.cuts[element]
             t, inside = left + (right - left) * places, 0.5 * (left + right)
             rest = (

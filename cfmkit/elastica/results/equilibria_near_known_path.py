@@ -35,17 +35,17 @@ def solve_near_known_path(
     status is LOST, with the first place, if any is missing. Raises InputError if the networks are not of one kind, or
     the numbers of points differ.
     """
-    known, mesh = path.at_requested, path.mesh
+    known_points, mesh = path.at_requested, path.mesh
     arrays = discretise(network, drive, mesh.degree, mesh.pieces, mesh.tension, mesh.scales)
     arrays = make_inextensible(arrays, np.flatnonzero(arrays.floored & ~mesh.floored))
-    if not np.array_equal(arrays.free, path.mesh.free) or len(known) != len(drive.points):
+    if not np.array_equal(arrays.free, path.mesh.free) or len(known_points) != len(drive.points):
         raise InputError("neighbouring equilibria need networks of the same kind and as many points as were reached")
-    own, moves = equations(arrays), arrays.free < arrays.n_motions
-    guesses, wanted = path.free[known], drive.points / arrays.scales.drive
+    system, moves = equations(arrays), arrays.free < arrays.n_motions
+    guesses, wanted = path.free[known_points], drive.points / arrays.scales.drive
     kept, states = [], []
-    for number, (guess, way) in enumerate(zip(guesses, wanted.tolist(), strict=True)):
-        state = own.solve(guess, way)
-        if state is None or state.unstable > int(path.unstable[known[number]]):
+    for number, (guess, wanted_drive) in enumerate(zip(guesses, wanted.tolist(), strict=True)):
+        state = system.solve(guess, wanted_drive)
+        if state is None or state.unstable > int(path.unstable[known_points[number]]):
             continue
         if float(np.abs((state.x - guess)[moves]).max(initial=0.0)) <= largest_turn:
             kept.append(number)
@@ -58,7 +58,7 @@ def solve_near_known_path(
     z[:, arrays.free] = np.array(states).reshape(len(kept), len(arrays.free))
     return EquilibriumPath(
         network, drive, Equilibria(arrays, z, wanted[kept]),
-        unstable=read_only(path.unstable[known[kept]], np.int64),
+        unstable=read_only(path.unstable[known_points[kept]], np.int64),
         requested=read_only(kept, np.int64),
         branch=read_only(np.repeat("neighbour", len(kept)), np.str_),
         status=status, message=message, events=(), error=path.error,
@@ -77,12 +77,12 @@ def drive_slope(
     if isinstance(path.load_case, Loading):
         raise InputError("the slope of the effort needs a displacement or a rotation as the drive")
     mesh, slopes = path.mesh, []
-    own, unit = equations(mesh), mesh.scales.moment / mesh.scales.drive**2
+    system, unit = equations(mesh), mesh.scales.moment / mesh.scales.drive**2
     for index in (path.at_requested if indices is None else np.asarray(indices)).tolist():
         drive = float(path.at.drive[index])
-        state = own.solve(path.free[index], drive)
+        state = system.solve(path.free[index], drive)
         if state is None:
             raise InputError("the slope of the effort needs converged points")
         moved = state.x + 1j * COMPLEX_STEP * state.rate
-        slopes.append(float(own.gradient(moved, drive + 1j * COMPLEX_STEP).imag @ mesh.rate) / COMPLEX_STEP)
+        slopes.append(float(system.gradient(moved, drive + 1j * COMPLEX_STEP).imag @ mesh.rate) / COMPLEX_STEP)
     return read_only(np.array(slopes) * unit)

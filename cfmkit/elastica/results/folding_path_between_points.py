@@ -51,8 +51,8 @@ class AlongTheWay:
         seen, points = self._seen, np.arange(float(len(self.path)))
         places = {*points.tolist(), *self._turns(0), *self._turns(1)}
         for values, _ in seen.stresses.values():
-            near = np.interp(inner_extremes(self.arc, values), self.arc, points)
-            places |= {*near[np.interp(near, points, values) > 0.5 * seen.stress.max()].tolist()}
+            beside = np.interp(inner_extremes(self.arc, values), self.arc, points)
+            places |= {*beside[np.interp(beside, points, values) > 0.5 * seen.stress.max()].tolist()}
         return read_only(sorted(places))
 
     def _turns(self, which: int) -> set[float]:
@@ -75,14 +75,16 @@ class AlongTheWay:
     def states(self, ways: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return motion [m or rad] and effort [N or N m] at places of the way of any shape."""
         flat = np.ravel(ways)
-        known = self._known.get(flat.tobytes())
-        if known is None:
-            there = self.solve_at(flat)
-            seen, points = self.observe(there), np.arange(float(len(self.path)))
+        solved_states = self._known.get(flat.tobytes())
+        if solved_states is None:
+            equilibria = self.solve_at(flat)
+            seen, points = self.observe(equilibria), np.arange(float(len(self.path)))
             rows = zip((seen.motion, seen.effort), self._states_at_points, strict=True)
-            known = [np.where(there.accurate, new, np.interp(flat, points, own)) for new, own in rows]
-            self._known[flat.tobytes()] = known
-        motion, effort = (values.reshape(np.shape(ways)) for values in known)
+            solved_states = [
+                np.where(equilibria.accurate, new, np.interp(flat, points, at_points)) for new, at_points in rows
+            ]
+            self._known[flat.tobytes()] = solved_states
+        motion, effort = (values.reshape(np.shape(ways)) for values in solved_states)
         return motion, effort
 
     @cached_property
@@ -92,32 +94,32 @@ class AlongTheWay:
 
     def stress(self, ways: FloatArray) -> FloatArray:
         """Return the largest stress at places of the way of any shape [Pa]."""
-        flat, own = np.ravel(ways), self._seen.stress
-        stress = np.interp(flat, np.arange(float(len(self.path))), own)
+        flat, point_stress = np.ravel(ways), self._seen.stress
+        stress = np.interp(flat, np.arange(float(len(self.path))), point_stress)
         between = np.flatnonzero(flat % 1.0)
-        there = self.solve_at(flat[between])
-        stress[between] = np.where(there.accurate, self.observe(there).stress, stress[between])
+        equilibria = self.solve_at(flat[between])
+        stress[between] = np.where(equilibria.accurate, self.observe(equilibria).stress, stress[between])
         return np.asarray(stress.reshape(np.shape(ways)))
 
     def solve_at(self, ways: FloatArray) -> EquilibriumPath:
         """Return the equilibria at places of the way (n,); `accurate` is False where none was found."""
-        path, places, own = self.path, self._places, equations(self.path.mesh)
+        path, places, system = self.path, self._places, equations(self.path.mesh)
         left = np.clip(ways.astype(np.int64), 0, len(path) - 2)
         share = ways - left
-        near = np.where(share > 0.5, left + 1, left)
-        rows, solved = self._guess(left, share, near), (share == 0.0) | (share == 1.0)
-        rows[solved] = places[near[solved]]
+        nearest = np.where(share > 0.5, left + 1, left)
+        rows, solved = self._guess(left, share, nearest), (share == 0.0) | (share == 1.0)
+        rows[solved] = places[nearest[solved]]
         for number in np.flatnonzero(~solved).tolist():
             at, guess = int(left[number]), rows[number]
             step = places[at + 1] - places[at]
             border = step * self._metric
             goal = float(border @ (places[at] + share[number] * step))
-            spot = own.solve(guess[:-1], float(guess[-1]), Border(border, goal))
+            spot = system.solve(guess[:-1], float(guess[-1]), Border(border, goal))
             if spot is None or spot.unstable not in path.unstable[at : at + 2].tolist():
                 continue
             if self._measure(spot.place - guess) <= max(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * self._measure(step)):
                 rows[number], solved[number] = spot.place, True
-        return path.with_states(near, rows[:, :-1], rows[:, -1], solved)
+        return path.with_states(nearest, rows[:, :-1], rows[:, -1], solved)
 
     def _measure(self, change: FloatArray) -> float:
         """Return the largest change of positions and rotations in a change of unknowns and drive."""
@@ -149,13 +151,13 @@ class AlongTheWay:
         branch = self.path.branch
         return np.cumsum(np.concatenate([[False], branch[1:] != branch[:-1]]))
 
-    def _guess(self, left: Any, share: FloatArray, near: Any) -> FloatArray:
+    def _guess(self, left: Any, share: FloatArray, nearest: Any) -> FloatArray:
         """Return the polynomials through up to four points of the branch at shares of the way behind some points."""
         arc = self.arc[left] + share * (self.arc[left + 1] - self.arc[left])
         rows = np.empty((len(left), self._places.shape[1]))
-        for number in distinct(self._stretch[near]).tolist():
-            own, here = self._stretch == number, self._stretch[near] == number
-            rows[here] = values_at(self.arc[own], self._places[own], arc[here])
+        for number in distinct(self._stretch[nearest]).tolist():
+            on_stretch, of_stretch = self._stretch == number, self._stretch[nearest] == number
+            rows[of_stretch] = values_at(self.arc[on_stretch], self._places[on_stretch], arc[of_stretch])
         return rows
 
 

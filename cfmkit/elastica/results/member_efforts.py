@@ -59,25 +59,27 @@ def largest_member_efforts(
     motion: Callable[[EquilibriumPath], FloatArray],
 ) -> FloatArray:
     """Return the largest effort of one beam or spring at points of a path, (k,) [N or N m]."""
-    here = path.take(points)
-    free, drive = _ways(here)
+    chosen_path = path.take(points)
+    free, drive = _ways(chosen_path)
     ahead, behind = (
-        here.with_states(np.arange(len(here)), here.free + step * free, here.at.drive + step * drive)
+        chosen_path.with_states(
+            np.arange(len(chosen_path)), chosen_path.free + step * free, chosen_path.at.drive + step * drive
+        )
         for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP)
     )
     with np.errstate(all="ignore"):
-        efforts = _works(here, free, drive) / ((motion(ahead) - motion(behind)) / (2 * DIFFERENCE_STEP))
+        efforts = _works(chosen_path, free, drive) / ((motion(ahead) - motion(behind)) / (2 * DIFFERENCE_STEP))
     sizes = np.abs(efforts)
     return np.asarray(sizes.max(axis=0, initial=0.0, where=np.isfinite(sizes)))
 
 
 def _ways(path: EquilibriumPath) -> tuple[FloatArray, FloatArray]:
     """Return the directions of a path at its points, (n, free) and (n,): their largest motion or drive is one."""
-    own, moves = equations(path.mesh), path.mesh.free < path.mesh.n_motions
-    solved = own.solve_each(path.free, path.at.drive, quick=True)
+    system, moves = equations(path.mesh), path.mesh.free < path.mesh.n_motions
+    solved = system.solve_each(path.free, path.at.drive, quick=True)
     rates = solved.rate.copy()
     for k in np.flatnonzero(~solved.converged):  # at a bifurcation, or where a force is open
-        equation = own.linearise(path.free[k], float(path.at.drive[k]))
+        equation = system.linearise(path.free[k], float(path.at.drive[k]))
         rates[k] = np.linalg.lstsq(equation.tangent, -equation.change)[0]
     size = np.maximum(1.0, np.abs(rates[:, moves]).max(axis=1, initial=0.0))
     return rates / size[:, None], 1.0 / size
@@ -91,12 +93,12 @@ def _works(path: EquilibriumPath, free: FloatArray, drive: FloatArray) -> FloatA
     mesh, names = path.mesh, list(path.network.beams)
     z = drive[:, None] * mesh.rate
     z[:, mesh.free] = free
-    found = np.zeros((len(names) + len(mesh.springs), len(path)))
+    works = np.zeros((len(names) + len(mesh.springs), len(path)))
     beam = np.array([names.index(name) for name in mesh.elements.beam])
     for k, (state, at) in enumerate(zip(path.at.z, path.at.drive.tolist(), strict=True)):
-        own, _ = energy.element_gradients(with_places(mesh, state), state, at, 1.0)
-        np.add.at(found[:, k], beam, (own * z[k][mesh.elements.unknowns]).sum(axis=1))
+        gradients, _ = energy.element_gradients(with_places(mesh, state), state, at, 1.0)
+        np.add.at(works[:, k], beam, (gradients * z[k][mesh.elements.unknowns]).sum(axis=1))
         for number, spring in enumerate(mesh.springs):
             part = ENERGY_TERMS[type(spring.item)](mesh, spring, state, 1.0, at)
-            found[len(names) + number, k] = part.gradient @ z[k][part.unknowns]
-    return found * mesh.scales.moment
+            works[len(names) + number, k] = part.gradient @ z[k][part.unknowns]
+    return works * mesh.scales.moment

@@ -106,16 +106,16 @@ class PathsOfDesigns:
         last = self._counts[rows, None] - 1
         left = np.clip((drive[:, None, :] <= wanted[..., None]).sum(axis=-1) - 1, 0, last - 1)
         before, behind = (np.take_along_axis(drive, at, 1) for at in (left, left + 1))
-        near = left + (wanted - before > behind - wanted)
-        guess, efforts = self._guess(rows, wanted, last), self._efforts[every, near]
-        known = np.abs(wanted - np.take_along_axis(drive, near, 1)) <= PLACE_RTOL * (drive[:, -1:] - drive[:, :1])
-        guess[known] = self._unknowns[every, near][known]
+        nearest = left + (wanted - before > behind - wanted)
+        guess, efforts = self._guess(rows, wanted, last), self._efforts[every, nearest]
+        is_known = np.abs(wanted - np.take_along_axis(drive, nearest, 1)) <= PLACE_RTOL * (drive[:, -1:] - drive[:, :1])
+        guess[is_known] = self._unknowns[every, nearest][is_known]
         change = np.abs(self._unknowns[every, left + 1] - self._unknowns[every, left])[..., self._moves].max(axis=-1)
-        found, solved = known.copy(), np.where(known, efforts, np.nan)
-        for k in np.flatnonzero(~known.all(axis=1)).tolist():
-            law, asked = self.laws[rows[k]], np.flatnonzero(~known[k])
-            own = equations(law.path.mesh)
-            states = own.solve_each(guess[k, asked], wanted[k, asked])
+        is_solved, solved = is_known.copy(), np.where(is_known, efforts, np.nan)
+        for k in np.flatnonzero(~is_known.all(axis=1)).tolist():
+            law, asked = self.laws[rows[k]], np.flatnonzero(~is_known[k])
+            system = equations(law.path.mesh)
+            states = system.solve_each(guess[k, asked], wanted[k, asked])
             moved = np.abs(states.free - guess[k, asked])[:, self._moves].max(axis=-1)
             good = (
                 states.converged
@@ -123,11 +123,11 @@ class PathsOfDesigns:
                 & (moved <= np.maximum(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * change[k, asked]))
             )
             chosen = asked[good]
-            guess[k, chosen], found[k, chosen] = states.free[good], True
-            solved[k, chosen] = law.unit * own.effort_unit * states.effort[good]
-        for k, m in np.argwhere(~found):
+            guess[k, chosen], is_solved[k, chosen] = states.free[good], True
+            solved[k, chosen] = law.unit * system.effort_unit * states.effort[good]
+        for k, m in np.argwhere(~is_solved):
             solved[k, m] = np.interp(wanted[k, m], drive[k], self._efforts[rows[k]])
-        return guess, found, solved
+        return guess, is_solved, solved
 
     def _guess(self, rows: Rows, wanted: FloatArray, last: Any) -> FloatArray:
         """Return the cubics through the four nearest points at some places, (k, m, n)."""
@@ -157,20 +157,21 @@ class PathsOfDesigns:
         """Return the largest stress of each design between two places, (d,) each [Pa]."""
         ends = np.stack([low, high], axis=1) / self._scale[:, None]
         every = range(len(self.laws))
-        free, found, _ = self._solve(np.arange(len(self.laws)), ends)
+        free, is_solved, _ = self._solve(np.arange(len(self.laws)), ends)
         chosen = [choose_few_points(self._get_drive(k), *ends[k]) for k in every]
-        known = self._evaluate_stresses(chosen)
-        more = [find_near_largest(self._get_drive(k), few, known[k], *ends[k]) for k, few in enumerate(chosen)]
+        few_stresses = self._evaluate_stresses(chosen)
+        more = [find_near_largest(self._get_drive(k), few, few_stresses[k], *ends[k]) for k, few in enumerate(chosen)]
         dense = self._evaluate_stresses(more)
-        both = [self._merge_points(*pairs) for pairs in zip(chosen, known, more, dense, strict=True)]
+        both = [self._merge_points(*pairs) for pairs in zip(chosen, few_stresses, more, dense, strict=True)]
         at_ends = self._stresses(np.repeat(every, 2), free.reshape(2 * len(every), -1), ends.ravel())
         stress_at_ends = at_ends.max(axis=0).reshape(-1, 2)
-        for k, m in np.argwhere(~found).tolist():
+        for k, m in np.argwhere(~is_solved).tolist():
             stress_at_ends[k, m] = self.laws[k].stress("", np.array([(low, high)[m][k]]))[0]
         tops = stress_at_ends.max(axis=1)
         runs = [runs_of_points(self._get_drive(k), *both[k], ends[k]) for k in every]
         row = [k for k in every for _ in runs[k]]
-        knots = iter(solve_all_extremes([run for own in runs for run in own], partial(self._stresses_at, row)))
+        pieces = [run for k in every for run in runs[k]]
+        knots = iter(solve_all_extremes(pieces, partial(self._stresses_at, row)))
         for k in every:
             top = largest_of_runs(self._get_drive(k), *both[k], ends[k], [next(knots) for _ in runs[k]])
             tops[k] = max(tops[k], top)
@@ -178,29 +179,29 @@ class PathsOfDesigns:
 
     def _stresses_at(self, rows: Sequence[int], places: Sequence[FloatArray]) -> list[tuple[FloatArray, Any]]:
         """Return the stress of each beam (b, m) at some dimensionless places of designs, and where it was solved."""
-        count = np.array([len(own) for own in places])
-        here = np.arange(count.max()) < count[:, None]
-        padded = np.zeros(here.shape)
-        padded[here] = np.concatenate(places)
-        padded = np.where(here, padded, self._drive[list(rows), :1])  # which is known
-        free, found, _ = self._solve(np.array(rows), padded)
-        stresses = self._stresses(np.repeat(rows, count), free[here], padded[here])
+        count = np.array(list(map(len, places)))
+        requested = np.arange(count.max()) < count[:, None]
+        padded = np.zeros(requested.shape)
+        padded[requested] = np.concatenate(places)
+        padded = np.where(requested, padded, self._drive[list(rows), :1])  # which is known
+        free, is_solved, _ = self._solve(np.array(rows), padded)
+        stresses = self._stresses(np.repeat(rows, count), free[requested], padded[requested])
         ends = np.cumsum(count)[:-1]
-        return list(zip(np.split(stresses, ends, axis=1), np.split(found[here], ends), strict=True))
+        return list(zip(np.split(stresses, ends, axis=1), np.split(is_solved[requested], ends), strict=True))
 
     def _get_drive(self, number: int) -> FloatArray:
         return np.asarray(self._drive[number, : self._counts[number]])
 
     def _evaluate_stresses(self, points: Sequence[Rows]) -> list[FloatArray]:
         """Return the stress of each beam at points of every path, (b, m) each [Pa]."""
-        rows, chosen = np.repeat(np.arange(len(points)), [len(own) for own in points]), np.concatenate(points)
+        rows, chosen = np.repeat(np.arange(len(points)), list(map(len, points))), np.concatenate(points)
         if not len(chosen):
             return [np.empty((0, 0)) for _ in points]
-        found = self._stresses(rows, self._unknowns[rows, chosen], self._drive[rows, chosen])
-        return np.split(found, np.cumsum([len(own) for own in points])[:-1], axis=1)
+        stresses = self._stresses(rows, self._unknowns[rows, chosen], self._drive[rows, chosen])
+        return np.split(stresses, np.cumsum(list(map(len, points)))[:-1], axis=1)
 
     @staticmethod
-    def _merge_points(few: Rows, known: FloatArray, more: Rows, dense: FloatArray) -> tuple[Rows, FloatArray]:
+    def _merge_points(few: Rows, few_stresses: FloatArray, more: Rows, dense: FloatArray) -> tuple[Rows, FloatArray]:
         points = np.concatenate([few, more])
         order = np.argsort(points, kind="stable")
-        return points[order], np.concatenate([known, dense] if len(more) else [known], axis=1)[:, order]
+        return points[order], np.concatenate([few_stresses, dense] if len(more) else [few_stresses], axis=1)[:, order]

@@ -77,15 +77,15 @@ def extremes(net: Network, at: Equilibria, beams: Sequence[str], signs: FloatArr
 
     They are values [Pa], fractions of the arc length, numbers of elements on the beam, and places on these, (b, p, c).
     """
-    own = [elements_of(at.mesh, beam) for beam in beams]
-    elements = [number for numbers in own for number in numbers]
+    beam_elements = [elements_of(at.mesh, beam) for beam in beams]
+    elements = [number for numbers in beam_elements for number in numbers]
     widths = np.array([net.beams[at.mesh.elements.beam[number]].section.width for number in elements])
 
     def find_forces(some: slice, fractions: Any) -> tuple[BeamStates, Any]:
         part = replace(at, z=at.z[some], drive=at.drive[some])
         return forces_of_elements(net, part, elements, fractions), np.repeat(widths, len(fractions))
 
-    return _highest(own, _find_tops(at, len(elements), signs, find_forces))
+    return _highest(beam_elements, _find_tops(at, len(elements), signs, find_forces))
 
 
 def extremes_of_designs(
@@ -97,8 +97,8 @@ def extremes_of_designs(
         part = replace(at, z=at.z[some], drive=at.drive[some])
         return forces_of_designs(networks, meshes, part, row[some], fractions)
 
-    own = [elements_of(at.mesh, beam) for beam in networks[0].beams]
-    return np.asarray(_highest(own, _find_tops(at, len(at.mesh.elements.beam), signs, find_forces))[0])
+    beam_elements = [elements_of(at.mesh, beam) for beam in networks[0].beams]
+    return np.asarray(_highest(beam_elements, _find_tops(at, len(at.mesh.elements.beam), signs, find_forces))[0])
 
 
 def _find_tops(
@@ -111,23 +111,25 @@ def _find_tops(
     fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
     together, tops = max(1, MAX_TOGETHER // max(1, count * len(signs) * N_GRID)), []
     for k in range(0, max(1, len(at.z)), together):
-        found, widths = find_forces(slice(k, k + together), fractions)
-        arcs = found.place.reshape(*found.place.shape[:-1], count, len(fractions))
+        forces, widths = find_forces(slice(k, k + together), fractions)
+        arcs = forces.place.reshape(*forces.place.shape[:-1], count, len(fractions))
         arcs = arcs if arcs.ndim == 3 else arcs[None]
-        tops.append(_tops(sections_of_width(widths, found), arcs, signs, to_series))
+        tops.append(_tops(sections_of_width(widths, forces), arcs, signs, to_series))
     return tops
 
 
-def _highest(own: Sequence[Sequence[int]], parts: Sequence[tuple[Any, Any, Any]]) -> tuple[Any, Any, Any, Any]:
+def _highest(
+    beam_elements: Sequence[Sequence[int]], parts: Sequence[tuple[Any, Any, Any]]
+) -> tuple[Any, Any, Any, Any]:
     """Return the highest stress of each beam [Pa], its place, element and fraction of the element, (b, p, c) each.
 
     `parts` are what `_tops` returns for all elements, in pieces of the points; of equal stresses the first one counts.
     """
     value, place, fraction = (np.concatenate(column, axis=1) for column in zip(*parts, strict=True))
-    shape, end = (len(own), *value.shape[1:]), 0
+    shape, end = (len(beam_elements), *value.shape[1:]), 0
     best, chosen = np.full(shape, -np.inf), np.zeros(shape, int)
     arc, where = np.zeros(shape), np.zeros(shape)
-    for k, numbers in enumerate(own):
+    for k, numbers in enumerate(beam_elements):
         for number in range(len(numbers)):
             better = value[end] > np.where(best[k] > 0, best[k] * (1 + STRESS_RTOL), best[k])
             best[k], chosen[k] = np.where(better, value[end], best[k]), np.where(better, number, chosen[k])
@@ -185,7 +187,7 @@ def signed_extremes(net: Network, at: Equilibria, beam: str, axial: bool) -> Sid
     """Return the highest and lowest stress on both sides of a beam at every point."""
     sense = np.array([1.0, -1.0, 1.0, -1.0])  # of highest and lowest
     signs = np.stack([sense * [1.0, 1.0, -1.0, -1.0], sense * float(axial)], axis=1)
-    value, place, element, fraction = (found[0] for found in extremes(net, at, [beam], signs))
+    value, place, element, fraction = (array[0] for array in extremes(net, at, [beam], signs))
     return SideExtremes(*(a.reshape(-1, 2, 2) for a in (value * sense, place, element, fraction)))
 
 
@@ -221,21 +223,21 @@ def stress_at(
 ) -> Any:
     """Return the stress on both sides of a beam at places of its own for every point, (p, 2, n)."""
     fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
-    found = np.zeros(np.shape(fraction), at.z.dtype)
+    stresses = np.zeros(np.shape(fraction), at.z.dtype)
     sides = np.array([1.0, -1.0])[:, None]
-    for number, own in enumerate(elements_of(at.mesh, beam)):
-        here = element == number
-        if not here.any():
+    for number, mesh_element in enumerate(elements_of(at.mesh, beam)):
+        is_on_element = element == number
+        if not is_on_element.any():
             continue
-        seen = sections(net, beam, forces_of_elements(net, at, [own], fractions))
+        seen = sections(net, beam, forces_of_elements(net, at, [mesh_element], fractions))
         bending, pull = (
             np.moveaxis(legendre.legvander(2 * fraction - 1, len(fractions) - 1), -1, 0)
             * np.moveaxis(values @ to_series.T, -1, 0)[:, :, None, None]
             for values in (seen.bending_stress, seen.axial_stress)
         )
         stress = sides * bending.sum(axis=0) + (pull.sum(axis=0) if axial else 0.0)
-        found = np.where(here, stress, found)
-    return found
+        stresses = np.where(is_on_element, stress, stresses)
+    return stresses
 
 
 N_EXTREME_ROUNDS = 3  # rounds in which extremes are located and solved for: the third moves them by less than rounding
@@ -358,40 +360,40 @@ def solve_passes(knots: tuple[Knots, ...], t: FloatArray, solve: Solve, allowed:
 
     They are those of the last of some rounds only: knots that nearly coincide spoil a cubic.
     """
-    found = list(knots)
+    all_knots = list(knots)
     for _ in range(N_EXTREME_ROUNDS):
-        more = [_find_passes(own, allowed, t) for own in found]
+        more = [_find_passes(beam_knots, allowed, t) for beam_knots in all_knots]
         if not any(map(len, more)):
             break
-        found = _add_solved(found, list(knots), more, *solve(np.concatenate(more)))
-    return tuple(found)
+        all_knots = _add_solved(all_knots, list(knots), more, *solve(np.concatenate(more)))
+    return tuple(all_knots)
 
 
 def _keep_tops(knots: Knots, top: FloatArray, t: FloatArray, largest: FloatArray) -> FloatArray:
     """Return those of the extremes of the stress of a beam that may be the largest of all."""
-    own, values = knots
-    beside = np.searchsorted(own, top)
+    ways, values = knots
+    beside = np.searchsorted(ways, top)
     return top[np.maximum(values[beside - 1], values[beside]) >= CANDIDATE_SHARE * np.interp(top, t, largest)]
 
 
-def _find_passes(knots: Knots, allowed: float, known: FloatArray) -> FloatArray:
+def _find_passes(knots: Knots, allowed: float, known_places: FloatArray) -> FloatArray:
     """Return where the stress of a beam passes the allowable one, but for known places."""
-    return np.array(sorted({*crossings(*knots, allowed)} - {*known.tolist()}))
+    return np.array(sorted({*crossings(*knots, allowed)} - {*known_places.tolist()}))
 
 
 def _add_solved(
     cubics: list[Knots], knots: list[Knots], more: list[FloatArray], stresses: FloatArray, accurate: Any
 ) -> list[Knots]:
     """Return the knots of each beam with more places: stresses as solved, or on its cubic where that failed."""
-    found: list[Knots] = []
+    extended_knots: list[Knots] = []
     end = 0
-    for own, cubic, places, row in zip(knots, cubics, more, stresses, strict=True):
+    for beam_knots, cubic, places, row in zip(knots, cubics, more, stresses, strict=True):
         mine = slice(end, end := end + len(places))
         stress = row[mine]
         if not accurate[mine].all():
             stress = np.where(accurate[mine], stress, values_at(*cubic, places))
-        found.append(insert_knots(*own, places, stress) if len(places) else cubic)
-    return found
+        extended_knots.append(insert_knots(*beam_knots, places, stress) if len(places) else cubic)
+    return extended_knots
 
 
 def insert_knots(x: FloatArray, y: FloatArray, places: FloatArray, values: FloatArray) -> Knots:

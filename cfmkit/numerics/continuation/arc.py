@@ -44,14 +44,14 @@ def unit_tangent(problem: ContinuationProblem, at: PathEquilibrium, along: Float
 
 def step_along(
     problem: ContinuationProblem,
-    here: PathEquilibrium,
+    start: PathEquilibrium,
     tangent: FloatArray,
     length: float,
     span: float,
     bend: FloatArray | None = None,
 ) -> ArcStep | None:
     """Return the equilibrium at a length along the unit tangent from here; `bend` is added to the first guess."""
-    weights, place = arc_weights(problem, span), here.place
+    weights, place = arc_weights(problem, span), start.place
     guess, row = place + length * tangent, weights * tangent
     first = guess if bend is None else guess + bend
     new = correct(problem, first[:-1], float(first[-1]), Border(row, float(row @ place) + length))
@@ -104,31 +104,31 @@ def _cubic(first: Any, last: Any, slope_first: Any, slope_last: Any, s: float) -
 
 
 def follow_arc(
-    problem: ContinuationProblem, here: PathEquilibrium, tangent: FloatArray, length: float, options: Options
+    problem: ContinuationProblem, current: PathEquilibrium, tangent: FloatArray, length: float, options: Options
 ) -> Iterator[ArcMove]:
     """Yield accepted steps along the arc from an equilibrium, until none is found."""
     first, weights = length, arc_weights(problem, options.span)
     before: ArcMove | None = None
     while length > max(SHORTEST_SHARE * first, MIN_STEP_LENGTHS):
         bend = before.bend(length) if before is not None and length <= LONGEST_BEND * before.length else None
-        step = step_along(problem, here, tangent, length, options.span, bend)
+        step = step_along(problem, current, tangent, length, options.span, bend)
         if (
             step is None
-            or not _accept(problem, here, step, tangent, length, options)
+            or not _accept(problem, current, step, tangent, length, options)
             or ((weights * step.tangent) @ tangent < TURN_COSINE)
         ):
             length *= 0.5
             continue
-        before = ArcMove(here, step.new, tangent, step.tangent, length)
+        before = ArcMove(current, step.new, tangent, step.tangent, length)
         yield before
-        here, tangent = step.new, step.tangent
+        current, tangent = step.new, step.tangent
         if step.missed < GOOD_MISS * length:
             length *= STEP_GROWTH
 
 
 def _accept(
     problem: ContinuationProblem,
-    here: PathEquilibrium,
+    start: PathEquilibrium,
     step: ArcStep,
     before: FloatArray,
     length: float,
@@ -138,14 +138,14 @@ def _accept(
 
     Forces may lead the arc length: where they do, a step over a sharp corner to the mirror image is told by motions.
     """
-    chord, motions = step.new.x - here.x, problem.motions
+    chord, motions = step.new.x - start.x, problem.motions
     moved = largest_motion(problem, chord)
     if step.missed > MISSED_SHARE * length or moved > options.largest_motion:
         return False
-    if force_change(problem, here.x, step.new.x, options.largest_force, FORCE_SHARE) > 1.5:
+    if force_change(problem, start.x, step.new.x, options.largest_force, FORCE_SHARE) > 1.5:
         return False
     if moved <= MOTION_ROUNDING:
         return True
-    own, ends = chord[motions], [tangent[:-1][motions] for tangent in (before, step.tangent)]
-    size = math.sqrt(own @ own)
-    return all(own @ end >= CHORD_COSINE * size * math.sqrt(end @ end) for end in ends)
+    moving_chord, ends = chord[motions], [tangent[:-1][motions] for tangent in (before, step.tangent)]
+    size = math.sqrt(moving_chord @ moving_chord)
+    return all(moving_chord @ end >= CHORD_COSINE * size * math.sqrt(end @ end) for end in ends)

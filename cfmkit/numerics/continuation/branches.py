@@ -44,13 +44,13 @@ def enter_branch(
             kick = sign * amplitude * mode
             row = keep_motions(problem, kick)
             row /= np.linalg.norm(row)
-            near = correct(problem, x + kick, drive, Border(np.append(row, 0.0), float(row @ (x + kick))))
-            if near is None or largest_motion(problem, near.x - x - kick) > 0.5 * amplitude:
+            entered = correct(problem, x + kick, drive, Border(np.append(row, 0.0), float(row @ (x + kick))))
+            if entered is None or largest_motion(problem, entered.x - x - kick) > 0.5 * amplitude:
                 continue
-            if (near.drive - drive) * sense <= 0:
+            if (entered.drive - drive) * sense <= 0:
                 break  # backwards: not this side
-            if near.unstable <= walk.here.unstable and abs(near.drive - drive) < room:
-                return near
+            if entered.unstable <= walk.here.unstable and abs(entered.drive - drive) < room:
+                return entered
     return None
 
 
@@ -62,8 +62,8 @@ def descend(problem: ContinuationProblem, saddle: PathEquilibrium, sign: int) ->
     """
     x, reach = saddle.x, FIRST_REACH
     for _ in range(MAX_STEPS_DOWN):
-        here = problem.linearise(x, saddle.drive)
-        newton = here.solve(-here.residual[:, None])
+        linear = problem.linearise(x, saddle.drive)
+        newton = linear.solve(-linear.residual[:, None])
         if newton is None or not np.isfinite(newton).all():
             return None
         values, modes = problem.modes(saddle._replace(x=x), len(x))
@@ -83,10 +83,10 @@ def descend(problem: ContinuationProblem, saddle: PathEquilibrium, sign: int) ->
 def opens_at(problem: ContinuationProblem, x: FloatArray, drive: float, entered: PathEquilibrium) -> bool:
     """Return True if an equilibrium is on a branch that opens at (x, drive), like the root of the distance."""
     guess, goal = x + 0.5 * (entered.x - x), drive + 0.25 * (entered.drive - drive)
-    near = correct(problem, guess, goal)
-    if near is None or near.unstable != entered.unstable:
+    between = correct(problem, guess, goal)
+    if between is None or between.unstable != entered.unstable:
         return False
-    return 0.3 < largest_motion(problem, near.x - x) / largest_motion(problem, entered.x - x) < 0.7
+    return 0.3 < largest_motion(problem, between.x - x) / largest_motion(problem, entered.x - x) < 0.7
 
 
 def find_beside(
@@ -141,8 +141,8 @@ def find_passed_end(walk: Walk, new: PathEquilibrium) -> PathEvent | Literal["un
     Who goes back from the new equilibrium along its own path comes to where the step began, or else to the path
     that the branch has joined, before its end.
     """
-    problem, here = walk.problem, walk.here
-    back = correct(problem, new.extrapolate(here.drive), here.drive)
+    problem, current = walk.problem, walk.here
+    back = correct(problem, new.extrapolate(current.drive), current.drive)
     moved = walk.measure_motion(new)
     if back is None:
         return "unsure" if moved > IN_DOUBT[0] else None
@@ -150,20 +150,20 @@ def find_passed_end(walk: Walk, new: PathEquilibrium) -> PathEvent | Literal["un
         return _find_end_at(walk, new)
     if back.unstable <= new.unstable:
         return "unsure" if moved > IN_DOUBT[1] else None
-    found = locate_stability_change(problem, back, new)
-    return "unsure" if found is None else found.as_bifurcation(back.unstable, new.unstable)
+    located = locate_stability_change(problem, back, new)
+    return "unsure" if located is None else located.as_bifurcation(back.unstable, new.unstable)
 
 
 def _find_end_at(walk: Walk, new: PathEquilibrium) -> PathEvent | None:
     """Return the event at the end of a branch if the last step came to just behind it: the next ones are short then."""
-    problem, here = walk.problem, walk.here
-    if abs(new.drive - here.drive) > SHORT_STEP * walk.options.span:
+    problem, current = walk.problem, walk.here
+    if abs(new.drive - current.drive) > SHORT_STEP * walk.options.span:
         return None
     for share in LOOK_AHEAD:
-        prior = _least_stable_before(walk, here.drive, new, walk.sense * share * walk.options.span)
-        found = None if prior is None else locate_stability_change(problem, prior, new)
-        if prior is not None and found is not None:
-            return found.as_bifurcation(prior.unstable, new.unstable)
+        prior = _least_stable_before(walk, current.drive, new, walk.sense * share * walk.options.span)
+        located = None if prior is None else locate_stability_change(problem, prior, new)
+        if prior is not None and located is not None:
+            return located.as_bifurcation(prior.unstable, new.unstable)
     return None
 
 

@@ -51,12 +51,12 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located | None = None, after: int
                 passed_fold = located[0]
                 yield PathEvent("limit point", passed_fold.drive, step.old.unstable, located[1], passed_fold.near)
         elif step.new.unstable != step.old.unstable:
-            found = locate_stability_change_on_arc(problem, step, options.span)
-            if found is None and step.length > shortest:
+            spot = locate_stability_change_on_arc(problem, step, options.span)
+            if spot is None and step.length > shortest:
                 arc = follow_arc(problem, step.old, step.tangent_before, 0.2 * step.length, options)
                 continue
-            drive = found.drive if found else step.new.drive
-            yield PathEvent("bifurcation", drive, step.old.unstable, step.new.unstable, found.near if found else None)
+            drive = spot.drive if spot else step.new.drive
+            yield PathEvent("bifurcation", drive, step.old.unstable, step.new.unstable, spot.near if spot else None)
         point: Point | None = None
         for point in _pass_values(walk, run, step, passed_fold):
             yield point
@@ -250,8 +250,8 @@ def _last_before(problem: ContinuationProblem, begin: PathEquilibrium, fold: Loc
 
     A location may close in from behind: then it is the other one at that drive.
     """
-    near: PathEquilibrium | None = fold.near
+    last: PathEquilibrium | None = fold.near
     if fold.near.unstable > begin.unstable:
-        near = correct(problem, 2 * fold.x - fold.near.x, fold.near.drive)
-    known = near is not None and near.unstable == begin.unstable and (near.drive - fold.before.drive) * sense > 0
-    return near if near is not None and known else fold.before
+        last = correct(problem, 2 * fold.x - fold.near.x, fold.near.drive)
+    valid = last is not None and last.unstable == begin.unstable and (last.drive - fold.before.drive) * sense > 0
+    return last if last is not None and valid else fold.before

@@ -31,10 +31,10 @@ def is_bent(first: PathEquilibrium, last: PathEquilibrium, steepest: float) -> b
 
 def crosses_bend(walk: Walk, new: PathEquilibrium) -> bool:
     """Return True if a step leads over a bend and is too long to tell a corner from a smooth curve."""
-    longest, here = walk.options.longest_bend, walk.here
-    if not longest or new.unstable != here.unstable or abs(new.drive - here.drive) <= longest:
+    longest, current = walk.options.longest_bend, walk.here
+    if not longest or new.unstable != current.unstable or abs(new.drive - current.drive) <= longest:
         return False
-    return is_bent(here, new, walk.steepest)
+    return is_bent(current, new, walk.steepest)
 
 
 def mark_corners(
@@ -53,8 +53,8 @@ def mark_corners(
             at = item.at
             steepest = max(steepest, abs(at.stiffness))
             if first is None:
-                near = [k for k, other in enumerate(passed) if abs(at.drive - other.drive) <= width]
-                first = next((k for k in near if is_bent(passed[k], at, steepest)), None)
+                nearby = [k for k, earlier in enumerate(passed) if abs(at.drive - earlier.drive) <= width]
+                first = next((k for k in nearby if is_bent(passed[k], at, steepest)), None)
             passed.append(at)
             yield item
             if first is None or abs(at.drive - passed[first].drive) <= 2.0 * width:

@@ -116,27 +116,25 @@ def _interpolate(
     largest: float,
 ) -> Located | None:
     """Return the place where the value vanishes by Lagrange's formula through the three smallest values."""
-    near = sorted(samples, key=lambda sample: abs(sample.value))[:3]
-    if abs(near[0].value) > largest:
+    smallest = sorted(samples, key=lambda sample: abs(sample.value))[:3]
+    if abs(smallest[0].value) > largest:
         return None
-    nearest = near[0]
-    if len({sample.value for sample in near}) < 3:
-        near = near[:1]
-    weights = _root_weights(near)
-    share = float(weights @ [sample.share for sample in near])
+    nearest = smallest[0]
+    if len({sample.value for sample in smallest}) < 3:
+        smallest = smallest[:1]
+    weights = _root_weights(smallest)
+    share = float(weights @ [sample.share for sample in smallest])
     if not low.share <= share <= high.share:
-        near = [low, high]  # the third lies on another path
-        weights = _root_weights(near)
-        share = float(weights @ [sample.share for sample in near])
-    x, drive = weights @ [sample.at.x for sample in near], float(weights @ [sample.at.drive for sample in near])
+        smallest = [low, high]  # the third lies on another path
+        weights = _root_weights(smallest)
+        share = float(weights @ [sample.share for sample in smallest])
+    x, drive = weights @ [sample.at.x for sample in smallest], float(weights @ [sample.at.drive for sample in smallest])
     return Located(x, drive, nearest.at, low.at, high.at, share, within)
 
 
-def _root_weights(near: list[_Sample]) -> FloatArray:
+def _root_weights(samples: list[_Sample]) -> FloatArray:
     """Return the weights of samples in Lagrange's interpolation to where their function vanishes."""
-    return np.array(
-        [math.prod(other.value / (other.value - own.value) for other in near if other is not own) for own in near]
-    )
+    return np.array([math.prod(b.value / (b.value - a.value) for b in samples if b is not a) for a in samples])
 
 
 def stability_value(problem: ContinuationProblem, reference: PathEquilibrium) -> Callable[[PathEquilibrium], float]:
@@ -162,24 +160,24 @@ def locate_loss(walk: Walk, new: PathEquilibrium) -> Located | None:
     Where an imperfection may round a bifurcation it is looked for by as short a step; if the path with the unstable
     directions is another there, the last equilibrium that is stable stands for it, where the path would be without it.
     """
-    problem, here, widest = walk.problem, walk.here, walk.options.corner * walk.options.span or np.inf
+    problem, old, widest = walk.problem, walk.here, walk.options.corner * walk.options.span or np.inf
     begin = walk.origin.drive
-    narrowest = min(ONE_LOSS * abs(new.drive - begin), 1e-3 * abs(here.drive - begin) + 1e-12 * walk.options.span)
+    narrowest = min(ONE_LOSS * abs(new.drive - begin), 1e-3 * abs(old.drive - begin) + 1e-12 * walk.options.span)
     for _ in range(MAX_HALVINGS):
-        width = abs(new.drive - here.drive)
-        if (abs(new.unstable - here.unstable) <= 1 and width <= widest) or width < narrowest:
+        width = abs(new.drive - old.drive)
+        if (abs(new.unstable - old.unstable) <= 1 and width <= widest) or width < narrowest:
             break
-        drive = 0.5 * (here.drive + new.drive)
-        middle = correct(problem, hermite(here, new, drive), drive)
+        drive = 0.5 * (old.drive + new.drive)
+        middle = correct(problem, hermite(old, new, drive), drive)
         if middle is None:
             break
-        here, new = (middle, new) if middle.unstable == walk.here.unstable else (here, middle)
+        old, new = (middle, new) if middle.unstable == walk.here.unstable else (old, middle)
     if not walk.options.corner:
-        return locate_stability_change(problem, here, new)
-    if abs(new.drive - here.drive) > widest:
+        return locate_stability_change(problem, old, new)
+    if abs(new.drive - old.drive) > widest:
         return None
-    found = locate_stability_change(problem, here, new, patient=False)
-    return found or Located(predict(walk, here.drive), here.drive, here, here, new, 0.0, (here, new), rounded=True)
+    located = locate_stability_change(problem, old, new, patient=False)
+    return located or Located(predict(walk, old.drive), old.drive, old, old, new, 0.0, (old, new), rounded=True)
 
 
 def locate_stability_change(
@@ -202,11 +200,11 @@ def relocate(
     None if it is not there: the path is another then.
     """
     if event.kind == "limit point" and event.near is not None:
-        near = event.near._replace(x=lift(event.near.x), rate=lift(event.near.rate))
-        along = np.append(near.rate, 1.0)
+        lifted = event.near._replace(x=lift(event.near.x), rate=lift(event.near.rate))
+        along = np.append(lifted.rate, 1.0)
         row = arc_weights(problem, span) * along / np.linalg.norm(along)
-        found = correct(problem, near.x, near.drive, Border(row, float(row @ near.place)))
-        return None if found is None else event.drive + found.drive - near.drive
+        moved = correct(problem, lifted.x, lifted.drive, Border(row, float(row @ lifted.place)))
+        return None if moved is None else event.drive + moved.drive - lifted.drive
     if event.within is None:
         return None
     first, last = (correct(problem, lift(at.x), at.drive) for at in event.within)

@@ -50,59 +50,59 @@ FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below a
 
 def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
     """Go on behind a loss of stability between here and a new equilibrium of the same path; None if it is another."""
-    problem, options, here = walk.problem, walk.options, walk.here
-    found = locate_loss(walk, new)
-    if found is None:
+    problem, options, current = walk.problem, walk.options, walk.here
+    loss = locate_loss(walk, new)
+    if loss is None:
         return None
-    far = _well_before(walk, found.drive, FARTHER_BACK * abs(found.drive - walk.origin.drive)) or here
-    slope = (found.x - far.x) / (found.drive - far.drive) if found.drive != far.drive else here.rate
-    modes, after = problem.modes(found.near, 1)[1], here.unstable + 1
+    far = _well_before(walk, loss.drive, FARTHER_BACK * abs(loss.drive - walk.origin.drive)) or current
+    slope = (loss.x - far.x) / (loss.drive - far.drive) if loss.drive != far.drive else current.rate
+    modes, after = problem.modes(loss.near, 1)[1], current.unstable + 1
     if options.branch == "primary":
-        modes = problem.modes(found.near, max(1, new.unstable - here.unstable))[1]
-        yield found.as_bifurcation(here.unstable, new.unstable, modes)
-        walk = yield from _reach_bifurcation(walk, found, far, slope)
+        modes = problem.modes(loss.near, max(1, new.unstable - current.unstable))[1]
+        yield loss.as_bifurcation(current.unstable, new.unstable, modes)
+        walk = yield from _reach_bifurcation(walk, loss, far, slope)
 
         def solve_behind(goal: float) -> PathEquilibrium:  # just behind it their count is rounding
-            guess = found.x + (goal - found.drive) / (new.drive - found.drive) * (new.x - found.x)
+            guess = loss.x + (goal - loss.drive) / (new.drive - loss.drive) * (new.x - loss.x)
             at = correct(problem, guess, goal) or PathEquilibrium(guess, goal, new.rate, new.unstable)
             return at._replace(unstable=new.unstable)
 
         walk = (yield from walk.deliver_values(new.drive, solve_behind)) or walk
-        return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
+        return walk.restart(new, 0.5 * abs(new.drive - loss.drive), same_piece=True)
     if options.branch == "stop":
-        yield from _reach_bifurcation(walk, found, far, slope)
+        yield from _reach_bifurcation(walk, loss, far, slope)
         yield Point(new, -1, walk.branch)
-        return PathStop(WhyStopped.JUMPS, found.drive, "stability is lost at {place}: the path ends there")
+        return PathStop(WhyStopped.JUMPS, loss.drive, "stability is lost at {place}: the path ends there")
     onto, mode = None, problem.orient(modes)
-    for widths, amplitudes in _cluster_widths(walk, found):
-        several = _pass_together(walk, new, found, slope, widths)
+    for widths, amplitudes in _cluster_widths(walk, loss):
+        several = _pass_together(walk, new, loss, slope, widths)
         if several is not None:
             onto, modes, after = several
-        onto = onto or enter_branch(walk, found.x, found.drive, mode, amplitudes)
+        onto = onto or enter_branch(walk, loss.x, loss.drive, mode, amplitudes)
         if onto is not None:
             break
-    corner = _find_rounded_corner(walk, found, onto) if found.rounded and onto is not None else None
-    yield replace(corner, after=after, modes=modes) if corner else found.as_bifurcation(here.unstable, after, modes)
-    walk = yield from _reach_bifurcation(walk, found, far, slope)
+    corner = _find_rounded_corner(walk, loss, onto) if loss.rounded and onto is not None else None
+    yield replace(corner, after=after, modes=modes) if corner else loss.as_bifurcation(current.unstable, after, modes)
+    walk = yield from _reach_bifurcation(walk, loss, far, slope)
     if onto is None and options.through_folds:
         return walk._replace(options=options._replace(branch="primary")).restart(new, walk.step, same_piece=True)
     if onto is None:
         return PathStop(
-            WhyStopped.JUMPS, found.drive, "no stable equilibrium near {place}: it jumps to a distant one there"
+            WhyStopped.JUMPS, loss.drive, "no stable equilibrium near {place}: it jumps to a distant one there"
         )
-    return (yield from _begin_branch(walk, found, onto, after))
+    return (yield from _begin_branch(walk, loss, onto, after))
 
 
-def _find_rounded_corner(walk: Walk, found: Located, onto: PathEquilibrium) -> PathEvent | None:
+def _find_rounded_corner(walk: Walk, loss: Located, onto: PathEquilibrium) -> PathEvent | None:
     """Return the bifurcation that an imperfection rounds, by the curve well before it and on the branch."""
     problem, width = walk.problem, walk.sense * walk.options.corner * walk.options.span
-    first, drive = _well_before(walk, found.drive, abs(width)) or walk.origin, found.drive - width
+    first, drive = _well_before(walk, loss.drive, abs(width)) or walk.origin, loss.drive - width
     if (drive - first.drive) * width > 0:
-        near = correct(problem, first.extrapolate(drive), drive)
-        first = first if near is None or near.unstable > walk.here.unstable else near
-    way = onto.drive - found.drive
-    goal = found.drive + min(max(BESIDE_CORNER * way, width, key=abs), way, key=abs)
-    beside = find_beside(problem, found.x, found.drive, onto, goal, walk.here.unstable)
+        before = correct(problem, first.extrapolate(drive), drive)
+        first = first if before is None or before.unstable > walk.here.unstable else before
+    distance = onto.drive - loss.drive
+    goal = loss.drive + min(max(BESIDE_CORNER * distance, width, key=abs), distance, key=abs)
+    beside = find_beside(problem, loss.x, loss.drive, onto, goal, walk.here.unstable)
     last = beside if np.isfinite(beside.effort) else correct(problem, beside.x, goal)
     return None if last is None else corner_between(first, last)
 
@@ -112,44 +112,47 @@ def _well_before(walk: Walk, drive: float, distance: float) -> PathEquilibrium |
     return next((e for e in walk.look_back() if abs(e.drive - drive) > distance), None)
 
 
-def _cluster_widths(walk: Walk, found: Located) -> Iterator[tuple[tuple[float, ...], tuple[float, ...]]]:
+def _cluster_widths(walk: Walk, loss: Located) -> Iterator[tuple[tuple[float, ...], tuple[float, ...]]]:
     """Yield ranges of the drive within which bifurcations are passed together, with amplitudes along the first mode.
 
     Nearly rigid structures reach many critical loads at once, measured by the drive's range, and not at all so measured
     by the way to the first.
     """
-    width, way = walk.options.cluster * walk.options.span, abs(found.drive - walk.origin.drive)
-    yield tuple(min(factor * width, NEAR_SHARE * way) for factor in NEAR_CLUSTERS), MODE_AMPLITUDES + LAST_AMPLITUDES
-    if way < NEARLY_RIGID * walk.options.span:
-        yield tuple(factor * way for factor in RIGID_CLUSTERS), ()
+    width, distance = walk.options.cluster * walk.options.span, abs(loss.drive - walk.origin.drive)
+    yield (
+        tuple(min(factor * width, NEAR_SHARE * distance) for factor in NEAR_CLUSTERS),
+        MODE_AMPLITUDES + LAST_AMPLITUDES,
+    )
+    if distance < NEARLY_RIGID * walk.options.span:
+        yield tuple(factor * distance for factor in RIGID_CLUSTERS), ()
     yield tuple(factor * width for factor in WIDE_CLUSTERS), ()
 
 
 def _pass_together(
-    walk: Walk, new: PathEquilibrium, found: Located, slope: FloatArray, widths: tuple[float, ...]
+    walk: Walk, new: PathEquilibrium, loss: Located, slope: FloatArray, widths: tuple[float, ...]
 ) -> tuple[PathEquilibrium, FloatArray, int] | None:
     """Return an equilibrium behind several bifurcations, their modes, and how many directions are unstable there."""
-    problem, here = walk.problem, walk.here
+    problem, current = walk.problem, walk.here
     for width in widths:
         ahead = walk.sense * width
-        saddle = correct(problem, found.x + ahead * slope, found.drive + ahead)
-        if saddle is None or saddle.unstable < max(here.unstable + 2, new.unstable):
+        saddle = correct(problem, loss.x + ahead * slope, loss.drive + ahead)
+        if saddle is None or saddle.unstable < max(current.unstable + 2, new.unstable):
             continue
         onto = descend(problem, saddle, walk.options.sign)
-        if onto is None or onto.unstable > here.unstable or not opens_at(problem, found.x, found.drive, onto):
+        if onto is None or onto.unstable > current.unstable or not opens_at(problem, loss.x, loss.drive, onto):
             continue
-        return onto, problem.modes(found.near, saddle.unstable - here.unstable)[1], saddle.unstable
+        return onto, problem.modes(loss.near, saddle.unstable - current.unstable)[1], saddle.unstable
     return None
 
 
 def _reach_bifurcation(
-    walk: Walk, found: Located, far: PathEquilibrium, slope: FloatArray
+    walk: Walk, loss: Located, far: PathEquilibrium, slope: FloatArray
 ) -> Generator[Point, None, Walk]:
     """Yield the requested values before a bifurcation, on the path itself; return the walk with the next one."""
     problem, unstable = walk.problem, walk.here.unstable
 
     def solve_before(goal: float) -> PathEquilibrium:
-        guess = found.x + (goal - found.drive) * slope
+        guess = loss.x + (goal - loss.drive) * slope
         at = advance(walk, goal).new
         if at is None or at.unstable > unstable:
             at = correct(problem, guess, goal)
@@ -157,37 +160,37 @@ def _reach_bifurcation(
             at = PathEquilibrium(guess, goal, far.rate, unstable)  # at the singular point itself
         return at
 
-    return (yield from walk.deliver_values(found.drive, solve_before)) or walk
+    return (yield from walk.deliver_values(loss.drive, solve_before)) or walk
 
 
-def _begin_branch(walk: Walk, found: Located, onto: PathEquilibrium, after: int) -> Generator[Point, None, Walk]:
+def _begin_branch(walk: Walk, loss: Located, onto: PathEquilibrium, after: int) -> Generator[Point, None, Walk]:
     """Yield the first points of a branch; return the walk on it."""
     problem, unstable = walk.problem, walk.here.unstable
-    walk = walk._replace(branch=PathBranch(found.drive, walk.options.sign), modes=after - unstable)
+    walk = walk._replace(branch=PathBranch(loss.drive, walk.options.sign), modes=after - unstable)
 
     def solve_beside(goal: float) -> PathEquilibrium:
-        return find_beside(problem, found.x, found.drive, onto, goal, unstable)
+        return find_beside(problem, loss.x, loss.drive, onto, goal, unstable)
 
     walk = (yield from walk.deliver_values(onto.drive, solve_beside)) or walk
     yield Point(onto, -1, walk.branch)
-    return walk.restart(onto, 0.5 * abs(onto.drive - found.drive))
+    return walk.restart(onto, 0.5 * abs(onto.drive - loss.drive))
 
 
 def look_past(walk: Walk, goal: float) -> Items:
     """Go on behind a bifurcation that lies at here or at the goal, where no step succeeds; None if there is none."""
-    problem, span, here = walk.problem, walk.options.span, walk.here
+    problem, span, current = walk.problem, walk.options.span, walk.here
     far, primary = (
-        _well_before(walk, here.drive, LOOK_PAST_FROM * span) or walk.origin,
+        _well_before(walk, current.drive, LOOK_PAST_FROM * span) or walk.origin,
         walk.options.branch == "primary",
     )
     for share in LOOK_PAST_BY:
-        for origin in (here.drive, goal):
+        for origin in (current.drive, goal):
             drive = origin + walk.sense * share * span
             guess = far.extrapolate(drive)
             past = correct(problem, guess, drive)
             if (
                 past is not None
-                and (past.unstable > here.unstable or (primary and past.unstable != here.unstable))
+                and (past.unstable > current.unstable or (primary and past.unstable != current.unstable))
                 and largest_motion(problem, past.x - guess) < LOOK_PAST_MISS
             ):
                 return (yield from lose_stability(walk._replace(here=far), past))

@@ -47,14 +47,14 @@ def correct(
     The bordered system is solved by elimination with the factors of the tangent alone: at limit points and
     bifurcations these are nearly singular, and the iteration makes good what rounding spoils.
     """
-    own = getattr(problem, "solve", None)
-    if own is not None:
-        return own(x, drive, border)  # type: ignore[no-any-return]
+    solve = getattr(problem, "solve", None)
+    if solve is not None:
+        return solve(x, drive, border)  # type: ignore[no-any-return]
     last = np.inf
     with np.errstate(all="ignore"):
         for iteration in range(iterations):
-            here = problem.linearise(x, drive)
-            columns = here.solve(np.column_stack([-here.residual, -here.rate]))
+            linear = problem.linearise(x, drive)
+            columns = linear.solve(np.column_stack([-linear.residual, -linear.rate]))
             if columns is None or not np.isfinite(columns).all():
                 return None
             step, rate = columns.T
@@ -71,7 +71,7 @@ def correct(
             stagnant = motion < FLOOR_OF_MOTION and largest < FLOOR_OF_FORCE and largest > STAGNATION_RATIO * last
             converged = largest < STEP_TOLERANCE * (1 + largest_motion(problem, x)) or stagnant
             if converged and (iteration > 0 or border is None):  # a first step may have changed the drive alone
-                return PathEquilibrium(x, float(drive), rate, here.unstable)
+                return PathEquilibrium(x, float(drive), rate, linear.unstable)
             last = largest
     return None
 
@@ -105,16 +105,16 @@ def hermite(a: PathEquilibrium, b: PathEquilibrium, drive: float) -> FloatArray:
 def predict(walk: Walk, goal: float) -> FloatArray:
     """Return the predicted unknowns at a drive: by the last two equilibria, or by the last one's slope.
 
-    A problem may have a method `predict(here, goal)` that knows better, and returns None if it does not.
+    A problem may have a method `predict(at, goal)` that knows better, and returns None if it does not.
     """
-    here, before = walk.here, walk.before
-    own = getattr(walk.problem, "predict", None)
-    guess: FloatArray | None = None if own is None else own(here, goal)
+    current, before = walk.here, walk.before
+    predict_unknowns = getattr(walk.problem, "predict", None)
+    guess: FloatArray | None = None if predict_unknowns is None else predict_unknowns(current, goal)
     if guess is not None:
         return guess
-    if before is None or before.drive == here.drive:
-        return here.extrapolate(goal)
-    return hermite(before, here, goal)
+    if before is None or before.drive == current.drive:
+        return current.extrapolate(goal)
+    return hermite(before, current, goal)
 
 
 def advance(walk: Walk, goal: float) -> Trial:
@@ -126,7 +126,7 @@ def advance(walk: Walk, goal: float) -> Trial:
 
 def judge(
     problem: ScaledUnknowns,
-    here: PathEquilibrium,
+    start: PathEquilibrium,
     new: PathEquilibrium | None,
     guess: FloatArray,
     limits: tuple[float, float],  # largest motion, and largest change of a force, in its unit besides half of it
@@ -134,27 +134,27 @@ def judge(
     """Return a step from one equilibrium to another, which is near a guess, with what is to be said of it."""
     if new is None:
         return Trial(None)
-    moved, missed = (largest_motion(problem, new.x - near) for near in (here.x, guess))
+    moved, missed = (largest_motion(problem, new.x - reference) for reference in (start.x, guess))
     if moved > limits[0]:
         return Trial(None)
-    excess = force_change(problem, here.x, new.x, limits[1], FORCE_SHARE)
+    excess = force_change(problem, start.x, new.x, limits[1], FORCE_SHARE)
     if excess > 1:
         return Trial(None, excess=excess)
-    if missed > MISSED_SHARE * moved + MOTION_ROUNDING or not _keeps_direction(problem, here, new, moved):
+    if missed > MISSED_SHARE * moved + MOTION_ROUNDING or not _keeps_direction(problem, start, new, moved):
         return Trial(None)
     return Trial(new, missed / (moved + 1e-8), motion=moved)
 
 
-def _keeps_direction(problem: ScaledUnknowns, here: PathEquilibrium, new: PathEquilibrium, moved: float) -> bool:
+def _keeps_direction(problem: ScaledUnknowns, start: PathEquilibrium, new: PathEquilibrium, moved: float) -> bool:
     """Return True if the chord of a step agrees with the slopes at its ends, in direction and length.
 
     Without the second a step hops from the end of a branch onto the path that it joins, unnoticed.
     """
     motions = problem.motions
-    if moved <= MOTION_ROUNDING or new.unstable != here.unstable:
+    if moved <= MOTION_ROUNDING or new.unstable != start.unstable:
         return True
-    change = new.drive - here.drive
-    chord, slopes = (new.x - here.x)[motions], (here.rate[motions], new.rate[motions])
+    change = new.drive - start.drive
+    chord, slopes = (new.x - start.x)[motions], (start.rate[motions], new.rate[motions])
     size, sense = math.sqrt(chord @ chord), math.copysign(1.0, change)
     if any(sense * (chord @ slope) < CHORD_COSINE * size * math.sqrt(slope @ slope) for slope in slopes):
         return False

@@ -65,10 +65,10 @@ class YamlDocument:
 
         Of a value of the base it is the place where the base is named.
         """
-        path = self._path(path)
+        path = self._as_path(path)
         if self._option_at(path):
             return 0, 0
-        return self._own_place(path if self._document_of_value(path) is self else ("base",), at_key=False)
+        return self._place_in_file(path if self._document_of_value(path) is self else ("base",), at_key=False)
 
     def set(self, option: str) -> YamlDocument:
         """Return the document changed by an option such as ``a.b=1 mm``.
@@ -124,13 +124,13 @@ class YamlDocument:
 
     def problem(self, path: str | Path, message: str, at_key: bool = False) -> Problem:
         """Return a problem at a path, with its line and column or the option that set the value."""
-        path = self._path(path)
+        path = self._as_path(path)
         reported = to_dotted(path)
         if option := self._option_at(path):
             return Problem(option, 0, 0, reported, message)
         owner = self._document_of_value(path)
-        line, column = owner._own_place(path, at_key)
-        return Problem(owner.source, line, column, reported, message, owner._line(line))
+        line, column = owner._place_in_file(path, at_key)
+        return Problem(owner.source, line, column, reported, message, owner._line_of_file(line))
 
     def _with_problems(self, option: Option, faults: list[tuple[Path, str]]) -> YamlDocument:
         new = [Problem(option.label, 0, 0, to_dotted(path), message) for path, message in faults]
@@ -162,17 +162,17 @@ class YamlDocument:
             node = node[part]
         return self
 
-    def _own_place(self, path: Path, at_key: bool) -> tuple[int, int]:
+    def _place_in_file(self, path: Path, at_key: bool) -> tuple[int, int]:
         table = self._reading.keys if at_key else self._reading.values
         for length in range(len(path), -1, -1):
             if position := table.get(path[:length]) or self._reading.values.get(path[:length]):
                 return position
         return 1, 1
 
-    def _line(self, number: int) -> str:
+    def _line_of_file(self, number: int) -> str:
         return self._lines[number - 1] if 0 < number <= len(self._lines) else ""
 
-    def _path(self, path: str | Path) -> Path:
+    def _as_path(self, path: str | Path) -> Path:
         return parse_indices(tuple(path.split(".")) if path else (), self.tree) if isinstance(path, str) else path
 
 

@@ -25,17 +25,17 @@ def dump(
     complete: bool = False,  # write every default too, not only what was set
 ) -> str:
     """Return a specification as YAML that `read_document` and `bind` turn into an equal one; keys as in the model."""
-    content = _content(spec, spec.model_dump(mode="json"), (), complete)
+    content = _to_json(spec, spec.model_dump(mode="json"), (), complete)
     # Lists of blocks, such as the requirements, read best at the end.
     ordered = dict(sorted(content.items(), key=lambda item: _holds_blocks(item[1])))
-    return "".join(f"{line}\n" for line in _block(ordered, 0))
+    return "".join(f"{line}\n" for line in _block_lines(ordered, 0))
 
 
 def _holds_blocks(value: Any) -> bool:
     return isinstance(value, list) and any(isinstance(item, dict) for item in value)
 
 
-def _content(value: Any, text: Any, allowed: tuple[Slot, ...], complete: bool) -> Any:
+def _to_json(value: Any, text: Any, allowed: tuple[Slot, ...], complete: bool) -> Any:
     """Return the JSON form of a value without what its reader knows anyway.
 
     Value and JSON form are walked side by side: one says what was set, the other how it is written.
@@ -46,12 +46,12 @@ def _content(value: Any, text: Any, allowed: tuple[Slot, ...], complete: bool) -
         names = [
             name for name in type(value).model_fields if name in text and _is_written(value, name, must_tell, complete)
         ]
-        return {name: _content(getattr(value, name), text[name], own_slot.child(name), complete) for name in names}
+        return {name: _to_json(getattr(value, name), text[name], own_slot.child(name), complete) for name in names}
     if isinstance(value, Mapping) and isinstance(text, dict):
-        return {key: _content(value.get(key), item, _slots_below(allowed, key), complete) for key, item in text.items()}
+        return {key: _to_json(value.get(key), item, _slots_below(allowed, key), complete) for key, item in text.items()}
     if isinstance(value, tuple | list) and isinstance(text, list) and len(value) == len(text):
         pairs = enumerate(zip(value, text, strict=True))
-        return [_content(*pair, _slots_below(allowed, index), complete) for index, pair in pairs]
+        return [_to_json(*pair, _slots_below(allowed, index), complete) for index, pair in pairs]
     return text
 
 
@@ -71,33 +71,33 @@ def _is_written(model: BaseModel, name: str, must_tell: bool, complete: bool) ->
     return complete or telling or name in model.model_fields_set
 
 
-def _block(content: Mapping[str, Any], indent: int) -> Iterator[str]:
+def _block_lines(content: Mapping[str, Any], indent: int) -> Iterator[str]:
     """Yield the lines of a block."""
     pad = " " * indent
     for key, value in content.items():
         if isinstance(value, dict) and value:
-            yield f"{pad}{_text(key)}:"
-            yield from _block(value, indent + 2)
+            yield f"{pad}{_scalar_text(key)}:"
+            yield from _block_lines(value, indent + 2)
         elif isinstance(value, list) and not _is_short(value):
-            yield f"{pad}{_text(key)}:"
-            yield from _items(value, indent + 2)
+            yield f"{pad}{_scalar_text(key)}:"
+            yield from _list_lines(value, indent + 2)
         else:
-            yield f"{pad}{_text(key)}: {_flow(value)}"
+            yield f"{pad}{_scalar_text(key)}: {_flow_text(value)}"
 
 
-def _items(items: list[Any], indent: int) -> Iterator[str]:
+def _list_lines(items: list[Any], indent: int) -> Iterator[str]:
     """Yield the lines of a list: plain values many to a line, blocks one below the other."""
     pad = " " * indent
     if all(not isinstance(item, dict | list) for item in items):
-        yield from _wrap_list([_flow(item) for item in items], pad)
+        yield from _wrap_list([_flow_text(item) for item in items], pad)
         return
     for item in items:
         if isinstance(item, dict) and item:
-            first, *rest = _block(item, indent + 2)
+            first, *rest = _block_lines(item, indent + 2)
             yield f"{pad}- {first.lstrip(' ')}"
             yield from rest
         else:
-            yield f"{pad}- {_flow(item)}"
+            yield f"{pad}- {_flow_text(item)}"
 
 
 def _wrap_list(words: list[str], pad: str) -> Iterator[str]:
@@ -115,23 +115,23 @@ def _wrap_list(words: list[str], pad: str) -> Iterator[str]:
 
 def _is_short(items: list[Any]) -> bool:
     """Return whether a list fits on its key's line: plain values, or a few pairs of numbers."""
-    return not any(isinstance(item, dict) for item in items) and len(_flow(items)) <= LINE_WIDTH - 40
+    return not any(isinstance(item, dict) for item in items) and len(_flow_text(items)) <= LINE_WIDTH - 40
 
 
-def _flow(value: Any) -> str:
+def _flow_text(value: Any) -> str:
     """Return a value on one line."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_text(key)}: {_flow(item)}" for key, item in value.items()) + "}"
+        return "{" + ", ".join(f"{_scalar_text(key)}: {_flow_text(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list):
-        return "[" + ", ".join(_flow(item) for item in value) + "]"
+        return "[" + ", ".join(_flow_text(item) for item in value) + "]"
     if value is None or isinstance(value, bool):
         return json.dumps(value)
     if isinstance(value, float):
         return decimal_text(value)
-    return _text(value) if isinstance(value, str) else str(value)
+    return _scalar_text(value) if isinstance(value, str) else str(value)
 
 
-def _text(text: str) -> str:
+def _scalar_text(text: str) -> str:
     """Return text as a scalar, quoted where a reader could take it for something else."""
     plain = _PLAIN_PATTERN.fullmatch(text) and text == text.strip() and text.isprintable()
     return text if plain and not _OLD_WORDS.fullmatch(text) and _reads_as_text(text) else _quote(text)

@@ -79,7 +79,7 @@ def explain(
         _Error(line["type"], trace(model, tree, line["loc"]), line.get("ctx", {}), line["msg"])
         for line in error.errors(include_url=False, include_input=False)[:MOST_EXPLAINED]
     ]
-    complaints = [_complaint(line) for line in _drop_unmeant([line for line in lines if not line.echo], 0)]
+    complaints = [_explain_error(line) for line in _drop_unmeant([line for line in lines if not line.echo], 0)]
     return _drop_echoes(list(dict.fromkeys(complaints)))
 
 
@@ -89,11 +89,11 @@ def _drop_unmeant(lines: list[_Error], depth: int) -> list[_Error]:
     inside = [line for line in lines if len(line.trace.tags) > depth]
     by_place = sorted(inside, key=lambda line: str(line.trace.tags[depth][0]))
     for _, group in groupby(by_place, key=lambda line: line.trace.tags[depth][0]):
-        kept += _drop_unmeant(_one_member(list(group), depth), depth + 1)
+        kept += _drop_unmeant(_likeliest_member(list(group), depth), depth + 1)
     return kept
 
 
-def _one_member(lines: list[_Error], depth: int) -> list[_Error]:
+def _likeliest_member(lines: list[_Error], depth: int) -> list[_Error]:
     """Return the errors of the likeliest member of one union."""
     members: dict[str, list[_Error]] = {}
     for line in lines:
@@ -115,11 +115,11 @@ def _union_error(lines: list[_Error], place: Path) -> _Error:
     return _Error("union", Trace(place, first.node, allowed, first.parents, first.tags), {}, "")
 
 
-def _complaint(line: _Error) -> Complaint:
+def _explain_error(line: _Error) -> Complaint:
     if line.kind == "missing":
         return _describe_missing(line.trace)
     if line.kind == "extra_forbidden":
-        return Complaint(line.trace.path, _unknown_key(line.trace), at_key=True)
+        return Complaint(line.trace.path, _describe_unknown_key(line.trace), at_key=True)
     if line.kind.startswith("union_tag"):
         return _unknown_kind(line)
     explainer = _EXPLAINER_BY_TYPE.get(line.kind, _translate_pydantic_message)
@@ -134,7 +134,7 @@ def _describe_missing(trace: Trace) -> Complaint:
     return Complaint(trace.path[:-1], f"{what} is missing: {describe_expected(trace.slots)}")
 
 
-def _unknown_key(trace: Trace) -> str:
+def _describe_unknown_key(trace: Trace) -> str:
     fields = [field for slot in trace.parents if slot.model is not None for field in slot.model.model_fields.items()]
     names = [field.alias or name for name, field in fields]
     key = str(trace.path[-1]) if trace.path else ""

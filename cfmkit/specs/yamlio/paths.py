@@ -216,7 +216,7 @@ def slots(annotation: Any, metadata: tuple[Any, ...] = ()) -> tuple[Slot, ...]:
     origin = get_origin(annotation)
     if origin is Annotated:
         inner, *extra = get_args(annotation)
-        return slots(inner, metadata + _flat(extra))
+        return slots(inner, metadata + _flatten_annotations(extra))
     if origin in (Union, types.UnionType):
         members = (item for item in get_args(annotation) if item is not type(None))
         return tuple(slot for item in members for slot in slots(item, metadata))
@@ -234,7 +234,7 @@ def slots_at(model: type[BaseModel], path: str) -> tuple[Slot, ...]:
     return allowed
 
 
-def _flat(extra: list[Any]) -> tuple[Any, ...]:
+def _flatten_annotations(extra: list[Any]) -> tuple[Any, ...]:
     """Return annotations in one row: those inside a ``Field(...)`` taken out of it."""
     return tuple(metadata for item in extra for metadata in (*getattr(item, "metadata", ()), item))
 
@@ -279,7 +279,7 @@ def _step_down(trace: Trace, item: str | int) -> Trace:
     validator put around what the user wrote adds nothing to the path.
     """
     allowed = tuple(slot for parent in trace.slots for slot in parent.child(item))
-    step = _step(trace.node, item)
+    step = _child_of(trace.node, item)
     if step is MISSING_VALUE and not allowed:
         return trace
     if (
@@ -291,7 +291,7 @@ def _step_down(trace: Trace, item: str | int) -> Trace:
     return Trace((*trace.path, item), step, allowed, trace.slots, trace.tags)
 
 
-def _step(node: Any, item: str | int) -> Any:
+def _child_of(node: Any, item: str | int) -> Any:
     if isinstance(node, BaseModel):
         return getattr(node, str(item), MISSING_VALUE)
     if isinstance(node, dict):

@@ -184,29 +184,29 @@ class _Builder:
         event = next(self.events)
         if not isinstance(event, DocumentStartEvent):
             return None
-        tree = self._node(next(self.events), ())
+        tree = self._build_node(next(self.events), ())
         next(self.events)
         event = next(self.events)
         if isinstance(event, DocumentStartEvent):
-            raise Unreadable(_fault(event, (), "a second document starts here; write one specification per file"))
+            raise Unreadable(_fault_at(event, (), "a second document starts here; write one specification per file"))
         return tree
 
-    def _node(self, event: Event, path: Path) -> Any:
-        self._count(event, path)
-        self.reading.values.setdefault(path, _place(event))
+    def _build_node(self, event: Event, path: Path) -> Any:
+        self._count_node(event, path)
+        self.reading.values.setdefault(path, _place_of(event))
         self._refuse_decoration(event, path)
         if isinstance(event, ScalarEvent):
-            return self._scalar(event, path)
+            return self._build_scalar(event, path)
         if isinstance(event, SequenceStartEvent):
-            return self._sequence(path)
-        return self._mapping(path, bool(event.flow_style)) if isinstance(event, MappingStartEvent) else None
+            return self._build_sequence(path)
+        return self._build_mapping(path, bool(event.flow_style)) if isinstance(event, MappingStartEvent) else None
 
-    def _count(self, event: Event, path: Path) -> None:
+    def _count_node(self, event: Event, path: Path) -> None:
         self.nodes += 1
         if self.nodes > MAX_NODES:
-            raise Unreadable(_fault(event, (), f"more than {MAX_NODES} values; put long data into a separate file"))
+            raise Unreadable(_fault_at(event, (), f"more than {MAX_NODES} values; put long data into a separate file"))
         if len(path) > MAX_DEPTH:
-            raise Unreadable(_fault(event, (), f"blocks and lists are nested more than {MAX_DEPTH} deep"))
+            raise Unreadable(_fault_at(event, (), f"blocks and lists are nested more than {MAX_DEPTH} deep"))
 
     def _refuse_decoration(self, event: Event, path: Path) -> None:
         anchor = getattr(event, "anchor", None)
@@ -218,14 +218,14 @@ class _Builder:
             message = tag.replace("tag:yaml.org,2002:", "!!")
             self._complain(event, path, f"the tag {quote(message)} is not read; write the plain value")
 
-    def _scalar(self, event: ScalarEvent, path: Path) -> Any:
+    def _build_scalar(self, event: ScalarEvent, path: Path) -> Any:
         try:
             return check_text(event.value) if event.style else read_plain(event.value)
         except QuantityError as error:
             self._complain(event, path, str(error))
             return event.value
 
-    def _sequence(self, path: Path) -> tuple[Any, ...]:
+    def _build_sequence(self, path: Path) -> tuple[Any, ...]:
         items: list[Any] = []
         last, zeros, spaced = None, [], False  # the item before, and what may be a zero or the start of 0,5 mm
         while not isinstance(event := next(self.events), SequenceEndEvent):
@@ -238,29 +238,29 @@ class _Builder:
                     continue
             elif last is not None:
                 spaced = spaced or not _adjacent(last, event)
-            items.append(self._node(event, (*path, len(items))))
+            items.append(self._build_node(event, (*path, len(items))))
             last = event
         if zeros and spaced:  # [0,240 mm] alone is two values, as zero needs no unit
             self._decimal_comma(*zeros[0], path)
         return tuple(items)
 
-    def _mapping(self, path: Path, flow: bool) -> dict[str, Any]:
+    def _build_mapping(self, path: Path, flow: bool) -> dict[str, Any]:
         block: dict[str, Any] = {}
         last, key = None, ""  # the value before, and its key
         while not isinstance(event := next(self.events), MappingEndEvent):
             if flow and last is not None and _continues_number(last, event):
                 self._decimal_comma(last, event, (*path, key))
                 if not _is_empty(following := next(self.events)):
-                    self._node(following, (*path, ""))
+                    self._build_node(following, (*path, ""))
                 continue
-            key = self._key(event, path)
+            key = self._build_key(event, path)
             key_path = (*path, key)
             if first := self.reading.keys.get(key_path):
                 message = f"the key {quote(key)} was given in line {first[0]} already; keep one"
                 self._complain(event, key_path, message, makes_value_unusable=False)
-            self.reading.keys.setdefault(key_path, _place(event))
+            self.reading.keys.setdefault(key_path, _place_of(event))
             last = next(self.events)
-            block.setdefault(key, self._node(last, key_path))
+            block.setdefault(key, self._build_node(last, key_path))
         return block
 
     def _decimal_comma(self, whole: Event, rest: Event, path: Path) -> None:
@@ -270,14 +270,14 @@ class _Builder:
         if not any(fault.path == path for fault in self.reading.faults):  # thousands have more than one
             self._complain(whole, path, message)
 
-    def _key(self, event: Event, path: Path) -> str:
+    def _build_key(self, event: Event, path: Path) -> str:
         """Return a key, after a complaint if it is no plain name: then its text, of a list or block an empty one."""
         self._refuse_decoration(event, path)
         if not isinstance(event, ScalarEvent):
-            self._node(event, (*path, ""))
+            self._build_node(event, (*path, ""))
             self._complain(event, path, "a key must be a name, not a list or a block")
             return ""
-        key = self._scalar(event, path)
+        key = self._build_scalar(event, path)
         if not isinstance(key, str):
             self._complain(event, path, f"the key {quote(event.value)} is not a name; keys start with a letter")
         elif key == "<<" and not event.style:
@@ -286,8 +286,8 @@ class _Builder:
 
     def _complain(self, event: Event, path: Path, message: str, makes_value_unusable: bool = True) -> None:
         if len(self.reading.faults) >= MAX_FAULTS:
-            raise Unreadable(_fault(event, (), f"more than {MAX_FAULTS} faults; reading stopped here"))
-        self.reading.faults.append(Fault(*_place(event), path, message, makes_value_unusable))
+            raise Unreadable(_fault_at(event, (), f"more than {MAX_FAULTS} faults; reading stopped here"))
+        self.reading.faults.append(Fault(*_place_of(event), path, message, makes_value_unusable))
 
 
 def _continues_number(value: Event, key: Event) -> bool:
@@ -317,13 +317,13 @@ def _is_empty(event: Event) -> bool:
     return isinstance(event, ScalarEvent) and not event.value and not event.style
 
 
-def _place(event: Event) -> tuple[int, int]:
+def _place_of(event: Event) -> tuple[int, int]:
     mark: Any = event.start_mark
     return mark.line + 1, mark.column + 1
 
 
-def _fault(event: Event, path: Path, message: str) -> Fault:
-    return Fault(*_place(event), path, message)
+def _fault_at(event: Event, path: Path, message: str) -> Fault:
+    return Fault(*_place_of(event), path, message)
 
 
 _CONSTANT_WORDS: dict[str, bool | None] = {
@@ -343,7 +343,7 @@ def read_plain(text: str) -> Any:
     if text in _CONSTANT_WORDS:
         return _CONSTANT_WORDS[text]
     if NUMBER_PATTERN.fullmatch(text):
-        return _number(text)
+        return _read_scalar_number(text)
     if len(text) <= MAX_NUMBER_LENGTH and (complaint := number_complaint(text, only_traps=True)):
         raise QuantityError(_advise_quoting(complaint))
     return text
@@ -359,7 +359,7 @@ def check_text(text: str) -> str:
     return text
 
 
-def _number(text: str) -> int | float:
+def _read_scalar_number(text: str) -> int | float:
     try:
         value = read_number(text)
     except QuantityError as error:
@@ -406,7 +406,7 @@ _PLAIN_WORDS = (
 def fault_of(error: YAMLError) -> Fault:
     """Return the fault that a YAML error tells, where it is and in plain words."""
     problem = f"{getattr(error, 'context', None) or ''}: {getattr(error, 'problem', None) or error}"
-    message = next(filter(None, (_translate(problem, *entry) for entry in _PLAIN_WORDS)), None)
+    message = next(filter(None, (_translate_problem(problem, *entry) for entry in _PLAIN_WORDS)), None)
     mark: Mark | None = getattr(error, "problem_mark", None)
     if message and "never closed" in message:
         mark = getattr(error, "context_mark", None) or mark
@@ -417,6 +417,6 @@ def fault_of(error: YAMLError) -> Fault:
     return Fault(line, column, (), message or "this is not YAML: " + " ".join(problem.strip(": ").split()))
 
 
-def _translate(problem: str, pattern: str, words: str) -> str | None:
+def _translate_problem(problem: str, pattern: str, words: str) -> str | None:
     match = re.search(pattern, problem)
     return match.expand(words.replace("\\'", "\\\\'")) if match else None
