@@ -30,7 +30,7 @@ from cfmkit.families.slider_crank.springs.largest_turns_and_forces import Motion
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.springs.part import N_SHEETS, height_of
 from cfmkit.families.slider_crank.springs.solution import grid_over
-from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemble
+from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, TurnedCrank, assemble
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
@@ -175,7 +175,7 @@ def _turning(request: Request, link: Linkage, unloaded: float, sheet: float | No
     low, high = _angle_range(request, unloaded)
     ends = low, min(high, unloaded + math.pi)
     return _sprung(
-        request, Assembly(link, unloaded, np.zeros(len(JOINT_NAMES))), ends, min(link.crank, link.coupler), sheet
+        request, TurnedCrank(link, unloaded, np.zeros(len(JOINT_NAMES))), ends, min(link.crank, link.coupler), sheet
     )
 
 
@@ -321,7 +321,7 @@ def _assemble_with_motion(spec: SliderCrankSpec) -> tuple[Assembly, float, float
 def _loads(spec: SliderCrankSpec) -> LinkLoads:
     """Return what acts on the links over the motion of the analysis."""
     assembly, low, high = _assemble_with_motion(spec)
-    return link_loads(assembly, grid_over(assembly.drive, low, high), spec.mechanism.sets)
+    return link_loads(assembly, grid_over(assembly, low, high), spec.mechanism.sets)
 
 
 def _least_sheet(spec: SliderCrankSpec, request: Request, block: MaterialBlock) -> float:

@@ -40,7 +40,7 @@ from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import choose_pr
 from cfmkit.families.slider_crank.springs.rate_fit_task import FREE_LENGTH_KEYS, N_WINDOW_PLACES, task_of, with_lengths
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest, widest_of_all
 from cfmkit.families.slider_crank.springs.solution import BAND_EDGE_FACTOR
-from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN, default_motion
+from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN
 from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, JOINTS_BY_NAME
 from cfmkit.numerics.box_search import BoxAxis, Lowest, lowest
 from cfmkit.results import Design, Status
@@ -277,7 +277,7 @@ def _motion_to_show(solved: ChosenSprings) -> dict[str, tuple[float, float]]:
     asked: tuple[float, float] | None = getattr(solved.task.spec.analysis, name)
     if asked is None and solved.task.spec.mechanism.limits is not None:
         return {name: solved.task.allowed}
-    low, high = asked or default_motion(solved.task.assembly)
+    low, high = asked or solved.task.assembly.default_motion()
     if low <= solved.window[0] and solved.window[1] <= high:
         return {}
     if asked is None and high - low >= FULL_TURN and solved.window[1] <= low:

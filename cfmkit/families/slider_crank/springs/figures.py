@@ -167,9 +167,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 
 def motion_scale(solution: Solution) -> Scale:
     """Return the horizontal axis of every diagram."""
-    if solution.drive == "torque":
-        return Scale("crank angle", "angle")
-    return Scale("travel of the slider", "length")
+    return Scale(solution.assembly.motion_words, solution.assembly.dimension)
 
 
 def assembly(result: Result) -> Figure:
@@ -183,9 +181,7 @@ def assembly(result: Result) -> Figure:
 def curve(result: Result) -> Figure:
     """Return torque or force over the motion: the constant band named, equilibria marked."""
     solution: Solution = result.state
-    drive = solution.drive
-    over = "crank angle" if drive == "torque" else "travel of the slider"
-    heading = f"{drive} over {over}: {_kind(solution)}"
+    heading = f"{solution.drive} over {solution.assembly.motion_words}: {_kind(solution)}"
     figure = curve_figure(result, None, heading)
     for ax in figure.axes:
         _mark_equilibria(ax, solution, lambda _motion, _energy: 0.0)
@@ -260,7 +256,7 @@ def _name_wells(ax: Axes, solution: Solution) -> None:
 def springs(result: Result) -> Figure:
     """Return the effort of each spring over the motion, and the stiffness of all."""
     solution: Solution = result.state
-    drive, over = solution.drive, motion_scale(solution)
+    drive, over, stiffness = solution.drive, motion_scale(solution), solution.assembly.stiffness_dimension
     joints = [k for k in range(4) if solution.assembly.rates[k] > 0.0]
     series = [
         Series(
@@ -273,10 +269,15 @@ def springs(result: Result) -> Figure:
     ]
     if len(joints) > 1:
         series.insert(0, Series(solution.effort[0], "all springs", TEXT_INK, prefer=0.7))
-    rate = "rotational_stiffness" if drive == "torque" else "stiffness"
     slope = [Series(solution.stiffness[0], "", TEXT_INK)]
     upper = Diagram(solution.motion[0], over, Scale(f"{drive} of a spring", drive), series)
-    lower = Diagram(solution.motion[0], over, Scale("stiffness", rate), slope, [Limit(0.0, "zero stiffness")])
+    lower = Diagram(
+        solution.motion[0],
+        over,
+        Scale("stiffness", stiffness),
+        slope,
+        [Limit(0.0, "zero stiffness")],
+    )
     heading = Heading.from_result(result, f"what each spring adds to the {drive}, and the slope of all")
     return diagram_figure(heading, [upper, lower])
 

@@ -182,8 +182,7 @@ def _reaches_reference(solution: Solution) -> Any:
 
 
 def _misses_reference(solution: Solution) -> Any:
-    analysis = solution.spec.analysis
-    asked = analysis.reference_angle if solution.drive == "torque" else analysis.reference_travel
+    asked = getattr(solution.spec.analysis, f"reference_{solution.assembly.motion_name}")
     return (asked is not None) & ~_reaches_reference(solution)
 
 

@@ -48,9 +48,7 @@ class MotionExtremes(ShortRepr):
         """A grid over the motion, (m, n), the unloaded position one of its places; the last one may stand twice."""
         low, high, start = (np.reshape(column, (-1, 1)) for column in (self.low, self.high, self.assembly.start))
         wide = is_wide(self.assembly, self.low, self.high)
-        share = np.linspace(0.0, 1.0, TURN_NODES if wide else GRID_SIZES)
-        if self.assembly.drive == "force":  # the force runs like the square root of the travel from the stretched place
-            share = share**2
+        share = self.assembly.spread(np.linspace(0.0, 1.0, TURN_NODES if wide else GRID_SIZES))
         places = low + (high - low) * share
         inside = (low < start) & (start < high) & (places != start).all(axis=1, keepdims=True)
         more = np.where(inside, start, places[:, -1:])

@@ -242,10 +242,9 @@ def _as_run(spec: SliderCrankSpec, assembly: Assembly) -> SliderCrankSpec:
 def _curve(solution: Solution) -> Curve:
     """Return the curve of one mechanism; with friction the way through the motion and back."""
     (assembly,), drive, units = solution.assemblies, solution.drive, solution.unit_spring_curves
-    rate = "rotational_stiffness" if drive == "torque" else "stiffness"
     coupler, guide = solution.reactions
     extra = {
-        "stiffness": Column(solution.stiffness[0], rate),
+        "stiffness": Column(solution.stiffness[0], assembly.stiffness_dimension),
         "energy": Column(solution.energy[0], "energy"),
         **{
             f"{drive}_{name}": Column(row[0], drive)

@@ -203,4 +203,4 @@ def task_of(spec: SliderCrankSpec) -> SpringTask:
     """
     design = spec.design
     assert design is not None
-    return SpringTask(spec, replace(assemble(spec), drive=design.drive))
+    return SpringTask(spec, assemble(spec, design.drive))

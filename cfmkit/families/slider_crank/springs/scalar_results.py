@@ -105,7 +105,7 @@ def _quantity_of_links(
         bars = [link_of(spec) for spec in solution.specs]
         numbers = [(bar.width, bar.sheet, bar.hole, bar.modulus) for bar in bars if bar is not None]
         allowable = np.array([allowable_of(spec) for spec in solution.specs], dtype=float)
-        motion = grid_over(solution.drive, solution.low, solution.high)
+        motion = grid_over(solution.assembly, solution.low, solution.high)
         loads = link_loads(solution.assembly, motion, solution.legs[:, 0])
         return function(LinkBar(*np.array(numbers).T), loads, allowable)
 

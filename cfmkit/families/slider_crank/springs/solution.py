@@ -70,12 +70,9 @@ def target_of(spec: SliderCrankSpec) -> float | None:
     return spec.design.torque if spec.analysis.drive == "torque" else spec.design.force
 
 
-def grid_over(drive: Kind, low: Any, high: Any) -> FloatArray:
+def grid_over(assembly: Assembly, low: Any, high: Any) -> FloatArray:
     """Return the places of the grid over a motion, (n,) [rad or m]; over several motions, (m, 1), (m, n)."""
-    share = np.linspace(0.0, 1.0, N_GRID_PLACES)
-    if drive == "force":  # the force runs like the square root of the travel from the stretched place
-        share = share**2
-    return np.asarray(low + (high - low) * share)
+    return np.asarray(low + (high - low) * assembly.spread(np.linspace(0.0, 1.0, N_GRID_PLACES)))
 
 
 @dataclass(frozen=True)
@@ -287,7 +284,7 @@ class Solution(ShortRepr):
     @cached_property
     def curve(self) -> Monotone:
         """The effort on the grid and at its turning points: (m, k), without friction."""
-        grid = grid_over(self.drive, self.low, self.high)
+        grid = grid_over(self.assembly, self.low, self.high)
         units = self.assembly.units(grid)
         effort = self.broadcast(self.assembly.total(units.effort))
         slope = self.broadcast(self.assembly.total(units.stiffness))

@@ -16,9 +16,10 @@ the slider's spring, that adds most where a joint turns most per travel.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
 
 
+Ends = tuple[float, float]
 FULL_TURN = 2.0 * math.pi
 SHORT_OF_END = 1e-3  # share of an arc that a motion stays away from its ends, where efforts are unbounded
 MIN_END_SHARE = 1e-6
@@ -59,38 +61,72 @@ class Rubbing:
 
 
 @dataclass(frozen=True, repr=False)
-class Assembly(ShortRepr):
+class Assembly(ShortRepr, ABC):
     """A slider-crank put together, or several as rows; the motion that can be run through is that of one."""
+
+    drive: ClassVar[Kind]  # the effort that drives it, as `analysis.drive` says it
+    # of the motion: its name in a specification and among the values, its dimension, and what it is in words
+    motion_name: ClassVar[Literal["angle", "travel"]]
+    dimension: ClassVar[Literal["angle", "length"]]
+    motion_words: ClassVar[str]
+    stiffness_dimension: ClassVar[Literal["rotational_stiffness", "stiffness"]]  # of the effort by the motion
+    also_stacked: ClassVar[tuple[str, ...]] = ()  # attributes beside the fields (`cfmkit.families.rows.stack`)
 
     linkage: Linkage  # the lengths, the coupler's written out
     unloaded: float  # crank angle with all springs relaxed [rad]
     rates: FloatArray  # (4,), of the springs of all legs together [N m/rad; the last N/m]
-    drive: Kind = "torque"  # what the motion is: the crank's angle ("torque") or the slider's travel ("force")
-    side: int = 1  # of a force drive: 1 beyond, -1 before the stretched position
+    side: int = 1  # of a slider that is pushed: 1 beyond, -1 before the stretched position
     anchor: float = 0.0  # how far the anchor of the slider's spring is screwed beyond where that is relaxed [m]
     rubbing: Rubbing = Rubbing()  # friction of its pins and guide; efforts of `units` and `forces` are without
 
-    @property
-    def also_stacked(self) -> tuple[str, ...]:
-        """Attributes that are stacked beside its fields (`cfmkit.families.rows.stacked`)."""
-        return ("path",) if self.drive == "force" else ()
-
-    @cached_property
-    def path(self) -> SliderPath:
-        """The way of the slider."""
-        return path_of(self.linkage, self.unloaded, self.side, self.anchor)
-
+    @abstractmethod
     def units(self, motion: FloatArray) -> UnitCurves:
         """Return what unit springs do along the motion of the drive."""
-        if self.drive == "torque":
-            return curves_along_crank(self.linkage, self.unloaded, motion, anchor=self.anchor)
-        return self.path.units(motion)
 
+    @abstractmethod
     def forces(self, motion: FloatArray) -> FloatArray:
         """Return the efforts of `units` alone, (4, n)."""
-        if self.drive == "torque":
-            return crank_efforts(self.linkage, self.unloaded, motion, self.anchor)
-        return self.path.unit_forces(motion)
+
+    @property
+    @abstractmethod
+    def start(self) -> float:
+        """The motion in the unloaded position."""
+
+    @property
+    @abstractmethod
+    def rest(self) -> float:
+        """The motion at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
+
+    @property
+    @abstractmethod
+    def stretched(self) -> float:
+        """The motion in the stretched position nearest to the unloaded one."""
+
+    @property
+    @abstractmethod
+    def reach(self) -> Ends:
+        """Ends of the motion that the linkage allows [rad or m]; infinite where the crank turns fully."""
+
+    @property
+    @abstractmethod
+    def poles(self) -> tuple[bool, bool]:
+        """Whether the effort grows without bound towards the first, and towards the last place of the reach.
+
+        A drive loses its hold in a dead point: nothing but springs that are relaxed there, or that it drives itself,
+        give it a finite effort.
+        """
+
+    @abstractmethod
+    def default_motion(self) -> Ends:
+        """Return the motion that is run through where none is requested: all of it, a full turn at most."""
+
+    @abstractmethod
+    def default_reference(self, low: float, high: float) -> float:
+        """Return where the constant band is taken in a motion unless somebody states it."""
+
+    @abstractmethod
+    def spread(self, share: FloatArray) -> FloatArray:
+        """Return even shares of a motion as those of a grid on which efforts are smooth."""
 
     @property
     def tight(self) -> float:
@@ -123,62 +159,10 @@ class Assembly(ShortRepr):
         """Return torque [N m] or force [N] at some places."""
         return self.total(self.forces(motion))
 
-    @property
-    def motion_name(self) -> Literal["angle", "travel"]:
-        """Name of the motion in a specification and among the values."""
-        return "angle" if self.drive == "torque" else "travel"
-
-    @property
-    def dimension(self) -> Literal["angle", "length"]:
-        """Dimension of the motion."""
-        return "angle" if self.drive == "torque" else "length"
-
-    @property
-    def start(self) -> float:
-        """The motion in the unloaded position."""
-        return self.unloaded if self.drive == "torque" else 0.0
-
     @cached_property
     def knee(self) -> float:
         """The knee angle in the unloaded position [rad]."""
         return self.linkage.knee(self.unloaded)
-
-    @property
-    def rest(self) -> float:
-        """The motion at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
-        other_side = self.drive == "force" and self.side * self.knee < 0.0 and self.knee != math.pi
-        return math.nan if other_side or self.anchor else self.start
-
-    @cached_property
-    def reach(self) -> tuple[float, float]:
-        """Ends of the motion that the linkage allows [rad or m]; infinite where the crank turns fully."""
-        if self.drive == "torque":
-            return self.linkage.arc(self.unloaded)
-        first, last = self._relaxed_ends
-        return 0.0 if first else -self.path.outward, 0.0 if last else self.path.inward
-
-    @cached_property
-    def _relaxed_ends(self) -> tuple[bool, bool]:
-        """Whether the springs are relaxed at the first, and at the last place that a driven slider can reach."""
-        stretched, folded = (self.knee == knee for knee in (0.0, math.pi))
-        past = self.linkage.branch * self.linkage.place(self.unloaded) < 0.0
-        return (folded, stretched) if past else (stretched, folded)
-
-    @property
-    def poles(self) -> tuple[bool, bool]:
-        """Whether the effort grows without bound towards the first, and towards the last place of the reach.
-
-        A drive loses its hold in a dead point: nothing but springs that are relaxed there, or that it drives itself,
-        give it a finite effort.
-        """
-        if self.drive == "torque":
-            held = bool(self.rates[1:].any())
-            first, last = (held and math.isfinite(end) and end != self.unloaded for end in self.reach)
-            return first, last
-        link, held = self.linkage, bool(self.rates[:3].any())
-        ends = link.find_path_ends(self.unloaded)[::-1]
-        first, last = (held and end != 0.0 and not rest for end, rest in zip(ends, self._relaxed_ends, strict=True))
-        return first, last
 
     def clip_motion(self, low: float, high: float) -> tuple[float, float]:
         """Return the part of a motion that is within reach, and ends before the efforts grow without bound.
@@ -195,30 +179,175 @@ class Assembly(ShortRepr):
         return max(low, first), min(high, last)
 
     @property
-    def _ways(self) -> tuple[float, float]:
-        """Distances of the motion from the unloaded position to the first, and to the last place of the reach.
+    def _ways(self) -> Ends:
+        """Distances of the motion from the unloaded position to the first, and to the last place of the reach."""
+        first, last = self.reach
+        return self.start - first, last - self.start
+
+
+class TurnedCrank(Assembly):
+    """A slider-crank that a torque drives over the crank's angle."""
+
+    drive = "torque"
+    motion_name = "angle"
+    dimension = "angle"
+    motion_words = "crank angle"
+    stiffness_dimension = "rotational_stiffness"
+
+    def units(self, motion: FloatArray) -> UnitCurves:
+        """Return what unit springs do along the crank's angle."""
+        return curves_along_crank(self.linkage, self.unloaded, motion, self.anchor)
+
+    def forces(self, motion: FloatArray) -> FloatArray:
+        """Return the efforts of `units` alone, (4, n)."""
+        return crank_efforts(self.linkage, self.unloaded, motion, self.anchor)
+
+    @property
+    def start(self) -> float:
+        """The unloaded angle."""
+        return self.unloaded
+
+    @property
+    def rest(self) -> float:
+        """The angle at which the springs are relaxed; NaN if an anchor tightens one."""
+        return math.nan if self.anchor else self.unloaded
+
+    @property
+    def stretched(self) -> float:
+        """The crank angle in the stretched position nearest to the unloaded one."""
+        return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, FULL_TURN)
+
+    @cached_property
+    def reach(self) -> Ends:
+        """Ends of the angle; infinite where the crank turns fully."""
+        return self.linkage.arc(self.unloaded)
+
+    @property
+    def poles(self) -> tuple[bool, bool]:
+        """Whether the torque grows without bound towards either end of the arc."""
+        held = bool(self.rates[1:].any())
+        first, last = (held and math.isfinite(end) and end != self.unloaded for end in self.reach)
+        return first, last
+
+    def default_motion(self) -> Ends:
+        """Return a full turn, or the arc that the crank can turn, less a little at either end."""
+        low, high = self.reach
+        if math.isinf(low):
+            return self.start, self.start + FULL_TURN
+        room = SHORT_OF_END * (high - low)
+        return low + room, high - room
+
+    def default_reference(self, low: float, high: float) -> float:
+        """Return the stretched position, or the middle of a motion that it is not in."""
+        return self.stretched if low <= self.stretched <= high else 0.5 * (low + high)
+
+    def spread(self, share: FloatArray) -> FloatArray:
+        """Return the shares as they are."""
+        return share
+
+
+class PushedSlider(Assembly):
+    """A slider-crank that a force drives over the slider's travel, which is counted from the unloaded position."""
+
+    drive = "force"
+    motion_name = "travel"
+    dimension = "length"
+    motion_words = "travel of the slider"
+    stiffness_dimension = "stiffness"
+    also_stacked = ("path",)
+
+    @cached_property
+    def path(self) -> SliderPath:
+        """The way of the slider."""
+        return path_of(self.linkage, self.unloaded, self.side, self.anchor)
+
+    def units(self, motion: FloatArray) -> UnitCurves:
+        """Return what unit springs do along the travel."""
+        return self.path.units(motion)
+
+    def forces(self, motion: FloatArray) -> FloatArray:
+        """Return the efforts of `units` alone, (4, n)."""
+        return self.path.unit_forces(motion)
+
+    @property
+    def start(self) -> float:
+        """No travel."""
+        return 0.0
+
+    @property
+    def rest(self) -> float:
+        """The travel at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
+        return math.nan if self._is_beyond or self.anchor else 0.0
+
+    @property
+    def _is_beyond(self) -> bool:
+        """Whether it moves on the other side of the stretched position than the unloaded one."""
+        return self.side * self.knee < 0.0 and self.knee != math.pi
+
+    @property
+    def stretched(self) -> float:
+        """The travel in the stretched position."""
+        first, last = self.reach
+        return first if self.linkage.find_path_ends(self.unloaded)[1] == self.linkage.stretched_position else last
+
+    @cached_property
+    def reach(self) -> Ends:
+        """Ends of the travel."""
+        inward, outward = self.linkage.room(self.unloaded)
+        first, last = self._relaxed_ends
+        return 0.0 if first else -outward, 0.0 if last else inward
+
+    @cached_property
+    def _relaxed_ends(self) -> tuple[bool, bool]:
+        """Whether the springs are relaxed at the first, and at the last place that a driven slider can reach."""
+        stretched, folded = (self.knee == knee for knee in (0.0, math.pi))
+        past = self.linkage.branch * self.linkage.place(self.unloaded) < 0.0
+        return (folded, stretched) if past else (stretched, folded)
+
+    @property
+    def poles(self) -> tuple[bool, bool]:
+        """Whether the force grows without bound towards either end of the travel."""
+        link, held = self.linkage, bool(self.rates[:3].any())
+        ends = link.find_path_ends(self.unloaded)[::-1]
+        first, last = (held and end != 0.0 and not rest for end, rest in zip(ends, self._relaxed_ends, strict=True))
+        return first, last
+
+    @property
+    def _ways(self) -> Ends:
+        """Distances from the unloaded position to the first, and to the last place of the reach.
 
         On the other side of the stretched position the slider gets to the folded one by way of the stretched one,
         the springs turned all the way, however near to it the unloaded position is.
         """
         first, last = self.reach
-        ways = [self.start - first, last - self.start]
-        if self.drive == "force" and math.isnan(self.rest):
-            ends, far = self.linkage.find_path_ends(self.unloaded)[::-1], self.linkage.stretched_position
-            ways = [arc if abs(end) == far else last - first for arc, end in zip(ways, ends, strict=True)]
-        return ways[0], ways[1]
+        if not math.isnan(self.rest):
+            return super()._ways
+        ends, far = self.linkage.find_path_ends(self.unloaded)[::-1], self.linkage.stretched_position
+        to_first, to_last = (
+            arc if abs(end) == far else last - first for arc, end in zip(super()._ways, ends, strict=True)
+        )
+        return to_first, to_last
 
-    @property
-    def stretched(self) -> float:
-        """The motion in the stretched position nearest to the unloaded one."""
-        if self.drive == "force":
-            first, last = self.reach
-            return first if self.linkage.find_path_ends(self.unloaded)[1] == self.linkage.stretched_position else last
-        return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, FULL_TURN)
+    def default_motion(self) -> Ends:
+        """Return all travel inward less a little; relaxed folded, it can only be pulled."""
+        low, high = self.reach
+        room = SHORT_OF_END * (high - low)
+        return (0.0, high - room) if high > room else (low + room, 0.0)
+
+    def default_reference(self, low: float, high: float) -> float:
+        """Return the middle of a motion."""
+        return 0.5 * (low + high)
+
+    def spread(self, share: FloatArray) -> FloatArray:
+        """Return their squares: the force runs like the square root of the travel from the stretched place."""
+        return share**2
 
 
-def assemble(spec: SliderCrankSpec) -> Assembly:
-    """Return the slider-crank put together.
+ASSEMBLY_BY_DRIVE: dict[Kind, type[Assembly]] = {kind.drive: kind for kind in (TurnedCrank, PushedSlider)}
+
+
+def assemble(spec: SliderCrankSpec, drive: Kind | None = None) -> Assembly:
+    """Return the slider-crank put together, for the drive of its analysis or another one.
 
     Raises CannotBuild if it cannot exist as described; the finding says why.
     """
@@ -227,11 +356,10 @@ def assemble(spec: SliderCrankSpec) -> Assembly:
     springs = mechanism.springs
     rates = np.array(springs.rates) * mechanism.sets
     rates.setflags(write=False)
-    return Assembly(
+    return ASSEMBLY_BY_DRIVE[drive or analysis.drive](
         linkage,
         unloaded,
         rates,
-        analysis.drive,
         analysis.side_sign or linkage.side(unloaded),
         springs.anchor or 0.0,
         _rubbing(mechanism),
@@ -247,21 +375,10 @@ def _rubbing(mechanism: Mechanism) -> Rubbing:
     )
 
 
-def default_motion(assembly: Assembly) -> tuple[float, float]:
-    """Return the motion that is run through where none is requested: all of it, a full turn at most."""
-    low, high = assembly.reach
-    if math.isinf(low):
-        return assembly.start, assembly.start + FULL_TURN
-    room = SHORT_OF_END * (high - low)
-    if assembly.drive == "force":
-        return (0.0, high - room) if high > room else (low + room, 0.0)  # relaxed folded, it can only be pulled
-    return low + room, high - room
-
-
 def asked_motion(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float]:
     """Return the motion that the analysis asks for [rad or m]."""
     asked: tuple[float, float] | None = getattr(spec.analysis, assembly.motion_name)
-    return asked or default_motion(assembly)
+    return asked or assembly.default_motion()
 
 
 def window_of(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float] | None:
@@ -272,14 +389,8 @@ def window_of(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float] 
 
 def reference_motion(spec: SliderCrankSpec, assembly: Assembly) -> float:
     """Return where the constant band is taken: as asked, else the stretched position, or half way of a force."""
-    low, high = asked_motion(spec, assembly)
-    if assembly.drive == "force":
-        asked = spec.analysis.reference_travel
-        return 0.5 * (low + high) if asked is None else asked
-    asked = spec.analysis.reference_angle
-    if asked is not None:
-        return asked
-    return assembly.stretched if low <= assembly.stretched <= high else 0.5 * (low + high)
+    asked: float | None = getattr(spec.analysis, f"reference_{assembly.motion_name}")
+    return assembly.default_reference(*asked_motion(spec, assembly)) if asked is None else asked
 
 
 def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple[FloatArray, FloatArray]:
