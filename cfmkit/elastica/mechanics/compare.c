@@ -9,6 +9,7 @@
 #include "march.h"
 
 #define N_COMPARED 7 /* numbers of a state, see `compare` */
+#define SHORTEST_CHORD 1e-9 /* of a shape of length 1 that can be fitted, as in beam_fits.py */
 
 /* As in accuracy.py. */
 #define N_PICKED 6 /* points at which the error of a path is estimated */
@@ -40,18 +41,61 @@ static void fill(const Model *shapes, Int elements, Int k, const double *law, co
     }
 }
 
-int beam_tables(const Model *shapes, Int elements, const Int *row, const double *cuts, const double *coefficients, Int powers,
-                const double *length, const double *rigidities, Int beams, double unit_length, double unit_force,
-                double *tables, double *lengths) {
-    for (Int k = 0; k < elements; k++) {
-        const Int b = row[k];
-        const double law[2] = {cuts[2 * k], cuts[2 * k + 1] - cuts[2 * k]}, speed = length[b] / unit_length * law[1];
-        const double rigidity = rigidities[b] / (unit_force * (unit_length * unit_length)) / (speed * speed);
-        fill(shapes, elements, k, law, coefficients + b * powers, powers, speed, rigidity, rigidities[beams + b] * unit_force,
-             rigidities[2 * beams + b] * unit_force, tables);
-        lengths[k] = speed;
+/* Arrays of a network of plain beams, one element each, that is like the one whose row is given: to `block` what the two do
+ * not share, whose addresses replace those in the row. `at` (elements + attachments, 2): nodes of both ends, then node and
+ * master; `rule` (2, count): places and weights along a whole beam; `spots` (nodes, 2) [m]; `beams` (elements, 8 + powers):
+ * bending, compliances by stretching and shearing, floor, offsets of both ends [m], angle. 0 if a beam cannot be fitted. */
+int fill_network(Model *m, const Int *at, Int attachments, const double *rule, Int count, const double *spots, const double *beams,
+                 Int powers, double *block) {
+    const Int e = m->elements, wide = 8 + powers, all = e * m->points, triangle = (m->degree + 1) * (m->degree + 2) / 2;
+    double *bend = block + 6 * all, *length = bend + e * triangle, *origin = length + e, *arm = origin + 2 * attachments;
+    double *unit = arm + 2 * attachments, *laws = unit + m->free, *scales = laws + e * (2 + powers), sum = 0.0;
+    for (Int k = 0; k < e; k++) {
+        const double *own = beams + k * wide, *first = spots + 2 * at[2 * k], *last = spots + 2 * at[2 * k + 1];
+        const double dx = last[0] + own[6] - (first[0] + own[4]), dy = last[1] + own[7] - (first[1] + own[5]);
+        double *law = laws + k * (2 + powers), cx = 0.0, cy = 0.0;
+        law[0] = 0.0; law[1] = 1.0;
+        memcpy(law + 2, own + 8, (size_t)powers * sizeof(double));
+        for (Int i = 0; i < count; i++) {
+            double angle = 0.0;
+            for (Int power = powers - 1; power >= 0; power--) angle = angle * rule[i] + own[8 + power];
+            cx += rule[count + i] * cos(angle);
+            cy += rule[count + i] * sin(angle);
+        }
+        const double far = dx * dx + dy * dy, chord = cx * cx + cy * cy;
+        if (!(far > 0.0 && chord > SHORTEST_CHORD * SHORTEST_CHORD)) return 0;
+        law[2] += atan2(dy * cx - dx * cy, dx * cx + dy * cy);
+        length[k] = sqrt(far / chord);
+        sum += length[k];
     }
-    return CONVERGED;
+    const double unit_length = sum / (double)e, unit_force = beams[0] / (unit_length * unit_length), square = unit_length * unit_length;
+    for (Int k = 0; k < 2 * attachments; k++) {
+        const Int *own = at + 2 * e + 2 * (k / 2);
+        origin[k] = spots[2 * own[1] + k % 2] / unit_length;
+        arm[k] = (spots[2 * own[0] + k % 2] - spots[2 * own[1] + k % 2]) / unit_length;
+    }
+    for (Int a = 0; a < m->free; a++) unit[a] = HUGE_VAL;
+    for (Int k = 0; k < e; k++) {
+        const double *own = beams + k * wide, *law = laws + k * (2 + powers), speed = length[k] / unit_length;
+        const double rigidity = own[0] / (unit_force * square) / (speed * speed);
+        const double axial = own[1] * unit_force + own[3] * unit_force * square / own[0];
+        double bending = 0.0;
+        fill(m, e, k, law, law + 2, powers, speed, rigidity, axial, own[2] * unit_force, block);
+        length[k] = speed;
+        for (Int i = 0; i < triangle; i++) bend[k * triangle + i] = speed * rigidity * m->unit_bend[i];
+        for (Int i = 0; i < 4; i++) arm[2 * m->ends[2 * k + i / 2] + i % 2] += own[4 + i] / unit_length;
+        for (Int i = 0; i < m->points; i++) bending += rigidity * block[all + k * m->points + i];
+        for (Int i = 1; i <= 2; i++) {
+            const Int slot = m->slot[m->unknowns[(k + 1) * (m->degree + 9) - i]];
+            if (slot >= 0) unit[slot] = bending * speed / (speed * speed);
+        }
+    }
+    m->angle = block; m->weight = block + all; m->rigidity = block + 2 * all;
+    m->axial = block + 3 * all; m->shear = block + 4 * all; m->ahead = block + 5 * all;
+    m->bend = bend; m->length = length; m->origin = origin; m->arm = arm; m->unit = unit;
+    scales[0] = unit_length;
+    scales[1] = unit_force;
+    return 1;
 }
 
 /* The tables at other points: what is even along an element is its first value there. */

@@ -224,9 +224,12 @@ class CompiledEquations(NumpyEquations):
 
     def _find_laws(self, degree: int) -> FloatArray:
         """Return the laws by which tables of a higher degree are made, empty unless all beams are plain."""
+        if degree > MAX_DEGREE:
+            return NO_NUMBERS
+        if "laws" in self.arrays:
+            return self.arrays["laws"]  # type: ignore[no-any-return]
         mesh, bundle = self.mesh, self.mesh.fits.bundle
-        special = has_more_unknowns(mesh) or bundle.others or degree > MAX_DEGREE
-        if special or np.count_nonzero(mesh.elements.line):
+        if has_more_unknowns(mesh) or bundle.others or np.count_nonzero(mesh.elements.line):
             return NO_NUMBERS
         return angle_laws(bundle.coefficients[mesh.fits.number], mesh)
 

@@ -158,9 +158,8 @@ int linearise(const Model *m, const double *x, double way, double *residual, dou
 int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable);
 int solve_each(const Model *m, double *x, double *way, Int count, const Goal *goal, double *rate, double *found);
 double soften(const Model *m, const double *x, double way, Int rounds, double *vector);
-int beam_tables(const Model *shapes, Int elements, const Int *row, const double *cuts, const double *coefficients, Int powers,
-                const double *length, const double *rigidities, Int beams, double unit_length, double unit_force,
-                double *tables, double *lengths);
+int fill_network(Model *m, const Int *at, Int attachments, const double *rule, Int count, const double *spots, const double *beams,
+                 Int powers, double *block);
 int compare(const Model *models, Int designs, const Model *shapes, const double *laws, Int powers, const double *z,
             const double *drive, Int count, double tolerance, double *ends, double *found);
 double path_error(const Model *m, const Model *shapes, const double *laws, Int powers, const double *rows, Int count);

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece
+from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece, join_pieces
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise, embed, raise_degree
 from cfmkit.elastica.mechanics.equations import NaturalMarch
+from cfmkit.elastica.mechanics.plain_networks import arrange
 from cfmkit.elastica.mechanics.problem import DEGREES_MORE
 from cfmkit.elastica.model.beam_fits import coils
 from cfmkit.elastica.model.contact import BeamSide
@@ -84,6 +85,8 @@ class DegreeAndPieces:
         self, network: Network, drive: Drive, fits: BeamFits | None = None, flanks: tuple[FlankPlace, ...] = ()
     ) -> Discretisation:
         """Return the arrays of a network, whose beams may be fitted already, and whose sides may touch at places."""
+        if self.pieces == 1 and not (self.tension or flanks):
+            return arrange(network, drive, self.degree, fits)
         return discretise(network, drive, self.degree, self.pieces, self.tension, fits=fits, flanks=flanks)
 
 
@@ -359,8 +362,7 @@ def trace_on(
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _path(network, drive, _states(start, meshes, columns), columns, told, status, message)
     if len(points) == 2 and not events and isinstance(points[1], NaturalMarch):  # one march from the start to the end
-        least = CORRECTION_ERROR * start.problem.next_correction
-        object.__setattr__(path, "error", max(points[1].error, least))
+        vars(path)["error"] = max(points[1].error, CORRECTION_ERROR * start.problem.next_correction)
     if changes:
         touched = tuple(
             ContactEvent(one.kind, one.contact, one.at.drive * unit, one.before, one.after, one.states)
@@ -395,8 +397,6 @@ def _states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points:
         pieces.append(StatesOfPiece(arrays, z, drives))
     if len(pieces) == 1 or start.problem.remesh is None:
         return Equilibria(*pieces[0])
-    from cfmkit.elastica.contact.path_items import join_pieces
-
     drives = np.concatenate([piece.drive for piece in pieces])
     return Equilibria(*join_pieces([piece for piece in pieces if len(piece.drive)], start.problem.remesh), drives)
 
@@ -436,16 +436,15 @@ def _settle_events(points: PointColumns, events: list[PathEvent], drive: Drive, 
 def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
     names = {branch: _name_branch(branch, unit) for branch in set(branches)}
     if len(names) == 1:
-        return read_only(np.full(len(branches), *names.values()), np.str_)
+        return read_only(np.full(len(branches), next(iter(names.values()))), np.str_)
     return read_only([names[branch] for branch in branches], np.str_)
 
 
 def _name_branch(branch: PathBranch | None, unit: float) -> str:
     if branch is None:
         return "primary"
-    where = (
-        f"under {100 * branch.drive:.4g} % of the {branch.label}" if branch.label else f"at {branch.drive * unit:.6g}"
-    )
+    share = f"under {100 * branch.drive:.4g} % of the {branch.label}"
+    where = share if branch.label else f"at {branch.drive * unit:.6g}"
     return f"bifurcated {where}, sign {branch.sign:+d}"
 
 
