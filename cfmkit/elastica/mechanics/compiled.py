@@ -172,9 +172,9 @@ class CompiledEquations(NumpyEquations):
         return solutions, int(self._count_each(free[None], np.array([place]), count)[0])
 
     def _count_each(self, free: FloatArray, places: FloatArray, told: Any) -> Any:
-        """Return counts of C (k,); where it knows only the parity, told < 0, eigenvalues are counted."""
+        """Return counts of C (k,); where loads follow and it knows only the parity, told < 0, eigenvalues."""
         unknown = np.flatnonzero(told < 0)
-        if len(unknown):
+        if len(unknown) and self.follows:
             tangents = [self.linearise(free[k], places[k]).tangent for k in unknown.tolist()]
             told[unknown] = energy.count_divergent(self.mesh, np.array(tangents))
         return told
@@ -215,7 +215,8 @@ class CompiledEquations(NumpyEquations):
         if special or np.count_nonzero(mesh.elements.line):
             return None
         laws = angle_laws(bundle.coefficients[mesh.fits.number], mesh)
-        return compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+        compared = compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+        return None if not self.follows and (compared.unstable < 0).any() else compared
 
     def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode."""
