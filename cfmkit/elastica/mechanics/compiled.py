@@ -113,13 +113,6 @@ class CompiledEquations(NumpyEquations):
         vars(exchanged).update(mesh=mesh, unit=unit, arrays={**self.arrays, **arrays}, row=row)
         return exchanged
 
-    def exchange_axial(self, mesh: Discretisation) -> CompiledEquations:
-        """Return the equations of the same network with other compliances along its elements."""
-        arrays, exchanged = {"axial": np.ascontiguousarray(mesh.elements.axial)}, copy(self)
-        row = make_row(arrays, {}, self.row)
-        vars(exchanged).update(mesh=mesh, arrays={**self.arrays, **arrays}, row=row)
-        return exchanged
-
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
         gradient, hessian = np.empty(len(z)), np.empty((len(z), len(z)))
@@ -220,7 +213,8 @@ class CompiledEquations(NumpyEquations):
         laws = self._find_laws(degree)
         if not len(laws):
             return None
-        return compare_rows(self.row, self.mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+        compared = compare_rows(self.row, self.mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+        return None if not self.follows and (compared.unstable < 0).any() else compared
 
     def _find_laws(self, degree: int) -> FloatArray:
         """Return the laws by which tables of a higher degree are made, empty unless all beams are plain."""

@@ -246,6 +246,14 @@ int factors_eliminate(Factors *f, const Int *leaves, Int element) {
     return 1;
 }
 
+/* Take shares of a pivot's row from the next rows of n numbers, and put them in the pivot's column. */
+FAST static void take_row(Int n, Int rows, const double *restrict pivot, double *restrict below) {
+    for (Int i = 0; i < rows; i++, below += n) {
+        const double share = below[0] /= pivot[0];
+        if (share != 0.0) for (Int j = 1; j <= rows; j++) below[j] -= share * pivot[j];
+    }
+}
+
 static int dense_factors(Factors *f) {
     const Int n = f->n;
     int odd = 0;
@@ -261,11 +269,7 @@ static int dense_factors(Factors *f) {
         }
         if (row[k] == 0.0 || row[k] != row[k]) return 0;
         if (row[k] < 0.0) odd = !odd;
-        for (Int i = k + 1; i < n; i++) {
-            double *below = f->dense + i * n;
-            const double share = below[k] /= row[k];
-            if (share != 0.0) for (Int j = k + 1; j < n; j++) below[j] -= share * row[j];
-        }
+        take_row(n, n - k - 1, row + k, row + k + n);
     }
     f->negative = odd;
     return 1;

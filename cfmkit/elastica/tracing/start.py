@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.contact.path_items import ContactChange, Remeshed
-from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, make_inextensible
 from cfmkit.elastica.mechanics.numbering import number_free
 from cfmkit.elastica.mechanics.problem import NetworkProblem
@@ -178,8 +177,6 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
     if not needless.size:
         return problem, at
     stiff = replace(problem, mesh=make_inextensible(mesh, needless))
-    equations = [(key, made) for key, made in mesh.known.items() if type(made) is CompiledEquations]
-    stiff.mesh.known.update((key, made.exchange_axial(stiff.mesh)) for key, made in equations)
     if problem.remesh is not None:
         beams, remesh = {mesh.elements.beam[number] for number in needless.tolist()}, problem.remesh
 
