@@ -15,6 +15,10 @@ NonNegativeLength = Annotated[Length, Field(ge=0)]
 PositiveForce = Annotated[Force, Field(gt=0)]
 
 
+STUDY_BLOCKS = ("sweep", "sensitivity", "suggest")
+"""Blocks of a specification that no analysis reads."""
+
+
 class Model(BaseModel):
     """Base of every block: frozen, no unknown keys, no silent type changes."""
 

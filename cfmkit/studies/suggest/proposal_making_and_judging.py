@@ -351,7 +351,11 @@ def judge_proposal(
     space: BoundingBox | None = record.envelope(result)
     result, values = add_size(result, space), values_of_family(record.outputs.values)
     required = plain.replace(
-        {"requirements": list_requirements(request, result, space, values), "design": block_for_redesign(spec, request)}
+        {
+            "requirements": list_requirements(request, result, space, values),
+            "design": block_for_redesign(spec, request),
+            **({"suggest": request.stated} if hasattr(plain, "suggest") else {}),
+        }
     )
     text = dump(with_made_parts(required, request, seed))
     written = spec_of(name, text)
