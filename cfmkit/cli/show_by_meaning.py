@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from cfmkit.cli.guide import compile_phrases, read_terms, search, words_for_synonym
 from cfmkit.cli.show_topics import TOPIC_KINDS
 from cfmkit.documents.document import Document, Paragraph, field, record_table
+from cfmkit.specs.block import STUDY_BLOCKS
 
 if TYPE_CHECKING:
     import re
@@ -61,7 +62,7 @@ def explain_by_meaning(word: str) -> Document | None:
 def _names(word: str, targets: Sequence[str]) -> list[NamedMeaning]:
     """Return the names that match a word: those of its glossary entry, then names with it, then meanings with it.
 
-    Of keys that have one name and meaning in several blocks the shortest path stands for all.
+    Of keys that have one name and meaning in several blocks the shortest path stands for all, one that is analysed.
     """
     by_target, by_word = compile_phrases(targets or (word,)), compile_phrases((word,))
     named: dict[tuple[str, str, str], NamedMeaning] = {}
@@ -71,9 +72,13 @@ def _names(word: str, targets: Sequence[str]) -> list[NamedMeaning]:
         rank = next((rank for rank, match in enumerate(ranks) if match), None)
         if rank is not None:
             present = named.get((kind, last, meaning))
-            if present is None or len(path) < len(present.name):
+            if present is None or _sorting_key(path) < _sorting_key(present.name):
                 named[kind, last, meaning] = NamedMeaning(rank, path, kind, meaning)
     return sorted(named.values(), key=lambda entry: entry.rank)
+
+
+def _sorting_key(path: str) -> tuple[bool, int]:
+    return path.partition(".")[0] in STUDY_BLOCKS, len(path)
 
 
 def _is_part(word: re.Pattern[str], name: str) -> bool:

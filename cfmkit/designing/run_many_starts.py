@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
+from cfmkit.specs.block import STUDY_BLOCKS
 from cfmkit.store import origin, stable_hash
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 Anything = TypeVar("Anything")
 
-NOT_DECIDING = {"name", "description", "requirements", "sweep", "sensitivity"}
+NOT_DECIDING = {"name", "description", "requirements", *STUDY_BLOCKS}
 """Blocks of a specification that no search looks at."""
 KEY_DIGITS = 32  # hexadecimal digits of the key under which a start is noted
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.export.contours import DRIVEN_LAYER, HELD_LAYER, OUTLINE_TOLERANCE, Contour, EngravedText, circle
+from cfmkit.specs.block import replace_blocks
 from cfmkit.specs.units import format_short
 from cfmkit.stock.stock_series import SOCKET_SCREWS
 
@@ -60,8 +61,7 @@ def remove_screws(spec: Any) -> Any:
     part = spec.mechanism.part
     if part is None or part.screws is None:
         return spec
-    plain = spec.mechanism.model_copy(update={"part": part.model_copy(update={"screws": None})})
-    return spec.model_copy(update={"mechanism": plain})
+    return replace_blocks(spec, type(part), lambda block: block.derive(screws=None))
 
 
 def _places_of_heads(outline: FloatArray, head: float) -> list[FloatArray]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypedDict
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from cfmkit.families.request_options import RequestOption, write_band, write_envelope, write_list
-from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
+from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, Spec, refuse
 from cfmkit.specs.units import Angle, Ratio, Torque, format_short
 from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec, SafetyFactor
 from cfmkit.stock.processes import PROCESSES_BY_NAME, ProcessName, why_not_made
@@ -252,6 +252,14 @@ class RequestArguments(TypedDict, total=False):
     min_yield: str | float | None
     overload: str | None
     prefer: Sequence[str] | None
+
+
+class ProposedSpec(Spec):
+    """A specification that `suggest` may write."""
+
+    suggest: SuggestBlock | None = Field(
+        None, description="requirements that it was proposed for; `cfmkit suggest` takes the file with them"
+    )
 
 
 class SuggestFile(Model):

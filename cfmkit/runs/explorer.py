@@ -23,6 +23,7 @@ from cfmkit.documents.run_outcome import report_on
 from cfmkit.errors import CfmError, OutputError, SpecError, UsageError, lines_of, visible
 from cfmkit.results import Status
 from cfmkit.runs.specfile import apply_options, bind, read_spec
+from cfmkit.specs.block import STUDY_BLOCKS
 from cfmkit.specs.units.strict_decimal_number import NUMBER_PATTERN
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.yamlio import YamlDocument
 
 
-LEFT_OUT = ("cfmkit", "family", "name", "description", "design", "sweep", "sensitivity")
+LEFT_OUT = ("cfmkit", "family", "name", "description", "design", *STUDY_BLOCKS)
 """Blocks without sliders: what is analysed does not depend on them."""
 MOST_POINTS = 600  # points of a branch that the page draws: more than there are pixels across its diagram
 SLIDER_SPAN = 0.5

@@ -19,7 +19,7 @@ from cfmkit.errors import ExitCode, Problem, SpecError
 from cfmkit.families.proposals import Request
 from cfmkit.families.request_spec import RequestArguments, SuggestBlock, SuggestFile
 from cfmkit.families.run_control import Run, read_time
-from cfmkit.runs.specfile import STDIN_PATH, content, rename_source, standard_input
+from cfmkit.runs.specfile import STDIN_PATH, bind, content, rename_source, standard_input
 from cfmkit.specs.units import format_short, to_border
 from cfmkit.specs.yamlio import read_document
 from cfmkit.studies.pool import give_up_at
@@ -225,6 +225,8 @@ def read_request(
     for key, value in keys.items():
         document = document.set(f"suggest.{key}={value}")
     try:
+        if isinstance(document.tree, dict) and {"family", "suggest"} <= document.tree.keys():  # of a proposal
+            return bind(document).suggest  # type: ignore[attr-defined, no-any-return]
         return document.bind(SuggestFile).suggest
     except SpecError as error:
         reported = error

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, create_model, field_validator, model_validator
 
-from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength, keys_of
+from cfmkit.specs.block import STUDY_BLOCKS, Model, NonNegativeLength, PositiveForce, PositiveLength, keys_of
 from cfmkit.specs.further_metrics import OF_MANY_PARTS, name_of
 from cfmkit.specs.study_spec import Correlated, Sensitivity, Sweep, Tolerance
 from cfmkit.specs.target_curve import Target
@@ -326,7 +326,7 @@ class Spec(Model):
 
         Laws that are assumed of a named material are none of the specification's.
         """
-        everything = self.model_dump(exclude_none=True, exclude={"sweep", "sensitivity"})
+        everything = self.model_dump(exclude_none=True, exclude=set(STUDY_BLOCKS))
         yield from _stated_leaves(everything, self.model_dump(exclude_unset=True))
 
 

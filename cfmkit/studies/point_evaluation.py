@@ -29,6 +29,7 @@ from cfmkit.metrics import (
 )
 from cfmkit.metrics.window_metrics import STATIC_BALANCE
 from cfmkit.results import Result
+from cfmkit.specs.block import STUDY_BLOCKS
 from cfmkit.specs.data_file_paths import list_data_files
 from cfmkit.specs.units import to_border
 from cfmkit.store import file_hash, origin, stable_hash
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
     DesignMaker = Callable[[Spec, Designer, Run], Design]
 
 
-NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
+NOT_DECIDING = {"name", "description", *STUDY_BLOCKS}
 """Parts of a specification that change no result of a point."""
 RECORD_VERSION = 5  # how records of the journal are written: those of another number are computed again
 
@@ -152,7 +153,7 @@ class Study:
     @cached_property
     def plain(self) -> Spec:
         """The specification without what is said of studies, which each variant would read again."""
-        return self.spec.model_copy(update={"sweep": None, "sensitivity": None})
+        return self.spec.model_copy(update={name: None for name in STUDY_BLOCKS if hasattr(self.spec, name)})
 
     def solve(self, spec: Spec) -> Result:
         """Return the result of a variant, designed first if the study says so, with the warnings of both."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from cfmkit.errors import Problem, QuantityError, SpecError, UsageError
+from cfmkit.specs.block import STUDY_BLOCKS
 from cfmkit.specs.units import BareFloat, UnitField, attach_dimension, format_quantity
 from cfmkit.specs.units.fields import describe_value
 from cfmkit.specs.yamlio.explain_validation_errors import not_among
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 Value = float | int | str | bool
 Kind = Literal["quantity", "number", "whole", "word", "switch"]
 
-FIXED_BLOCKS = ("cfmkit", "family", "name", "description", "requirements", "sweep", "sensitivity")
+FIXED_BLOCKS = ("cfmkit", "family", "name", "description", "requirements", *STUDY_BLOCKS)
 """Blocks of a specification that do not describe the mechanism or its analysis."""
 NAME_PLACEHOLDER = "NAME"  # stands for any name of a block's own choosing in a path, as the name of a beam
 _MAX_DEPTH = 8

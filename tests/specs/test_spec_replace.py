@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from pydantic import ValidationError
 
+import cfmkit
 from cfmkit import SpecError
 from cfmkit.api import load
+from cfmkit.specs.block import replace_blocks
+from cfmkit.specs.spec import Requirement
 from cfmkit.specs.yamlio.paths import with_value
 
 if TYPE_CHECKING:
@@ -64,3 +67,19 @@ def test_a_replaced_value_gives_what_the_whole_file_with_it_gives(file: Path) ->
         assert own == whole, path
         if own is not None and whole is not None:
             assert own.model_dump(exclude_unset=True) == whole.model_dump(exclude_unset=True), path
+
+
+def test_blocks_of_a_kind_are_changed_wherever_they_are_and_not_counted_as_stated() -> None:
+    spec = cfmkit.load(CONFIGS / "vcfm_ding2022.yaml")
+    text = cfmkit.dumps(spec)
+    halved = replace_blocks(
+        spec, type(spec.mechanism.material), lambda block: block.derive(youngs_modulus=0.5 * block.modulus)
+    )
+    assert halved.mechanism.material.modulus == 0.5 * spec.mechanism.material.modulus
+    assert cfmkit.dumps(halved) == text
+    assert halved.mechanism.bistable is spec.mechanism.bistable
+    assert halved.analysis is spec.analysis
+    assert replace_blocks(spec, Requirement, lambda block: block) is spec
+    before, after = (cfmkit.analyze(each) for each in (spec, halved))
+    mean = cfmkit.evaluate(before, ["force_mean"])["force_mean"].value
+    assert cfmkit.evaluate(after, ["force_mean"])["force_mean"].value == pytest.approx(0.5 * mean, rel=1e-6)

@@ -325,3 +325,11 @@ def test_common_units_are_read_and_written_without(heavy: str) -> None:
         f"assert {heavy!r} not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_temperatures_are_in_kelvin_and_degrees_of_others_are_refused_with_the_way_to_write_them() -> None:
+    assert read_quantity("296.15 K", "temperature") == 296.15
+    assert format_quantity(296.15, "temperature") == "296.15 K"
+    for text in ("23 °C", "23 degC", "23 deg C", "23 C", "73.4 degF", "23 celsius"):
+        with pytest.raises(QuantityError, match="temperatures are in K"):
+            read_quantity(text, "temperature")

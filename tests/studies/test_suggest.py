@@ -129,6 +129,22 @@ def test_a_proposal_keeps_the_request_when_its_file_is_analysed():
         assert one.numbers["depth"] <= 0.012
 
 
+def test_a_proposal_says_what_was_requested_and_its_file_is_a_request_again(tmp_path):
+    asked, (candidate, *_) = offered("vcfm", cycles="100", prefer="[parts, size]")
+    text = proposal_of("vcfm", candidate, asked).text
+    file = tmp_path / "design.yaml"
+    file.write_text(text)
+    spec = cfmkit.load(file)
+    assert spec.suggest == asked.stated == block(file=file)
+    assert block({"cycles": "200"}, file).cycles == 200
+    assert "\n  prefer: [parts, size]\n" in text
+    assert not [path for path, _ in spec.leaves() if "suggest" in path]
+    assert cfmkit.dumps(spec) == text
+    stricter = spec.replace({"suggest": spec.suggest.as_written() | {"yield": "90 %"}})
+    assert "\n  yield: 0.9\n" in cfmkit.dumps(stricter)
+    assert cfmkit.loads(cfmkit.dumps(stricter)) == stricter
+
+
 def test_what_misses_a_request_says_which():
     asked = request()
     offer = propose("cam", asked)

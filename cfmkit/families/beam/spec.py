@@ -13,6 +13,7 @@ from cfmkit.families.beam.mechanism_spec import Mechanism
 from cfmkit.families.beam.network_elements_spec import DisplacementDrive, Drive, LoadsDrive, MaterialField
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.families.end_stops_spec import contact_requirement_faults, travel_up_to_stop
+from cfmkit.families.request_spec import ProposedSpec
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.formula_of_x import formula
@@ -23,7 +24,6 @@ from cfmkit.specs.spec import (
     Model,
     PositiveLength,
     SolidAnalysis,
-    Spec,
     is_made,
     refuse,
 )
@@ -227,7 +227,7 @@ class BeamAnalysis(Analysis):
     )
 
 
-class BeamSpec(Spec):
+class BeamSpec(ProposedSpec):
     """A mechanism of slender beams."""
 
     family: Literal["beam"]

@@ -11,7 +11,8 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
 from cfmkit.families.cam.springs_spec import Springs
-from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, PositiveLength, Spec, is_made, refuse
+from cfmkit.families.request_spec import ProposedSpec
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, PositiveLength, is_made, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Time, format_short
 from cfmkit.stock.material_and_part_spec import (
@@ -411,7 +412,7 @@ class CamAnalysis(Analysis):
     )
 
 
-class CamSpec(Spec):
+class CamSpec(ProposedSpec):
     """A cam mechanism: rollers, cam and springs."""
 
     family: Literal["cam"]

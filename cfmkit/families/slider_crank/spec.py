@@ -9,10 +9,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.families.end_stops_spec import stop_faults, travel_up_to_stop
+from cfmkit.families.request_spec import ProposedSpec
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
 from cfmkit.families.slider_crank.springs.spec import Limits, Links, SpringDesign, Springs
 from cfmkit.metrics.fatigue_and_relaxation import Durability
-from cfmkit.specs.spec import PositiveLength, SolidAnalysis, Spec, is_made, refuse
+from cfmkit.specs.spec import PositiveLength, SolidAnalysis, is_made, refuse
 from cfmkit.specs.units import Angle, Length, Ratio, format_short
 from cfmkit.stock.material_and_part_spec import Guide, Pins, sheet_faults, stated_sheet
 from cfmkit.stock.stock_series import StockSize, stock_faults
@@ -128,7 +129,7 @@ class CrankAnalysis(PrintedAnalysis):
         return self
 
 
-class SliderCrankSpec(Spec):
+class SliderCrankSpec(ProposedSpec):
     """A slider-crank with springs at its joints."""
 
     family: Literal["slider-crank"]

@@ -10,6 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.end_stops import EndStops
 from cfmkit.families.end_stops_spec import EndStop, stop_faults, travel_up_to_stop
+from cfmkit.families.request_spec import ProposedSpec
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS, Bistable, Positive
 from cfmkit.families.vcfm.surroundings_spec import BoughtSprings, CutLeaves, StandingFrame, VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
@@ -21,7 +22,6 @@ from cfmkit.specs.spec import (
     NonNegativeLength,
     PositiveLength,
     SolidAnalysis,
-    Spec,
     is_made,
     refuse,
 )
@@ -251,7 +251,7 @@ class VcfmAnalysis(Analysis):
         return values
 
 
-class VcfmSpec(Spec):
+class VcfmSpec(ProposedSpec):
     """A constant-force mechanism of snap-through leaves and a preloaded spring."""
 
     family: Literal["vcfm"]

@@ -266,6 +266,9 @@ def unit_complaint(unit: str, dimensions: Sequence[str]) -> str:
         word in UNITS_BY_SYMBOL for word in re.findall("[A-Za-z%]+", unit)
     ):
         return f"{quote(unit)} has two units side by side; put * or / between them"
+    if re.fullmatch("((deg|°) *)?(C|F|[Cc]elsius|[Ff]ahrenheit)", unit):
+        # an offset would be lost where values are subtracted and scaled, as tolerances are
+        return f"{quote(unit)} is not a unit: temperatures are in K, 23 degrees Celsius are 296.15 K"
     guess = nearest_unit(unit, dimensions)
     hint = f"did you mean {guess!r}?" if guess else "`cfmkit show units` lists them"
     return f"{quote(unit)} is not a unit; {hint}"

@@ -64,6 +64,7 @@ _DIMENSION_LIST = (
     Dimension("inertia", "kg*mm^2", "mass moment of inertia", "12 kg*mm^2", up=1e6),
     Dimension("density", "kg/m^3", "mass per volume", "1240 kg/m^3"),
     Dimension("time", "s", "time, duration", "0.5 s"),
+    Dimension("temperature", "K", "temperature above absolute zero", "296.15 K"),
     Dimension("velocity", "mm/s", "speed", "10 mm/s", up=1e3),
     Dimension("acceleration", "m/s^2", "acceleration", "9.80665 m/s^2"),
     Dimension("frequency", "Hz", "cycles per time", "2 Hz"),
@@ -135,6 +136,7 @@ UNIT_TABLE = (
     Unit("ms", "millisecond", "0.001 * second", "time"),
     Unit("min", "minute", "60 * second", "time"),
     Unit("h", "hour", "3600 * second", "time"),
+    Unit("K", "kelvin", "[temperature]", "temperature"),
     Unit("Hz", "hertz", "1 / second", "frequency"),
     Unit("kHz", "kilohertz", "1000 / second", "frequency"),
     Unit("rpm", "revolution_per_minute", "revolution / minute", "angular_velocity"),
@@ -194,12 +196,12 @@ def from_border(values: Any, dimension: str) -> Any:
 
 _FACTOR_PATTERN = re.compile(r" *([*/]?) *([A-Za-z%]+|1) *(?:(?:\^|\*\*) *(-?[1-9])(?![0-9]))? *")
 _MOST_FACTORS = 8
-_BASE_UNITS = {"meter": "m", "kilogram": "kg", "second": "s", "radian": "rad"}
+_BASE_UNITS = {"meter": "m", "kilogram": "kg", "second": "s", "radian": "rad", "kelvin": "K"}
 
 
 @dataclass(frozen=True)
 class Size:
-    """Unit in SI: its exact size, and the powers of m, kg, s and rad."""
+    """Unit in SI: its exact size, and the powers of m, kg, s, rad and K."""
 
     factor: Fraction
     powers: tuple[tuple[str, int], ...]

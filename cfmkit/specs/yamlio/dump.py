@@ -25,7 +25,7 @@ def dump(
     complete: bool = False,  # write every default too, not only what was set
 ) -> str:
     """Return a specification as YAML that `read_document` and `bind` turn into an equal one; keys as in the model."""
-    content = _to_json(spec, spec.model_dump(mode="json"), (), complete)
+    content = _to_json(spec, spec.model_dump(mode="json", by_alias=True), (), complete)
     # Lists of blocks, such as the requirements, read best at the end.
     ordered = dict(sorted(content.items(), key=lambda item: _holds_blocks(item[1])))
     return "".join(f"{line}\n" for line in _block_lines(ordered, 0))
@@ -43,10 +43,14 @@ def _to_json(value: Any, text: Any, allowed: tuple[Slot, ...], complete: bool) -
     if isinstance(value, BaseModel) and isinstance(text, dict):
         must_tell = sum(slot.model is not None for slot in allowed) != 1
         own_slot = Slot(type(value))
-        names = [
-            name for name in type(value).model_fields if name in text and _is_written(value, name, must_tell, complete)
-        ]
-        return {name: _to_json(getattr(value, name), text[name], own_slot.child(name), complete) for name in names}
+        keys = {
+            field.alias or name: name
+            for name, field in type(value).model_fields.items()
+            if (field.alias or name) in text and _is_written(value, name, must_tell, complete)
+        }
+        return {
+            key: _to_json(getattr(value, name), text[key], own_slot.child(key), complete) for key, name in keys.items()
+        }
     if isinstance(value, Mapping) and isinstance(text, dict):
         return {key: _to_json(value.get(key), item, _slots_below(allowed, key), complete) for key, item in text.items()}
     if isinstance(value, tuple | list) and isinstance(text, list) and len(value) == len(text):

@@ -353,10 +353,10 @@ def judge_proposal(
         return Proposal(name, variant, message=result.message)
     space: BoundingBox | None = record.envelope(result)
     result, values = add_size(result, space), values_of_family(record.outputs.values)
-    required = plain.replace(
-        {"requirements": list_requirements(request, result, space, values), "design": block_for_redesign(spec, request)}
-    )
-    text = dump(with_made_parts(required, request, seed))
+    requirements = list_requirements(request, result, space, values)
+    blocks: dict[str, Any] = {"requirements": requirements, "design": block_for_redesign(spec, request)}
+    blocks |= {"suggest": request.stated} if hasattr(plain, "suggest") else {}
+    text = dump(with_made_parts(plain.replace(blocks), request, seed))
     written = spec_of(name, text)
     outcomes = check(written.part_requirements, result, values)
     missed = [outcome for outcome in outcomes if not outcome.ok]
