@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -198,7 +198,6 @@ class SliderPath:
     x0: float  # x in the unloaded position [m]
     inward: float  # largest travel, and largest travel backwards [m]
     outward: float
-    shares: tuple[float, float]  # `_shares` in the unloaded position [rad]
 
     @classmethod
     def from_linkage(cls, linkage: Linkage, unloaded: float, side: int, anchor: float) -> SliderPath:
@@ -211,9 +210,13 @@ class SliderPath:
         gap = 4.0 * linkage.crank * linkage.coupler * math.sin(0.5 * start) ** 2
         square = max(xs**2 - gap, 0.0)
         x0 = place if square < NEAR_FOOT * xs**2 else math.copysign(math.sqrt(square), place)
-        phi, chi = _shares(linkage, np.sin(start), np.cos(start))
-        shares = float(phi), float(chi)
-        return cls(linkage, False, unloaded, side, anchor, start, xs, gap, x0, *linkage.room(unloaded), shares)
+        return cls(linkage, False, unloaded, side, anchor, start, xs, gap, x0, *linkage.room(unloaded))
+
+    @cached_property
+    def _unloaded_shares(self) -> tuple[FloatArray, FloatArray]:
+        """`_shares` in the unloaded position, to the last bit [rad]: nothing has turned there."""
+        _, sine, cosine = self._find_knee(0.0)
+        return _shares(self.linkage, np.copysign(sine, self.start), cosine)  # on its own side of the stretched position
 
     @np.errstate(divide="ignore", invalid="ignore", over="ignore")
     def units(self, travel: FloatArray) -> UnitCurves:
@@ -241,7 +244,7 @@ class SliderPath:
         is_beyond: NDArray[np.bool_] = (travel > self.inward + slack) | (travel < -self.outward - slack)
         return is_beyond
 
-    def _square_to_stretched(self, travel: FloatArray) -> FloatArray:
+    def _square_to_stretched(self, travel: Any) -> Any:
         """Return x_s^2 - x^2, the product of both distances from the stretched positions, without cancellation."""
         xs, x0 = self.stretched, np.abs(self.x0)
         outward = np.where(np.asarray(self.x0) >= 0.0, travel, -travel)
@@ -249,25 +252,28 @@ class SliderPath:
 
     def evaluate(self, travel: FloatArray) -> _SliderState:
         """Return the state at some travels."""
-        link = self.linkage
-        position, whole = self.x0 - travel, 4.0 * link.crank * link.coupler
+        e, position = self.linkage.offset, self.x0 - travel
+        knee, sine, cosine = self._find_knee(travel)
+        view = np.arctan2(e * travel, position * self.x0 + e * e)  # how far the direction from A to C has turned
+        phi, chi = _shares(self.linkage, sine, cosine)
+        turn = np.empty((4, *np.shape(knee)))
+        turn[0], turn[1] = view + phi - self._unloaded_shares[0], self.start - knee
+        turn[2], turn[3] = view - (chi - self._unloaded_shares[1]), -travel - self.anchor
+        return _SliderState(knee, position, turn, sine, cosine)
+
+    def _find_knee(self, travel: Any) -> tuple[Any, Any, Any]:
+        """Return the knee angle at some travels, its sine and its cosine."""
+        whole = 4.0 * self.linkage.crank * self.linkage.coupler
         square = self._square_to_stretched(travel) / whole
         share = np.sqrt(square)  # sin(psi/2)
         knee = 2.0 * np.arcsin(np.minimum(share, 1.0))
         sine, cosine = 2.0 * share * np.sqrt(1.0 - square), 1.0 - 2.0 * square
         if (is_folding := share > NEARLY_FOLDED).any():
-            rest = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / whole
+            rest = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + (self.x0 - travel)) / whole
             folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(rest, 0.0), 1.0)))
             pairs = (folding, knee), (np.sin(folding), sine), (np.cos(folding), cosine)
             knee, sine, cosine = (np.where(is_folding, *pair) for pair in pairs)
-        knee, sine = self.side * knee, self.side * sine
-        e = link.offset
-        view = np.arctan2(e * travel, position * self.x0 + e * e)  # how far the direction from A to C has turned
-        phi, chi = _shares(link, sine, cosine)
-        turn = np.empty((4, *np.shape(knee)))
-        turn[0], turn[1] = view + phi - self.shares[0], self.start - knee
-        turn[2], turn[3] = view - (chi - self.shares[1]), -travel - self.anchor
-        return _SliderState(knee, position, turn, sine, cosine)
+        return self.side * knee, self.side * sine, cosine
 
     def forces(self, state: _SliderState) -> FloatArray:
         """Return q q' by the travel, (4, n)."""
