@@ -54,7 +54,7 @@ class Moving:
 
 
 def choose_poses(count: int) -> FloatArray:
-    """Return the indices of the points of a curve with `count` points that are shown as poses: evenly, ends included."""
+    """Return the indices of the points of a curve with `count` points that are shown as poses, spread evenly."""
     return np.unique(np.linspace(0, count - 1, min(count, N_FILM_POSES)).round().astype(int))
 
 
