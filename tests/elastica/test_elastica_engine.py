@@ -6,6 +6,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import cfmkit.elastica as el
 from cfmkit.elastica import BeamOnObstacle, NodeOnObstacle, circle_edge
@@ -18,7 +20,11 @@ TAPER = el.Taper(np.array([0, 0.4, 1]), np.array([1.0e-3, 1.6e-3, 0.8e-3]))
 
 
 def frame(
-    section: el.Section | None = None, turn: float = 0.0, size: float = 1.0, mirrored: bool = False
+    section: el.Section | None = None,
+    turn: float = 0.0,
+    size: float = 1.0,
+    mirrored: bool = False,
+    bend: tuple[float, float] = (0.8, -0.5),
 ) -> el.Network:
     """Return a network with curved and straight beams, a pin, a spring, an offset and a linked node."""
     section = section or el.Section(2e9, 8e-3 * size, _scaled(TAPER, size), shear=True)
@@ -43,7 +49,7 @@ def frame(
         "d": at(0.06, 0.07, el.slider_support(UP)),
     }
     beams = {
-        "ab": el.Beam("a", "b", section, el.Polynomial((0.0, sign * 0.8, -sign * 0.5))),
+        "ab": el.Beam("a", "b", section, el.Polynomial((0.0, sign * bend[0], sign * bend[1]))),
         "bc": el.Beam("bb", "c", section, el.arc(-sign * 0.7), end_joint="pin"),
         "bd": el.Beam("b", "d", section, start_offset=arm(0.0, 0.004)),
     }
@@ -72,7 +78,8 @@ def reference() -> el.Path:
     return driven(frame(), TRAVEL)
 
 
-@pytest.mark.parametrize("turn", [0.3, 2.0, -1.1])
+@given(turn=st.floats(-np.pi, np.pi))
+@settings(max_examples=4, deadline=None)
 def test_a_turned_network_has_the_same_forces(reference: el.Path, turn: float) -> None:
     p = driven(frame(turn=turn), TRAVEL, turn)
     np.testing.assert_allclose(p.effort[p.at_requested], reference.effort[reference.at_requested], rtol=1e-8)
@@ -81,13 +88,18 @@ def test_a_turned_network_has_the_same_forces(reference: el.Path, turn: float) -
     np.testing.assert_allclose(moved, [c * was[0] - s * was[1], s * was[0] + c * was[1], was[2]], atol=1e-10)
 
 
-def test_a_mirrored_network_has_mirrored_motions(reference: el.Path) -> None:
-    p = el.trace(frame(mirrored=True), el.Displacement("d", UP, TRAVEL), TIGHT)
-    np.testing.assert_allclose(p.effort[p.at_requested], reference.effort[reference.at_requested], rtol=1e-8)
-    np.testing.assert_allclose(p.motion("b")[-1], reference.motion("b")[-1] * [1, -1, -1], atol=1e-10)
+@given(bend=st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)))
+@settings(max_examples=4, deadline=None)
+def test_a_mirrored_network_has_mirrored_motions(bend: tuple[float, float]) -> None:
+    p = el.trace(frame(bend=bend), el.Displacement("d", -UP, TRAVEL), TIGHT)
+    q = el.trace(frame(bend=bend, mirrored=True), el.Displacement("d", UP, TRAVEL), TIGHT)
+    assert p.status is q.status
+    np.testing.assert_allclose(q.effort, p.effort, rtol=1e-8)
+    np.testing.assert_allclose(q.motion("b"), p.motion("b") * [1, -1, -1], atol=1e-10)
 
 
-@pytest.mark.parametrize("size", [0.1, 25.0])
+@given(size=st.floats(0.1, 25.0))
+@settings(max_examples=3, deadline=None)
 def test_a_scaled_network_has_scaled_forces(reference: el.Path, size: float) -> None:
     """All lengths times k (width too): forces times k^2, torsion springs times k^3, line springs times k."""
     p = driven(frame(size=size), TRAVEL * size)

@@ -9,25 +9,33 @@ import numpy as np
 import pytest
 from beam_equilibrium import Judge, mean_motion
 from beam_networks import drives, network
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 import cfmkit.elastica as el
 
 FINE = el.Control(tolerance=1e-9)
+SEEDS = st.integers(0, 2**32 - 1)
 
 
-def solved(net: Any, drive: Any, points: Any = None) -> el.Path:
-    if points is not None:
-        drive = dataclasses.replace(drive, points=points)
+def solved(net: Any, drive: Any) -> el.Path:
     path = el.trace(net, drive, FINE)
     assert path.status is el.PathStatus.COMPLETE, path.message
     return path
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("kind", range(4))
+def solved_drawn(net: Any, drive: Any, points: Any = None) -> el.Path:
+    """Return the path of a drawn network; some have no way on before the drive's end."""
+    path = el.trace(net, drive if points is None else dataclasses.replace(drive, points=points), FINE)
+    assume(path.status is el.PathStatus.COMPLETE)
+    return path
+
+
+@given(seed=SEEDS, kind=st.integers(0, 3))
+@settings(max_examples=16, deadline=None)
 def test_every_beam_and_every_body_is_in_equilibrium(seed: int, kind: int) -> None:
     net = network(seed)
-    path = solved(net, drives(net, seed)[kind])
+    path = solved_drawn(net, drives(net, seed)[kind])
     scales = path.mesh.scales
     forces = np.array([scales.force, scales.force, scales.moment])
     judge = Judge(path, int(path.at_requested[-1]))
@@ -54,16 +62,18 @@ def dead_work(path: el.Path, point: int) -> float:
     return total
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("kind", range(3))
+@given(seed=SEEDS, kind=st.integers(0, 2))
+@settings(max_examples=9, deadline=None)
 def test_energy_grows_by_the_work_of_the_drive_and_of_dead_loads(seed: int, kind: int) -> None:
     """With prestressed springs and moved supports, which do no work while the drive goes on."""
     net = network(seed, follower=False)
     drive = drives(net, seed)[kind]
     nodes, weights = np.polynomial.legendre.leggauss(20)
     end = float(drive.points[-1])
-    path = solved(net, drive, np.array([0.0, *(0.5 * end * (nodes + 1)), end]))
+    path = solved_drawn(net, drive, np.array([0.0, *(0.5 * end * (nodes + 1)), end]))
     at = path.at_requested
+    waves = np.abs(np.polynomial.legendre.legfit(nodes, path.effort[at[1:-1]], 19))
+    assume(waves[-4:].max() < 1e-8 * waves.max())  # the points show all of the effort: none locks on the way
     work = 0.5 * end * weights @ path.effort[at[1:-1]]
     grown = path.energy[at[-1]] - path.energy[0]
     size = 0.5 * abs(end) * weights @ np.abs(path.effort[at[1:-1]])

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from varied_networks import BUILDERS, KINDS, X, pushed
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from varied_networks import BUILDERS, KINDS, LAN, X, lan_pushed, pushed
 
 import cfmkit.elastica as el
 from cfmkit.errors import InputError
@@ -53,6 +55,17 @@ def slopes(g: Any) -> dict[str, Any]:
         for axial in (True, False):
             found[f"extremes {beam} {axial}"] = g.stress_extremes(beam, axial)
     return found
+
+
+@given(way=st.lists(st.floats(-0.1, 0.1), min_size=len(LAN), max_size=len(LAN)).filter(any))
+@settings(max_examples=5, deadline=None)
+def test_a_force_changes_along_any_way_as_its_gradient_says(way: list[float]) -> None:
+    x, step = LAN * (1.0 + 0.2 * np.array(way)), LAN * np.array(way)
+    a, b, c, d = (outputs(el.trace(*lan_pushed(x + k * 1e-3 * step), FINE))["effort"] for k in (-2, -1, 1, 2))
+    slope = el.gradient(el.trace(*lan_pushed(x), FINE), lan_pushed, x).effort @ step
+    np.testing.assert_allclose(
+        slope, (a - 8 * b + 8 * c - d) / 12e-3, atol=2e-6 * np.abs(slope).max() + 1e-9 * np.abs(b).max()
+    )
 
 
 @pytest.mark.parametrize(("build", "x"), BUILDERS, ids=[build.__name__ for build, _ in BUILDERS])
