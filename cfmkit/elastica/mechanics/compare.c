@@ -1,6 +1,6 @@
-/* Tables of plain beams, and their equilibria beside those with a higher degree, by which the error of a path is estimated.
+/* Arrays of plain beams, and their equilibria beside those with a higher degree, by which the error of a path is estimated.
  *
- * numpy's way: `plain_tables` of element_tables.py; `raise_degree`, `embed` and `compare_states` of error_estimate.py. */
+ * numpy is the specification: beam_fits.py, elements.py and discretise.py; `compare_states`, `point_errors` of accuracy.py. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>

@@ -7,7 +7,6 @@ kind is set up by `discretise`, which is the specification, and where there is n
 from __future__ import annotations
 
 import itertools
-from copy import copy
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -133,8 +132,9 @@ def _refill(
     arrays: dict[str, Any] = {name: block[begin:end].reshape(shape) for name, begin, end, shape in kind.parts}
     length, force = arrays.pop("scales").tolist()
     tables: dict[str, Any] = {name: arrays[name] for name in (*TABLES_AT_POINTS, "length")}
-    mesh, exchanged = copy(old), copy(kind.equations)
+    mesh, exchanged = object.__new__(Discretisation), object.__new__(CompiledEquations)
     vars(mesh).update(
+        old.__getstate__(),
         elements=old.elements._replace(**tables),
         attachments=old.attachments._replace(origin=arrays["origin"], arm=arrays["arm"]),
         scales=MechanicsUnits(length, force, length if isinstance(drive, Displacement) else 1.0),
@@ -149,7 +149,8 @@ def _refill(
         )
         terms = term_arrays(mesh)
         arrays, row = arrays | terms, make_row(terms, {}, row)
-    vars(exchanged).update(mesh=mesh, unit=arrays["unit"], arrays={**kind.equations.arrays, **arrays}, row=row)
+    arrays = {**kind.equations.arrays, **arrays}
+    vars(exchanged).update(vars(kind.equations), mesh=mesh, unit=arrays["unit"], arrays=arrays, row=row)
     mesh.known.update((key, exchanged) for key, made in old.known.items() if made is kind.equations)
     return mesh
 

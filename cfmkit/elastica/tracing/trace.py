@@ -376,9 +376,9 @@ def trace_on(
 
 
 def _options(drive: Drive, control: Control, unit: float) -> Options:
-    targets = drive.points / unit
-    span = max(float(targets.max()), 0.0) - min(float(targets.min()), 0.0)
-    nearest = abs(float(targets[0])) / span or FIRST_STEP
+    targets = (drive.points / unit).tolist()
+    span = max(*targets, 0.0) - min(*targets, 0.0)
+    nearest = abs(targets[0]) / span or FIRST_STEP
     return Options(
         span, control.branch, control.sign, control.through_folds, control.largest_turn,
         first_step=control.first_step or min(FIRST_STEP, nearest), most_points=control.most_points,
