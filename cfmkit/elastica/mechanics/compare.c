@@ -1,6 +1,7 @@
 /* Tables of plain beams, and their equilibria beside those with a higher degree, by which the error of a path is estimated.
  *
  * numpy's way: `plain_tables` of element_tables.py; `raise_degree`, `embed` and `compare_states` of error_estimate.py. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +9,17 @@
 #include "march.h"
 
 #define N_COMPARED 7 /* numbers of a state, see `compare` */
+#define SHORTEST_CHORD 1e-9 /* of a shape of length 1 that can be fitted, as in beam_fits.py */
+
+/* As in accuracy.py. */
+#define N_PICKED 6 /* points at which the error of a path is estimated */
+#define NEXT_CORRECTION 1e-10
+#define LARGEST_CHANGE 0.3
+#define ERROR_SAFETY 2.0
+#define ROUNDING_ERROR 1e-13
+#define ROUNDED_PLACES 4.0
+#define NO_FORCE 1e-6
+#define SMALL_MOTION 1e-3
 
 static Int n_ends(const Model *m) { return m->size - m->elements * (m->degree + 1); } /* unknowns that move ends */
 
@@ -29,18 +41,61 @@ static void fill(const Model *shapes, Int elements, Int k, const double *law, co
     }
 }
 
-int beam_tables(const Model *shapes, Int elements, const Int *row, const double *cuts, const double *coefficients, Int powers,
-                const double *length, const double *rigidities, Int beams, double unit_length, double unit_force,
-                double *tables, double *lengths) {
-    for (Int k = 0; k < elements; k++) {
-        const Int b = row[k];
-        const double law[2] = {cuts[2 * k], cuts[2 * k + 1] - cuts[2 * k]}, speed = length[b] / unit_length * law[1];
-        const double rigidity = rigidities[b] / (unit_force * (unit_length * unit_length)) / (speed * speed);
-        fill(shapes, elements, k, law, coefficients + b * powers, powers, speed, rigidity, rigidities[beams + b] * unit_force,
-             rigidities[2 * beams + b] * unit_force, tables);
-        lengths[k] = speed;
+/* Arrays of a network of plain beams, one element each, that is like the one whose row is given: to `block` what the two do
+ * not share, whose addresses replace those in the row. `at` (elements + attachments, 2): nodes of both ends, then node and
+ * master; `rule` (2, count): places and weights along a whole beam; `spots` (nodes, 2) [m]; `beams` (elements, 8 + powers):
+ * bending, compliances by stretching and shearing, floor, offsets of both ends [m], angle. 0 if a beam cannot be fitted. */
+int fill_network(Model *m, const Int *at, Int attachments, const double *rule, Int count, const double *spots, const double *beams,
+                 Int powers, double *block) {
+    const Int e = m->elements, wide = 8 + powers, all = e * m->points, triangle = (m->degree + 1) * (m->degree + 2) / 2;
+    double *bend = block + 6 * all, *length = bend + e * triangle, *origin = length + e, *arm = origin + 2 * attachments;
+    double *unit = arm + 2 * attachments, *laws = unit + m->free, *scales = laws + e * (2 + powers), sum = 0.0;
+    for (Int k = 0; k < e; k++) {
+        const double *own = beams + k * wide, *first = spots + 2 * at[2 * k], *last = spots + 2 * at[2 * k + 1];
+        const double dx = last[0] + own[6] - (first[0] + own[4]), dy = last[1] + own[7] - (first[1] + own[5]);
+        double *law = laws + k * (2 + powers), cx = 0.0, cy = 0.0;
+        law[0] = 0.0; law[1] = 1.0;
+        memcpy(law + 2, own + 8, (size_t)powers * sizeof(double));
+        for (Int i = 0; i < count; i++) {
+            double angle = 0.0;
+            for (Int power = powers - 1; power >= 0; power--) angle = angle * rule[i] + own[8 + power];
+            cx += rule[count + i] * cos(angle);
+            cy += rule[count + i] * sin(angle);
+        }
+        const double far = dx * dx + dy * dy, chord = cx * cx + cy * cy;
+        if (!(far > 0.0 && chord > SHORTEST_CHORD * SHORTEST_CHORD)) return 0;
+        law[2] += atan2(dy * cx - dx * cy, dx * cx + dy * cy);
+        length[k] = sqrt(far / chord);
+        sum += length[k];
     }
-    return CONVERGED;
+    const double unit_length = sum / (double)e, unit_force = beams[0] / (unit_length * unit_length), square = unit_length * unit_length;
+    for (Int k = 0; k < 2 * attachments; k++) {
+        const Int *own = at + 2 * e + 2 * (k / 2);
+        origin[k] = spots[2 * own[1] + k % 2] / unit_length;
+        arm[k] = (spots[2 * own[0] + k % 2] - spots[2 * own[1] + k % 2]) / unit_length;
+    }
+    for (Int a = 0; a < m->free; a++) unit[a] = HUGE_VAL;
+    for (Int k = 0; k < e; k++) {
+        const double *own = beams + k * wide, *law = laws + k * (2 + powers), speed = length[k] / unit_length;
+        const double rigidity = own[0] / (unit_force * square) / (speed * speed);
+        const double axial = own[1] * unit_force + own[3] * unit_force * square / own[0];
+        double bending = 0.0;
+        fill(m, e, k, law, law + 2, powers, speed, rigidity, axial, own[2] * unit_force, block);
+        length[k] = speed;
+        for (Int i = 0; i < triangle; i++) bend[k * triangle + i] = speed * rigidity * m->unit_bend[i];
+        for (Int i = 0; i < 4; i++) arm[2 * m->ends[2 * k + i / 2] + i % 2] += own[4 + i] / unit_length;
+        for (Int i = 0; i < m->points; i++) bending += rigidity * block[all + k * m->points + i];
+        for (Int i = 1; i <= 2; i++) {
+            const Int slot = m->slot[m->unknowns[(k + 1) * (m->degree + 9) - i]];
+            if (slot >= 0) unit[slot] = bending * speed / (speed * speed);
+        }
+    }
+    m->angle = block; m->weight = block + all; m->rigidity = block + 2 * all;
+    m->axial = block + 3 * all; m->shear = block + 4 * all; m->ahead = block + 5 * all;
+    m->bend = bend; m->length = length; m->origin = origin; m->arm = arm; m->unit = unit;
+    scales[0] = unit_length;
+    scales[1] = unit_force;
+    return 1;
 }
 
 /* The tables at other points: what is even along an element is its first value there. */
@@ -165,4 +220,76 @@ int compare(const Model *models, Int designs, const Model *shapes, const double 
         if (!good) return 0;
     }
     return 1;
+}
+
+/* The largest of the last two coefficients of the rotation of any element. */
+static double last_coefficients(const Model *m, const double *z) {
+    const Int wide = m->degree + 9;
+    double largest = 0.0;
+    for (Int e = 0; e < m->elements; e++)
+        for (Int k = wide - 4; k < wide - 2; k++) largest = larger(largest, fabs(z[m->unknowns[e * wide + k]]));
+    return largest;
+}
+
+static Int largest_of(const double *values, const Int *at, Int first, Int end) {
+    Int best = first;
+    for (Int k = first + 1; k < end; k++) if (fabs(values[at[k]]) > fabs(values[at[best]])) best = k;
+    return at[best];
+}
+
+/* Put the points at which the error is estimated first in `at`, in order; return their number: `pick_points` of accuracy.py. */
+static Int pick(const double *effort, const double *last, Int *at, Int count, char *chosen) {
+    Int kept = 0;
+    chosen[at[count - 1]] = chosen[largest_of(effort, at, 0, count)] = 1;
+    for (Int k = 0; count > N_PICKED && k < N_PICKED - 2; k++)
+        chosen[largest_of(last, at, count * k / (N_PICKED - 2), count * (k + 1) / (N_PICKED - 2))] = 1;
+    for (Int k = 0; k < count; k++) if (count <= N_PICKED || chosen[at[k]]) at[kept++] = at[k];
+    return kept;
+}
+
+/* Estimated error of a path on which all is stable: its start and points as rows of `march`, free unknowns, slopes, drive,
+ * effort, stability, target. Not a number if that is not certain. `point_errors` of accuracy.py is the specification. */
+double path_error(const Model *m, const Model *shapes, const double *laws, Int powers, const double *rows, Int total) {
+    const Int n = m->free, wide = 2 * n + 4, same = n_ends(m), size = m->size;
+    double *z = malloc((size_t)(total * (size + 3) + N_PICKED * (size + 1 + same + N_COMPARED)) * sizeof(double));
+    Int *at = calloc((size_t)(2 * total), sizeof(Int)), targets = 0;
+    if (!z || !at) { free(z); free(at); return NAN; }
+    double *effort = z + total * size, *last = effort + total, *drive = last + total, *picked = drive + total;
+    double *ways = picked + N_PICKED * size, *ends = ways + N_PICKED, *found = ends + N_PICKED * same;
+    double reach = 0.0, most = 0.0, largest = 0.0, error = 0.0;
+    int by_loads = 1;
+    for (Int i = 0; i < size; i++) by_loads = by_loads && m->rate[i] == 0.0;
+    for (Int p = 0; p < total; p++) {
+        const double *row = rows + p * wide;
+        double *own = z + p * size;
+        drive[p] = row[2 * n];
+        for (Int i = 0; i < size; i++) own[i] = m->slot[i] >= 0 ? row[m->slot[i]] : m->base[i] + drive[p] * m->rate[i];
+        effort[p] = by_loads ? load_work(m, own) : row[2 * n + 1];
+        last[p] = last_coefficients(m, own);
+        if (row[2 * n + 3] >= 0.0) at[targets++] = p;
+        most = larger(most, fabs(effort[p]));
+        for (Int i = 0; i < same; i++) reach = larger(reach, fabs(own[i]));
+    }
+    const Int chosen = targets ? pick(effort, last, at, targets, (char *)(at + total)) : 0;
+    for (Int k = 0; k < chosen; k++) {
+        memcpy(picked + k * size, z + at[k] * size, (size_t)size * sizeof(double));
+        ways[k] = drive[at[k]];
+    }
+    int good = chosen && compare(m, 1, shapes, laws, powers, picked, ways, chosen, NEXT_CORRECTION, ends, found);
+    for (Int k = 0; good && k < chosen; k++) largest = larger(largest, found[k * N_COMPARED + 5]);
+    const double load = larger(larger(largest, NO_FORCE * reach), ROUNDING_ERROR);
+    const double unit = larger(most, NO_FORCE * larger(load, reach));
+    for (Int k = 0; good && k < chosen; k++) {
+        const double *other = found + k * N_COMPARED;
+        double rise = 0.0, work = other[4];
+        good = other[0] == CONVERGED && other[1] == 0.0 && other[2] <= LARGEST_CHANGE;
+        for (Int p = larger(at[k], 1); p <= at[k] + 1 && p < total; p++)
+            if (drive[p] != drive[p - 1]) rise = larger(rise, fabs((effort[p] - effort[p - 1]) / (drive[p] - drive[p - 1])));
+        if (by_loads) { memcpy(picked, ends + k * same, (size_t)same * sizeof(double)); work = load_work(m, picked); }
+        const double bearing = larger(fabs(work - effort[at[k]]) / unit, other[3] / load) - ROUNDED_PLACES * DBL_EPSILON * rise / unit;
+        error = larger(error, ERROR_SAFETY * larger(bearing, other[6] / larger(reach, SMALL_MOTION)) + ROUNDING_ERROR);
+    }
+    free(z);
+    free(at);
+    return good && most <= DBL_MAX ? (larger(reach, largest) <= ROUNDING_ERROR ? ROUNDING_ERROR : error) : NAN;
 }

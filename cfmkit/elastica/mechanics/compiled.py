@@ -94,22 +94,22 @@ class CompiledEquations(NumpyEquations):
 
     def exchange(self, mesh: Discretisation) -> CompiledEquations:
         """Return those with other contacts closed, or other elements that stretch; free unknowns are among these."""
-        slot, kept = number_free(mesh.free, mesh.size), np.searchsorted(self.mesh.free, mesh.free)
-        unit, nodes = self.unit[kept], mesh.node_contacts
-        arrays = {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
-        if mesh.moving is None:
-            arrays["axial"] = np.ascontiguousarray(mesh.elements.axial)
-        for name, column, contacts in (
-            ("contact_at", CLOSED_NODE, nodes),
-            ("side_at", CLOSED_SIDE, mesh.side_contacts),
-        ):
-            if contacts:
-                arrays[name] = self.arrays[name].copy()
-                arrays[name][:, column] = [-1 if contact.closed is None else contact.closed for contact in contacts]
-        presses = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
-        counts = {"free": len(mesh.free), "presses": presses, "contacts": len(nodes)}
+        exchanged, unit, counts = copy(self), self.unit, dict[str, int]()
+        arrays: dict[str, Any] = {"axial": np.ascontiguousarray(mesh.elements.axial)} if mesh.moving is None else {}
+        if mesh.free is not self.mesh.free:
+            slot, kept = number_free(mesh.free, mesh.size), np.searchsorted(self.mesh.free, mesh.free)
+            unit, nodes = self.unit[kept], mesh.node_contacts
+            arrays |= {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
+            for name, column, contacts in (
+                ("contact_at", CLOSED_NODE, nodes),
+                ("side_at", CLOSED_SIDE, mesh.side_contacts),
+            ):
+                if contacts:
+                    arrays[name] = self.arrays[name].copy()
+                    arrays[name][:, column] = [-1 if at.closed is None else at.closed for at in contacts]
+            presses = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
+            counts = {"free": len(mesh.free), "presses": presses, "contacts": len(nodes)}
         row = make_row(arrays, counts, self.row)
-        exchanged = copy(self)
         vars(exchanged).update(mesh=mesh, unit=unit, arrays={**self.arrays, **arrays}, row=row)
         return exchanged
 
@@ -210,13 +210,30 @@ class CompiledEquations(NumpyEquations):
 
     def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
         """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""
-        mesh, bundle = self.mesh, self.mesh.fits.bundle
-        special = has_more_unknowns(mesh) or bundle.others or degree > MAX_DEGREE
-        if special or np.count_nonzero(mesh.elements.line):
+        laws = self._find_laws(degree)
+        if not len(laws):
             return None
-        laws = angle_laws(bundle.coefficients[mesh.fits.number], mesh)
-        compared = compare_rows(self.row, mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
+        compared = compare_rows(self.row, self.mesh, laws, np.ascontiguousarray(z, float), drive, degree, tolerance)
         return None if not self.follows and (compared.unstable < 0).any() else compared
+
+    def _find_laws(self, degree: int) -> FloatArray:
+        """Return the laws by which tables of a higher degree are made, empty unless all beams are plain."""
+        if degree > MAX_DEGREE:
+            return NO_NUMBERS
+        if "laws" in self.arrays:
+            return self.arrays["laws"]  # type: ignore[no-any-return]
+        mesh, bundle = self.mesh, self.mesh.fits.bundle
+        if has_more_unknowns(mesh) or bundle.others or np.count_nonzero(mesh.elements.line):
+            return NO_NUMBERS
+        return angle_laws(bundle.coefficients[mesh.fits.number], mesh)
+
+    def measure_load_work(self, z: FloatArray) -> FloatArray | None:
+        """Return the displacements that growing loads work on in states (n, size), (n,); None under line loads."""
+        work = np.empty(len(z))
+        if np.count_nonzero(self.mesh.elements.line):
+            return None
+        self.code.load_work(self.row, np.ascontiguousarray(z, float), work)
+        return work
 
     def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode."""
@@ -226,20 +243,27 @@ class CompiledEquations(NumpyEquations):
     def march(self, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
         n, goals = self.n, np.ascontiguousarray(targets, float)
-        rows, stored = np.empty((plan.room, 2 * n + 4)), np.zeros(2, np.int64)
+        rows, stored = np.empty((plan.room + 1, 2 * n + 4)), np.zeros(2, np.int64)
         parity = start.unstable % 2 if self.follows else start.unstable
+        rows[0, :n], rows[0, n : 2 * n] = start.x, start.rate
+        rows[0, 2 * n :] = start.drive, start.effort, parity, -1.0
         plan_row = plan_row_of(plan, parity, False)
         before = plan.before
         previous_row = NO_NUMBERS if before is None else np.concatenate([before.x, before.rate, [before.drive]])
-        start_row = np.concatenate([start.x, start.rate, [start.drive]])
         any_vector = NO_NUMBERS if plan.any_vector is None else plan.any_vector
-        code = self.code.march(self.row, plan_row, start_row, previous_row, goals, rows, stored, any_vector)
-        rows = rows[: stored[0]].copy()
+        shapes, laws = NO_NUMBERS, NO_NUMBERS
+        if plan.finer_degree:
+            shapes, laws = shape_row(plan.finer_degree)[0], self._find_laws(plan.finer_degree)
+        code = self.code.march(self.row, plan_row, previous_row, goals, rows, stored, any_vector, shapes, laws)
+        rows = rows[1 : 1 + stored[0]].copy()
         drive, effort, told, target = rows[:, 2 * n :].T
         unstable, at_targets = told.astype(np.int64), target.astype(np.int64)
         x, rate, step = rows[:, :n], rows[:, n : 2 * n], float(plan_row[0])
-        ends = tuple(plan_row[-2:].tolist())
-        march = NaturalMarch(x, drive, rate, unstable, effort, at_targets, step, plan.branch, MarchCode(code), ends)
+        *ends, error = plan_row[-3:].tolist()
+        reason = MarchCode(code)
+        march = NaturalMarch(
+            x, drive, rate, unstable, effort, at_targets, step, plan.branch, reason, tuple(ends), error
+        )
         return self._cut_at_stability_change(march, start.unstable) if self.follows else march
 
     def _cut_at_stability_change(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
@@ -282,4 +306,4 @@ def plan_row_of(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
     """Return a `Plan` of march.h."""
     on_branch = plan.branch is not None
     numbers = plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, on_branch, start
-    return np.array((*numbers, N_POWERS, 0.0, 0.0), float)
+    return np.array((*numbers, N_POWERS, 0.0, 0.0, np.nan), float)

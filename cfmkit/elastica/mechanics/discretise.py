@@ -289,8 +289,12 @@ def _find_floor(beam: Beam, drive: Drive, scales: MechanicsUnits, fits: BeamFits
     """Return 1/EA that a straight beam gets which does not stretch."""
     if beam.section.axial or not is_straight(beam, fits, name):
         return 0.0
-    floor = FLOOR_UNDER_LOADS if isinstance(drive, Loading) else FLOOR_UNDER_MOTION
-    return floor * scales.force * scales.length**2 / _find_rigidity(beam)
+    return find_straight_floor(drive) * scales.force * scales.length**2 / _find_rigidity(beam)
+
+
+def find_straight_floor(drive: Drive) -> float:
+    """Return 1/EA [L^2/EI] that a straight beam gets under a drive if it does not stretch."""
+    return FLOOR_UNDER_LOADS if isinstance(drive, Loading) else FLOOR_UNDER_MOTION
 
 
 def _find_topology(network: Network, degree: int, cuts: Mapping[str, list[float]], loads: list[PointLoad]) -> Topology:

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.compiled_module import load_compiled, shape_row
-from cfmkit.elastica.mechanics.polynomials import N_EXTRA_POINTS, basis, integrals_to_points, slopes_at_points
+from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, slopes_at_points
 from cfmkit.elastica.model.beam_fits import is_plain
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.model.shapes import Polynomial
@@ -85,12 +84,7 @@ def plain_tables(
     row: Any,
     cuts: FloatArray,
 ) -> dict[str, Any]:
-    """Return the tables of elements of plain beams of d networks, (d, e, q) each; of one by compiled code."""
-    if len(length) == 1 and coefficients.dtype == rigidities.dtype == float and (compiled := load_compiled()):
-        table, lengths = np.empty((6, 1, len(row), degree + N_EXTRA_POINTS)), np.empty((1, len(row)))
-        given = (np.ascontiguousarray(values, float) for values in (cuts, coefficients, length, rigidities))
-        compiled.tables(shape_row(degree)[0], row, *given, table, lengths, scales.length, scales.force)
-        return {**dict(zip(TABLES_AT_POINTS, table, strict=True)), "length": lengths}
+    """Return the tables of elements of plain beams of d networks, (d, e, q) each."""
     rule, force, width = basis(degree), scales.force, cuts[:, 1:] - cuts[:, :1]
     t, own, angle = cuts[:, :1] + width * rule.places, coefficients[..., row, :], 0.0
     for k in reversed(range(own.shape[-1])):

@@ -116,6 +116,7 @@ class MarchPlan:
     branch: PathBranch | None = None  # then it is checked that every state leads back: a branch may end
     room: int = 2000  # states
     any_vector: FloatArray | None = None  # then flexibilities at both ends are wanted, found from this one (compiled)
+    finer_degree: int = 0  # with which the error of the whole path is estimated, if it is wanted (compiled)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +124,8 @@ class NaturalMarch(MarchedSteps):
     """Equilibria that were reached, and why the march ended; efforts are gradients by what the way moves."""
 
     code: MarchCode
-    flexibilities: tuple[float, float] = (0.0, 0.0)  # of the softest modes at both ends, if they are known
+    flexibilities: tuple[float, ...] = (0.0, 0.0)  # of the softest modes at both ends, if they are known
+    error: float = np.nan  # estimated, of the whole path, if it is known
 
     @property
     def stuck(self) -> bool:
@@ -188,7 +190,7 @@ class NumpyEquations:
     def _leave(self, *_: Any, **__: Any) -> Any:
         """Return None: what `CompiledEquations` computes under these names functions in numpy compute elsewhere."""
 
-    measure_nodes = measure_curvatures = search_sides = locate = compare = _leave
+    measure_nodes = measure_curvatures = search_sides = locate = compare = measure_load_work = _leave
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""

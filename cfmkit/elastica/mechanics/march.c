@@ -167,6 +167,19 @@ end:
     return code;
 }
 
+/* A march from the first row to those behind it, with the error of the path if there are laws of elements. */
+int march_rows(const Model *m, Plan *plan, const double *before, const double *targets, Int count, double *rows, Int room,
+               Int *stored, const double *any, const Model *shapes, const double *laws, Int powers) {
+    const Int n = m->free, wide = 2 * n + 4;
+    double *here = malloc((size_t)wide * sizeof(double));
+    if (!here) return NO_START;
+    memcpy(here, rows, (size_t)wide * sizeof(double));
+    const int code = march(m, plan, here, here + n, here + 2 * n, before, targets, count, rows + wide, room - 1, stored, any);
+    if (laws && code == DONE) plan->error = path_error(m, shapes, laws, powers, rows, stored[0] + 1);
+    free(here);
+    return code;
+}
+
 /* One path a design: efforts at the targets (designs, count), not a number from where a path does not simply go on, and
  * the states (designs, some, n) at some of the targets. */
 int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts, Int room,

@@ -98,6 +98,7 @@ void term(const Model *m, Int number, const double *z, Stage at, int with_hessia
 double bending_change(const Model *m, Int o, double curvature, double grows, double rest);
 
 Pose pose(const Model *m, const double *z, Int k);
+double load_work(const Model *m, const double *z);
 Distance outline_distance(const Outline *o, double x, double y);
 void contact_term(const Model *m, Int number, const double *z, Term *t);
 int contact_gaps(const Model *m, const double *z, Int n, double *gaps);
@@ -157,20 +158,23 @@ int linearise(const Model *m, const double *x, double way, double *residual, dou
 int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable);
 int solve_each(const Model *m, double *x, double *way, Int count, const Goal *goal, double *rate, double *found);
 double soften(const Model *m, const double *x, double way, Int rounds, double *vector);
-int beam_tables(const Model *shapes, Int elements, const Int *row, const double *cuts, const double *coefficients, Int powers,
-                const double *length, const double *rigidities, Int beams, double unit_length, double unit_force,
-                double *tables, double *lengths);
+int fill_network(Model *m, const Int *at, Int attachments, const double *rule, Int count, const double *spots, const double *beams,
+                 Int powers, double *block);
 int compare(const Model *models, Int designs, const Model *shapes, const double *laws, Int powers, const double *z,
             const double *drive, Int count, double tolerance, double *ends, double *found);
+double path_error(const Model *m, const Model *shapes, const double *laws, Int powers, const double *rows, Int count);
 
 /* Of a march: numbers of 8 bytes, too. */
 typedef struct {
     double step, range, largest_turn, largest_force, tolerance, unstable, on_branch, start;
     double powers, first_flexibility, last_flexibility; /* of the softest mode at both ends, by so many powers; 0: not asked */
+    double error; /* of the whole path, if it is asked for; not a number: not known */
 } Plan;
 
 int march(const Model *m, Plan *plan, double *x, double *rate, double *way, const double *before, const double *targets,
           Int count, double *rows, Int room, Int *stored, const double *any);
+int march_rows(const Model *m, Plan *plan, const double *before, const double *targets, Int count, double *rows, Int room,
+               Int *stored, const double *any, const Model *shapes, const double *laws, Int powers);
 int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts,
                Int room, Int *codes, const Int *chosen, Int some, double *states);
 

@@ -38,12 +38,7 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     arrays: dict[str, Any] = {name: getattr(e, name) for name in OF_ELEMENTS}
     arrays |= {"arm": a.arm, "origin": a.origin, "frame": a.frame, "base": mesh.base, "rate": mesh.rate}
     arrays |= {"bend": (e.weight * e.rigidity) @ slope_products(mesh.degree), "unit": of.unit}
-    for name, rows in (
-        ("spring", [spring_row(mesh, spring) for spring in mesh.springs]),
-        ("load", [load_row(mesh, load) for load in mesh.loads]),
-    ):
-        if rows:
-            arrays |= {f"{name}_at": [at for at, _ in rows], name: [values for _, values in rows]}
+    arrays |= term_arrays(mesh)
     if has_more_unknowns(mesh):
         arrays |= {"slot": number_free(mesh.free, mesh.size), "leaves": last_elements(mesh)[mesh.free]}
     if mesh.contacts:
@@ -57,6 +52,19 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
         for name, values in arrays.items()
         if values is not None
     }
+
+
+def term_arrays(mesh: Discretisation) -> dict[str, Any]:
+    """Return the arrays of springs and loads in a `Model`."""
+    arrays: dict[str, Any] = {}
+    for name, rows in (
+        ("spring", [spring_row(mesh, spring) for spring in mesh.springs]),
+        ("load", [load_row(mesh, load) for load in mesh.loads]),
+    ):
+        if rows:
+            arrays[f"{name}_at"] = np.array([at for at, _ in rows], np.int64)
+            arrays[name] = np.array([values for _, values in rows], float)
+    return arrays
 
 
 def has_more_unknowns(mesh: Discretisation) -> bool:

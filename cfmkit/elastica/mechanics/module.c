@@ -5,7 +5,7 @@
 
 #include "march.h"
 
-#define MAX_BUFFERS 8
+#define MAX_BUFFERS 9
 #define MAX_NUMBERS 3
 
 /* Arguments of a call: arrays in C order, NULL of an empty one, how many doubles each has, and numbers. */
@@ -56,12 +56,18 @@ FUNCTION(soften, 3, 2, soften(m, a->at[1], a->number[0], (Int)a->number[1], a->a
 /* models, shapes, laws, z, drives, ends, found; tolerance -> whether there was memory */
 FUNCTION(compare, 7, 1, compare(m, a->count[0] / N_FIELDS, a->at[1], a->at[2], a->count[2] * N_FIELDS / (a->count[0] * m->elements) - 2,
                                 a->at[3], a->at[4], a->count[4], a->number[0], a->at[5], a->at[6]))
-/* shapes, row, cuts, coefficients, length, rigidities, tables, lengths; units of length, force */
-FUNCTION(tables, 8, 2, beam_tables(m, a->count[1], a->at[1], a->at[2], a->at[3], a->count[3] / a->count[4], a->at[4], a->at[5],
-                                   a->count[4], a->number[0], a->number[1], a->at[6], a->at[7]))
-/* model, plan, x with rate and way, before, targets, rows, stored, any vector -> code */
-FUNCTION(march, 8, 0, march(m, a->at[1], a->at[2], (double *)a->at[2] + m->free, (double *)a->at[2] + 2 * m->free, a->at[3], a->at[4],
-                            a->count[4], a->at[5], a->count[5] / (2 * m->free + 4), a->at[6], a->at[7]))
+/* model, places, rule, spots, beams, block -> whether all beams can be fitted */
+FUNCTION(fill, 6, 0, fill_network(a->at[0], a->at[1], a->count[1] / 2 - m->elements, a->at[2], a->count[2] / 2, a->at[3], a->at[4],
+                                  a->count[4] / m->elements - 8, a->at[5]))
+/* model, plan, before, targets, rows, stored, any vector, shapes, laws -> code */
+FUNCTION(march, 9, 0, march_rows(m, a->at[1], a->at[2], a->at[3], a->count[3], a->at[4], a->count[4] / (2 * m->free + 4), a->at[5],
+                                 a->at[6], a->at[7], a->at[8], a->count[8] / m->elements - 2))
+/* model, states, works -> nothing */
+static double load_works(const Model *m, const Arguments *a) {
+    for (Int k = 0; k < a->count[2]; k++) ((double *)a->at[2])[k] = load_work(m, (double *)a->at[1] + k * (a->count[1] / a->count[2]));
+    return 0.0;
+}
+FUNCTION(load_work, 3, 0, load_works(m, a))
 /* models, plan, targets, efforts, codes, chosen, states; room -> whether there was memory */
 FUNCTION(march_many, 7, 1, march_many(m, a->count[4], a->at[1], a->at[2], a->count[2], a->at[3], (Int)a->number[0], a->at[4], a->at[5],
                                       a->count[5], a->at[6]))
@@ -96,7 +102,7 @@ static PyObject *py_place(PyObject *self, PyObject *given) {
 
 #define ENTRY(name) {#name, py_##name, METH_VARARGS, NULL}
 static PyMethodDef methods[] = {
-    ENTRY(evaluate), ENTRY(linearise), ENTRY(resolve), ENTRY(solve), ENTRY(soften), ENTRY(compare), ENTRY(tables),
+    ENTRY(evaluate), ENTRY(linearise), ENTRY(resolve), ENTRY(solve), ENTRY(soften), ENTRY(compare), ENTRY(fill), ENTRY(load_work),
     ENTRY(march), ENTRY(march_many), ENTRY(side_gaps), ENTRY(contact_gaps), ENTRY(side_curvatures), ENTRY(side_places), ENTRY(place),
     {NULL, NULL, 0, NULL},
 };

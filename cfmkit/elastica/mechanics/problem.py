@@ -29,6 +29,7 @@ SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier
 N_SPARE_STATES = 50  # states of a march besides two for each requested value, until it is looked at again
 ROOM_IN_CONTACT, ROOM_IN_NUMPY = 40, 8
 """States of a march with closed contacts, behind which it is seen whether one begins or ends; fewer where they cost."""
+DEGREES_MORE = 4  # with which the error of a path is estimated
 FIRST_POWERS, STIFF_SHARE = 8, 1e-2
 """Powers by which the softest mode is estimated first, and its flexibility as a share of a critical one's."""
 MODE_MIX_SHARE = 0.1  # of any vector, that is added to a mode which may have no share of the one looked for
@@ -91,7 +92,7 @@ class NetworkProblem:
         own = self.equations
         if not isinstance(own, CompiledEquations) or own.follows or self.mesh.fits.network.contacts:
             return None
-        march = self._march(walk, self._any_vector)
+        march = self._march(walk, whole=True)
         ends = zip(march.flexibilities, stiffnesses, strict=True)
         if march.code is MarchCode.DONE and all(0 < abs(soft) * stiffness < STIFF_SHARE for soft, stiffness in ends):
             return march
@@ -104,14 +105,15 @@ class NetworkProblem:
         taken: NaturalMarch | None = begun[1] if begun[0] is walk.here and walk.before is None else None
         return taken or self._march(walk)
 
-    def _march(self, walk: Walk, any_vector: FloatArray | None = None) -> NaturalMarch:
+    def _march(self, walk: Walk, whole: bool = False) -> NaturalMarch:
         left = walk.targets[walk.number :]
         room = 2 * len(left) + N_SPARE_STATES
         if self.mesh.contacts:
             room = ROOM_IN_CONTACT if isinstance(self.equations, CompiledEquations) else ROOM_IN_NUMPY
         plan = MarchPlan(
             walk.step, walk.options.span, walk.before, walk.options.largest_motion, self.next_correction,
-            branch=walk.branch, room=room, any_vector=any_vector,
+            branch=walk.branch, room=room, any_vector=self._any_vector if whole else None,
+            finer_degree=self.mesh.degree + DEGREES_MORE if whole and not (self.ramp or walk.number) else 0,
         )  # fmt: skip
         marched = self.equations.march(walk.here, left, plan)
         marched.target[marched.target >= 0] += walk.number
@@ -197,8 +199,13 @@ class NetworkProblem:
         e = self.mesh.elements
         last = np.array([number for number, (_, right) in enumerate(e.cuts) if right == 1.0])
         unknowns = e.unknowns[last][:, energy.rotation_columns(self.mesh.degree)]
-        _, slopes = shape_functions(self.mesh.degree, np.ones(1))
-        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
+        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], _end_slopes(self.mesh.degree), z[unknowns]))
+
+
+@lru_cache(maxsize=64)
+def _end_slopes(degree: int) -> FloatArray:
+    """Return the slopes of the shape functions at the end of an element, (degree + 1,)."""
+    return read_only(shape_functions(degree, np.ones(1))[1][0])
 
 
 @lru_cache(maxsize=64)

@@ -276,17 +276,38 @@ static void spring(const Model *m, Int number, const double *z, Stage at, Term *
     line_spring(value, ends, given[2] >= 0, at, t);
 }
 
+/* Force of a load that may turn with its place. */
+static void load_force(const Model *m, Int number, const double *z, const Pose *p, double *fx, double *fy) {
+    const double *value = m->load + 3 * number;
+    *fx = value[0]; *fy = value[1];
+    if (!m->load_at[3 * number + 2]) return;
+    const double c = cos(z[p->at[3]]), s = sin(z[p->at[3]]);
+    *fx = c * value[0] - s * value[1];
+    *fy = s * value[0] + c * value[1];
+}
+
+/* Displacement that the loads which grow with the drive work on: see `load_displacement` of results/path.py. */
+double load_work(const Model *m, const double *z) {
+    double work = 0.0;
+    for (Int k = 0; k < m->loads; k++) {
+        const Int place = m->load_at[3 * k];
+        const Pose p = pose(m, z, place);
+        double fx, fy, moved[2];
+        if (!m->load_at[3 * k + 1]) continue;
+        load_force(m, k, z, &p, &fx, &fy);
+        for (int i = 0; i < 2; i++) moved[i] = p.place[i] - (m->origin[2 * place + i] + m->arm[2 * place + i]);
+        work += fx * moved[0] + fy * moved[1] + m->load[3 * k + 2] * z[p.at[3]];
+    }
+    return work;
+}
+
 static void point_load(const Model *m, Int number, const double *z, Stage at, Term *t) {
     const Int *given = m->load_at + 3 * number;
     const double *value = m->load + 3 * number, factor = given[1] ? at.drive : at.share;
     const double grows = given[1] ? at.by_drive : at.by_share;
     const Pose p = pose(m, z, given[0]);
-    double fx = value[0], fy = value[1];
-    if (given[2]) {
-        const double c = cos(z[p.at[3]]), s = sin(z[p.at[3]]);
-        fx = c * value[0] - s * value[1];
-        fy = s * value[0] + c * value[1];
-    }
+    double fx, fy;
+    load_force(m, number, z, &p, &fx, &fy);
     t->count = 4;
     memcpy(t->at, p.at, 4 * sizeof(Int));
     memset(t->hessian, 0, 16 * sizeof(double));

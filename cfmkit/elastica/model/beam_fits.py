@@ -160,11 +160,11 @@ def chords(coefficients: Any) -> tuple[Any, Any]:
 def rigidities_of(beams: Sequence[Beam]) -> Any:
     """Return bending rigidities and the compliances of stretching and shearing of plain beams, (3, b)."""
     sections = [beam.section for beam in beams]
-    known = {key: _rigidities(section) for key, section in {id(each): each for each in sections}.items()}
+    known = {key: section_rigidities(section) for key, section in {id(each): each for each in sections}.items()}
     return np.array([known[id(section)] for section in sections]).T
 
 
-def _rigidities(s: Section) -> tuple[Any, Any, Any]:
+def section_rigidities(s: Section) -> tuple[Any, Any, Any]:
     """Return bending rigidity and the compliances of stretching and shearing of a section of one thickness."""
     thickness: Any = s.thickness
     pull = s.youngs_modulus * s.width * thickness
@@ -192,10 +192,17 @@ class BeamFits(Mapping[str, Fit]):
     """Fits of the beams between their nodes by name, made when they are requested."""
 
     def __init__(self, network: Network, bundle: Bundle | None = None, number: int = 0) -> None:
-        """Fit the plain beams, all at once, unless that is done: the bundle has the network under a number."""
-        self.network, self.bundle, self.number = network, bundle or Bundle([network]), number
+        """Take the plain beams from a bundle that has the network under a number, if there is one."""
+        self.network, self.number = network, number
+        if bundle is not None:
+            self.bundle = bundle
         self._known: dict[str, Fit] = {}
         self.known: dict[Any, Any] = {}  # what else was found of the unloaded network, by its maker
+
+    @cached_property
+    def bundle(self) -> Bundle:
+        """All plain beams, fitted at once."""
+        return Bundle([self.network])
 
     def __getitem__(self, name: str) -> Fit:
         """Return the fit of a beam."""

@@ -16,7 +16,7 @@ from cfmkit.elastica.mechanics.discretise import Discretisation, embed, raise_de
 from cfmkit.elastica.mechanics.elements import TAUT_RATIO
 from cfmkit.elastica.mechanics.equations import ComparedStates
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.problem import NetworkProblem
+from cfmkit.elastica.mechanics.problem import DEGREES_MORE, NetworkProblem
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.path import Path, PathStatus, largest_force, load_displacement, work_with_drive
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-DEGREES_MORE = 4
 MAX_POINTS = 6  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
 ERROR_SAFETY = 2.0  # of a change: where forms converge slowly, four degrees more still miss as much again
@@ -155,9 +154,10 @@ def find_tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     e, found = path.mesh.elements, dict[str, float]()
     if not len(path):
         return {}
-    whole = _tautness(path)
-    if not whole.max() > TAUT_RATIO:
+    force = np.abs(path.at.z[:, e.unknowns[:, -2:]])
+    if not _tautness(path, force.max(axis=0).max(axis=1)).max() > TAUT_RATIO:
         return {}
+    whole = _tautness(path, force.max(axis=2))
     resolved = np.where(whole < MAX_TENSION, whole, 0.0).max(axis=0)
     for number, (beam, (left, right)) in enumerate(zip(e.beam, e.cuts, strict=True)):
         if right - left > RECUT_SHARE and resolved[number] * (right - left) > TAUT_RATIO:
@@ -165,10 +165,9 @@ def find_tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value}
 
 
-def _tautness(path: Path) -> FloatArray:
-    """Return L sqrt(N/EI) at every point with the length of an element's beam, (n, e)."""
+def _tautness(path: Path, force: FloatArray) -> FloatArray:
+    """Return L sqrt(N/EI) of forces in elements, dimensionless, with the lengths of their beams, (..., e)."""
     e = path.mesh.elements
-    force = np.abs(path.at.z[:, e.unknowns[:, -2:]]).max(axis=2)
     bending = (e.rigidity * e.weight).sum(axis=-1) * e.length
     row = path.mesh.numbering.row
     return np.asarray(np.sqrt(force / bending) * np.bincount(row, e.length.reshape(-1, len(row))[0])[row])
@@ -181,5 +180,6 @@ def drop_locked_points(path: Path) -> Path:
     rigid = ~path.mesh.axial.any(axis=1)
     if not rigid.any():
         return path
-    locked = (_tautness(path)[:, rigid] > MAX_TENSION).any(axis=1)
+    force = np.abs(path.at.z[:, path.mesh.elements.unknowns[:, -2:]]).max(axis=2)
+    locked = (_tautness(path, force)[:, rigid] > MAX_TENSION).any(axis=1)
     return path.take(slice(0, int(locked.argmax()))) if locked.any() else path

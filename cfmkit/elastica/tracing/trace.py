@@ -11,16 +11,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece
+from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece, join_pieces
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise, embed, raise_degree
+from cfmkit.elastica.mechanics.equations import NaturalMarch
+from cfmkit.elastica.mechanics.plain_networks import arrange
+from cfmkit.elastica.mechanics.problem import DEGREES_MORE
 from cfmkit.elastica.model.beam_fits import coils
 from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Control, Loading
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
 from cfmkit.elastica.tracing.accuracy import (
     CORRECTION_ERROR,
-    DEGREES_MORE,
     drop_locked_points,
     find_tension,
     pick_points,
@@ -83,6 +85,8 @@ class DegreeAndPieces:
         self, network: Network, drive: Drive, fits: BeamFits | None = None, flanks: tuple[FlankPlace, ...] = ()
     ) -> Discretisation:
         """Return the arrays of a network, whose beams may be fitted already, and whose sides may touch at places."""
+        if self.pieces == 1 and not (self.tension or flanks):
+            return arrange(network, drive, self.degree, fits)
         return discretise(network, drive, self.degree, self.pieces, self.tension, fits=fits, flanks=flanks)
 
 
@@ -158,7 +162,7 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             resolution = replace(resolution, tension={**(resolution.tension or {}), **taut}, degree=degree)
             best, attempt = attempt, None
             continue
-        attempt = _with_error(attempt)
+        attempt = attempt if math.isfinite(attempt.path.error) else _with_error(attempt)
         near = tolerance < attempt.path.error < NEAR_ERROR_FACTOR * tolerance
         if near and not (resolution.degree < MAX_DEGREE and _can_be_raised(attempt)):  # which corrects all its points
             attempt = _with_error(attempt._replace(path=polish(path)))
@@ -237,7 +241,8 @@ def raise_attempt(attempt: TraceAttempt, resolution: DegreeAndPieces, control: C
     )
     unit = path.mesh.scales.drive
     told = tuple(_tell(replace(event, drive=drive), unit) for event, drive in zip(attempt.events, drives, strict=True))
-    raised = replace(path, at=Equilibria(fine, z, path.at.drive), branch=_name_branches(branches, unit), events=told)
+    at, names = Equilibria(fine, z, path.at.drive), _name_branches(branches, unit)
+    raised = replace(path, at=at, branch=names, events=told, error=math.inf)
     lifted = tuple(_lift(event, drive, path.mesh, fine) for event, drive in zip(attempt.events, drives, strict=True))
     started = start._replace(problem=problem)
     return attempt._replace(path=raised, resolution=resolution, start=started, branches=branches, events=lifted)
@@ -356,6 +361,8 @@ def trace_on(
     _settle_events(columns, events, drive, unit)
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _path(network, drive, _states(start, meshes, columns), columns, told, status, message)
+    if len(points) == 2 and not events and isinstance(points[1], NaturalMarch):  # one march from the start to the end
+        vars(path)["error"] = max(points[1].error, CORRECTION_ERROR * start.problem.next_correction)
     if changes:
         touched = tuple(
             ContactEvent(one.kind, one.contact, one.at.drive * unit, one.before, one.after, one.states)
@@ -369,9 +376,9 @@ def trace_on(
 
 
 def _options(drive: Drive, control: Control, unit: float) -> Options:
-    targets = drive.points / unit
-    span = max(float(targets.max()), 0.0) - min(float(targets.min()), 0.0)
-    nearest = abs(float(targets[0])) / span or FIRST_STEP
+    targets = (drive.points / unit).tolist()
+    span = max(*targets, 0.0) - min(*targets, 0.0)
+    nearest = abs(targets[0]) / span or FIRST_STEP
     return Options(
         span, control.branch, control.sign, control.through_folds, control.largest_turn,
         first_step=control.first_step or min(FIRST_STEP, nearest), most_points=control.most_points,
@@ -390,8 +397,6 @@ def _states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points:
         pieces.append(StatesOfPiece(arrays, z, drives))
     if len(pieces) == 1 or start.problem.remesh is None:
         return Equilibria(*pieces[0])
-    from cfmkit.elastica.contact.path_items import join_pieces
-
     drives = np.concatenate([piece.drive for piece in pieces])
     return Equilibria(*join_pieces([piece for piece in pieces if len(piece.drive)], start.problem.remesh), drives)
 
@@ -405,7 +410,7 @@ def _path(
         unstable=read_only(points.unstable, np.int64), requested=read_only(points.target, np.int64),
         branch=_name_branches(points.branches, states.mesh.scales.drive),
         status=status, message=message, events=events, error=float("inf"),
-        accurate=read_only(np.ones(len(points.drive)), np.bool_),
+        accurate=read_only(np.ones(len(points.drive), np.bool_), np.bool_),
     )  # fmt: skip
     # the solver has them already
     if not (isinstance(drive, Loading) or np.count_nonzero(~np.isfinite(points.effort))):
@@ -430,15 +435,16 @@ def _settle_events(points: PointColumns, events: list[PathEvent], drive: Drive, 
 
 def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
     names = {branch: _name_branch(branch, unit) for branch in set(branches)}
+    if len(names) == 1:
+        return read_only(np.full(len(branches), next(iter(names.values()))), np.str_)
     return read_only([names[branch] for branch in branches], np.str_)
 
 
 def _name_branch(branch: PathBranch | None, unit: float) -> str:
     if branch is None:
         return "primary"
-    where = (
-        f"under {100 * branch.drive:.4g} % of the {branch.label}" if branch.label else f"at {branch.drive * unit:.6g}"
-    )
+    share = f"under {100 * branch.drive:.4g} % of the {branch.label}"
+    where = share if branch.label else f"at {branch.drive * unit:.6g}"
     return f"bifurcated {where}, sign {branch.sign:+d}"
 
 

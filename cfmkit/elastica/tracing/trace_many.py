@@ -22,12 +22,12 @@ from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.equations import ComparedStates, MarchCode, MarchPlan
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.mechanics.problem import DEGREES_MORE
 from cfmkit.elastica.model.beam_fits import is_plain
 from cfmkit.elastica.model.drive import Control, Loading
 from cfmkit.elastica.model.network import apart
 from cfmkit.elastica.results.path import PathStatus
 from cfmkit.elastica.tracing.accuracy import (
-    DEGREES_MORE,
     ERROR_SAFETY,
     NEXT_CORRECTION,
     ROUNDING_ERROR,
