@@ -344,12 +344,12 @@ def _follow_part(
         waiting = []
         assert isinstance(item, Point)
         assert at is not None
-        yield item._replace(at=at)
+        yield Point(at, item.target, item.branch)
         if previous is not None and part.is_locked(previous, at):
             stop = PathStop(WhyStopped.LIMIT_POINT, at.drive, LOCKED_MESSAGE)
             return EndOfPiece(stop, _pass_point(walk, last), at)
-        reached = item.target if item.target >= 0 or last is None else last.target
-        last, previous = item._replace(target=reached), at
+        last = item if item.target >= 0 or last is None else item._replace(target=last.target)
+        previous = at
     walk = _pass_point(walk, last)
     return EndOfPiece(PathStop(WhyStopped.LOST, walk.here.drive, "no step converged at {place}"), walk, walk.here)
 

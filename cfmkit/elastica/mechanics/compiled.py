@@ -94,22 +94,22 @@ class CompiledEquations(NumpyEquations):
 
     def exchange(self, mesh: Discretisation) -> CompiledEquations:
         """Return those with other contacts closed, or other elements that stretch; free unknowns are among these."""
-        slot, kept = number_free(mesh.free, mesh.size), np.searchsorted(self.mesh.free, mesh.free)
-        unit, nodes = self.unit[kept], mesh.node_contacts
-        arrays = {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
-        if mesh.moving is None:
-            arrays["axial"] = np.ascontiguousarray(mesh.elements.axial)
-        for name, column, contacts in (
-            ("contact_at", CLOSED_NODE, nodes),
-            ("side_at", CLOSED_SIDE, mesh.side_contacts),
-        ):
-            if contacts:
-                arrays[name] = self.arrays[name].copy()
-                arrays[name][:, column] = [-1 if contact.closed is None else contact.closed for contact in contacts]
-        presses = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
-        counts = {"free": len(mesh.free), "presses": presses, "contacts": len(nodes)}
+        exchanged, unit, counts = copy(self), self.unit, dict[str, int]()
+        arrays: dict[str, Any] = {"axial": np.ascontiguousarray(mesh.elements.axial)} if mesh.moving is None else {}
+        if mesh.free is not self.mesh.free:
+            slot, kept = number_free(mesh.free, mesh.size), np.searchsorted(self.mesh.free, mesh.free)
+            unit, nodes = self.unit[kept], mesh.node_contacts
+            arrays |= {"slot": slot, "leaves": self.arrays["leaves"][kept], "unit": unit}
+            for name, column, contacts in (
+                ("contact_at", CLOSED_NODE, nodes),
+                ("side_at", CLOSED_SIDE, mesh.side_contacts),
+            ):
+                if contacts:
+                    arrays[name] = self.arrays[name].copy()
+                    arrays[name][:, column] = [-1 if at.closed is None else at.closed for at in contacts]
+            presses = sum(bool(slot[contact.unknown] >= 0) for contact in nodes)
+            counts = {"free": len(mesh.free), "presses": presses, "contacts": len(nodes)}
         row = make_row(arrays, counts, self.row)
-        exchanged = copy(self)
         vars(exchanged).update(mesh=mesh, unit=unit, arrays={**self.arrays, **arrays}, row=row)
         return exchanged
 

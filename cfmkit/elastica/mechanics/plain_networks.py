@@ -44,7 +44,7 @@ class _Kind(NamedTuple):
 
 def arrange(network: Network, drive: Drive, degree: int, fits: BeamFits | None = None) -> Discretisation:
     """Return the arrays of a network under a drive as `discretise` does, in one compiled call if beams are plain."""
-    described = None if load_compiled() is None else _describe(network, drive)
+    described = None if network.contacts or load_compiled() is None else _describe(network, drive)
     if described is None:
         return discretise(network, drive, degree, fits=fits)
     key, spots, beams = described
@@ -89,7 +89,7 @@ def _describe(network: Network, drive: Drive) -> tuple[Any, Any, Any] | None:
         if node.support.displacement != NO_DISPLACEMENT:
             return None
         kinds += (name, node.support)
-    if network.contacts or not all(link.turns for link in network.links):
+    if not all(link.turns for link in network.links):
         return None
     kinds += [apart(network, link.node) for link in network.links]
     for item in (*network.springs, *network.loads, None, *drive.loads):

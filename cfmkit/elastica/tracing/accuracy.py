@@ -56,8 +56,9 @@ def point_errors(path: Path, indices: Sequence[int]) -> FloatArray:
     else:
         effort_unit = mesh.scales.moment / mesh.scales.drive
     known = compared.converged & (compared.moved <= MAX_CHANGE)
-    for row in np.flatnonzero(known & ~compared.is_as_stable(path.unstable[chosen])):
-        known[row] = _is_critical(mesh, z[row], float(drives[row]))
+    for row in np.flatnonzero(known & (compared.unstable != path.unstable[chosen])):
+        alike = compared.is_as_stable(path.unstable[chosen])[row]
+        known[row] = alike or _is_critical(mesh, z[row], float(drives[row]))
     efforts = np.abs(effort_unit * compared.effort - path.effort[chosen])
     reach = float(np.abs(own.z[:, : mesh.numbering.n_ends]).max())
     largest = float(compared.largest.max(initial=0.0))

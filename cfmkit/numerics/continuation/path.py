@@ -81,7 +81,12 @@ class PointColumns(NamedTuple):
                 rows.append((item.drive, item.unstable, item.effort, item.target))
             else:
                 x.append(item.at.x[None])
-                rows.append(([item.at.drive], [item.at.unstable], [item.at.effort], [item.target]))
+                numbers = item.at.drive, item.at.unstable, item.at.effort, item.target
+                if rows and isinstance(rows[-1][0], list):
+                    for column, number in zip(rows[-1], numbers, strict=True):
+                        column.append(number)
+                else:
+                    rows.append(tuple([number] for number in numbers))
             branches += [item.branch] * len(x[-1])
         if not rows:
             return cls([], np.empty(0), np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64), ())
