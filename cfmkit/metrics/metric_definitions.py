@@ -1,9 +1,8 @@
 """The table of constant-force metrics by their names; definitions stand beside the functions.
 
-A metric of a force curve is called ``force_mean``; of a torque curve, where it
-is a torque over an angle, ``torque_mean``. Names without ``force_`` are the same
-for both. On a torque curve ``force_ripple`` is accepted for ``torque_ripple``: whoever compares
-mechanisms need not know what drives them.
+A metric of a force curve is called ``force_mean``; of a torque curve, where it is a torque over an angle,
+``torque_mean``. Names without ``force_`` are the same for both. On a torque curve ``force_ripple`` is accepted for
+``torque_ripple``: whoever compares mechanisms need not know what drives them.
 
 Sources
 -------

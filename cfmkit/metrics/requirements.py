@@ -260,9 +260,8 @@ def check(
 ) -> tuple[Outcome, ...]:
     """Return the outcome of every requirement on a result, in their order.
 
-    Where no branch is named, all branches must meet it. A metric that has no
-    value (the curve ends before the window does, there is no target) is missed.
-    `surveys` has what is known of this result already, and is where more is noted.
+    Where no branch is named, all branches must meet it. A metric that has no value (the curve ends before the window
+    does, there is no target) is missed. `surveys` has what is known of this result already, and is where more is noted.
 
     Raises
     ------

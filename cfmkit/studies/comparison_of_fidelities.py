@@ -1,8 +1,7 @@
 """One mechanism by every model that its family has: the curves, and how far each is from the finest one.
 
-The models are those of the family's record, which `analysis.fidelity` names, the coarsest first and the finest
-last. A choice that the specification has no data for is left out; a curve that fails
-keeps its status.
+The models are those of the family's record, which `analysis.fidelity` names, the coarsest first and the finest last. A
+choice that the specification has no data for is left out; a curve that fails keeps its status.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The points of a study in their order, enumerated when they are needed.
+"""Points of a study in their order: a grid, lists side by side or drawn samples, enumerated when they are needed.
 
 Nothing of the size of a grid is ever allocated: a grid of a million points from two
 axes holds two thousand values. Only what is drawn at random is kept as drawn.

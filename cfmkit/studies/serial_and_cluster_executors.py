@@ -1,13 +1,11 @@
-"""Executors: an executor takes jobs as they come and yields outcomes as they finish.
+"""Executors of jobs, which yield outcomes as they finish: in this process, or on a Dask cluster.
 
-``executor(work, jobs, stopping)`` yields (job, outcome) in any order. It pulls from
-`jobs` only as fast as it works, and once ``stopping()`` is true it pulls no more,
-finishes what runs and ends. `serial` is the simplest, `Cluster` hands jobs to Dask;
-`cfmkit.studies.pool` has processes of this computer.
+``executor(work, jobs, stopping)`` yields (job, outcome) in any order. It pulls from `jobs` only as fast as it works,
+and once ``stopping()`` is true it pulls no more, finishes what runs and ends. `cfmkit.studies.pool` is one, too.
 
-An executor on a Dask cluster: one that runs somewhere, or one that is started here for the study. A worker that dies
-costs its points a second try elsewhere; a point whose workers die again is given up (``crashed``), as in a pool. What
-a worker needs travels with each job, so that workers may come and go. A single point cannot be ended from outside.
+A Dask cluster (`Cluster`) runs somewhere, or is started here for the study. A worker that dies costs its points a
+second try elsewhere; a point whose workers die again is given up (``crashed``), as in a pool. What a worker needs
+travels with each job, so that workers may come and go. A single point cannot be ended from outside.
 
 Rows of a study are of one code and one set of libraries. The stamp of both travels with each job; a worker that has
 another one computes nothing and is refused by name, whether it is there at the start or joins later.

@@ -1,4 +1,4 @@
-"""The mechanism as a part that can be cut: beams with their true thickness, joints merged, inside corners rounded.
+"""Drawing of a beam mechanism as a part that can be cut: outline, dimensions, point tables, warnings on what it joins.
 
 Warnings say what the drawing joins although the mechanism does not.
 """

@@ -1,4 +1,4 @@
-"""Solution of a beam mechanism, and its columns of nodes and beams.
+"""Solution of a beam mechanism: effort, stress, gaps, stability, frequencies along its path; columns of nodes, beams.
 
 Columns are those that `analysis.outputs` asks for, of beams and of solids alike, and forces. Every other file of this
 family may import these types.

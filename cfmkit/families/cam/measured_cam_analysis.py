@@ -1,9 +1,8 @@
 """Quasi-static analysis of a cam as it was built, from measured points of its flanks: where rollers run on them.
 
-The points are registered to the design, both flanks by one motion; what is left is the
-error of the profile. Both sides may differ: with the spring force S = K (x_R + x_L - 2 x0)
-on each roller the slider's force is the sum of what each side needs. The force is split
-into what the design gives, and what rest length, profile and friction add to it, one
+The points are registered to the design, both flanks by one motion; what is left is the error of the profile. Both sides
+may differ: with the spring force S = K (x_R + x_L - 2 x0) on each roller the slider's force is the sum of what each
+side needs. The force is split into what the design gives, and what rest length, profile and friction add to it, one
 after the other, so that the parts add up.
 
 Where rollers run on flanks as they were built: the outermost place that no point of the flank forbids. A roller is

@@ -1,9 +1,4 @@
-"""Scalar results of snap-through leaves beside a preloaded spring, and its force by preload, leaves and stiffness.
-
-They stand beside the constant-force metrics of every family: stiffnesses [N/m], travels [m], stresses [Pa], effects of
-the preload.
-
-Tables are what each preload gives, and what other readings of a paper's table of sizes would give.
+"""Scalar results of snap-through leaves beside a preloaded spring; tables of its force by preload, leaves, stiffness.
 """
 
 from __future__ import annotations

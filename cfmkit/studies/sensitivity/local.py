@@ -1,10 +1,9 @@
 """Gradients at the nominal point: differences over steps that are halved, extrapolated, with an error estimate.
 
-Ridders' scheme [R]: the differences over h, h/2, h/4, ... are extrapolated to h = 0, and
-of all the values so found the one is taken that differs least from its neighbours. That
-is the step control: large steps suffer from curvature, small ones from rounding, and
-the difference that is left is the error estimate. Where one side has no values (a
-friction cannot be negative), differences of the other side are extrapolated.
+Ridders' scheme [R]: the differences over h, h/2, h/4, ... are extrapolated to h = 0, and of all the values so found the
+one is taken that differs least from its neighbours. That is the step control: large steps suffer from curvature, small
+ones from rounding, and the difference that is left is the error estimate. Where one side has no values (a friction
+cannot be negative), differences of the other side are extrapolated.
 
 Reference
 ---------

@@ -1,7 +1,4 @@
-"""A sensitivity study by its method: draw, evaluate, analyse, state; and its files.
-
-These are results.csv, indices.csv, convergence.csv, metrics.json, resolved.yaml.
-"""
+"""A sensitivity study by its method: draw, evaluate, analyse, state; and its files (results.csv, indices.csv, ...)."""
 
 from __future__ import annotations
 

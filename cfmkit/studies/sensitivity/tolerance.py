@@ -1,10 +1,9 @@
 """Monte Carlo over tolerances: how many parts are good, and which tolerance to tighten first.
 
-Every sample is one made mechanism. It is evaluated as drawn, and again with each
-tolerance (or group of correlated ones) halved about its nominal value while all random
-numbers stay: the differences are those of the tolerance alone. ``yield_gain`` says how
-many more parts would be good, ``variance_drop`` which share of an output's variance
-would go away.
+Every sample is one made mechanism. It is evaluated as drawn, and again with each tolerance (or group of correlated
+ones) halved about its nominal value while all random numbers stay: the differences are those of the tolerance alone.
+``yield_gain`` says how many more parts would be good, ``variance_drop`` which share of an output's variance would go
+away.
 """
 
 from __future__ import annotations

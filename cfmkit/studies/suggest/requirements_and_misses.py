@@ -4,8 +4,6 @@ Every number of a request becomes a requirement on a metric, so that `cfmkit ana
 search. What a request asks for and nothing is known of, as the life of a material without fatigue data, is no
 requirement: the proposal says that it was not judged, and does not meet the request. A yield is that of many
 parts: it stands in the block `sensitivity`, as `min_yield`.
-
-Words about misses are of the envelope, the travel, and a force that wide beams raise.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The limits of a task, clearance included, as rows that must be at least zero, all of order one, with derivatives.
+"""Limits of a shape task (stress, envelope, length, radius, clearance, force ...) as scaled rows >= 0, with slopes.
 
 Clearance of beams: a smooth bound of the smallest gap of a pair over the required one, with derivatives. Beams that
 meet in a joint come close to each other there. So the gap that is required between two places grows with the way

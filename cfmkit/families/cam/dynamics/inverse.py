@@ -1,19 +1,17 @@
-"""Forces of a given motion, from the position of the slider alone.
+"""Kinematics and forces of a cam mechanism for a given motion of its slider, from its position alone; also at rest.
 
-The mechanism has one degree of freedom, so every velocity is a known function of
-the slider's position times its speed. With C the roller's centre, t the unit tangent
-of its curve, k the curvature, sigma the arc length, d = C - i S the brace (complex
-numbers, ' = d/dS):
+The mechanism has one degree of freedom, so every velocity is a known function of the slider's position times its speed.
+With C the roller's centre, t the unit tangent of its curve, k the curvature, sigma the arc length, d = C - i S the
+brace (complex numbers, ' = d/dS):
 
     sigma'  = Im d / Re(conj(d) t)                                from |d| = L
     sigma'' = -(|d'|^2 + k sigma'^2 Re(conj(d) i t)) / Re(conj(d) t)
 
-and C' = t sigma', C'' = t sigma'' + i k t sigma'^2. Rolling without slip is integrable
-in the plane: the roller turns by sigma / r. With all accelerations known, the balance of
-each brace about the slider's pin gives the contact force, that of the roller the force at
-its axis, that of the brace the force at the pin, and that of the slider the force wanted: side
-by side, without symmetry, and with nothing to integrate. The power of all forces is the
-rate of the energy (`MotionResponse.energy`), which the tests use as a check.
+and C' = t sigma', C'' = t sigma'' + i k t sigma'^2. Rolling without slip is integrable in the plane: the roller turns
+by sigma / r. With all accelerations known, the balance of each brace about the slider's pin gives the contact force,
+that of the roller the force at its axis, that of the brace the force at the pin, and that of the slider the force
+wanted: side by side, without symmetry, and with nothing to integrate. The power of all forces is the rate of the energy
+(`MotionResponse.energy`), which the tests use as a check.
 
 Rolling resistance, which the multibody model of [SS] lacks, is that of the quasi-static
 model: a force mu N against the motion of the roller's centre.

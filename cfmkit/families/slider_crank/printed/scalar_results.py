@@ -1,4 +1,4 @@
-"""Scalar results of flexures and strips."""
+"""Scalar results of a printed slider-crank: flexures or a strip."""
 
 from __future__ import annotations
 
