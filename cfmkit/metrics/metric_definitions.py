@@ -42,10 +42,10 @@ METRIC_TABLE = (
 
 @lru_cache(maxsize=4)
 def _table(kind: Kind) -> tuple[Definition, ...]:
-    return tuple(replace(item.state_for_kind(kind), name=_name_in_words(item.name, kind)) for item in METRIC_TABLE)
+    return tuple(replace(item.state_for_kind(kind), name=_name_for_kind(item.name, kind)) for item in METRIC_TABLE)
 
 
-def _name_in_words(name: str, kind: Kind) -> str:
+def _name_for_kind(name: str, kind: Kind) -> str:
     return f"{kind}_{name.removeprefix('force_')}" if name.startswith("force_") else name
 
 

@@ -281,7 +281,7 @@ def check(
         raise SpecError(problems)
     table = _group_by_name(definitions)
     surveys = {} if surveys is None else surveys
-    return tuple(_outcome(requirement, result, table, surveys) for requirement in requirements)
+    return tuple(_judge_requirement(requirement, result, table, surveys) for requirement in requirements)
 
 
 def judge_part_metric(requirement: Requirement, quantity: Quantity) -> Outcome:
@@ -303,7 +303,7 @@ def judge_part_metric(requirement: Requirement, quantity: Quantity) -> Outcome:
 
 
 @np.errstate(all="ignore")
-def _outcome(
+def _judge_requirement(
     requirement: Requirement,
     result: Result,
     table: Mapping[str, Sequence[Definition]],

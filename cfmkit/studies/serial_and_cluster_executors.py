@@ -253,7 +253,7 @@ class _ClusterRun:
             return outcome
         error = future.exception() if future.status == "error" else None
         if error is None:
-            raise self._build_error()
+            raise self._connection_error()
         if type(error).__name__ == "KilledWorker":
             return Lost(Status.CRASHED, f"the workers that worked on this point died {MAX_RETRIES + 1} times")
         # `do_parcel` lets no error of a point out: this worker could not even read the job.
@@ -289,17 +289,17 @@ class _ClusterRun:
     def _check_connection(self) -> Iterator[None]:
         """Raise if the scheduler has gone: it forgets the jobs of a client that it has lost."""
         if self.client.status != "running":
-            raise self._build_error()
+            raise self._connection_error()
         try:
             yield
         except TimeoutError:
             if self.client.status == "running":
                 raise
-            raise self._build_error() from None
+            raise self._connection_error() from None
         except OSError:
-            raise self._build_error() from None
+            raise self._connection_error() from None
 
-    def _build_error(self) -> UsageError:
+    def _connection_error(self) -> UsageError:
         return UsageError(f"--cluster {self.address}: the Dask scheduler has gone; {_RESUME_MESSAGE}")
 
     def _refuse_other_code(self) -> None:

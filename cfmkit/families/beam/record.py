@@ -1,5 +1,4 @@
-"""Record by which the registry knows beam mechanisms: their models, design, proposals, pictures and names of results.
-"""
+"""Record by which the registry knows beam mechanisms: models, design, proposals, pictures and names of results."""
 
 from __future__ import annotations
 

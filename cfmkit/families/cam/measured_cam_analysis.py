@@ -79,7 +79,7 @@ def analyze_built(spec: CamSpec) -> Result:
         assembly = assemble(spec)
         check_first_pose(assembly)
         registration = register_cam(assembly)
-        tracks = _tracks(assembly, registration)
+        tracks = _make_tracks(assembly, registration)
         travel, ended = _travel(assembly, tracks)
         built = MeasuredCam(assembly, registration, tracks, travel)
         check_springs(built.elongation, built.forces(1.0)[1], assembly.loads.rest_half_width)
@@ -166,7 +166,7 @@ def _check_fit(registration: Registration, name: str) -> None:
         )
 
 
-def _tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack, BuiltTrack]:
+def _make_tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack, BuiltTrack]:
     mechanism, design = assembly.spec.mechanism, flanks_of(assembly)[0]
     noise = float(mechanism.profile.noise or 0.0)
     # The left flank's feet and errors are those of its mirror image.

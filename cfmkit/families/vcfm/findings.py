@@ -187,7 +187,7 @@ def _only_rises(solution: Solution) -> Any:
     return np.logical_not(_negative_and_straight(solution)[0])
 
 
-def _is_rounded(solution: Solution) -> Any:
+def _has_rounded_force(solution: Solution) -> Any:
     negative, straight = _negative_and_straight(solution)
     return np.logical_and(negative, np.logical_not(straight))
 
@@ -261,7 +261,7 @@ def _rests_beyond(solution: Solution) -> Any:
     return ~(solution.nominal.rest <= solution.window[0])
 
 
-def _reverses(solution: Solution) -> Any:
+def _has_reversed_force(solution: Solution) -> Any:
     return _rests_beyond(solution) | (solution.nominal.extremes_inside(solution.window)[1] <= 0)
 
 
@@ -448,7 +448,7 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule("spring_closed", is_closed, closed_spring),
     FindingRule("truss_law", lambda solution: solution.fidelity == "truss", _describe_truss),
     FindingRule("no_negative_stiffness", _only_rises, _rising_force),
-    FindingRule("no_linear_region", _is_rounded, _rounded_force),
+    FindingRule("no_linear_region", _has_rounded_force, _rounded_force),
     FindingRule(
         "not_flat",
         _is_not_flat,
@@ -459,7 +459,7 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
         ),
     ),
     FindingRule("bistable", _stays_behind_peak, _second_position),
-    FindingRule("force_reversal", _reverses, _reversal),
+    FindingRule("force_reversal", _has_reversed_force, _reversal),
     FindingRule("overload", _is_overloaded, _overload),
     FindingRule("preload_out_of_range", lambda solution: _pulled_out_of_range(solution).any(axis=1), _pull),
     FindingRule("spring_overstretched", is_overstretched, overstretching),

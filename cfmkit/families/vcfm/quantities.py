@@ -1,5 +1,4 @@
-"""Scalar results of snap-through leaves beside a preloaded spring; tables of its force by preload, leaves, stiffness.
-"""
+"""Scalar results of snap-through leaves beside a preloaded spring; tables of its force by preload and by leaves."""
 
 from __future__ import annotations
 
@@ -274,7 +273,7 @@ def adjustability(solution: Solution) -> Table:
             row |= {"window_start": start, "window_end": end, "window_length": end - start}
             row |= {"window_start_from_rest": start - push.rest if push.rest is not None else None}
         rows.append(row)
-    return _table(rows, _PRELOAD_COLUMNS)
+    return _make_table(rows, _PRELOAD_COLUMNS)
 
 
 _PRELOAD_COLUMNS = {
@@ -317,7 +316,7 @@ def readings(solution: Solution) -> Table:
     Where a measured force and stiffness are stated, also with those.
     """
     rows = []
-    for reading in _readings(solution):
+    for reading in _list_readings(solution):
         spread_values = force_statistics(_force(solution, reading))
         about = {
             "reading": reading.text,
@@ -325,7 +324,7 @@ def readings(solution: Solution) -> Table:
             "positive_stiffness": reading.positive_stiffness,
         }
         rows.append(about | spread_values)
-    return _table(rows, _READING_COLUMNS)
+    return _make_table(rows, _READING_COLUMNS)
 
 
 _READING_COLUMNS = {
@@ -339,7 +338,7 @@ _READING_COLUMNS = {
 }
 
 
-def _readings(solution: Solution) -> Iterator[TableReading]:
+def _list_readings(solution: Solution) -> Iterator[TableReading]:
     mechanism, reported = solution.spec.mechanism, solution.spec.analysis.measured
     if mechanism.positive is None:
         for leaves in sorted({2, 4, mechanism.bistable.half_beams}):
@@ -374,7 +373,7 @@ def _force(solution: Solution, reading: TableReading) -> FloatArray:
     return np.asarray(reading.half_beams * leaves + reading.positive_stiffness * spring)
 
 
-def _table(rows: list[dict[str, Any]], columns: dict[str, str]) -> Table:
+def _make_table(rows: list[dict[str, Any]], columns: dict[str, str]) -> Table:
     table_columns = []
     for name, dimension in columns.items():
         values = [row.get(name) for row in rows]

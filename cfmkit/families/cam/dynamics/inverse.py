@@ -150,11 +150,11 @@ def respond(machine: Machine, slider: SliderState) -> MotionResponse:
     loads = _loads(machine, parts, at, slider)
     free = loads.springs - parts.roller_mass * loads.roller - loads.rolling * at.tangent
     middle = parts.brace_mass * loads.middle
-    balance = parts.brace_inertia * loads.turning + _cross(at.brace, 0.5 * middle - free)
+    balance = parts.brace_inertia * loads.turning + _cross_product(at.brace, 0.5 * middle - free)
     traction = loads.rolling
     if machine.friction:
         resistance = -machine.friction if slider.speed.sum() < 0 else machine.friction
-        lever = at.lever + resistance * _cross(at.brace, at.tangent)
+        lever = at.lever + resistance * _cross_product(at.brace, at.tangent)
         contact = np.where(lever < 0, -balance / lever, np.nan)  # else friction holds the roller
         free, traction = free - resistance * contact * at.tangent, traction + resistance * contact
     else:
@@ -189,7 +189,7 @@ def kinematics(stances: tuple[Stance, Stance], position: FloatArray, length: Flo
     arc_bend = (bent * product.imag - (relative.real**2 + relative.imag**2)) / lever
     center_bend = tangent * (arc_bend + 1j * bent)
     square = length * length
-    angle_slope, angle_bend = _cross(brace, relative) / square, _cross(brace, center_bend) / square
+    angle_slope, angle_bend = _cross_product(brace, relative) / square, _cross_product(brace, center_bend) / square
     return Kinematics(
         center, tangent, brace, lever, ratio, arc_bend, center_slope, center_bend, angle_slope, angle_bend
     )
@@ -213,5 +213,5 @@ def _loads(machine: Machine, parts: SideParts, at: Kinematics, slider: SliderSta
     )
 
 
-def _cross(a: ComplexArray, b: ComplexArray) -> FloatArray:
+def _cross_product(a: ComplexArray, b: ComplexArray) -> FloatArray:
     return a.real * b.imag - a.imag * b.real
