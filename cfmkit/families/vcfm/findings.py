@@ -176,9 +176,8 @@ def _negative_and_straight(solution: Solution) -> tuple[Any, Any]:
     if not solution.leaf_kind.buckles or solution.fidelity == "truss":
         return True, True
     if limits is None:  # or they depend on more than the slenderness: as the curve has it
-        return solution.spread_over_mechanisms(solution.character.negative_stiffness) > 0, np.isfinite(
-            solution.linear[0]
-        )
+        is_negative = solution.spread_over_mechanisms(solution.character.negative_stiffness) > 0
+        return is_negative, np.isfinite(solution.linear_range[0])
     q = _slenderness(solution)
     return q >= limits.negative, q > limits.constant
 
@@ -277,20 +276,20 @@ def _reversal(solution: Solution) -> Sentence:
 def _forces_beyond_linear(solution: Solution) -> tuple[FloatArray, FloatArray]:
     """Return the force where the leaves straighten again, NaN beyond the curve, and at the end, (m,) each [N]."""
     curves = solution.nominal
-    return curves.evaluate_within_ends(solution.linear[1][:, None])[:, 0], curves.force[
-        np.arange(len(solution)), curves.count - 1
-    ]
+    at_end = curves.evaluate_within_ends(solution.linear_range[1][:, None])[:, 0]
+    return at_end, curves.force[np.arange(len(solution)), curves.count - 1]
 
 
 def _is_overloaded(solution: Solution) -> Any:
-    at_end, last = _forces_beyond_linear(solution)
-    saved = solution.curves.stops.free_end <= solution.linear[1] * (1 + LIMIT_RTOL)  # what rises there is the stop
-    beyond = goes_beyond(solution.nominal.ends[1], solution.linear[1]) & ~saved
+    (at_end, last), end = _forces_beyond_linear(solution), solution.linear_range[1]
+    saved = solution.curves.stops.free_end <= end * (1 + LIMIT_RTOL)  # what rises there is the stop
+    beyond = goes_beyond(solution.nominal.ends[1], end) & ~saved
     return beyond & ~(last - at_end <= solution.spec.analysis.flatness * np.abs(last))
 
 
 def _overload(solution: Solution) -> Sentence:
-    end, (at_end, last) = float(solution.linear[1][0]), (float(force[0]) for force in _forces_beyond_linear(solution))
+    at_end, last = (float(force[0]) for force in _forces_beyond_linear(solution))
+    end = float(solution.linear_range[1][0])
     return (
         f"beyond {mm(end)} the leaves straighten and stiffen: the force goes from {newton(at_end)} to {newton(last)} "
         f"at {mm(float(solution.first.travel[-1]))}; a stop at {mm(end)} limits the travel to the linear range",

@@ -40,7 +40,7 @@ def _is_solid(solution: Solution) -> bool:
 
 
 def _linear_stroke(solution: Solution) -> FloatArray:
-    low, high = solution.linear
+    low, high = solution.linear_range
     return np.where(np.isfinite(high - low), high - low, 0.0)
 
 
@@ -152,9 +152,11 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "rise over thickness of the leaves, Q: above pi they buckle, above 3.195 they are bistable",
         lambda solution: solution.parts.strip.slenderness,
     ),
-    "linear_start": ScalarQuantity("length", "travel at which the leaves buckle", lambda solution: solution.linear[0]),
+    "linear_start": ScalarQuantity(
+        "length", "travel at which the leaves buckle", lambda solution: solution.linear_range[0]
+    ),
     "linear_end": ScalarQuantity(
-        "length", "travel at which they straighten again", lambda solution: solution.linear[1]
+        "length", "travel at which they straighten again", lambda solution: solution.linear_range[1]
     ),
     "linear_stroke": ScalarQuantity("length", "length of the linear negative stiffness", _linear_stroke),
     "constant_force": ScalarQuantity(
