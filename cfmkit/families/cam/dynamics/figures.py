@@ -52,7 +52,7 @@ def motion(result: Result) -> Figure:
     level = Limit(constant, f"{name} = {value_text(constant, 'force')}")
     diagrams = [
         Diagram(times, TIME_SCALE, Scale("force", "force"), forces, [level], ranges),
-        Diagram(times, TIME_SCALE, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _without_names(ranges)),
+        Diagram(times, TIME_SCALE, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _drop_names(ranges)),
     ]
     return diagram_figure(Heading.from_result(result, f"force that the motion needs: {_motion_text(moved)}"), diagrams)
 
@@ -93,7 +93,7 @@ def motion_contact(result: Result) -> Figure:
             Scale("force in a brace", "force"),
             [*roller_end, *slider_end],
             (),
-            _without_names(ranges),
+            _drop_names(ranges),
         ),
     ]
     return diagram_figure(Heading.from_result(result, "forces of the cam on the rollers, and in the braces"), diagrams)
@@ -138,7 +138,7 @@ def _find_intervals(times: FloatArray, where: NDArray[np.bool_], text: str) -> I
         yield MarkedRange(float(times[first]), float(times[after - 1]), "" if index else text)
 
 
-def _without_names(regions: list[MarkedRange]) -> list[MarkedRange]:
+def _drop_names(regions: list[MarkedRange]) -> list[MarkedRange]:
     return [MarkedRange(item.start, item.stop, "") for item in regions]
 
 
