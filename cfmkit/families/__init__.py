@@ -149,7 +149,7 @@ def examine_families() -> tuple[tuple[entry_point_plugins.InstalledFamily | None
         Those of this package and of this process come first, without an offer. All others are imported.
     """
     loaded = tuple((None, family(name)) for name in (*FAMILY_MODULES, *_REGISTERED_FAMILIES))
-    return loaded + tuple((offer, _try_family(offer)) for offer in entry_point_plugins.offers())
+    return loaded + tuple((offer, _import_or_explain(offer)) for offer in entry_point_plugins.offers())
 
 
 def records() -> tuple[Family, ...]:
@@ -162,7 +162,7 @@ def list_skipped() -> tuple[str, ...]:
     return tuple(examined for _, examined in examine_families() if isinstance(examined, str))
 
 
-def _try_family(offer: entry_point_plugins.InstalledFamily) -> Family | str:
+def _import_or_explain(offer: entry_point_plugins.InstalledFamily) -> Family | str:
     try:
         return entry_point_plugins.import_family(offer, FAMILY_MODULES)
     except Unusable as problem:
@@ -179,10 +179,10 @@ def origin(name: str) -> dict[str, str]:
         ``registered`` where functions of this process compute: those of no other process are the same.
     """
     stamps = [*filter(None, (_REGISTRATION_STAMPS.get(name), further_metrics.stamp()))]
-    return _package_of(name) | ({"registered": " ".join(stamps)} if stamps else {})
+    return _identity_of_package(name) | ({"registered": " ".join(stamps)} if stamps else {})
 
 
-def _package_of(name: str) -> dict[str, str]:
+def _identity_of_package(name: str) -> dict[str, str]:
     if name in FAMILY_MODULES or name in _REGISTERED_FAMILIES:
         return {}
     offers = entry_point_plugins.offers()

@@ -1,7 +1,4 @@
-"""Findings of families, made by name; numbers in them as users read them; and errors that carry one.
-
-The errors: a mechanism that cannot exist (`CannotBuild`), and targets that no mechanism meets (`Infeasible`).
-"""
+"""Findings made by name, numbers as users read them, and errors that carry a finding: no mechanism, no design."""
 
 from __future__ import annotations
 

@@ -4,9 +4,8 @@ A family's ``propose(request, run)`` looks at scaling laws, which takes millisec
 trying; the caller designs them, analyses each with its exact model and keeps those that do what is required. SI
 throughout.
 
-Families share the search for the flattest window of a given length on a curve, and by how much the force of a part
-rises because the anticlastic bending of its wide beams is suppressed. In a planar solid, in plane stress, that is free.
-Beam models know both: with `mechanism.wide_beams` they are as stiff as the curvature makes them. The ratio of both
+Stiffening: the force of a part rises because the anticlastic bending of its wide beams is suppressed. In a planar
+solid, in plane stress, that is free. Beam models know both, with and without `mechanism.wide_beams`. The ratio of both
 means over the window is what a solid misses; what clamped ends add is left out (docs/beam.md, wide beams).
 """
 

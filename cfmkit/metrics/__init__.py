@@ -2,7 +2,7 @@
 
 `metric_definitions` lists what there is and what a name may mean, `window_metrics` and `ranges` compute it,
 `branches` cuts windows, `curve_rows` and `rows_in_window` are what a metric looks at, `metric_values` runs the
-definitions over a curve, `requirements` compares with bounds, `metric_values` writes border units.
+definitions over a curve and writes border units, `requirements` compares with bounds.
 """
 
 from cfmkit.metrics.branches import BranchTrace, Undefined, Window, restrict, traces

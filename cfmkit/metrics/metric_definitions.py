@@ -1,9 +1,8 @@
 """The table of constant-force metrics by their names; definitions stand beside the functions.
 
-A metric of a force curve is called ``force_mean``; of a torque curve, where it
-is a torque over an angle, ``torque_mean``. Names without ``force_`` are the same
-for both. On a torque curve ``force_ripple`` is accepted for ``torque_ripple``: whoever compares
-mechanisms need not know what drives them.
+A metric of a force curve is called ``force_mean``; of a torque curve, where it is a torque over an angle,
+``torque_mean``. Names without ``force_`` are the same for both. On a torque curve ``force_ripple`` is accepted for
+``torque_ripple``: whoever compares mechanisms need not know what drives them.
 
 Sources
 -------
@@ -53,10 +52,10 @@ METRIC_TABLE = refuse_namesakes(
 
 @lru_cache(maxsize=4)
 def _table(kind: Kind) -> tuple[Definition, ...]:
-    return tuple(replace(item.state_for_kind(kind), name=_name_in_words(item.name, kind)) for item in METRIC_TABLE)
+    return tuple(replace(item.state_for_kind(kind), name=_name_for_kind(item.name, kind)) for item in METRIC_TABLE)
 
 
-def _name_in_words(name: str, kind: Kind) -> str:
+def _name_for_kind(name: str, kind: Kind) -> str:
     return f"{kind}_{name.removeprefix('force_')}" if name.startswith("force_") else name
 
 

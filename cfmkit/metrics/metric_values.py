@@ -174,12 +174,12 @@ class Survey:
         elif branch is not None:
             chosen = {name: rows for name, rows in chosen.items() if name == branch}
         if not chosen:
-            return (Value(None, self._no_branch(branch)),)
+            return (Value(None, self._explain_no_branch(branch)),)
         if definition.scope == "branch":
             return tuple(_compute_value(function, rows) for rows in chosen.values())
         return (_compute_value(function, self.subject if branch is None else CycleRows(chosen)),)
 
-    def _no_branch(self, name: str | None) -> str:
+    def _explain_no_branch(self, name: str | None) -> str:
         if not self.branches:
             return "the curve has no points"
         return f"there is no branch {name!r}; there are {', '.join(map(repr, self.branches))}"

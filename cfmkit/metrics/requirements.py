@@ -237,8 +237,8 @@ def check(
 ) -> tuple[Outcome, ...]:
     """Return the outcome of every requirement on a result, in their order.
 
-    Where no branch is named, all branches must meet it. A metric that has no
-    value (the curve ends before the window does, there is no target) is missed.
+    Where no branch is named, all branches must meet it. A metric that has no value (the curve ends before the window
+    does, there is no target) is missed.
 
     Raises
     ------
@@ -258,7 +258,7 @@ def check(
         raise SpecError(problems)
     table = _group_by_name(definitions)
     surveys: Surveys = {}
-    return tuple(_outcome(requirement, result, table, surveys) for requirement in requirements)
+    return tuple(_judge_requirement(requirement, result, table, surveys) for requirement in requirements)
 
 
 def judge_part_metric(requirement: Requirement, quantity: Quantity) -> Outcome:
@@ -280,7 +280,7 @@ def judge_part_metric(requirement: Requirement, quantity: Quantity) -> Outcome:
 
 
 @np.errstate(all="ignore")
-def _outcome(
+def _judge_requirement(
     requirement: Requirement,
     result: Result,
     table: Mapping[str, Sequence[Definition]],

@@ -140,7 +140,7 @@ class RowsInWindow:
         """The efforts at the points in the window and at its ends."""
         self.require(self.covered, self.describe_extent)
         inside = self.curves.samples if self.window is None else self._cut_window()
-        self.require(len(self) > 1 or np.isfinite(inside.values).all(), lambda: self._describe_failed(inside))
+        self.require(len(self) > 1 or np.isfinite(inside.values).all(), lambda: self._describe_unknown_points(inside))
         return inside
 
     def _cut_window(self) -> RowSamples:
@@ -153,7 +153,7 @@ class RowsInWindow:
             return curves.samples.cut(low, high, at_ends)
         return curves.samples.with_ends((low, high), at_ends, WINDOW_RTOL * (high - low))
 
-    def _describe_failed(self, part: RowSamples) -> str:
+    def _describe_unknown_points(self, part: RowSamples) -> str:
         count, failed = part.values.size, int((~np.isfinite(part.values)).sum())
         name, kind = self.curves.name, self.curves.kind
         return f"{failed} of {count} points of branch {name!r} in the window have no known {kind}"
@@ -235,7 +235,7 @@ class RowsInWindow:
         """Largest and smallest effort: of the points, or of the model next to them."""
         inside, path = self.inside, self.curves.frame.winding
         if path is not None:
-            return _pair(branches.extremes(path, *self._ends_on_way))
+            return _ends_of_one(branches.extremes(path, *self._ends_on_way))
         if self.curves.effort is None:
             return inside.values.max(axis=1), inside.values.min(axis=1)
         return inside.extremes_with(self.curves.all_at, *self._peaks, self._uneven)
@@ -303,7 +303,7 @@ class RowsInWindow:
         points = inside.values.shape[1]
         self.require(unknown == 0, lambda: f"the stress is unbounded at {unknown[0]} of {points} points in the window")
         if path is not None:
-            return _pair(branches.stress_extremes(path, *self._ends_on_way))[::-1]
+            return _ends_of_one(branches.stress_extremes(path, *self._ends_on_way))[::-1]
         if stress.at is None:
             return inside.values.min(axis=1), inside.values.max(axis=1)
         rows, function = np.arange(len(self)), stress.at
@@ -384,7 +384,7 @@ class RowsInWindow:
         return np.array([curve is not None and pair[0] < pair[1] and curve.covers(*pair) for pair in ends])
 
 
-def _pair(values: tuple[float, float]) -> Ends:
+def _ends_of_one(values: tuple[float, float]) -> Ends:
     return np.array(values[:1]), np.array(values[1:])
 
 

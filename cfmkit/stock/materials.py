@@ -1,13 +1,11 @@
 """Named materials with source and scatter, and the fatigue, creep and loss data that are assumed of them.
 
-The nominal value is where a design starts; the scatter is what it must survive.
-For metals the low end is the minimum of the standard. For printed plastics the
-range is wide on purpose: orientation, layer adhesion, printer, humidity and the
-maker of the filament all affect it, and none of them is known to this library.
+The nominal value is where a design starts; the scatter is what it must survive. For metals the low end is the minimum
+of the standard. For printed plastics the range is wide on purpose: orientation, layer adhesion, printer, humidity and
+the maker of the filament all affect it, and none of them is known to this library.
 
-All values are at room temperature and for short-term loads. Plastics creep: a part that is
-held deflected loses force with time, which no modulus here shows. For plastics the yield
-strength is the stress at yield of a tensile test.
+All values are at room temperature and for short-term loads. Plastics creep: a part that is held deflected loses force
+with time, which no modulus here shows. For plastics the yield strength is the stress at yield of a tensile test.
 
 How materials last and creep is for where a specification states nothing better. S-N data of steels follow the rule of a
 text book from their least tensile strength; creep is that of a data sheet. Each says its source and how far it may be

@@ -1,4 +1,4 @@
-"""Sizes in which sheets, wire, pins, bearings and screws are sold: each series with its standard and where it was read.
+"""Sizes in which sheets, wire, pins, bearings and screws are sold, by series with standard and source; fits of holes.
 
 A size that no text could be named for is not here: a series may end where the text that was read ends. Where no series
 of a material is known, nothing is rounded and nothing is refused.

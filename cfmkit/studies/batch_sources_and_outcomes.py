@@ -95,12 +95,12 @@ def sources(
     """
     paths: dict[str, str] = {}
     for name in named:
-        for path in _matches(name, out):
+        for path in _find_files(name, out):
             paths.setdefault(os.path.realpath(path), path)
     return tuple(paths.values())
 
 
-def _matches(name: str, out: str) -> list[str]:
+def _find_files(name: str, out: str) -> list[str]:
     if not name or name == "-" or "\0" in name:
         raise UsageError(
             f"{name!r} is not a file: a batch reads files, folders and patterns such as 'configs/**/*.yaml'"

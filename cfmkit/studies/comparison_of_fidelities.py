@@ -1,8 +1,7 @@
 """One mechanism by every model that its family has: the curves, and how far each is from the finest one.
 
-The models are those of the family's record, which `analysis.fidelity` names, the coarsest first and the finest
-last. A choice that the specification has no data for is left out; a curve that fails
-keeps its status.
+The models are those of the family's record, which `analysis.fidelity` names, the coarsest first and the finest last. A
+choice that the specification has no data for is left out; a curve that fails keeps its status.
 """
 
 from __future__ import annotations
@@ -185,10 +184,10 @@ def fidelity_of(result: Result) -> str:
 
 def data_of(comparison: FidelityComparison) -> dict[str, object]:
     """Return what metrics.json says besides the differences, which are metrics."""
-    return {"fidelity": {"reference": comparison.finest, "curves": list(_records(comparison))}}
+    return {"fidelity": {"reference": comparison.finest, "curves": list(_list_records(comparison))}}
 
 
-def _records(comparison: FidelityComparison) -> Iterator[dict[str, object]]:
+def _list_records(comparison: FidelityComparison) -> Iterator[dict[str, object]]:
     for item in comparison.variants:
         points = sum(map(len, item.result.curves))
         about = {"fidelity": item.name, "status": item.result.status.key, "message": item.result.message}

@@ -268,7 +268,7 @@ def move_free_values(
     """Return a specification whose free values were moved until all requirements are met, or why there is none."""
     from cfmkit.experiment.redrawn_values import Redesign, aim_of, limits_of
 
-    nominal = _analyze(spec, run)
+    nominal = _analyze_with_box(spec, run)
     if not nominal.curves:
         return Design(None, nominal.status, nominal.message)
     outcomes = family(spec.family).check(nominal)
@@ -279,7 +279,7 @@ def move_free_values(
     if target is None:
         return Design(None, Status.INVALID, NO_LEVEL_MESSAGE.format(kind))
     drawn = _choose_finest_beam_model(spec)
-    begun = nominal if drawn is spec else _analyze(drawn, run)
+    begun = nominal if drawn is spec else _analyze_with_box(drawn, run)
     if not begun.curves:
         return Design(None, begun.status, begun.message)
     own_aim = aim_of(begun)
@@ -295,7 +295,7 @@ def move_free_values(
     return design if design.spec is None else _check_requirements(design, run)
 
 
-def _analyze(spec: Spec, run: Run) -> Result:
+def _analyze_with_box(spec: Spec, run: Run) -> Result:
     record = family(spec.family)
     result: Result = record.analyze(spec, run)
     return add_size(result, record.envelope(result)) if result.curves else result
@@ -304,7 +304,7 @@ def _analyze(spec: Spec, run: Run) -> Result:
 def _check_requirements(design: Design, run: Run) -> Design:
     """Return a design, or what it misses by more than the rounding of its values."""
     assert design.spec is not None
-    outcomes = family(design.spec.family).check(_analyze(design.spec, run))
+    outcomes = family(design.spec.family).check(_analyze_with_box(design.spec, run))
     missed = [outcome.sentence for outcome in outcomes if not outcome.ok]
     if not missed:
         return design

@@ -221,7 +221,7 @@ class Records:
             if place == ROW_MISSING:
                 at += 1
                 continue
-            part = self._held[at] if place == ROW_IN_MEMORY else self._read(at)
+            part = self._held[at] if place == ROW_IN_MEMORY else self._read_journal(at)
             yield at, part
             at += len(part)
 
@@ -235,7 +235,7 @@ class Records:
         key: bytes = self._keys[index].tobytes()
         return key.hex()
 
-    def _read(self, index: int) -> ResultRows:
+    def _read_journal(self, index: int) -> ResultRows:
         assert self._journal is not None  # some row is in it
         return self.work.recall(self._journal.read(self._journal_key(index)))
 
@@ -244,7 +244,7 @@ class Records:
         if int(self._places[index]) == ROW_IN_MEMORY:
             start = max(at for at in self._held if at <= index)
             return cut_rows(self._held[start], index - start, index - start + 1)
-        rows, start = self._read(index), index - index % self.work.step
+        rows, start = self._read_journal(index), index - index % self.work.step
         return rows if len(rows) == 1 else cut_rows(rows, index - start, index - start + 1)
 
 

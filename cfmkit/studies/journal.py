@@ -87,14 +87,14 @@ class Journal:
 
     def find(self, key: str) -> Any:
         """Return the record of a key that was there when the file was opened; None if there is none."""
-        return self._record("AND session <= ?", key, 0 if self.fresh else self._known)
+        return self._find_record("AND session <= ?", key, 0 if self.fresh else self._known)
 
     def read(self, key: str) -> Any:
         """Return the record of a key.
 
         Raises OutputError if it is not there any more.
         """
-        record = self._record("", key)
+        record = self._find_record("", key)
         if record is None:
             raise OutputError(f"cannot read {quote_path(self.path)}: it was changed during the run; run it again")
         return record
@@ -156,7 +156,7 @@ class Journal:
         """Return the number of the last run that added something; 0 if there was none."""
         return int(self._db.execute("PRAGMA user_version").fetchone()[0])
 
-    def _record(self, condition: str, key: str, *values: int) -> Any:
+    def _find_record(self, condition: str, key: str, *values: int) -> Any:
         with self._reporting("read"):
             query = f"SELECT record FROM records WHERE key = ? {condition}"
             row = self._db.execute(query, (bytes.fromhex(key), *values)).fetchone()

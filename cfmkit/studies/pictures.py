@@ -65,7 +65,7 @@ def scales(
     about = {key.path: key.description for key in keys(type(spec))}
     names = short_names([path for path, _ in varied])
     return tuple(
-        _scale(kind, values, tuple(dict.fromkeys(names_of_values)), (name, about.get(_place(kind[0]), "")))
+        _varied_scale(kind, values, tuple(dict.fromkeys(names_of_values)), (name, about.get(_place(kind[0]), "")))
         for kind, values, names_of_values, name in zip(varied, shown, words, names, strict=True)
     )
 
@@ -94,7 +94,7 @@ def _place(path: str) -> str:
     return re.sub(r"\.\d+", "[]", path)
 
 
-def _scale(kind: tuple[str, str], shown: Any, words: tuple[str, ...], reported: tuple[str, str]) -> DrawnScale:
+def _varied_scale(kind: tuple[str, str], shown: Any, words: tuple[str, ...], reported: tuple[str, str]) -> DrawnScale:
     path, dimension = kind
     name, about = reported
     if dimension != "text":
@@ -132,10 +132,10 @@ def _nominal(table: Table) -> Table:
     rows = list(zip(*(column.cells() for column in table.columns[:labels]), strict=True)) or [()] * len(table)
     first = [number for number, row in enumerate(rows) if row == rows[0]]
     # the cells of a column once, not once a row: a study has thousands of these
-    return Table(tuple(_take_column(column, first) for column in table.columns[labels : labels + 3]))
+    return Table(tuple(_take_rows(column, first) for column in table.columns[labels : labels + 3]))
 
 
-def _take_column(column: TableColumn, rows: list[int]) -> TableColumn:
+def _take_rows(column: TableColumn, rows: list[int]) -> TableColumn:
     cells = column.cells()
     return TableColumn(column.name, tuple(cells[k] for k in rows), column.unit)
 
@@ -166,7 +166,7 @@ def _marks(spec: Spec, summary: Mapping[str, Any], table: Table) -> StudyMarks:
     columns = {column.name: column for column in table.columns}
     varied = [(parameter["path"], parameter["dimension"]) for parameter in drawn["varied"]]
     shown = [columns[path].cells() for path, _ in varied]
-    metrics = [_metric(metric, columns[metric["column"]]) for metric in drawn["metrics"]]
+    metrics = [_metric_scale(metric, columns[metric["column"]]) for metric in drawn["metrics"]]
     best = summary["best"]
     return StudyMarks(
         scales(spec, varied, shown, [parameter["words"] for parameter in drawn["varied"]]),
@@ -179,16 +179,16 @@ def _marks(spec: Spec, summary: Mapping[str, Any], table: Table) -> StudyMarks:
     )
 
 
-def _metric(reported: Mapping[str, Any], column: TableColumn) -> DrawnScale:
+def _metric_scale(reported: Mapping[str, Any], column: TableColumn) -> DrawnScale:
     cells = column.cells()
     if not reported["words"]:
-        return measured_scale(reported["name"], reported["dimension"], _numbers(cells))
+        return measured_scale(reported["name"], reported["dimension"], _to_numbers(cells))
     words = tuple(reported["words"])
     places = [np.nan if cell is None else float(words.index(str(cell))) for cell in cells]
     return DrawnScale(reported["name"], reported["dimension"], np.array(places), words)
 
 
-def _numbers(cells: Sequence[Cell]) -> FloatArray:
+def _to_numbers(cells: Sequence[Cell]) -> FloatArray:
     return np.array([np.nan if cell is None else cell for cell in cells], dtype=np.float64)
 
 

@@ -1,4 +1,4 @@
-"""The points of a study in their order, enumerated when they are needed.
+"""Points of a study in their order: a grid, lists side by side or drawn samples, enumerated when they are needed.
 
 Nothing of the size of a grid is ever allocated: a grid of a million points from two
 axes holds two thousand values. Only what is drawn at random is kept as drawn.
@@ -66,7 +66,7 @@ class Plan:
 
     def point(self, index: int) -> tuple[Any, ...]:
         """Return the values of one point, as `Spec.replace` takes them."""
-        return tuple(item.value(at) for item, at in zip(self.variables, self._levels(index), strict=True))
+        return tuple(item.value(at) for item, at in zip(self.variables, self._level_indices(index), strict=True))
 
     def block(self, start: int, stop: int) -> tuple[NDArray[Any], ...]:
         """Return the values of the points from `start` up to `stop`, one array for each variable."""
@@ -82,7 +82,7 @@ class Plan:
         parts = (Variable(item.path, item.dimension, values, shown, item.several) for item, values, shown in taken)
         return Plan(tuple(parts), stop - start, joint=True)
 
-    def _levels(self, index: int) -> list[int]:
+    def _level_indices(self, index: int) -> list[int]:
         if self.joint:
             return [index] * len(self.variables)
         levels = []
@@ -94,15 +94,15 @@ class Plan:
     def _select_points(self, columns: Sequence[Levels], start: int, stop: int) -> tuple[NDArray[Any], ...]:
         index = np.arange(start, stop)
         if self.joint:
-            return tuple(_array(column)[index] for column in columns)
+            return tuple(_as_array(column)[index] for column in columns)
         taken = []
         for column in reversed(columns):
             index, level = np.divmod(index, len(column))
-            taken.append(_array(column)[level])
+            taken.append(_as_array(column)[level])
         return tuple(taken[::-1])
 
 
-def _array(values: Levels) -> NDArray[Any]:
+def _as_array(values: Levels) -> NDArray[Any]:
     if isinstance(values, np.ndarray):
         return values
     kinds = set(map(type, values))
@@ -210,7 +210,7 @@ def _drawn_variable(axis: Axis, unit: FloatArray) -> Variable:
     if axis.ends is None:
         levels = step_axis(axis)
         index = np.minimum((unit * len(levels.values)).astype(np.intp), len(levels.values) - 1)
-        return Variable(path, dimension, _array(levels.values)[index], _array(levels.shown)[index], several)
+        return Variable(path, dimension, _as_array(levels.values)[index], _as_array(levels.shown)[index], several)
     low, high = axis.ends
     if axis.leaf.kind == "whole":
         low, high = min(low, high), max(low, high)

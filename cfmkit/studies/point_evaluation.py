@@ -168,14 +168,14 @@ class Study:
 
     def check_requirements(self, kind: Kind) -> None:
         """Raise SpecError if a requirement is not well put for curves of a kind."""
-        if kind not in self._checked:
+        if kind not in self._problems_by_kind:
             definitions = self.definitions(kind).values()
-            self._checked[kind] = tuple(requirement_problems(self.spec.part_requirements, definitions, kind))
-        if problems := self._checked[kind]:
+            self._problems_by_kind[kind] = tuple(requirement_problems(self.spec.part_requirements, definitions, kind))
+        if problems := self._problems_by_kind[kind]:
             raise SpecError(problems)
 
     @cached_property
-    def _checked(self) -> dict[Kind, tuple[Problem, ...]]:
+    def _problems_by_kind(self) -> dict[Kind, tuple[Problem, ...]]:
         return {}
 
     def quantities(self, result: Result) -> tuple[Quantity, ...]:

@@ -1,13 +1,11 @@
-"""Executors: an executor takes jobs as they come and yields outcomes as they finish.
+"""Executors of jobs, which yield outcomes as they finish: in this process, or on a Dask cluster.
 
-``executor(work, jobs, stopping)`` yields (job, outcome) in any order. It pulls from
-`jobs` only as fast as it works, and once ``stopping()`` is true it pulls no more,
-finishes what runs and ends. `serial` is the simplest, `Cluster` hands jobs to Dask;
-`cfmkit.studies.pool` has processes of this computer.
+``executor(work, jobs, stopping)`` yields (job, outcome) in any order. It pulls from `jobs` only as fast as it works,
+and once ``stopping()`` is true it pulls no more, finishes what runs and ends. `cfmkit.studies.pool` is one, too.
 
-An executor on a Dask cluster: one that runs somewhere, or one that is started here for the study. A worker that dies
-costs its points a second try elsewhere; a point whose workers die again is given up (``crashed``), as in a pool. What
-a worker needs travels with each job, so that workers may come and go. A single point cannot be ended from outside.
+A Dask cluster (`Cluster`) runs somewhere, or is started here for the study. A worker that dies costs its points a
+second try elsewhere; a point whose workers die again is given up (``crashed``), as in a pool. What a worker needs
+travels with each job, so that workers may come and go. A single point cannot be ended from outside.
 
 Rows of a study are of one code and one set of libraries. The stamp of both travels with each job; a worker that has
 another one computes nothing and is refused by name, whether it is there at the start or joins later.
@@ -255,7 +253,7 @@ class _ClusterRun:
             return outcome
         error = future.exception() if future.status == "error" else None
         if error is None:
-            raise self._build_error()
+            raise self._connection_error()
         if type(error).__name__ == "KilledWorker":
             return Lost(Status.CRASHED, f"the workers that worked on this point died {MAX_RETRIES + 1} times")
         # `do_parcel` lets no error of a point out: this worker could not even read the job.
@@ -291,17 +289,17 @@ class _ClusterRun:
     def _check_connection(self) -> Iterator[None]:
         """Raise if the scheduler has gone: it forgets the jobs of a client that it has lost."""
         if self.client.status != "running":
-            raise self._build_error()
+            raise self._connection_error()
         try:
             yield
         except TimeoutError:
             if self.client.status == "running":
                 raise
-            raise self._build_error() from None
+            raise self._connection_error() from None
         except OSError:
-            raise self._build_error() from None
+            raise self._connection_error() from None
 
-    def _build_error(self) -> UsageError:
+    def _connection_error(self) -> UsageError:
         return UsageError(f"--cluster {self.address}: the Dask scheduler has gone; {_RESUME_MESSAGE}")
 
     def _refuse_other_code(self) -> None:

@@ -77,14 +77,14 @@ def _noted_column(metric: Metric, values: FloatArray) -> TableColumn:
 def varied_columns(plan: Plan, indices: NDArray[np.int64]) -> Iterator[TableColumn]:
     """Yield the columns of what varies, in border units."""
     if not len(indices):
-        yield from (_column(item, ()) for item in plan.variables)
+        yield from (_varied_column(item, ()) for item in plan.variables)
         return
     start, stop = int(indices[0]), int(indices[-1]) + 1
     for item, shown in zip(plan.variables, plan.list_shown_values(start, stop), strict=True):
-        yield _column(item, shown if len(indices) == stop - start else shown[indices - start])
+        yield _varied_column(item, shown if len(indices) == stop - start else shown[indices - start])
 
 
-def _column(item: Variable, shown: Any) -> TableColumn:
+def _varied_column(item: Variable, shown: Any) -> TableColumn:
     if item.dimension in ("text", "count"):
         return TableColumn(item.path, shown)
     return TableColumn(item.path, shown, border_unit(item.dimension))
@@ -151,10 +151,10 @@ def _with_values(plan: Plan, index: int, curve: Table, headers: tuple[str, ...])
         for variable in varied_columns(plan, np.array([index]))
     )
     columns = {column.header: column for column in curve.columns}
-    return Table((*leading, *(columns.get(header) or _empty(header, count) for header in headers)))
+    return Table((*leading, *(columns.get(header) or _empty_column(header, count) for header in headers)))
 
 
-def _empty(header: str, count: int) -> TableColumn:
+def _empty_column(header: str, count: int) -> TableColumn:
     name, bracket, unit = header.partition(" [")
     return TableColumn(name, (None,) * count, unit.removesuffix("]") if bracket else None)
 
@@ -347,9 +347,9 @@ class Summary:
     def as_json(self, records: Records) -> dict[str, Any]:
         """Return what metrics.json says of a study: the metrics are those of the best point."""
         counts = {"total": self.total, **{status.key: count for status, count in self._list_counts() if count}}
-        best = self._best(records)
+        best = self._describe_best(records)
         return {
-            "status": _status(self),
+            "status": _status_of_study(self),
             "message": self.message,
             "points": counts,
             "best": best,
@@ -359,7 +359,7 @@ class Summary:
             "warnings": self._warnings(),
         }
 
-    def _best(self, records: Records) -> dict[str, Any] | None:
+    def _describe_best(self, records: Records) -> dict[str, Any] | None:
         if self.best is None or self._goal is None:
             return None
         plan = records.work.plan
@@ -416,7 +416,7 @@ class Summary:
         ]
 
 
-def _status(summary: Summary) -> str:
+def _status_of_study(summary: Summary) -> str:
     if not summary.usable:
         return "no_result"
     return "complete" if summary.counts[Status.COMPLETE] == summary.total else "partial"

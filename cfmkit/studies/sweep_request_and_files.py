@@ -54,7 +54,7 @@ def prepare(spec: Spec, request: SweepRequest) -> Work:
     asked = request.vary or (collect_variations(block.vary) if block else ())
     if not asked:
         raise UsageError(NOTHING_TO_VARY.replace("{example}", _example(spec)))
-    plan = _plan(spec, request, asked)
+    plan = _make_plan(spec, request, asked)
     design = _is_given(request.design, block.design if block else False)
     drawn = request.pictures and len(plan.variables) == 1 and len(plan) <= MOST_CURVES
     curves = writes_curves(spec, request) or drawn
@@ -80,7 +80,7 @@ def _is_given(option: bool | None, otherwise: bool) -> bool:
     return otherwise if option is None else option
 
 
-def _plan(spec: Spec, request: SweepRequest, asked: tuple[WantedVariation, ...]) -> Plan:
+def _make_plan(spec: Spec, request: SweepRequest, asked: tuple[WantedVariation, ...]) -> Plan:
     block = spec.sweep
     combine, samples = request.combine, request.samples
     if combine is None:
@@ -90,10 +90,10 @@ def _plan(spec: Spec, request: SweepRequest, asked: tuple[WantedVariation, ...])
         return grid(axes(spec, asked), request.most)
     if combine == "zip":
         return zip_axes(axes(spec, asked, joint=True), request.most)
-    return sample_axes(axes(spec, asked, drawn=True), _draw(combine, samples, request.seed), request.most)
+    return sample_axes(axes(spec, asked, drawn=True), _read_draw(combine, samples, request.seed), request.most)
 
 
-def _draw(combine: str, samples: int | None, seed: int) -> Draw:
+def _read_draw(combine: str, samples: int | None, seed: int) -> Draw:
     if samples is None or samples < 1:
         raise UsageError(f"how many points are to be drawn? Write --sample {combine}:256")
     return Draw(combine, samples, seed)

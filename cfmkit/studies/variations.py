@@ -57,7 +57,7 @@ class Leaf:
         Raises CannotVary if it is not what this leaf holds.
         """
         if self.kind == "quantity" and self.quantity is not None:
-            return self._quantity(stated, self.quantity)
+            return self._read_quantity(stated, self.quantity)
         if self.kind == "word":
             if self.choices and stated not in self.choices:
                 raise CannotVary(not_among(stated, self.choices))
@@ -68,9 +68,9 @@ class Leaf:
             if not isinstance(stated, bool):
                 raise CannotVary(f"{describe_value(stated)} is not true or false")
             return stated, "text"
-        return self._number(stated)
+        return self._read_number(stated)
 
-    def _quantity(self, stated: Any, quantity: UnitField) -> tuple[Value, str]:
+    def _read_quantity(self, stated: Any, quantity: UnitField) -> tuple[Value, str]:
         marked = BareFloat(stated) if isinstance(stated, int | float) and not isinstance(stated, bool) else stated
         try:
             value, dimension = quantity.read(marked)
@@ -78,7 +78,7 @@ class Leaf:
             raise CannotVary(str(error)) from None
         return (attach_dimension(value, dimension) if self.has_several_dimensions else value), dimension
 
-    def _number(self, stated: Any) -> tuple[Value, str]:
+    def _read_number(self, stated: Any) -> tuple[Value, str]:
         if isinstance(stated, bool) or not isinstance(stated, int | float):
             raise CannotVary(f"{describe_value(stated)} is not a {'whole ' * (self.kind == 'whole')}number")
         if self.kind == "whole":
@@ -93,14 +93,14 @@ def length_to_vary(spec: Spec) -> tuple[str, float]:
     from cfmkit.specs.yamlio import dump, read_document
 
     mechanism = read_document(dump(spec, False), "spec").tree["mechanism"]
-    return next(_lengths(mechanism, "mechanism"), ("mechanism.LENGTH", 10.0))
+    return next(_find_lengths(mechanism, "mechanism"), ("mechanism.LENGTH", 10.0))
 
 
-def _lengths(tree: Any, path: str) -> Iterator[tuple[str, float]]:
+def _find_lengths(tree: Any, path: str) -> Iterator[tuple[str, float]]:
     for key, value in tree.items():
         below = f"{path}.{key}"
         if isinstance(value, dict):
-            yield from _lengths(value, below)
+            yield from _find_lengths(value, below)
         elif isinstance(value, str) and (match := re.fullmatch(r"([0-9.]+) mm", value)) and float(match[1]) > 0:
             yield below, float(match[1])
 
@@ -126,7 +126,7 @@ def leaf(spec_type: type[Spec], path: str) -> Leaf:
 def _leaf_of(path: str, slots: tuple[Slot, ...]) -> Leaf:
     """Return the leaf that one of several allowed types is; the first that can be varied."""
     for slot in slots:
-        if (kind := _kind(slot)) is not None:
+        if (kind := _kind_of_slot(slot)) is not None:
             return Leaf(path, kind, slot.quantity, slot.choices)
     blocks = [slot.model for slot in slots if slot.model is not None]
     if blocks:
@@ -135,7 +135,7 @@ def _leaf_of(path: str, slots: tuple[Slot, ...]) -> Leaf:
     raise CannotVary(f"{path!r} holds {describe_expected(slots, plain=True)}: vary one item of it, as {path}.0")
 
 
-def _kind(slot: Slot) -> Kind | None:
+def _kind_of_slot(slot: Slot) -> Kind | None:
     if slot.quantity is not None:
         return "quantity"
     if slot.choices:
@@ -167,7 +167,7 @@ def paths(spec_type: type[Spec]) -> Iterator[str]:
 
 
 def _paths_below(slots: tuple[Slot, ...], path: str, depth: int) -> Iterator[str]:
-    if any(_kind(slot) for slot in slots):
+    if any(_kind_of_slot(slot) for slot in slots):
         yield path
     for slot in slots if depth < _MAX_DEPTH else ():
         if slot.model is not None:

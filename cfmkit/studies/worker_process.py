@@ -84,11 +84,11 @@ def _do_received_jobs(work: Any, received: SimpleQueue[bytes], outlet: IO[bytes]
         while True:
             job = pickle.loads(received.get())
             send(outlet, STARTED_MESSAGE)
-            send(outlet, _outcome(work, job))
+            send(outlet, _do_job(work, job))
             collect()
 
 
-def _outcome(work: Any, job: Any) -> bytes:
+def _do_job(work: Any, job: Any) -> bytes:
     try:
         return DONE_MESSAGE + pickle.dumps(work(job), pickle.HIGHEST_PROTOCOL)
     except Exception as error:

@@ -399,7 +399,7 @@ def test_the_progress_of_a_search_never_goes_back_and_ends_at_one(monkeypatch) -
     flat = ShapeCandidate(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
     for name in ("search_start", "search_far"):
         monkeypatch.setattr(multistart, name, lambda _task, _seed, _index, plan: flat)
-    for name in ("widen", "nearer", "refine"):
+    for name in ("widen", "search_nearer", "refine"):
         monkeypatch.setattr(multistart, name, lambda _task, found, _plan: found)
     monkeypatch.setattr(multistart, "audit_design", lambda _variables, _found: None)
     told: list[float] = []
@@ -423,7 +423,7 @@ def test_of_two_designs_of_a_start_the_wider_one_is_kept(monkeypatch) -> None:
         "widen": lambda _task, found, _plan: found,
         "audit_design": lambda _task, _found: None,
         "search_far": lambda _task, _seed, index, plan: replace(far, objective=bands[index]),
-        "nearer": lambda _task, found, _plan: replace(found, start=led[found.objective], objective=0.02),
+        "search_nearer": lambda _task, found, _plan: replace(found, start=led[found.objective], objective=0.02),
     }.items():
         monkeypatch.setattr(multistart, name, step)
     ended = explore(replace(lan("range"), orders=(1, 3)), StartBudget(), (5, 5), "x", Run())

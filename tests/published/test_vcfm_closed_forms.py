@@ -71,12 +71,12 @@ def test_eq_17_and_the_euler_load():
 
 def test_onset_and_exit_of_the_linear_region():
     assert leaves.onset_and_exit(leaf()) == pytest.approx((0.92017, 4.76707), abs=6e-6)
-    assert leaves.VBeam(leaf()).linear == pytest.approx((0.9096, 4.7705), abs=3e-4)
+    assert leaves.VBeam(leaf()).linear_range == pytest.approx((0.9096, 4.7705), abs=3e-4)
 
 
 @pytest.mark.parametrize(("thickness", "first", "last"), [(0.6, 0.291898, 5.383347), (0.8, 0.543216, 5.126420)])
 def test_onset_and_exit_are_near_those_of_exact_leaves(thickness, first, last):
-    assert leaves.VBeam(leaf(thickness)).linear == pytest.approx((first, last), rel=3e-3)
+    assert leaves.VBeam(leaf(thickness)).linear_range == pytest.approx((first, last), rel=3e-3)
 
 
 EXACT = {

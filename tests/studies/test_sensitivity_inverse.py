@@ -67,9 +67,9 @@ def test_limits_with_a_corner_are_followed_on_both_of_its_sides():
 def test_what_one_look_at_the_limits_has_seen_the_next_one_keeps():
     near = LimitsAlong(np.array([-1.0, 0.0, 1.0]), np.array([[1.0], [0.0], [-1.0]]))
     far = LimitsAlong(np.array([-4.0, 0.0, 4.0]), np.array([[2.0], [0.0], [-9.0]]))
-    both = near.and_at(far)
+    both = near.merge(far)
     assert both(np.array([-4.0, -1.0, 0.5, 1.0, 4.0]))[:, 0] == pytest.approx([2.0, 1.0, -0.5, -1.0, -9.0])
-    assert near.and_at(None) is near
+    assert near.merge(None) is near
 
 
 def test_a_range_does_not_reach_beyond_a_jump_that_was_seen_once():

@@ -105,7 +105,7 @@ def test_a_pose_keeps_its_digits_for_tiny_travels():
 def test_the_force_is_the_derivative_of_no_jump():
     """The two laws are joined where they cross."""
     law = VBeam(leaf())
-    for place in law.linear:
+    for place in law.linear_range:
         below, above = law.force(np.array([place - 1e-9, place + 1e-9]))
         assert above == pytest.approx(below, abs=1e-7)
 

@@ -88,13 +88,13 @@ def _misfits(solution: Solution) -> dict[str, Fit]:
     }
 
 
-def _is_raw(solution: Solution) -> bool:
+def _has_raw_closure(solution: Solution) -> bool:
     return solution.spec.mechanism.closure == "raw"
 
 
 def _is_adjusted(solution: Solution) -> bool:
     """Return True if a beam was fitted to nodes that it missed by more than lengths are rounded to."""
-    return not _is_raw(solution) and any(fit.gap > ROUNDED_CLOSURE for fit in _misfits(solution).values())
+    return not _has_raw_closure(solution) and any(fit.gap > ROUNDED_CLOSURE for fit in _misfits(solution).values())
 
 
 def _forced_beams(solution: Solution) -> Sentence:
@@ -242,7 +242,7 @@ def _too_large_stress(solution: Solution) -> Sentence:
 # --- what beam theory leaves out, and what cannot be made -----------------------------------------------------------
 
 
-def _thick_beam(name: str) -> FindingRule[Solution]:
+def _thick_beam_rule(name: str) -> FindingRule[Solution]:
     def sizes(solution: Solution) -> tuple[float, float]:
         path = solution.path
         return float(np.real(path.fits[name].length)), thickest_of(path.network.beams[name].section)
@@ -315,7 +315,7 @@ def _small_gap(solution: Solution) -> Sentence:
     )
 
 
-def _thin_beam(name: str) -> FindingRule[Solution]:
+def _thin_beam_rule(name: str) -> FindingRule[Solution]:
     def least(solution: Solution) -> float:
         part = solution.spec.mechanism.part
         if part is None or not _has_curve(solution):
@@ -346,7 +346,7 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     ),
     FindingRule(
         "closure_prestress",
-        lambda solution: _is_raw(solution) and len(solution.keep) > 0 and bool(_misfits(solution)),
+        lambda solution: _has_raw_closure(solution) and len(solution.keep) > 0 and bool(_misfits(solution)),
         _forced_beams,
     ),
     FindingRule("closure_adjusted", _is_adjusted, _fitted_beams),
@@ -392,7 +392,7 @@ LAST_RULES: tuple[FindingRule[Solution], ...] = (
 def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     """Return everything that may be wrong with a solved mechanism: of its beams, too."""
     beams = solution.path.network.beams
-    return (*FINDING_RULES, *map(_thick_beam, beams), *LAST_RULES, *map(_thin_beam, beams))
+    return (*FINDING_RULES, *map(_thick_beam_rule, beams), *LAST_RULES, *map(_thin_beam_rule, beams))
 
 
 def findings_of(solution: Solution) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""The largest value of something along a path in a window: an extreme between points is solved for, not sampled.
+"""Largest of some values along a path of equilibria in a window: an extreme between points is solved for, not sampled.
 
 Where a cubic through the points may be higher than all of them, the equilibrium is solved for and looked at, and the
 cubic is drawn again; so are the ends of the window and corners of the path.

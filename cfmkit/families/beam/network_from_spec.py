@@ -122,13 +122,13 @@ class Assembly(ShortRepr):
         return min(beam.section.thinnest for beam in self.network.beams.values())
 
     @property
-    def _even(self) -> FloatArray:
+    def _even_places(self) -> FloatArray:
         return np.linspace(0.0, self.spec.extent, self.spec.analysis.points)
 
     @property
     def places(self) -> FloatArray:
         """Motions that are requested, in the order of the drive: those of the curve, and ends of windows between."""
-        even, extent = self._even, self.spec.extent
+        even, extent = self._even_places, self.spec.extent
         if self.spec.analysis.through_folds:
             return even
         ends = np.array([end for _, window in self.spec.windows() for end in window_places(window, (0.0, extent))])
@@ -140,13 +140,13 @@ class Assembly(ShortRepr):
     @property
     def on_curve(self) -> NDArray[np.bool_]:
         """Which of `places` are points of the curve."""
-        even = set(self._even.tolist())
+        even = set(self._even_places.tolist())
         return np.array([place in even for place in self.places.tolist()])
 
     def drive(self) -> engine.Displacement | engine.Rotation | engine.Loading:
         """Return what is done to the network, from rest to the end: at even steps, and where windows end between."""
         spec, drive = self.spec, self.spec.mechanism.drive
-        points = self.places if drive.by_motion else self._even
+        points = self.places if drive.by_motion else self._even_places
         match drive:
             case DisplacementDrive():
                 return engine.Displacement(self.driven, self.direction, points, self.growing(spec.extent))
@@ -208,8 +208,8 @@ def assemble(spec: BeamSpec) -> Assembly:
     """Return the mechanism that a specification describes, as the engine takes it."""
     mechanism, copies = spec.mechanism, spec.mechanism.copies
     network = engine.Network(
-        nodes={name: _node(node) for name, node in mechanism.nodes.items()},
-        beams={name: _beam(spec, beam) for name, beam in mechanism.beams.items()},
+        nodes={name: _engine_node(node) for name, node in mechanism.nodes.items()},
+        beams={name: _engine_beam(spec, beam) for name, beam in mechanism.beams.items()},
         links=tuple(engine.Link(link.master, link.node) for link in mechanism.links),
         springs=tuple(spring.build() for spring in mechanism.springs.values()),
         loads=tuple(load.build() for load in mechanism.loads) if spec.analysis.loads_first else (),
@@ -263,20 +263,20 @@ def thickest_of(section: engine.Section) -> float:
     return float(thickness if isinstance(thickness, float | int) else np.max(thickness.values))
 
 
-def _node(node: NodeSpec) -> engine.Node:
+def _engine_node(node: NodeSpec) -> engine.Node:
     moved = (0.0, 0.0, 0.0)
     if node.moved is not None:
         moved = (node.moved.along, node.moved.across, node.moved.rotation)
     return engine.Node(*node.at, engine.Support(*HELD_MOTIONS[node.support], node.direction or 0.0, moved))
 
 
-def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
+def _engine_beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
     mechanism = spec.mechanism
     of = beam.material or mechanism.material
     section = engine.Section(
         of.modulus,
         beam.width or mechanism.width,
-        _thickness(beam.thickness or mechanism.thickness),
+        _engine_thickness(beam.thickness or mechanism.thickness),
         axial=spec.fidelity != "inextensible" or is_between_held_places(mechanism, beam),
         shear=spec.fidelity in ("reissner", "solid"),
         poisson_ratio=of.poisson,
@@ -305,7 +305,7 @@ def is_between_held_places(mechanism: Mechanism, beam: MemberSpec) -> bool:
     return held and beam.shape.is_straight and not (beam.start_offset or beam.end_offset)
 
 
-def _thickness(thickness: Thickness) -> float | engine.Taper:
+def _engine_thickness(thickness: Thickness) -> float | engine.Taper:
     if isinstance(thickness, tuple):
         return engine.Taper(np.array([place for place, _ in thickness]), np.array([value for _, value in thickness]))
     return thickness

@@ -1,4 +1,4 @@
-"""The mechanism as a part that can be cut: beams with their true thickness, joints merged, inside corners rounded.
+"""Drawing of a beam mechanism as a part that can be cut: outline, dimensions, point tables, warnings on what it joins.
 
 Warnings say what the drawing joins although the mechanism does not.
 """
@@ -103,15 +103,15 @@ def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
     at = np.vstack(assembly.add_images([np.array([(node.x, node.y) for node in held.values()])]))
     words = "across clamps" if all(node.support.rotation for node in held.values()) else "across supports"
     first, last = at[at.argmin(axis=0)], at[at.argmax(axis=0)]
-    yield from _distances(words, first[0], last[0], ("x",))
-    yield from _distances(words, first[1], last[1], ("y",))
+    yield from _dimension(words, first[0], last[0], ("x",))
+    yield from _dimension(words, first[1], last[1], ("y",))
     if driven in nodes and driven not in held:
-        yield from _distances(
+        yield from _dimension(
             f"{driven} from {next(iter(held))}", at[0], (nodes[driven].x, nodes[driven].y), ("x", "y")
         )
 
 
-def _distances(words: str, start: Any, end: Any, along: tuple[Literal["x", "y"], ...]) -> Iterator[DrawnDimension]:
+def _dimension(words: str, start: Any, end: Any, along: tuple[Literal["x", "y"], ...]) -> Iterator[DrawnDimension]:
     for axis in along:
         if abs(end["xy".index(axis)] - start["xy".index(axis)]) > STANDING_DISTANCE * math.dist(start, end):
             yield DrawnDimension(words, (float(start[0]), float(start[1])), (float(end[0]), float(end[1])), axis)

@@ -54,7 +54,7 @@ def _describe_pulled_beams(path: Path, last: int) -> Iterator[str]:
         pull = float(path.end_force(name, 1)[last, :2] @ chord) / distance_of_ends
         stiffness = float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0]))
         if pull * length**2 > _TAUT_RATIO * stiffness:
-            yield f"{name}: {_describe_beam(distance_of_ends, length)}"
+            yield f"{name}: {_describe_lengths(distance_of_ends, length)}"
 
 
 def _describe_taut_supports(path: Path, last: int) -> Iterator[str]:
@@ -69,10 +69,10 @@ def _describe_taut_supports(path: Path, last: int) -> Iterator[str]:
     for name, length in ways_to_supports(network, drive.node, lengths).items():
         first, now = (_apart(path, drive.node, name, point) for point in (0, last))
         if now > max(_STRAIGHT_LENGTH_SHARE * length, first):  # a column is as straight when it begins to shorten
-            yield f"{name} to {drive.node}: {_describe_beam(now, length)}"
+            yield f"{name} to {drive.node}: {_describe_lengths(now, length)}"
 
 
-def _describe_beam(distance_of_ends: float, length: float) -> str:
+def _describe_lengths(distance_of_ends: float, length: float) -> str:
     return f"{format_short(distance_of_ends, 'length')} of {format_short(length, 'length')}"
 
 

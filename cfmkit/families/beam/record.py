@@ -1,4 +1,4 @@
-"""Record of the mechanisms of slender beams in large deflection [Lan, Wang, Chen 2010]."""
+"""Record by which the registry knows beam mechanisms: models, design, proposals, pictures and names of results."""
 
 from __future__ import annotations
 

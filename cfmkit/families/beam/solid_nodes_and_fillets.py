@@ -39,7 +39,7 @@ class SolidNodes:
         """Return x, y [m] and rotation [rad] as a function of travels (n,), (n, 3); NaN where there is no material."""
         from cfmkit.solid.point_motions_and_reactions import motion
 
-        return motion(self.solved, self._place(name), name)
+        return motion(self.solved, self._node_place(name), name)
 
     def reaction(self, name: str) -> Callable[[FloatArray], FloatArray]:
         """Return the force x, y [N] and the moment [N m] that support and drive exert on a node, of one half, (n, 3).
@@ -63,11 +63,11 @@ class SolidNodes:
     def _transfer_reaction(self, name: str, neighbour: str, travel: FloatArray) -> FloatArray:
         """Return the reaction at another node with its moment about this one, (n, 3)."""
         reaction = self.reaction(neighbour)(travel) + constant_load(self.assembly, neighbour)
-        place, end = ((self._place(node) + self.motion(node)(travel)[:, :2]).T for node in (name, neighbour))
+        place, end = ((self._node_place(node) + self.motion(node)(travel)[:, :2]).T for node in (name, neighbour))
         arm = end - place
         return np.asarray(reaction + np.outer(arm[0] * reaction[:, 1] - arm[1] * reaction[:, 0], [0.0, 0.0, 1.0]))
 
-    def _place(self, name: str) -> FloatArray:
+    def _node_place(self, name: str) -> FloatArray:
         return node_place(self.assembly.network, name)
 
     @cached_property
@@ -78,7 +78,7 @@ class SolidNodes:
             return None
         grid, back = self.solved.problem.elements.mesh, np.exp(-1j * mirror.direction)
         middles = grid.nodes[grid.triangles[:, :3]].mean(axis=1) @ [1.0, 1.0j]
-        side = sum(((complex(*self._place(name)) - mirror.at) * back).imag for name in self.assembly.network.nodes)
+        side = sum(((complex(*self._node_place(name)) - mirror.at) * back).imag for name in self.assembly.network.nodes)
         return np.asarray(((middles - mirror.at) * back).imag * side > 0.0)
 
 

@@ -1,4 +1,4 @@
-"""Solution of a beam mechanism, and its columns of nodes and beams.
+"""Solution of a beam mechanism: effort, stress, gaps, stability, frequencies along its path; columns of nodes, beams.
 
 Columns are those that `analysis.outputs` asks for, of beams and of solids alike, and forces. Every other file of this
 family may import these types.
@@ -244,10 +244,10 @@ class Solution(ShortRepr):
         """The smallest gap between two beams before any load, and of some places of the curve [m]; None without one."""
         if len(self.keep) < 2:
             return None, None
-        gaps_of_poses = [self._gap(int(self.keep[pose])) for pose in choose_points(len(self.keep), _N_POSES)]
+        gaps_of_poses = [self._least_gap(int(self.keep[pose])) for pose in choose_points(len(self.keep), _N_POSES)]
         return gaps_of_poses[0], min((gap for gap in gaps_of_poses if gap is not None), default=None)
 
-    def _gap(self, point: int) -> BeamGap | None:
+    def _least_gap(self, point: int) -> BeamGap | None:
         network = self.path.network
         lines = {name: self.path.shape(name, point) for name in network.beams}
         halves = {name: 0.5 * thickest_of(beam.section) for name, beam in network.beams.items()}

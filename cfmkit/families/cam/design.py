@@ -1,10 +1,9 @@
 """Design of a cam from target force and stroke: its force constant A, the springs, and the profile to cut.
 
-The force is F = 4 K A [SS, eq. 1]: of K and A one is given and the other follows, or
-both come from a catalogue. Springs that are tight at the start give the path a slope there that a larger roller
-can follow: the smallest such preload is chosen where that is requested. A profile that
-also carries weight is designed for the force that is left after the slider's own weight; its slope is steeper by
-c = F' / (F' - 2 w), w the weight that hangs on one roller.
+The force is F = 4 K A [SS, eq. 1]: of K and A one is given and the other follows, or both come from a catalogue.
+Springs that are tight at the start give the path a slope there that a larger roller can follow: the smallest such
+preload is chosen where that is requested. A profile that also carries weight is designed for the force that is left
+after the slider's own weight; its slope is steeper by c = F' / (F' - 2 w), w the weight that hangs on one roller.
 
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
 """

@@ -215,19 +215,19 @@ starts without leverage self-locks, over nanometres.
 """
 
 
-def _is_sunk(solution: Solution) -> Any:
+def _sinks_first(solution: Solution) -> Any:
     track = solution.assembly.track
     return sinks_first(track.dead_point, track.start, track.brace_length)
 
 
-def _is_dead(solution: Solution) -> Any:
+def _has_dead_start(solution: Solution) -> Any:
     unbounded = np.isnan(solution.up.slider[..., :1]) | np.isnan(solution.down.slider[..., :1])
-    return np.logical_or(solution.column(_is_sunk(solution)), solution.column(unbounded))
+    return np.logical_or(solution.column(_sinks_first(solution)), solution.column(unbounded))
 
 
 def _describe_dead_point(solution: Solution) -> tuple[str, ...]:
     track, loads = solution.assembly.track, solution.assembly.loads
-    if _is_sunk(solution):
+    if _sinks_first(solution):
         return (
             f"at the start the slider must first go down by {mm(track.start - track.dead_point)} before the rollers "
             "move out: the brace is too short for this profile",
@@ -353,7 +353,7 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
             _describe_corner_pressure,
         ),
         *map(_make_jam_rule, range(number)),
-        FindingRule("dead_point", _is_dead, _describe_dead_point),
+        FindingRule("dead_point", _has_dead_start, _describe_dead_point),
         FindingRule("spring_slack", lambda solution: is_slack(solution.elongation).any(axis=-1), _describe_slack),
         FindingRule("spring_overstretched", _is_overstretched, _describe_overstretch),
         _make_slack_cable_rule("up"),

@@ -1,8 +1,7 @@
 """Forces of many cams with drawn errors, without friction: the band in which the force of one that is cut will lie.
 
-Waviness is a sum of waves of equal power between the stated wavelength and the length of the
-flank, with random phases. The roller is taken to touch every point of the flank, which holds
-for waves longer than its size makes it bridge.
+Waviness is a sum of waves of equal power between the stated wavelength and the length of the flank, with random phases.
+The roller is taken to touch every point of the flank, which holds for waves longer than its size makes it bridge.
 
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, fig. 13.
 """

@@ -1,9 +1,8 @@
 """Quasi-static analysis of a cam as it was built, from measured points of its flanks: where rollers run on them.
 
-The points are registered to the design, both flanks by one motion; what is left is the
-error of the profile. Both sides may differ: with the spring force S = K (x_R + x_L - 2 x0)
-on each roller the slider's force is the sum of what each side needs. The force is split
-into what the design gives, and what rest length, profile and friction add to it, one
+The points are registered to the design, both flanks by one motion; what is left is the error of the profile. Both sides
+may differ: with the spring force S = K (x_R + x_L - 2 x0) on each roller the slider's force is the sum of what each
+side needs. The force is split into what the design gives, and what rest length, profile and friction add to it, one
 after the other, so that the parts add up.
 
 Where rollers run on flanks as they were built: the outermost place that no point of the flank forbids. A roller is
@@ -80,7 +79,7 @@ def analyze_built(spec: CamSpec) -> Result:
         assembly = assemble(spec)
         check_first_pose(assembly)
         registration = register_cam(assembly)
-        tracks = _tracks(assembly, registration)
+        tracks = _make_tracks(assembly, registration)
         travel, ended = _travel(assembly, tracks)
         built = MeasuredCam(assembly, registration, tracks, travel)
         check_springs(built.elongation, built.forces(1.0)[1], assembly.loads.rest_half_width)
@@ -167,7 +166,7 @@ def _check_fit(registration: Registration, name: str) -> None:
         )
 
 
-def _tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack, BuiltTrack]:
+def _make_tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack, BuiltTrack]:
     mechanism, design = assembly.spec.mechanism, flanks_of(assembly)[0]
     noise = float(mechanism.profile.noise or 0.0)
     # The left flank's feet and errors are those of its mirror image.

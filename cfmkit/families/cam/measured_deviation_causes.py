@@ -1,10 +1,9 @@
 """Causes of the departure of a measured loop: profile, friction, rest length of the springs.
 
-The area between the branches is proportional to the rolling friction, whatever moves both of them
-together; the line midway between them is not moved by friction, but by springs that are longer or
-shorter than stated, -d/D of the force for d on either side. So the loop gives the friction and
-the midline the rest length, one after the other until neither changes. The errors of a measured
-profile need no fit: the model has them. What is left is unexplained.
+The area between the branches is proportional to the rolling friction, whatever moves both of them together; the line
+midway between them is not moved by friction, but by springs that are longer or shorter than stated, -d/D of the force
+for d on either side. So the loop gives the friction and the midline the rest length, one after the other until neither
+changes. The errors of a measured profile need no fit: the model has them. What is left is unexplained.
 
 `calibrate` fits the same values with intervals, and others.
 

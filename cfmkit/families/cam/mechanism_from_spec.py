@@ -156,7 +156,7 @@ def assemble(spec: CamSpec) -> Assembly:
     shortfall = _shortfall(law, stroke, end, reached)
     profile = cut_profile(path, radius, end)
     # A flank with material missing is the flank for a larger roller, trimmed where that one undercuts it.
-    track = _track(cut_profile(path, radius + missing, end) if agree(missing > 0.0) else profile, mechanism)
+    track = _make_track(cut_profile(path, radius + missing, end) if agree(missing > 0.0) else profile, mechanism)
     loads = loads_of(spec, mechanism.springs.total, mechanism.springs_rest)
     return Assembly(spec, profile, track, loads, reached, shortfall)
 
@@ -281,7 +281,7 @@ def _check_bend(profile: CamProfile) -> None:
         )
 
 
-def _track(profile: CamProfile, mechanism: Mechanism) -> Track:
+def _make_track(profile: CamProfile, mechanism: Mechanism) -> Track:
     try:
         offset = np.maximum(mechanism.profile.offset, 0.0)
         return track_of(profile, mechanism.roller_radius, mechanism.brace_length, offset)

@@ -2,9 +2,8 @@
 
 A specification with a motion goes to the dynamic model (`cfmkit.families.cam.dynamics`) instead.
 
-Friction opposes the motion, so the way up and the way down have different forces;
-the area between them is lost in one cycle. Where the cam is undercut the roller
-pivots on its corner, and the curve shows the force that really acts there.
+Friction opposes the motion, so the way up and the way down have different forces; the area between them is lost in one
+cycle. Where the cam is undercut the roller pivots on its corner, and the curve shows the force that really acts there.
 
 Cams of a study of one kind are solved together. Mechanisms that differ in what moves neither the roller nor the brace
 on the cam (springs, friction, weights, the width of the contact) share one cam and its track, which is found once.

@@ -143,18 +143,18 @@ class CutPlate:
             tab = [(-half, left_low[1]), (-half, floor), (half, floor), (half, low[1])]
         else:  # a slanted bottom could pass through the higher roller
             tab = [(0.0, left_low[1]), (0.0, low[1])] if left_low[1] != low[1] else []
-        bottom: list[Edge] = list(_lines([(-left_low[0], left_low[1]), *tab, (low[0], low[1])]))
+        bottom: list[Edge] = list(_lines_between([(-left_low[0], left_low[1]), *tab, (low[0], low[1])]))
         r = plate.tool_radius
         if 0 < r <= self.tool_room:
             left, right = left_low[1], low[1]
             bottom = [
-                *_lines([(-left_low[0], left), (-half - r, left)]),
+                *_lines_between([(-left_low[0], left), (-half - r, left)]),
                 Arc((-half - r, float(left) - r), r, 0.5 * np.pi, 0.0),
-                *_lines([(-half, left - r), (-half, floor), (half, floor), (half, right - r)]),
+                *_lines_between([(-half, left - r), (-half, floor), (half, floor), (half, right - r)]),
                 Arc((half + r, float(right) - r), r, np.pi, 0.5 * np.pi),
-                *_lines([(half + r, right), (low[0], right)]),
+                *_lines_between([(half + r, right), (low[0], right)]),
             ]
-        edges: list[Edge] = [flanks[0], *_lines(above), flanks[1].mirror().reverse(), *bottom]
+        edges: list[Edge] = [flanks[0], *_lines_between(above), flanks[1].mirror().reverse(), *bottom]
         return Contour(tuple(edges), "cut", closed=True)
 
     @property
@@ -205,7 +205,7 @@ class CutPlate:
         yield DrawnDimension("roller axes at the start", (-x0[1], 0.0), (x0[0], 0.0), "x")
 
 
-def _lines(corners: list[tuple[float, float]]) -> list[Line]:
+def _lines_between(corners: list[tuple[float, float]]) -> list[Line]:
     points = [(float(x), float(y)) for x, y in corners]
     return [Line(a, b) for a, b in pairwise(points) if a != b]
 

@@ -91,10 +91,10 @@ class PartsPose:
 def pose(solution: Solution, index: int) -> PartsPose:
     """Return the positions of the parts at one point of the solution."""
     (x, y), (_, pin) = (path[index].tolist() for path in (solution.roller_path, solution.pin_path))
-    return PartsPose((x, y), (0.0, pin), _contact(solution, index), bool(solution.states.on_corner[index]))
+    return PartsPose((x, y), (0.0, pin), _contact_point(solution, index), bool(solution.states.on_corner[index]))
 
 
-def _contact(solution: Solution, index: int) -> Point:
+def _contact_point(solution: Solution, index: int) -> Point:
     states, profile = solution.states, solution.assembly.track.profile
     center = np.array([states.x[index], states.y[index]])
     if states.on_corner[index] and profile.corner:

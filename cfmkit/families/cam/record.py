@@ -1,4 +1,4 @@
-"""Record of the cam mechanisms: rollers, cam and springs [Sanchez-Salinas et al. 2022]."""
+"""Record by which the registry knows cam mechanisms: their models, design, proposals, pictures and names of results."""
 
 from __future__ import annotations
 

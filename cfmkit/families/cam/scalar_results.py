@@ -1,7 +1,6 @@
 """Scalar results of a cam mechanism as designed, beside the constant-force metrics of every family.
 
-Those of measured cams stand in `measured_cam`; how those of a motion are computed stands in
-`dynamics.scalar_results`.
+Those of measured cams stand in `measured_cam`; how those of a motion are computed stands in `dynamics.scalar_results`.
 """
 
 from __future__ import annotations

@@ -333,10 +333,10 @@ class Solution(ShortRepr):
     def part_efforts(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the force of the strongest spring on the slider, without any weight, at displacements [N]."""
         share = self.mechanism.springs.stiffest / self.assembly.loads.stiffness
-        return np.asarray(share * np.abs(self._unweighted.effort(branch, places)))
+        return np.asarray(share * np.abs(self._without_weight.effort(branch, places)))
 
     @cached_property
-    def _unweighted(self) -> Solution:
+    def _without_weight(self) -> Solution:
         loads = self.assembly.loads
         alone = replace(loads, roller_weight=0.0, slider_weight=0.0, sideways=(0.0, 0.0), off_plane=0.0)
         return replace(self, assembly=replace(self.assembly, loads=alone))

@@ -1,9 +1,8 @@
-"""Quasi-static forces in a cam mechanism, per slider position and direction of travel.
+"""Quasi-static forces in a cam mechanism per slider position and direction, with all friction, and where it jams.
 
-Each roller is in equilibrium under the contact force, turned by atan(mu) against the
-motion, the springs, the brace and its weight. With p = tan(atan f -+ atan mu), the
-slope f of the track so turned (minus on the way up), t = tan(alpha) of the brace,
-S the spring force on one roller and w the weight that hangs on it,
+Each roller is in equilibrium under the contact force, turned by atan(mu) against the motion, the springs, the brace and
+its weight. With p = tan(atan f -+ atan mu), the slope f of the track so turned (minus on the way up), t = tan(alpha) of
+the brace, S the spring force on one roller and w the weight that hangs on it,
 
     F = 2 (S + w p) / (p - t) + W
 

@@ -1,4 +1,4 @@
-"""Record of the slider-crank mechanisms with springs at their joints [Li, Hao 2019; Bilancia et al. 2019]."""
+"""Record by which the registry knows slider-cranks: their models, design, proposals, pictures, names of results."""
 
 from __future__ import annotations
 

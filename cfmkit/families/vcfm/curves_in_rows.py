@@ -53,7 +53,7 @@ class Characteristics:
     positive_stiffness: Any
     negative_stiffness: Any
     first_stiffness: Any
-    linear: tuple[Any, Any]
+    linear_range: tuple[Any, Any]
 
 
 class PartSampler(ABC):

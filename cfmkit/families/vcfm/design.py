@@ -108,7 +108,7 @@ def _design_from_targets(spec: VcfmSpec) -> Design:
         sizes = refine_sizes(spec, target, sizes)
         check_width(spec, target, sizes.leaf)
         check_room(target, sizes)
-    made = complete_analysis(write_sizes(spec, sizes), target, sizes.linear, sizes.leaf.angle)
+    made = complete_analysis(write_sizes(spec, sizes), target, sizes.linear_range, sizes.leaf.angle)
     return Design(made, Status.COMPLETE, active_bounds=tuple(active))
 
 
@@ -196,7 +196,7 @@ class DesignSizes:
 
     leaf: LeafStrip  # one leaf
     spring_leaf: LeafStrip  # one leaf of the spring
-    linear: tuple[float, float]  # ends of the region in which the stiffness of the leaves is constant [m]
+    linear_range: tuple[float, float]  # ends of the region in which the stiffness of the leaves is constant [m]
     half_beams: int  # number of leaves
 
 
@@ -277,7 +277,7 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
     )
     wanted = partial(_follow_curve, curve) if curve is not None else lambda _places: target.required_force
     try:
-        fit = fit_exact_force(made, sizes.linear, full, 1.2 * farthest_back(made, (full,)), wanted)
+        fit = fit_exact_force(made, sizes.linear_range, full, 1.2 * farthest_back(made, (full,)), wanted)
     except SolutionError as error:
         raise finding.infeasible(
             "no_linear_region",

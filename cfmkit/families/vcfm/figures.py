@@ -77,7 +77,7 @@ def force(result: Result) -> Figure:
 
 def _range_beyond(solution: Solution) -> tuple[MarkedRange, ...]:
     """Return the part of the travel where the leaves have straightened again."""
-    end, last = float(solution.linear[1][0]), float(solution.first.travel[-1])
+    end, last = float(solution.linear_range[1][0]), float(solution.first.travel[-1])
     return (MarkedRange(end, last, "leaves straightened"),) if np.isfinite(end) and end < last * (1 - 1e-6) else ()
 
 
@@ -94,7 +94,7 @@ def split(result: Result) -> Figure:
         bars = solution.parts.half_beams * np.asarray(truss(solution.parts.strip).force(push.travel))
         series.append(Series(bars, "leaves by the truss law", TEXT_GREY, dashed=True, prefer=0.4))
     ranges = list(_range_beyond(solution))
-    low = float(solution.linear[0][0])
+    low = float(solution.linear_range[0][0])
     if np.isfinite(low):
         ranges.insert(0, MarkedRange(push.travel[0], low, "not yet buckled"))
     diagram = Diagram(push.travel, TRAVEL_SCALE, Scale("force", "force"), series, (), ranges)

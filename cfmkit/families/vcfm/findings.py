@@ -176,9 +176,8 @@ def _negative_and_straight(solution: Solution) -> tuple[Any, Any]:
     if not solution.leaf_kind.buckles or solution.fidelity == "truss":
         return True, True
     if limits is None:  # or they depend on more than the slenderness: as the curve has it
-        return solution.spread_over_mechanisms(solution.character.negative_stiffness) > 0, np.isfinite(
-            solution.linear[0]
-        )
+        is_negative = solution.spread_over_mechanisms(solution.character.negative_stiffness) > 0
+        return is_negative, np.isfinite(solution.linear_range[0])
     q = _slenderness(solution)
     return q >= limits.negative, q > limits.constant
 
@@ -187,7 +186,7 @@ def _only_rises(solution: Solution) -> Any:
     return np.logical_not(_negative_and_straight(solution)[0])
 
 
-def _is_rounded(solution: Solution) -> Any:
+def _has_rounded_force(solution: Solution) -> Any:
     negative, straight = _negative_and_straight(solution)
     return np.logical_and(negative, np.logical_not(straight))
 
@@ -261,7 +260,7 @@ def _rests_beyond(solution: Solution) -> Any:
     return ~(solution.nominal.rest <= solution.window[0])
 
 
-def _reverses(solution: Solution) -> Any:
+def _has_reversed_force(solution: Solution) -> Any:
     return _rests_beyond(solution) | (solution.nominal.extremes_inside(solution.window)[1] <= 0)
 
 
@@ -277,20 +276,20 @@ def _reversal(solution: Solution) -> Sentence:
 def _forces_beyond_linear(solution: Solution) -> tuple[FloatArray, FloatArray]:
     """Return the force where the leaves straighten again, NaN beyond the curve, and at the end, (m,) each [N]."""
     curves = solution.nominal
-    return curves.evaluate_within_ends(solution.linear[1][:, None])[:, 0], curves.force[
-        np.arange(len(solution)), curves.count - 1
-    ]
+    at_end = curves.evaluate_within_ends(solution.linear_range[1][:, None])[:, 0]
+    return at_end, curves.force[np.arange(len(solution)), curves.count - 1]
 
 
 def _is_overloaded(solution: Solution) -> Any:
-    at_end, last = _forces_beyond_linear(solution)
-    saved = solution.curves.stops.free_end <= solution.linear[1] * (1 + LIMIT_RTOL)  # what rises there is the stop
-    beyond = goes_beyond(solution.nominal.ends[1], solution.linear[1]) & ~saved
+    (at_end, last), end = _forces_beyond_linear(solution), solution.linear_range[1]
+    saved = solution.curves.stops.free_end <= end * (1 + LIMIT_RTOL)  # what rises there is the stop
+    beyond = goes_beyond(solution.nominal.ends[1], end) & ~saved
     return beyond & ~(last - at_end <= solution.spec.analysis.flatness * np.abs(last))
 
 
 def _overload(solution: Solution) -> Sentence:
-    end, (at_end, last) = float(solution.linear[1][0]), (float(force[0]) for force in _forces_beyond_linear(solution))
+    at_end, last = (float(force[0]) for force in _forces_beyond_linear(solution))
+    end = float(solution.linear_range[1][0])
     return (
         f"beyond {mm(end)} the leaves straighten and stiffen: the force goes from {newton(at_end)} to {newton(last)} "
         f"at {mm(float(solution.first.travel[-1]))}; a stop at {mm(end)} limits the travel to the linear range",
@@ -448,7 +447,7 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule("spring_closed", is_closed, closed_spring),
     FindingRule("truss_law", lambda solution: solution.fidelity == "truss", _describe_truss),
     FindingRule("no_negative_stiffness", _only_rises, _rising_force),
-    FindingRule("no_linear_region", _is_rounded, _rounded_force),
+    FindingRule("no_linear_region", _has_rounded_force, _rounded_force),
     FindingRule(
         "not_flat",
         _is_not_flat,
@@ -459,7 +458,7 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
         ),
     ),
     FindingRule("bistable", _stays_behind_peak, _second_position),
-    FindingRule("force_reversal", _reverses, _reversal),
+    FindingRule("force_reversal", _has_reversed_force, _reversal),
     FindingRule("overload", _is_overloaded, _overload),
     FindingRule("preload_out_of_range", lambda solution: _pulled_out_of_range(solution).any(axis=1), _pull),
     FindingRule("spring_overstretched", is_overstretched, overstretching),

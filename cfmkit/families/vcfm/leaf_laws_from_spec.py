@@ -48,9 +48,9 @@ class LeafLaws:
         return self.half_beams * self.leaf.first_stiffness
 
     @property
-    def linear(self) -> tuple[Any, Any]:
+    def linear_range(self) -> tuple[Any, Any]:
         """Range of constant negative stiffness, from and to [m]; NaN where it nowhere is."""
-        return self.leaf.linear
+        return self.leaf.linear_range
 
     @property
     def balance(self) -> Any:

@@ -59,7 +59,7 @@ class ExactFit:
 
 def fit_exact_force(
     spec: VcfmSpec,
-    linear: tuple[float, float],  # ends of the region in which the stiffness of the leaves is constant [m]
+    linear_range: tuple[float, float],  # ends of the region in which the stiffness of the leaves is constant [m]
     # preload, back: the whole preload, and how far it pushes the shuttle back at most [m]
     preload: float,
     back: float,
@@ -73,7 +73,7 @@ def fit_exact_force(
     """
     from cfmkit.families.vcfm.exact_model import ExactSampler
 
-    first, last = map(float, linear)
+    first, last = map(float, linear_range)
     middle, half = 0.5 * (first + last), 0.5 * FITTED_REGION_SHARE * (last - first)
     places = np.linspace(middle - half, middle + half, 101)
     sampler = ExactSampler(spec, last, back)
@@ -202,13 +202,13 @@ def shortest_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float) -> float
     return max(sqrt(made.modulus / (spec.mechanism.allowable_stress or 1.0) * stressed), rise / sin(MAX_LEAF_ANGLE))
 
 
-def complete_analysis(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, float], angle: float) -> VcfmSpec:
+def complete_analysis(spec: VcfmSpec, target: VcfmDesign, linear_range: tuple[float, float], angle: float) -> VcfmSpec:
     """Return a designed mechanism with an analysis that shows what was requested, where the spec states none.
 
     The window is the linear region by the closed form, as long as the stroke; the travel ends with it, the preloads
     are none and the whole. Required are the force and its adjustment, within `analysis.flatness`, and the stress.
     """
-    low, high = (float(end) for end in linear)
+    low, high = (float(end) for end in linear_range)
     # inwards to a thousandth of the stroke: numbers that can be read
     step = 10.0 ** floor(log10(target.stroke) - 3)
     inside = ceil(low / step) * step, floor(high / step) * step

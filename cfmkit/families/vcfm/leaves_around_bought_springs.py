@@ -67,14 +67,14 @@ class LeavesAroundSprings:
     springs: BoughtSprings  # as a specification has them
     target: VcfmDesign  # with the rise and the preload that follow from their rate, and the force that is left to it
     leaf: LeafStrip  # one leaf
-    linear: tuple[float, float]  # where the leaves' stiffness is constant [m]
+    linear_range: tuple[float, float]  # where the leaves' stiffness is constant [m]
     half_beams: int  # number of leaves
     listed: bool = False  # whether the springs are from a catalogue, and not those of the mechanism
 
     @property
     def deflection(self) -> float:
         """Largest one of a spring, with the preload and at the end of the leaves' linear range [m]."""
-        return float(self.linear[1]) + self.target.preload_stroke
+        return float(self.linear_range[1]) + self.target.preload_stroke
 
     @property
     def held_springs(self) -> BoughtSprings:
@@ -266,7 +266,7 @@ def _find_miss(spec: VcfmSpec, target: VcfmDesign, leaves: LeavesAroundSprings, 
 
 def _list_springs_in_use(spec: VcfmSpec, leaves: LeavesAroundSprings, offer: Offer) -> Iterator[SpringInUse]:
     """Yield a spring between rest and the end of the travel at each preload, by the closed form of the leaves."""
-    springs, end = leaves.springs, max(float(leaves.linear[1]), spec.analysis.travel or 0.0)
+    springs, end = leaves.springs, max(float(leaves.linear_range[1]), spec.analysis.travel or 0.0)
     laws = LeafLaws(VBeam(leaves.leaf), Coils.from_springs(springs), leaves.half_beams)
     stated = "analysis" in spec.model_fields_set and "preloads" in spec.analysis.model_fields_set
     preloads = (*{*(spec.analysis.preloads if stated else (0.0,)), leaves.target.preload_stroke},)
@@ -292,7 +292,7 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, sized: LeavesAroundSprings) -
         # leaves are followed as far as the spring can push them, not through all of a long preload
         back = min(preload, RETURN_TRAVEL_RATIO * farthest_back(made, (preload,)))
         try:
-            fit = fit_exact_force(made, sized.linear, preload, back, lambda _places: target.required_force)
+            fit = fit_exact_force(made, sized.linear_range, preload, back, lambda _places: target.required_force)
         except SolutionError as error:
             return Miss(sized.label, 1.0, f"the exact model does not confirm the stroke: {error}")
         fitted = replace(sized, leaf=replace(sized.leaf, width=sized.leaf.width * fit.wide))
@@ -301,7 +301,7 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, sized: LeavesAroundSprings) -
             if worst <= 1.0 + 1e-4 and abs(fit.wide - 1.0) <= FORCE_RTOL:
                 return _find_miss(spec, target, sized, None) or sized
             count, leaf = next_leaf(sized.half_beams, sized.leaf, fit.wide, worst, sized.target.height)
-            sized = replace(sized, leaf=leaf, linear=onset_and_exit(leaf), half_beams=count)
+            sized = replace(sized, leaf=leaf, linear_range=onset_and_exit(leaf), half_beams=count)
             continue
         if worst <= 1.0 + 1e-4:
             return _find_miss(spec, target, fitted, None) or fitted
@@ -309,7 +309,7 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, sized: LeavesAroundSprings) -
             break
         # stress falls with the square of a length
         longer = size_leaf(spec, sized.target, sized.leaf.thickness, float(sized.leaf.length) * sqrt(1.0005 * worst))
-        sized = replace(sized, leaf=longer, linear=onset_and_exit(longer))
+        sized = replace(sized, leaf=longer, linear_range=onset_and_exit(longer))
     return Miss(
         sized.label, worst - 1.0, f"the exact stress of the leaves is {mpa(worst * allowable)} of {mpa(allowable)}"
     )
@@ -332,7 +332,7 @@ def _make_design(spec: VcfmSpec, target: VcfmDesign, leaves: LeavesAroundSprings
     made = complete_analysis(
         _write_design(spec, leaves),
         own_target.model_copy(update={"force": target.force}),
-        leaves.linear,
+        leaves.linear_range,
         leaves.leaf.angle,
     )
     active = ("design.catalogue",) if target.catalogue else ("mechanism.springs",)

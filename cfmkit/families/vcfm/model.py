@@ -77,7 +77,7 @@ def result_of(solution: Solution) -> Result:
     short = nominal.travel[-1] < spec.travel * (1 - 1e-9) or bool(reason)
     stops, pressed = solution.curves.stops, bool(nominal.force[0] > solution.effort_error[0])
     curves = tuple(_curve(push, stops, bool(push.force[0] > solution.effort_error[0])) for push in solution.pushes)
-    (low, high), dense = (float(end[0]) for end in solution.linear), DenseCurve(solution)
+    (low, high), dense = (float(end[0]) for end in solution.linear_range), DenseCurve(solution)
     return Result(
         spec=with_values(spec, {"analysis.travel": spec.travel}),
         status=Status.PARTIAL if short else Status.COMPLETE,
@@ -186,7 +186,7 @@ def _solve_kind(specs: Sequence[VcfmSpec]) -> Solution:
     preloads = np.concatenate([spec.analysis.preloads for spec in specs])
     mechanism_of_row = np.repeat(np.arange(len(specs)), count)
     grid, room = np.stack([travel_grid(spec) for spec in specs]), np.array([spring_room(spec) for spec in specs])
-    made.linear  # noqa: B018  once for all preloads
+    made.linear_range  # noqa: B018  once for all preloads
     sampler = LawSampler(made)
     sampler = sampler if count == 1 or len(specs) == 1 else sampler.select_rows(mechanism_of_row)
     pushed = PreloadedRows(sampler, preloads[:, None], NO_STOPS)
@@ -361,7 +361,9 @@ class LawSampler(PartSampler):
     def character(self) -> Characteristics:
         """Stiffnesses and linear range by the laws."""
         parts = self.parts
-        return Characteristics(parts.positive_stiffness, parts.negative_stiffness, parts.first_stiffness, parts.linear)
+        return Characteristics(
+            parts.positive_stiffness, parts.negative_stiffness, parts.first_stiffness, parts.linear_range
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -322,12 +322,13 @@ def _both_ways(pushed: MeshSolution, pulled: MeshSolution, radius: float) -> Ite
             yield fillet
         else:
             travel, stress = (
-                np.concatenate([a[:-1], b]) for a, b in zip(_poses(pulled_fillet), _poses(fillet), strict=True)
+                np.concatenate([a[:-1], b])
+                for a, b in zip(_travels_and_stresses(pulled_fillet), _travels_and_stresses(fillet), strict=True)
             )
             yield FilletStress(fillet.arc, travel, stress)
 
 
-def _poses(fillet: FilletStress) -> tuple[Any, Any]:
+def _travels_and_stresses(fillet: FilletStress) -> tuple[Any, Any]:
     return fillet.travel, fillet.stress
 
 

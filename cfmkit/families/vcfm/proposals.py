@@ -213,7 +213,7 @@ def _with_close_spring(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
     if target is None or corner + frame.block > float(leaf.reach):
         return spec
     share, rise, preload = corner / float(leaf.reach), float(leaf.rise), float(target.preload_stroke)
-    end = TRAVEL_OVER_LINEAR_REGION * float(sizes.linear[1])
+    end = TRAVEL_OVER_LINEAR_REGION * float(sizes.linear_range[1])
     closest = max(0.5 * preload + share * rise, 0.5 * (preload + end) + share * (rise - end))
     clearance = max(frame.block, closest - float(spring_leaf.rise) - 0.5 * frame.block)
     if clearance >= frame.clearance:
@@ -231,7 +231,8 @@ def _room_over(request: Request, spec: VcfmSpec, sizes: DesignSizes) -> dict[str
     across = 2.0 * float(max(halves))
     target = spec.design
     corner = max(
-        frame.corner, float(sizes.linear[1]) + (target.preload_stroke if target else 0.0) - 2 * float(spring_leaf.rise)
+        frame.corner,
+        float(sizes.linear_range[1]) + (target.preload_stroke if target else 0.0) - 2 * float(spring_leaf.rise),
     )
     along = (
         (pairs - 1) * frame.spacing + 2.0 * frame.clearance + 2.0 * frame.block + 2.0 * float(spring_leaf.rise) + corner
@@ -251,7 +252,7 @@ def _offer_coiled(request: Request, block: MaterialBlock, spec: VcfmSpec, sizes:
     stands = frame.spacing + 2.0 * frame.clearance + frame.block
     if across > request.envelope[0] or (request.depth is not None and leaf.width > request.depth):
         return None
-    springs = list(_springs_beside(request, spec, float(sizes.linear[1]), request.envelope[1] - stands))
+    springs = list(_springs_beside(request, spec, float(sizes.linear_range[1]), request.envelope[1] - stands))
     if not springs:
         return None
     promise = across * (stands + min(spring.free_length or 0.0 for spring in springs))

@@ -1,10 +1,4 @@
-"""Scalar results of snap-through leaves beside a preloaded spring, and its force by preload, leaves and stiffness.
-
-They stand beside the constant-force metrics of every family: stiffnesses [N/m], travels [m], stresses [Pa], effects of
-the preload.
-
-Tables are what each preload gives, and what other readings of a paper's table of sizes would give.
-"""
+"""Scalar results of snap-through leaves beside a preloaded spring; tables of its force by preload and by leaves."""
 
 from __future__ import annotations
 
@@ -46,7 +40,7 @@ def _is_solid(solution: Solution) -> bool:
 
 
 def _linear_stroke(solution: Solution) -> FloatArray:
-    low, high = solution.linear
+    low, high = solution.linear_range
     return np.where(np.isfinite(high - low), high - low, 0.0)
 
 
@@ -158,9 +152,11 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "rise over thickness of the leaves, Q: above pi they buckle, above 3.195 they are bistable",
         lambda solution: solution.parts.strip.slenderness,
     ),
-    "linear_start": ScalarQuantity("length", "travel at which the leaves buckle", lambda solution: solution.linear[0]),
+    "linear_start": ScalarQuantity(
+        "length", "travel at which the leaves buckle", lambda solution: solution.linear_range[0]
+    ),
     "linear_end": ScalarQuantity(
-        "length", "travel at which they straighten again", lambda solution: solution.linear[1]
+        "length", "travel at which they straighten again", lambda solution: solution.linear_range[1]
     ),
     "linear_stroke": ScalarQuantity("length", "length of the linear negative stiffness", _linear_stroke),
     "constant_force": ScalarQuantity(
@@ -279,7 +275,7 @@ def adjustability(solution: Solution) -> Table:
             row |= {"window_start": start, "window_end": end, "window_length": end - start}
             row |= {"window_start_from_rest": start - push.rest if push.rest is not None else None}
         rows.append(row)
-    return _table(rows, _PRELOAD_COLUMNS)
+    return _make_table(rows, _PRELOAD_COLUMNS)
 
 
 _PRELOAD_COLUMNS = {
@@ -322,7 +318,7 @@ def readings(solution: Solution) -> Table:
     Where a measured force and stiffness are stated, also with those.
     """
     rows = []
-    for reading in _readings(solution):
+    for reading in _list_readings(solution):
         spread_values = force_statistics(_force(solution, reading))
         about = {
             "reading": reading.text,
@@ -330,7 +326,7 @@ def readings(solution: Solution) -> Table:
             "positive_stiffness": reading.positive_stiffness,
         }
         rows.append(about | spread_values)
-    return _table(rows, _READING_COLUMNS)
+    return _make_table(rows, _READING_COLUMNS)
 
 
 _READING_COLUMNS = {
@@ -344,7 +340,7 @@ _READING_COLUMNS = {
 }
 
 
-def _readings(solution: Solution) -> Iterator[TableReading]:
+def _list_readings(solution: Solution) -> Iterator[TableReading]:
     mechanism, reported = solution.spec.mechanism, solution.spec.analysis.measured
     if mechanism.positive is None:
         for leaves in sorted({2, 4, mechanism.bistable.half_beams}):
@@ -379,7 +375,7 @@ def _force(solution: Solution, reading: TableReading) -> FloatArray:
     return np.asarray(reading.half_beams * leaves + reading.positive_stiffness * spring)
 
 
-def _table(rows: list[dict[str, Any]], columns: dict[str, str]) -> Table:
+def _make_table(rows: list[dict[str, Any]], columns: dict[str, str]) -> Table:
     table_columns = []
     for name, dimension in columns.items():
         values = [row.get(name) for row in rows]

@@ -144,7 +144,7 @@ def find_flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, 
         by_spring = "as wide" if solution.spec.mechanism.springs is None else "as stiff"
         text = f"; leaves {factor:.3g} times as wide, or a spring {1.0 / factor:.3g} times {by_spring}, make them equal"
         return text, ()
-    (first, last), (low, high) = (float(end[0]) for end in solution.linear), solution.window_of_one
+    (first, last), (low, high) = (float(end[0]) for end in solution.linear_range), solution.window_of_one
     why = ""
     if np.isfinite(first) and (low < first or high > last):
         why = f"; the leaves are buckled from {mm(first)} to {mm(last)} only"

@@ -1,4 +1,4 @@
-"""Record of the mechanisms of snap-through leaves and a preloaded spring [Ding, Li and Li 2022]."""
+"""Record by which the registry knows vcfms: their models, design, proposals, pictures and names of results."""
 
 from __future__ import annotations
 

@@ -148,9 +148,9 @@ class Solution(ShortRepr):
         return self.nominal.sampler.character
 
     @cached_property
-    def linear(self) -> Ends:
+    def linear_range(self) -> Ends:
         """Range of constant negative stiffness, from and to [m]; NaN where it nowhere is."""
-        first, last = map(self.spread_over_mechanisms, self.character.linear)
+        first, last = map(self.spread_over_mechanisms, self.character.linear_range)
         return first, last
 
     @cached_property
@@ -202,7 +202,7 @@ class Solution(ShortRepr):
     @cached_property
     def is_linear(self) -> NDArray[np.bool_]:
         """True where the leaves buckle within the travel, and so have a range of constant negative stiffness."""
-        return np.isfinite(self.linear[0]) & (self.linear[0] < self.reach)
+        return np.isfinite(self.linear_range[0]) & (self.linear_range[0] < self.reach)
 
     @cached_property
     def window(self) -> Ends:
@@ -215,8 +215,8 @@ class Solution(ShortRepr):
             low, high = np.array([window_places(ends, travel) for ends, travel in stated if ends is not None]).T
             return low, high
         if self.is_linear.all():  # nothing flat needs to be looked for
-            return self.linear[0], np.minimum(self.linear[1], self.reach)
-        some, (first, last) = np.isfinite(self.flat[0]), self.linear
+            return self.linear_range[0], np.minimum(self.linear_range[1], self.reach)
+        some, (first, last) = np.isfinite(self.flat[0]), self.linear_range
         return (
             np.where(self.is_linear, first, np.where(some, self.flat[0], 0.0)),
             np.where(self.is_linear, np.minimum(last, self.reach), np.where(some, self.flat[1], self.reach)),
@@ -257,7 +257,7 @@ class Solution(ShortRepr):
         place = self.spread_over_mechanisms(self.parts.balance)[:, None]
         force = curves.sampler.spring(place + curves.preload)[0][:, 0]
         # leaves with a stated waviness carry a little there, which no flatness tells
-        buckles = np.isfinite(self.linear[0]) & self.leaf_kind.buckles
+        buckles = np.isfinite(self.linear_range[0]) & self.leaf_kind.buckles
         bears = (np.abs(curves.sampler.leaf_force(place)[:, 0]) > self._flatness * np.abs(force)) & ~buckles
         return np.where(bears | (about is not None and not about.kind.is_linear), np.nan, force)
 
@@ -367,7 +367,7 @@ class Solution(ShortRepr):
         grid = [np.linspace(low[:, 0], high[:, 0], N_EVEN_PLACES, axis=1)]
         grid += [np.clip(np.full_like(low, place), low, high) for place in self.curves.stops.marks]
         with np.errstate(all="ignore"):
-            for mark in (*(end[:, None] for end in self.linear), np.zeros_like(low)):
+            for mark in (*(end[:, None] for end in self.linear_range), np.zeros_like(low)):
                 crowd = np.hstack([mark, mark - CROWDED_SHARES * (high - low), mark + CROWDED_SHARES * (high - low)])
                 inside = (mark >= low) & (mark < high) & (crowd >= low) & (crowd <= high)
                 grid.append(np.where(inside, crowd, low))
@@ -399,7 +399,7 @@ class Solution(ShortRepr):
     def branches(self) -> dict[str, CurveRows]:
         """The nominal curves by branch, as metrics see them."""
         curves = self.nominal
-        low, high = (np.where(self.is_linear, *ends) for ends in zip(self.linear, curves.ends, strict=True))
+        low, high = (np.where(self.is_linear, *ends) for ends in zip(self.linear_range, curves.ends, strict=True))
         rows_of_curves = CurveRows(
             RowSamples(curves.travel, curves.force, curves.count),
             lambda: self.dense,

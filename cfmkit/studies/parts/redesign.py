@@ -1,11 +1,10 @@
 """Designs with margins: values of a designed specification moved until enough of its made parts are good.
 
-What may move is what `design.free` names, or what the family says that its design may choose; what errors there are
-say `design.tolerances`; what must hold say the requirements. Requirements on forces and stresses become rows of the
-force and the stress at a few poses, which are smooth where the metrics, largest and smallest values, are not:
-(max - min)/(max + min) <= b holds if (1 + b) F_j - (1 - b) F_i >= 0 for every pair of poses. Any other metric is a
-number of its own. How limits are drawn in is `designing.robust_design`'s; the yield is judged afterwards, on parts
-drawn anew.
+What may move is what `design.free` names, or what the family says that its design may choose; what errors there are say
+`design.tolerances`; what must hold say the requirements. Requirements on forces and stresses become rows of the force
+and the stress at a few poses, which are smooth where the metrics, largest and smallest values, are not: (max -
+min)/(max + min) <= b holds if (1 + b) F_j - (1 - b) F_i >= 0 for every pair of poses. Any other metric is a number of
+its own. How limits are drawn in is `designing.robust_design`'s; the yield is judged afterwards, on parts drawn anew.
 """
 
 from __future__ import annotations

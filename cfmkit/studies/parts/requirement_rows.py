@@ -106,7 +106,7 @@ class _RowsOfMargins:
                 if not self._contradicts_analysis(added, requirement):
                     self.rows += added
                     return
-        column = self._numbers + len(self.metrics)
+        column = self._n_numbers + len(self.metrics)
         self.metrics.append(replace(metric, over=requirement.over, label=str(number)))
         if limits.min is not None:
             self.rows.append(({column: 1.0}, -limits.min, number))
@@ -123,7 +123,7 @@ class _RowsOfMargins:
         return False
 
     @property
-    def _numbers(self) -> int:
+    def _n_numbers(self) -> int:
         return (len(self.branches) + self.stresses) * len(self.places)
 
     def _stress(self, name: str, limits: Bounds, over: Any, number: int) -> bool:
@@ -150,7 +150,7 @@ class _RowsOfMargins:
 
     def rows_of(self) -> RequirementRows:
         """Return all rows."""
-        size = self._numbers + len(self.metrics)
+        size = self._n_numbers + len(self.metrics)
         matrix = np.zeros((len(self.rows), size))
         for r, (row, _, _) in enumerate(self.rows):
             for column, weight in row.items():

@@ -229,7 +229,7 @@ def together(block: Sensitivity, paths: Sequence[str]) -> tuple[tuple[int, ...],
 
 
 def _expand(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> list[Parameter]:
-    return [_parameter(spec, item, stated) for item in _items(spec, path)]
+    return [_read_parameter(spec, item, stated) for item in _items(spec, path)]
 
 
 def _items(spec: Spec, path: str) -> list[str]:
@@ -246,16 +246,16 @@ def _items(spec: Spec, path: str) -> list[str]:
     return [item for index in range(len(values)) for item in _items(spec, f"{before}.{index}{after}")]
 
 
-def _parameter(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> Parameter:
+def _read_parameter(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> Parameter:
     place = leaf(type(spec), path)
     if place.kind not in ("quantity", "number"):
         raise CannotVary(f"{path!r} does not vary continuously; `cfmkit sweep` goes through its values")
-    nominal, dimension = _nominal(spec, place)
+    nominal, dimension = _read_nominal(spec, place)
     spread = _tolerance(place, stated, nominal) if isinstance(stated, Tolerance) else _range(place, stated, nominal)
     return Parameter(path, dimension, spread, place.has_several_dimensions)
 
 
-def _nominal(spec: Spec, place: Leaf) -> tuple[float, str]:
+def _read_nominal(spec: Spec, place: Leaf) -> tuple[float, str]:
     try:
         value = spec.get_value(place.path)
     except KeyError:
@@ -288,7 +288,7 @@ def _tolerance(place: Leaf, stated: Tolerance, nominal: float) -> ParameterSprea
 def _width(place: Leaf, key: str, text: str, nominal: float) -> float:
     """Return the size of a tolerance [SI]; a percentage is of the nominal value."""
     if text.endswith("%"):
-        share = _percent(key, text)
+        share = _read_percent(key, text)
         if share > 1:
             raise CannotVary(f"{key}: {text} is more than the value itself: at most 100 %, or give it in its unit")
         width = share * abs(nominal)
@@ -304,7 +304,7 @@ def _width(place: Leaf, key: str, text: str, nominal: float) -> float:
     return width
 
 
-def _percent(key: str, text: str) -> float:
+def _read_percent(key: str, text: str) -> float:
     try:
         return read_quantity(text, "ratio")
     except QuantityError as problem:

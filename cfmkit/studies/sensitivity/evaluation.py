@@ -79,14 +79,14 @@ class Evaluator:
         self.pieces.append(piece)
         if piece.records.finished < len(piece.records):
             for _, rows in piece.records.batches():
-                self._numbers(rows)
+                self._numbers_of_rows(rows)
             raise Interrupted
         outputs = np.empty((count * size, len(self.study.metrics) + len(self.study.spec.part_requirements)))
         for indices, rows in piece.records.batches():
-            outputs[sequence[indices]] = self._numbers(rows)
+            outputs[sequence[indices]] = self._numbers_of_rows(rows)
         return outputs.reshape(count, size, -1)
 
-    def _numbers(self, rows: ResultRows) -> FloatArray:
+    def _numbers_of_rows(self, rows: ResultRows) -> FloatArray:
         numbers = np.concatenate([rows.values, rows.met.astype(np.float64)], axis=1)
         # A curve that ends early is measured over another travel: its metrics are no samples of these.
         failed = {k: item for k, item in rows.odd.items() if item[0] is not Status.COMPLETE}

@@ -1,10 +1,9 @@
 """Gradients at the nominal point: differences over steps that are halved, extrapolated, with an error estimate.
 
-Ridders' scheme [R]: the differences over h, h/2, h/4, ... are extrapolated to h = 0, and
-of all the values so found the one is taken that differs least from its neighbours. That
-is the step control: large steps suffer from curvature, small ones from rounding, and
-the difference that is left is the error estimate. Where one side has no values (a
-friction cannot be negative), differences of the other side are extrapolated.
+Ridders' scheme [R]: the differences over h, h/2, h/4, ... are extrapolated to h = 0, and of all the values so found the
+one is taken that differs least from its neighbours. That is the step control: large steps suffer from curvature, small
+ones from rounding, and the difference that is left is the error estimate. Where one side has no values (a friction
+cannot be negative), differences of the other side are extrapolated.
 
 Reference
 ---------
@@ -152,16 +151,16 @@ def _gradient_lines(metric: Metric, parameter: Parameter, slope: Slope, at_nomin
     above, below = border_unit(metric.dimension), border_unit(parameter.dimension)
     scale = float(to_border(1.0, metric.dimension)) / float(to_border(1.0, parameter.dimension))
     unit = above if below == "1" else f"{above}/{below}" if below.isalpha() else f"{above}/({below})"
-    value, low, high = (reported(end * scale, "ratio") for end in _neighbours(slope.value, slope.error))
+    value, low, high = (reported(end * scale, "ratio") for end in _value_and_ends(slope.value, slope.error))
     yield IndexLine(metric.label, parameter.path, "gradient", value, low, high, unit, N_STEP_LEVELS)
     relative = normalise(1.0, parameter.spread.nominal, at_nominal)
     value, low, high = (
-        reported(end, "ratio") for end in _neighbours(slope.value * relative, slope.error * abs(relative))
+        reported(end, "ratio") for end in _value_and_ends(slope.value * relative, slope.error * abs(relative))
     )
     yield IndexLine(metric.label, parameter.path, SLOPE_INDEX, value, low, high, "1", N_STEP_LEVELS)
 
 
-def _neighbours(value: float, reach: float) -> tuple[float, float, float]:
+def _value_and_ends(value: float, reach: float) -> tuple[float, float, float]:
     return value, value - reach, value + reach
 
 

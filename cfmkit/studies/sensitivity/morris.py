@@ -1,8 +1,7 @@
 """Morris screening: the mean and the scatter of the effects of single steps.
 
-``mu_star`` is the mean size of the change of the output when one parameter crosses its
-whole range, ``mu`` the mean with its sign, ``sigma`` the standard deviation: large where
-the effect is curved or depends on the other parameters.
+``mu_star`` is the mean size of the change of the output when one parameter crosses its whole range, ``mu`` the mean
+with its sign, ``sigma`` the standard deviation: large where the effect is curved or depends on the other parameters.
 
 Reference
 ---------

@@ -1,7 +1,4 @@
-"""A sensitivity study by its method: draw, evaluate, analyse, state; and its files.
-
-These are results.csv, indices.csv, convergence.csv, metrics.json, resolved.yaml.
-"""
+"""A sensitivity study by its method: draw, evaluate, analyse, state; and its files (results.csv, indices.csv, ...)."""
 
 from __future__ import annotations
 
@@ -166,11 +163,11 @@ def as_json(findings: Findings) -> dict[str, Any]:
         "message": message(findings),
         "method": setup.method,
         "metrics": metrics_json(_metrics(findings)),
-        "requirements": _requirements(findings),
+        "requirements": _list_requirements(findings),
         "warnings": [{"name": item.name, "message": item.message} for item in warnings(findings)],
         "yield": findings.all_met and findings.all_met.as_json(),
-        "samples": _samples(findings),
-        "parameters": [_parameter(parameter) for parameter in setup.parameters],
+        "samples": _describe_samples(findings),
+        "parameters": [_describe_parameter(parameter) for parameter in setup.parameters],
         "correlated": _correlated_pairs(setup),
         "indices": [vars(line) for line in findings.lines],
     }
@@ -197,7 +194,7 @@ def _metrics(findings: Findings) -> dict[str, Quantity]:
     return noted
 
 
-def _requirements(findings: Findings) -> list[dict[str, Any]]:
+def _list_requirements(findings: Findings) -> list[dict[str, Any]]:
     outcomes = findings.setup.nominal.outcomes
     shares = findings.each_met or (None,) * len(outcomes)
     records = [
@@ -221,7 +218,7 @@ def _finite_or_none(value: float) -> float | None:
     return None if isnan(value) else value
 
 
-def _samples(findings: Findings) -> dict[str, Any]:
+def _describe_samples(findings: Findings) -> dict[str, Any]:
     evaluator, setup = findings.evaluator, findings.setup
     ends = {status.key: count for status, count in evaluator.ends.items() if count}
     about: dict[str, Any] = {"blocks": setup.samples, "evaluated": evaluator.count, "failed": evaluator.failed}
@@ -233,7 +230,7 @@ def _samples(findings: Findings) -> dict[str, Any]:
     }
 
 
-def _parameter(parameter: Parameter) -> dict[str, Any]:
+def _describe_parameter(parameter: Parameter) -> dict[str, Any]:
     spread = parameter.spread
     low, high = spread.ends
     about = {

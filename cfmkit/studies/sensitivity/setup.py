@@ -182,7 +182,7 @@ def _metrics(spec: Spec, block: Sensitivity, sample: Curve | None) -> tuple[Metr
     plain = {metric.name: metric for metric in metrics_of(spec, [name for name, _ in wanted], sample)}
     motion = sample.motion_dimension if sample is not None else "length"
     labels = {
-        name_and_window: _label(plain[name_and_window[0]].label, name_and_window[1], motion)
+        name_and_window: _label_metric(plain[name_and_window[0]].label, name_and_window[1], motion)
         for name_and_window in wanted
     }
     return tuple(
@@ -200,7 +200,7 @@ def _numeric(metrics: tuple[Metric, ...], block: Sensitivity) -> tuple[Metric, .
     return tuple(metric for metric in metrics if not metric.words)
 
 
-def _label(name: str, over: Ends | None, motion: str) -> str:
+def _label_metric(name: str, over: Ends | None, motion: str) -> str:
     if over is None:
         return name
     if any(isinstance(end, TravelShare) for end in over):

@@ -81,11 +81,12 @@ def analyze(outputs: FloatArray, seed: int) -> Analysis:
         salib_problem(count), outputs.ravel(), calc_second_order=False, num_resamples=N_RESAMPLES, seed=seed + 1
     )
     return tuple(
-        _index(name, indices[key], indices[f"{key}_conf"]) for name, key in zip(INDEX_NAMES, ("S1", "ST"), strict=True)
+        _make_index(name, indices[key], indices[f"{key}_conf"])
+        for name, key in zip(INDEX_NAMES, ("S1", "ST"), strict=True)
     )
 
 
-def _index(name: str, value: Any, reach: Any) -> Index:
+def _make_index(name: str, value: Any, reach: Any) -> Index:
     values, reaches = np.asarray(value, dtype=np.float64), np.asarray(reach, dtype=np.float64)
     return Index(name, values, values - reaches, values + reaches)
 

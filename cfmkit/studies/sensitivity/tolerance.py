@@ -1,10 +1,9 @@
 """Monte Carlo over tolerances: how many parts are good, and which tolerance to tighten first.
 
-Every sample is one made mechanism. It is evaluated as drawn, and again with each
-tolerance (or group of correlated ones) halved about its nominal value while all random
-numbers stay: the differences are those of the tolerance alone. ``yield_gain`` says how
-many more parts would be good, ``variance_drop`` which share of an output's variance
-would go away.
+Every sample is one made mechanism. It is evaluated as drawn, and again with each tolerance (or group of correlated
+ones) halved about its nominal value while all random numbers stay: the differences are those of the tolerance alone.
+``yield_gain`` says how many more parts would be good, ``variance_drop`` which share of an output's variance would go
+away.
 """
 
 from __future__ import annotations
@@ -92,13 +91,13 @@ def variance_drops(
         gap = np.full(groups, np.nan)
         return (Index(VARIANCE_DROP, gap, gap, gap),)
     count, generator = len(outputs), np.random.default_rng([seed, 2])
-    again = np.array([_drops(outputs[generator.integers(count, size=count)]) for _ in range(N_RESAMPLES)])
+    again = np.array([_variance_drops(outputs[generator.integers(count, size=count)]) for _ in range(N_RESAMPLES)])
     tail = 50.0 * (1.0 - CONFIDENCE_LEVEL)
     low, high = np.nanpercentile(again, (tail, 100.0 - tail), axis=0)
-    return (Index(VARIANCE_DROP, _drops(outputs), low, high),)
+    return (Index(VARIANCE_DROP, _variance_drops(outputs), low, high),)
 
 
-def _drops(outputs: FloatArray) -> FloatArray:
+def _variance_drops(outputs: FloatArray) -> FloatArray:
     variance = outputs.var(axis=0)
     # A bootstrap sample may hold one point many times and nothing else.
     with np.errstate(all="ignore"):

@@ -72,7 +72,7 @@ def to_one_scale(
         "Proposals in the envelope, same scale" + _count_left_out(proposals),
         fontsize=NORMAL_FONT,
     )
-    figure.text(0.02, 1.5 / total, _scale_reported(request), fontsize=SMALL_FONT, color=TEXT_GREY)
+    figure.text(0.02, 1.5 / total, _describe_scale(request), fontsize=SMALL_FONT, color=TEXT_GREY)
     return figure
 
 
@@ -94,7 +94,7 @@ def _wrap_text(width: float, text: str) -> str:
     return textwrap.fill(text, int(width / LETTER_WIDTH))
 
 
-def _scale_reported(request: Request) -> str:
+def _describe_scale(request: Request) -> str:
     sides = " x ".join(f"{1e3 * side:.4g}" for side in request.envelope[:2])
     return f"Dashed: envelope, {sides} mm" + (" across and along the travel" if request.kind == "force" else "")
 

@@ -291,7 +291,7 @@ def redesign_for_yield(
             break
         last, judged = moved, judge(moved.spec)
         if judged.good:
-            return replace(judged, notes=(_note(moved), *judged.notes))
+            return replace(judged, notes=(_describe_margins(moved), *judged.notes))
         if not judged.movable:
             obstacle = "; ".join(judged.missed) or judged.message
             break
@@ -304,7 +304,7 @@ def redesign_for_yield(
     return replace(best, missed=(f"{best.missed[0]}; {_explain_margins(last, obstacle)}",), movable=False)
 
 
-def _note(moved: MovedForYield) -> str:
+def _describe_margins(moved: MovedForYield) -> str:
     before, now = (f"{100.0 * share:.3g} %" for share in (moved.began, moved.share))
     return f"designed with margins: yield {before} before, {now} now (linear estimate)"
 
@@ -419,7 +419,7 @@ def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> d
         return max(values) if values else None
 
     lost, mechanism = worst("hysteresis_area"), result.spec.get_value("mechanism")
-    rubs = not hasattr(mechanism, "pins") or any(_friction(mechanism, name) for name in RUBBING_BLOCKS)
+    rubs = not hasattr(mechanism, "pins") or any(_friction_of_block(mechanism, name) for name in RUBBING_BLOCKS)
     means = {key: quantity.value for key, quantity in quantities.items() if key.partition("[")[0] == f"{kind}_mean"}
     means_of_branches = [value for key, value in means.items() if value is not None and ("[" in key or len(means) == 1)]
     mean = float(np.mean(means_of_branches)) if means_of_branches else None
@@ -458,7 +458,7 @@ def _notes(space: BoundingBox | None, result: Result) -> Iterator[str]:
     if space is not None and space.assumed:
         yield space.assumed
     mechanism = result.spec.get_value("mechanism")
-    rubs = [f"{name} {value:g}" for name in RUBBING_BLOCKS if (value := _friction(mechanism, name))]
+    rubs = [f"{name} {value:g}" for name in RUBBING_BLOCKS if (value := _friction_of_block(mechanism, name))]
     if rubs:
         yield f"friction assumed: {', '.join(rubs)}"
     elif hasattr(mechanism, "pins"):
@@ -468,5 +468,5 @@ def _notes(space: BoundingBox | None, result: Result) -> Iterator[str]:
         yield f"{finding.name}: {finding.message}"
 
 
-def _friction(mechanism: Any, name: str) -> float:
+def _friction_of_block(mechanism: Any, name: str) -> float:
     return float(getattr(getattr(mechanism, name, None), "friction", 0.0) or 0.0)

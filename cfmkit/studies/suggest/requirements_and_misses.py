@@ -4,8 +4,6 @@ Every number of a request becomes a requirement on a metric, so that `cfmkit ana
 search. What a request asks for and nothing is known of, as the life of a material without fatigue data, is no
 requirement: the proposal says that it was not judged, and does not meet the request. A yield is that of many
 parts: it stands in the block `sensitivity`, as `min_yield`.
-
-Words about misses are of the envelope, the travel, and a force that wide beams raise.
 """
 
 from __future__ import annotations
@@ -65,9 +63,9 @@ def list_unjudged(request: Request, result: Result) -> Iterator[str]:
     """Yield what is required and no model here can judge, each with the reason."""
     quantities = evaluate(result)
     if request.hysteresis is not None and "unload" not in result.curve.branches:
-        yield f"hysteresis not judged: no loss factor is known of {_material(result)}"
+        yield f"hysteresis not judged: no loss factor is known of {_name_material(result)}"
     if request.stated.cycles is not None:
-        yield from _unknown_lives(result, quantities)
+        yield from _list_unknown_lives(result, quantities)
     if request.adjustable is not None and "adjusted_force_min" not in quantities:
         yield "adjustment not judged: the model does not know its ends"
     names = {warning.name for warning in result.warnings}
@@ -76,10 +74,10 @@ def list_unjudged(request: Request, result: Result) -> Iterator[str]:
     if "mesh_coarse" in names:
         yield "force and stress not judged: the mesh is too coarse"
     if _bends(result) and result.allowable_stress is None:
-        yield f"stress not judged: no strength is known of {_material(result)}"
+        yield f"stress not judged: no strength is known of {_name_material(result)}"
     contact = getattr(result.spec.get_value("mechanism"), "contact", None)
     if contact is not None and contact.material.yield_strength is None:
-        yield f"contact pressure not judged: no strength is known of {_material(result)}"
+        yield f"contact pressure not judged: no strength is known of {_name_material(result)}"
 
 
 def list_misses_within_mesh_error(request: Request, result: Result, values: Iterable[Definition]) -> Iterator[str]:
@@ -104,7 +102,7 @@ def stressed_motion(request: Request, spec: Spec) -> tuple[str, str]:
     return format_short(0.5 * float(window[0]), "length", 12), end  # an end stop is where it is for all parts
 
 
-def _share(value: float) -> str:
+def _percent_text(value: float) -> str:
     return f"{100.0 * value:.12g} %"
 
 
@@ -113,7 +111,7 @@ def _value_of(quantities: Mapping[str, Quantity], name: str) -> float | None:
 
 
 def _require_effort(request: Request) -> Iterator[dict[str, Any]]:
-    yield {"metric": f"{request.kind}_ripple", "max": _share(request.ripple)}
+    yield {"metric": f"{request.kind}_ripple", "max": _percent_text(request.ripple)}
     low, high = (format_short(value, request.kind, 12) for value in (request.low, request.high))
     if request.banded:
         yield {"metric": f"{request.kind}_min", "min": low}
@@ -161,11 +159,11 @@ def _require_lives(request: Request, result: Result, quantities: Mapping[str, Qu
         yield {"metric": "spring_life", "min": f"{cycles}"}
 
 
-def _unknown_lives(result: Result, quantities: Mapping[str, Quantity]) -> Iterator[str]:
+def _list_unknown_lives(result: Result, quantities: Mapping[str, Quantity]) -> Iterator[str]:
     wired = "wire_stress_max" in quantities or _has_springs(result.spec)
     links = "link_safety_factor" in quantities
     if (_bends(result) or links) and getattr(_block(result.spec), "fatigue", None) is None:
-        yield f"life not judged: no S-N data for {_material(result)}"
+        yield f"life not judged: no S-N data for {_name_material(result)}"
     elif _bends(result) and "fatigue_life" not in quantities:
         yield "life not judged: no model of the fatigue of its contact"
     if wired and _value_of(quantities, "spring_life") is None:
@@ -191,7 +189,7 @@ def _block(spec: Spec) -> Any:
     return getattr(mechanism, "material", None) or getattr(getattr(mechanism, "contact", None), "material", None)
 
 
-def _material(result: Result) -> str:
+def _name_material(result: Result) -> str:
     return getattr(_block(result.spec), "name", None) or "its material"
 
 
@@ -201,7 +199,7 @@ def _require_adjustment(request: Request, quantities: Mapping[str, Quantity]) ->
     low, high = request.adjustable
     yield {"metric": "adjusted_force_min", "max": format_short(low * (1.0 + ADJUSTMENT_TOL), "force", 12)}
     yield {"metric": "adjusted_force_max", "min": format_short(high * (1.0 - ADJUSTMENT_TOL), "force", 12)}
-    yield {"metric": "adjusted_ripple_max", "max": _share(request.ripple)}
+    yield {"metric": "adjusted_ripple_max", "max": _percent_text(request.ripple)}
 
 
 LENGTH_RTOL = 1e-9  # on lengths that are compared: what writing a number down does to its last digit

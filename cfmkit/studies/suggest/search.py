@@ -177,7 +177,7 @@ class _MadeCandidates:
         self._known = {index: Proposal.from_record(record) for index, record in records.items() if record is not None}
         self.reused += len(self._known)
         left = [index for index in range(len(jobs)) if index not in self._known]
-        work = partial(_made_of, tuple(jobs))
+        work = partial(_make_job, tuple(jobs))
         executor = surviving_until(run, self._times.without, self._bugs)
         for index, outcome in executor(work, iter(left), self.late):
             proposal = _proposal_or_loss(jobs[index], outcome)
@@ -259,7 +259,7 @@ def _with_nearest(
     return [replace(answer, nearest=named.get(answer.family, {})) for answer in answers], complete
 
 
-def _made_of(jobs: Sequence[ProposalJob], index: int) -> Proposal:
+def _make_job(jobs: Sequence[ProposalJob], index: int) -> Proposal:
     return make_proposal(jobs[index])
 
 

@@ -324,7 +324,7 @@ def _nearest_box(key: str) -> Callable[[Task, float], dict[str, str]]:
     return nearest
 
 
-def _scale_limit(
+def _nearest(
     key: str, value: Callable[[TaskLimits, float], float], sense: str, dimension: str
 ) -> Callable[..., dict[str, str]]:
     def nearest(task: Task, slack: float) -> dict[str, str]:
@@ -337,13 +337,13 @@ NEAREST_LIMITS: dict[str, Callable[[Task, float], dict[str, str]]] = {
     "stress": _nearest_stress,
     "envelope": _nearest_box("envelope"),
     "deformed_envelope": _nearest_box("deformed_envelope"),
-    "max_length_ratio": _scale_limit(
+    "max_length_ratio": _nearest(
         "max_length_ratio", lambda limits, s: 1 / max(1e-3, 1 / (limits.length_ratio or 1.0) - s), "at least", "count"
     ),
-    "min_slenderness": _scale_limit(
+    "min_slenderness": _nearest(
         "min_slenderness", lambda limits, s: (limits.slenderness or 0.0) * (1 - s), "at most", "count"
     ),
-    "min_radius": _scale_limit("min_radius", lambda limits, s: (limits.radius or 0.0) * (1 - s), "at most", "length"),
+    "min_radius": _nearest("min_radius", lambda limits, s: (limits.radius or 0.0) * (1 - s), "at most", "length"),
     "clearance": _nearest_clearance,
     "force": _nearest_force,
 }

@@ -1,4 +1,4 @@
-"""The limits of a task, clearance included, as rows that must be at least zero, all of order one, with derivatives.
+"""Limits of a shape task (stress, envelope, length, radius, clearance, force ...) as scaled rows >= 0, with slopes.
 
 Clearance of beams: a smooth bound of the smallest gap of a pair over the required one, with derivatives. Beams that
 meet in a joint come close to each other there. So the gap that is required between two places grows with the way
@@ -134,15 +134,15 @@ def stress(view: View) -> list[PendingRows]:
 
 def envelope(view: View) -> list[PendingRows]:
     """Extremes of the centre lines before loading."""
-    return _keep_inside(view, "envelope", view.task.limits.envelope, slice(0, 1))
+    return _envelope_rows(view, "envelope", view.task.limits.envelope, slice(0, 1))
 
 
 def deformed_envelope(view: View) -> list[PendingRows]:
     """Extremes of the centre lines at every pose."""
-    return _keep_inside(view, "deformed_envelope", view.task.limits.deformed_envelope, slice(None))
+    return _envelope_rows(view, "deformed_envelope", view.task.limits.deformed_envelope, slice(None))
 
 
-def _keep_inside(
+def _envelope_rows(
     view: View, name: str, box: tuple[float, float, float, float] | None, which: slice
 ) -> list[PendingRows]:
     if box is None:
@@ -302,10 +302,10 @@ class Pair:
 
 def pairs(network: Network) -> list[Pair]:
     """Return all pairs of beams, each beam with itself included."""
-    return [_pair(network, *names) for names in combinations_with_replacement(network.beams, 2)]
+    return [_make_pair(network, *names) for names in combinations_with_replacement(network.beams, 2)]
 
 
-def _pair(network: Network, first: str, second: str) -> Pair:
+def _make_pair(network: Network, first: str, second: str) -> Pair:
     ends = [[network.master_of(end) for end in (network.beams[n].start, network.beams[n].end)] for n in (first, second)]
     joints = [(i, j) for i in (0, 1) for j in (0, 1) if ends[0][i] == ends[1][j]]
     return Pair((first, second), () if first == second else tuple(joints))

@@ -153,11 +153,11 @@ def lines_cross(line: FloatArray, second_line: FloatArray, joined: bool) -> bool
 
 def _least_gap(task: Task, path: Path) -> float | None:
     """Return the least distance of surfaces of different beams, away from where they meet [m]."""
-    least = min((_gap(task, path, pair) for pair in pairs(task.network) if not pair.alone), default=np.inf)
+    least = min((_gap_of_pair(task, path, pair) for pair in pairs(task.network) if not pair.alone), default=np.inf)
     return float(least) if np.isfinite(least) else None
 
 
-def _gap(task: Task, path: Path, pair: Pair) -> float:
+def _gap_of_pair(task: Task, path: Path, pair: Pair) -> float:
     sections = [task.network.beams[name].section for name in pair.beams]
     thickness = 0.5 * sum(thickest_of(section) for section in sections)
     wanted = thickness + (task.limits.clearance or 0.0)

@@ -1,8 +1,7 @@
-"""Force, centre lines and stresses of a network at chosen poses for one vector of design variables, with exact slopes.
+"""Response of a network to its design variables at chosen poses: force, lines, stresses, slopes; and at many poses.
 
-It is asked at some poses: rest, some on the way, the window, the two that the paper compares. A search sees the force
-at those of the window, and the polynomial through them. Where the force bends more sharply than that polynomial can, it
-leaves the band between two poses: that is seen at many more poses, where a design is looked at closely.
+Poses are rest, some on the way, the window, the two that the paper compares. A search has the force at those of the
+window, and the polynomial through them. A force that bends more sharply leaves the band between two poses: hence many.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Dynamic analysis of a cam mechanism: the force that a given motion of its slider needs, and where the motion ends.
 
-The curve is the force over the slider's displacement, in the order of time, with everything
-that happens at contacts, pins and springs beside it. The displacement is that of the quasi-static
-model, so that the two can be overlaid.
+The curve is the force over the slider's displacement, in the order of time, with everything that happens at contacts,
+pins and springs beside it. The displacement is that of the quasi-static model, so that the two can be overlaid.
 
 Where a motion stops being one of this mechanism: rollers in each other's way, lifted off, or held by nothing. Each
 condition is a margin over time, positive while it holds. The place at which the first of them is lost is found by

@@ -1,19 +1,17 @@
-"""Forces of a given motion, from the position of the slider alone.
+"""Kinematics and forces of a cam mechanism for a given motion of its slider, from its position alone; also at rest.
 
-The mechanism has one degree of freedom, so every velocity is a known function of
-the slider's position times its speed. With C the roller's centre, t the unit tangent
-of its curve, k the curvature, sigma the arc length, d = C - i S the brace (complex
-numbers, ' = d/dS):
+The mechanism has one degree of freedom, so every velocity is a known function of the slider's position times its speed.
+With C the roller's centre, t the unit tangent of its curve, k the curvature, sigma the arc length, d = C - i S the
+brace (complex numbers, ' = d/dS):
 
     sigma'  = Im d / Re(conj(d) t)                                from |d| = L
     sigma'' = -(|d'|^2 + k sigma'^2 Re(conj(d) i t)) / Re(conj(d) t)
 
-and C' = t sigma', C'' = t sigma'' + i k t sigma'^2. Rolling without slip is integrable
-in the plane: the roller turns by sigma / r. With all accelerations known, the balance of
-each brace about the slider's pin gives the contact force, that of the roller the force at
-its axis, that of the brace the force at the pin, and that of the slider the force wanted: side
-by side, without symmetry, and with nothing to integrate. The power of all forces is the
-rate of the energy (`MotionResponse.energy`), which the tests use as a check.
+and C' = t sigma', C'' = t sigma'' + i k t sigma'^2. Rolling without slip is integrable in the plane: the roller turns
+by sigma / r. With all accelerations known, the balance of each brace about the slider's pin gives the contact force,
+that of the roller the force at its axis, that of the brace the force at the pin, and that of the slider the force
+wanted: side by side, without symmetry, and with nothing to integrate. The power of all forces is the rate of the energy
+(`MotionResponse.energy`), which the tests use as a check.
 
 Rolling resistance, which the multibody model of [SS] lacks, is that of the quasi-static
 model: a force mu N against the motion of the roller's centre.
@@ -152,11 +150,11 @@ def respond(machine: Machine, slider: SliderState) -> MotionResponse:
     loads = _loads(machine, parts, at, slider)
     free = loads.springs - parts.roller_mass * loads.roller - loads.rolling * at.tangent
     middle = parts.brace_mass * loads.middle
-    balance = parts.brace_inertia * loads.turning + _cross(at.brace, 0.5 * middle - free)
+    balance = parts.brace_inertia * loads.turning + _cross_product(at.brace, 0.5 * middle - free)
     traction = loads.rolling
     if machine.friction:
         resistance = -machine.friction if slider.speed.sum() < 0 else machine.friction
-        lever = at.lever + resistance * _cross(at.brace, at.tangent)
+        lever = at.lever + resistance * _cross_product(at.brace, at.tangent)
         contact = np.where(lever < 0, -balance / lever, np.nan)  # else friction holds the roller
         free, traction = free - resistance * contact * at.tangent, traction + resistance * contact
     else:
@@ -191,7 +189,7 @@ def kinematics(stances: tuple[Stance, Stance], position: FloatArray, length: Flo
     arc_bend = (bent * product.imag - (relative.real**2 + relative.imag**2)) / lever
     center_bend = tangent * (arc_bend + 1j * bent)
     square = length * length
-    angle_slope, angle_bend = _cross(brace, relative) / square, _cross(brace, center_bend) / square
+    angle_slope, angle_bend = _cross_product(brace, relative) / square, _cross_product(brace, center_bend) / square
     return Kinematics(
         center, tangent, brace, lever, ratio, arc_bend, center_slope, center_bend, angle_slope, angle_bend
     )
@@ -215,5 +213,5 @@ def _loads(machine: Machine, parts: SideParts, at: Kinematics, slider: SliderSta
     )
 
 
-def _cross(a: ComplexArray, b: ComplexArray) -> FloatArray:
+def _cross_product(a: ComplexArray, b: ComplexArray) -> FloatArray:
     return a.real * b.imag - a.imag * b.real

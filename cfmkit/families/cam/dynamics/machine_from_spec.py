@@ -25,7 +25,7 @@ def build(spec: CamSpec) -> Build:
     motion = stated_motion(spec)
     right, left = assemble_sides(spec)
     lift = cam_start_height(right.profile) if motion.origin == "cam-start" else 0.0
-    machine = _machine(spec, (right, left), lift)
+    machine = _make_machine(spec, (right, left), lift)
     for name, side in (("right", machine.right), ("left", machine.left)):
         _check_leverage(name, side)
     return Build(right, left, machine, Cycloid(motion.slider_position, motion.stroke, motion.time), lift)
@@ -41,7 +41,7 @@ def stated_motion(spec: CamSpec) -> Dynamics:
     return spec.analysis.dynamics
 
 
-def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Machine:
+def _make_machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Machine:
     mechanism, masses = spec.mechanism, spec.mechanism.masses
     right, left = sides
     errors = _angles(mechanism.errors)

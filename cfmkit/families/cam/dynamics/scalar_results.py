@@ -1,4 +1,4 @@
-"""Scalar results of a motion of a cam mechanism."""
+"""Scalar results of a motion of a cam mechanism, its contact pressure, and its force when moved slowly."""
 
 from __future__ import annotations
 

@@ -1,16 +1,14 @@
 """The cam as it is cut: the roller path shifted by the roller radius, where that fails, and its flanks as curves.
 
-The cam's flank is the roller-centre path shifted by the roller radius along the
-normal. Where the path is curved more tightly than the roller the shifted curve
-turns back on itself: material that another position of the roller needs is gone,
-the cam ends in a corner, and the roller pivots on that corner instead of
-following the path (undercut). The published design does so at its start.
+The cam's flank is the roller-centre path shifted by the roller radius along the normal. Where the path is curved more
+tightly than the roller the shifted curve turns back on itself: material that another position of the roller needs is
+gone, the cam ends in a corner, and the roller pivots on that corner instead of following the path (undercut). The
+published design does so at its start.
 
-The path begins at x0, so the shifted curve does not cross itself there: the corner
-is the point of it that is one roller radius from the path's first point. Elsewhere
-there is no undercut: where the slider rises, paths are curved most at their start
-(`SlopeLaw.curvature_radius`), for rollers smaller than the brace. Paths that weights help
-or whose force follows a curve may be curved more elsewhere: `mechanism_from_spec.cut_profile` refuses these.
+The path begins at x0, so the shifted curve does not cross itself there: the corner is the point of it that is one
+roller radius from the path's first point. Elsewhere there is no undercut: where the slider rises, paths are curved most
+at their start (`SlopeLaw.curvature_radius`), for rollers smaller than the brace. Paths that weights help or whose force
+follows a curve may be curved more elsewhere: `mechanism_from_spec.cut_profile` refuses these.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Roller-centre path of a constant-force cam: its slope, integrated.
+"""Roller-centre path of a cam: its height, the integral of the slope, and how far along it a slider travel reaches.
 
 With x as the independent variable the height is one integral of the slope
 (`cfmkit.families.cam.geometry.slope_law`); without friction it has a closed form,

@@ -1,10 +1,9 @@
 """The track on which a roller's centre really runs, with the brace and roller that are built in.
 
-On the flank the centre is one roller radius from the cam along the normal; on the corner
-of an undercut cam the roller pivots. The slider position is what drives the mechanism, so
-the track is the part over which the slider rises while the rollers move out: where another
-brace or friction makes the slider fall first, that part is passed over (a dead point), and
-where the slider would fall again near the end of the brace the track ends.
+On the flank the centre is one roller radius from the cam along the normal; on the corner of an undercut cam the roller
+pivots. The slider position is what drives the mechanism, so the track is the part over which the slider rises while the
+rollers move out: where another brace or friction makes the slider fall first, that part is passed over (a dead point),
+and where the slider would fall again near the end of the brace the track ends.
 
 A `Track` finds its ends when it is made; its formulas take numbers, or columns: `TrackRows` are tracks of one kind.
 """

@@ -1,4 +1,4 @@
-"""The slope that a constant-force cam gives the path of its rollers.
+"""Slope law of a constant-force cam's roller path: slope, curvature, and the smallest A or preload without undercut.
 
 The rollers of a symmetric mechanism are pulled together by springs and up by two
 braces that meet in a slider. The force on the slider is constant when the path of
@@ -11,9 +11,8 @@ elongation that the springs have at the start already, A is the force constant, 
 rolling friction that the profile is cut for, and c = 1 unless the profile also carries
 the weight of the moving parts, or is helped by it (`slope_factor`).
 
-Assumes: massless parts but for dead weight, linear springs, point contact, one
-rolling resistance. The paper's Delta x is half the spring's elongation and its A
-contains it: A has the unit of a length.
+Assumes: massless parts but for dead weight, linear springs, point contact, one rolling resistance. The paper's Delta x
+is half the spring's elongation and its A contains it: A has the unit of a length.
 
 [SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
 """

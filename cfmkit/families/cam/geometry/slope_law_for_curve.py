@@ -110,11 +110,11 @@ class CurveSlopeLaw(SlopeLaw):
         def work(travel: FloatArray) -> tuple[FloatArray, FloatArray]:
             return self._work(travel), self.shape.evaluate(travel) - self.carried
 
-        places = self._guide
+        places = self._work_table
         return invert_increasing(work, energy, (0.0, far), np.interp(energy, places[1], places[0]))
 
     @cached_property
-    def _guide(self) -> tuple[FloatArray, FloatArray]:
+    def _work_table(self) -> tuple[FloatArray, FloatArray]:
         travel = self.travel_end * np.linspace(0.0, 1.0, 257) ** 2
         return travel, self._work(travel)
 

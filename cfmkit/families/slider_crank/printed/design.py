@@ -110,7 +110,7 @@ def _design_strip(spec: SliderCrankSpec, run: Run) -> Design:
             continue
         if allowed is not None:
             allowed /= max(1.0, judged.overstress)
-        reported = _report(_with_finished_strip(spec, judged, wanted.shape == "uniform"), judged.window, run)
+        reported = _analyse_reported(_with_finished_strip(spec, judged, wanted.shape == "uniform"), judged.window, run)
         if not reported.keeps(*limits):
             refused = _broken_limit(reported, judged.window, limits)
             continue
@@ -128,7 +128,7 @@ def _make_design(strip: FoundStrip, judged: FinishedStrip, reported: Reported) -
     return Design(
         reported.spec,
         Status.COMPLETE,
-        _message(strip, judged, reported),
+        _describe_strip(strip, judged, reported),
         active_bounds=judged.active,
         warnings=_warnings(strip, judged),
         search=_search_of(strip, judged),
@@ -154,7 +154,7 @@ class Reported:
         )
 
 
-def _report(spec: SliderCrankSpec, window: tuple[float, float], run: Run) -> Reported:
+def _analyse_reported(spec: SliderCrankSpec, window: tuple[float, float], run: Run) -> Reported:
     result = analyze(spec, run)
     kind = "target" if spec.target_curve is None else "curve"
     names = (f"deviation_from_{kind}", f"rms_to_{kind}", "stress_max")
@@ -357,7 +357,7 @@ def _analyse_strip(spec: SliderCrankSpec, task: StripTask, section: tuple[float,
     """Return a uniform strip of a width and a thickness [m] as a design, if its analysis keeps the stress, too."""
     window, limits = (task.start, task.stroke), _limits(spec)
     spec = _with_strip(spec, *section, None, window)
-    reported = _report(
+    reported = _analyse_reported(
         with_values(spec, {"analysis.points": min(spec.analysis.points, MAX_ANALYSIS_POINTS)}), window, run
     )
     return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _broken_limit(reported, window, limits)
@@ -394,7 +394,7 @@ def _with_finished_strip(spec: SliderCrankSpec, finished: FinishedStrip, uniform
     return _with_strip(spec, width, listed[0] if uniform else listed, finished.shares, finished.window)
 
 
-def _message(strip: FoundStrip, judged: FinishedStrip, reported: Reported) -> str:
+def _describe_strip(strip: FoundStrip, judged: FinishedStrip, reported: Reported) -> str:
     descent, count = strip.descent, strip.program.form.count
     what = "one thickness" if count == 1 else f"{count} thicknesses"
     if strip.program.task.goal == "rms":

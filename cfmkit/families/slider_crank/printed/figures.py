@@ -152,7 +152,7 @@ def _place(solution: Solution, lines: Sequence[FloatArray], along: float) -> Flo
     names = list(solution.pressed.path.network.beams)
     if names == [STRIP_BEAM]:
         points = lines[0]
-        return np.asarray(points[round(along / _length(solution.chain.points) * (len(points) - 1))])
+        return np.asarray(points[round(along / _polyline_length(solution.chain.points) * (len(points) - 1))])
     marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(solution.chain.points, axis=0).T))])
     piece = int(np.clip(np.searchsorted(marks, along, side="right") - 1, 0, len(lines) - 1))
     points = lines[piece]
@@ -160,7 +160,7 @@ def _place(solution: Solution, lines: Sequence[FloatArray], along: float) -> Flo
     return np.asarray(points[round(share * (len(points) - 1))])
 
 
-def _length(points: FloatArray) -> float:
+def _polyline_length(points: FloatArray) -> float:
     return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 

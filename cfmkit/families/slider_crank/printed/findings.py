@@ -75,7 +75,7 @@ def _process_limits(solution: Solution) -> tuple[float, float]:
     return position or 0.0, thinnest or 0.0
 
 
-def _runs_in_long(solution: Solution) -> bool:
+def _has_long_run_in(solution: Solution) -> bool:
     run_in, off = solution.run_in(0.98), _kink_size(solution)
     is_long = run_in is not None and run_in > RUN_IN_SHARE * solution.travel[-1]
     return not _is_straight(solution) and is_long and off > 1e-3 * solution.chain.length
@@ -155,7 +155,7 @@ FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     ),
     FindingRule(
         "long_run_in",
-        _runs_in_long,
+        _has_long_run_in,
         lambda solution: (
             f"with a kink of {mm(_kink_size(solution))} the force needs {mm(solution.run_in(0.98) or 0.0)} of travel "
             "to reach 98 % of its level; a smaller kink shortens it",

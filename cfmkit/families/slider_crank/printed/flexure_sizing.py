@@ -182,7 +182,7 @@ def design_flexures(spec: SliderCrankSpec) -> Design:
     return Design(
         _write_flexures(spec, sized.flexures, stroke),
         Status.COMPLETE,
-        _message(sized, wanted.flexures.exact),
+        _describe_flexures(sized, wanted.flexures.exact),
         search=search_values(factors, "lumped", (0.1 * stroke, stroke)),
     )
 
@@ -286,7 +286,7 @@ def _write_flexures(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: flo
     return with_values(spec, {"mechanism.flexures": flexures, **analysis})
 
 
-def _message(sized: SizedFlexures, exact: bool) -> str:
+def _describe_flexures(sized: SizedFlexures, exact: bool) -> str:
     parts = ", ".join(mm(flexure.thickness) for flexure in sized.flexures)
     done = "which the sizes are corrected for" if exact else "which the sizes are not corrected for"
     harder = format_short(sized.force_factor - 1.0, "ratio")

@@ -108,14 +108,14 @@ class Strip:
     def network(self, material: Elasticity) -> Network:
         """Return the strip as a beam network."""
         nodes = {
-            "ground": _node(self.corners[0], CLAMPED_SUPPORT),
-            SLIDER_NODE: _node(self.corners[-1], slider_support(0.0)),
+            "ground": _make_node(self.corners[0], CLAMPED_SUPPORT),
+            SLIDER_NODE: _make_node(self.corners[-1], slider_support(0.0)),
         }
         section = material.section(self.width, Taper(self.places, np.asarray(self.thickness)))
         return Network(nodes, {STRIP_BEAM: Beam("ground", SLIDER_NODE, section, Polyline(self.corners))})
 
 
-def _node(place: FloatArray, support: Support) -> Node:
+def _make_node(place: FloatArray, support: Support) -> Node:
     return Node(float(place[0]), float(place[1]), support)
 
 
@@ -164,7 +164,7 @@ def flexure_network(ends: FloatArray, flexures: Sequence[Flexure], material: Ela
     """Return three flexures and two rigid links as a beam network."""
     names = ("ground", "crank", "crank end", "coupler", "coupler end", SLIDER_NODE)
     supports = {"ground": CLAMPED_SUPPORT, SLIDER_NODE: slider_support(0.0)}
-    nodes = {name: _node(place, supports.get(name, FREE_SUPPORT)) for name, place in zip(names, ends, strict=True)}
+    nodes = {name: _make_node(place, supports.get(name, FREE_SUPPORT)) for name, place in zip(names, ends, strict=True)}
     beams = {
         name: Beam(names[2 * k], names[2 * k + 1], material.section(flexure.width, flexure.thickness))
         for k, (name, flexure) in enumerate(zip(FLEXURE_BEAMS, flexures, strict=True))

@@ -101,12 +101,12 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         reference=spec.analysis.reference_travel,
         allowable_stress=solution.material.allowable_stress,
         effort_error=solution.effort_error,
-        closed=solution.course if stops else solution.course or _interpolate(solution),
+        closed=solution.course if stops else solution.course or _interpolate_path(solution),
         state=solution,
     )
 
 
-def _interpolate(solution: Solution) -> BetweenPoints | None:
+def _interpolate_path(solution: Solution) -> BetweenPoints | None:
     path, allowed = solution.pressed.path, solution.material.allowable_stress
     return interpolate_path(path, float(solution.legs), allowed=allowed)
 

@@ -247,7 +247,7 @@ def _edge(line: FloatArray, half: FloatArray) -> list[FloatArray]:
 
 def _corner(side: _ChainSide, following: _ChainSide) -> list[FloatArray]:
     """Return where two edges meet; where the width steps, both ends on the line that halves the angle."""
-    if abs(_cross(side.along, following.along)) < STRAIGHT_SINE:
+    if abs(_cross_product(side.along, following.along)) < STRAIGHT_SINE:
         return [side.last, following.first]
     at, reach = side.end, float(np.hypot(*(side.last - side.end)))
     ways = side.last - side.first, following.last - following.first
@@ -263,9 +263,9 @@ def _corner(side: _ChainSide, following: _ChainSide) -> list[FloatArray]:
 
 def _meeting(a: FloatArray, a_along: FloatArray, b: FloatArray, b_along: FloatArray) -> FloatArray:
     """Return where the lines through two points along two ways meet."""
-    met: FloatArray = a + _cross(b - a, b_along) / _cross(a_along, b_along) * a_along
+    met: FloatArray = a + _cross_product(b - a, b_along) / _cross_product(a_along, b_along) * a_along
     return met
 
 
-def _cross(a: FloatArray, b: FloatArray) -> float:
+def _cross_product(a: FloatArray, b: FloatArray) -> float:
     return float(a[0] * b[1] - a[1] * b[0])

@@ -1,4 +1,4 @@
-"""A printed slider-crank as it is drawn, as a planar solid: flexures with their fillets, links that bend, or a strip.
+"""Analysis of a printed slider-crank as drawn, a planar solid: flexures with fillets, links that bend, or a strip.
 
 The pad at the ground is held and that at the slider moved from their faces on; widths are those of the flexures where
 they are. Poses stand close where the travel begins: a nearly straight chain buckles within a thousandth of it. Nominal

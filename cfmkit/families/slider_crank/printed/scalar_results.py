@@ -1,4 +1,4 @@
-"""Scalar results of flexures and strips."""
+"""Scalar results of a printed slider-crank: flexures or a strip."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _absent(dimension: str, definition: str, reason: str) -> ScalarQuantity[Solu
     return ScalarQuantity(dimension, definition, lambda _: math.nan, reason)
 
 
-def _run_in(share: float) -> ScalarQuantity[Solution]:
+def _run_in_quantity(share: float) -> ScalarQuantity[Solution]:
     return ScalarQuantity(
         "length",
         f"travel at which the force first reaches {100 * share:.0f} % of its mean in the window",
@@ -54,8 +54,8 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "offset of the crank pin from the line between pivot and slider pin, unloaded; left is positive",
         lambda solution: solution.chain.kink,
     ),
-    "run_in_95": _run_in(0.95),
-    "run_in_98": _run_in(0.98),
+    "run_in_95": _run_in_quantity(0.95),
+    "run_in_98": _run_in_quantity(0.98),
     "side_force_max": ScalarQuantity(
         "force",
         "largest transverse force of the slider on its guide",

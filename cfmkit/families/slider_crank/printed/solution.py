@@ -178,34 +178,34 @@ class Solution(ShortRepr):
         return self.pressed.path.stable[self._at]
 
     @cached_property
-    def _reaction(self) -> FloatArray:
+    def _slider_reaction(self) -> FloatArray:
         reaction: FloatArray = self.legs * self.pressed.path.reaction(SLIDER_NODE)[self._at]
         return reaction
 
     @property
     def side_force(self) -> FloatArray:
         """Force of the slider on its guide, across its way [N]."""
-        return np.zeros(len(self.travel)) if self.mirrored else -self._reaction[:, 1]
+        return np.zeros(len(self.travel)) if self.mirrored else -self._slider_reaction[:, 1]
 
     @property
     def guide_moment(self) -> FloatArray:
         """Moment of the slider on its guide [N m]."""
-        return np.zeros(len(self.travel)) if self.mirrored else -self._reaction[:, 2]
+        return np.zeros(len(self.travel)) if self.mirrored else -self._slider_reaction[:, 2]
 
     @cached_property
-    def _peak(self) -> tuple[FloatArray, FloatArray]:
+    def _peak_stress(self) -> tuple[FloatArray, FloatArray]:
         peak = self.pressed.path.peak_stress()
         return peak.value[self._at], self._locate_along_chain(peak.beam[self._at], peak.place[self._at])
 
     @property
     def stress(self) -> FloatArray:
         """Largest stress of the part [Pa]."""
-        return self._peak[0]
+        return self._peak_stress[0]
 
     @property
     def place(self) -> FloatArray:
         """Place of the largest stress: along the centre line from the clamped end [m]."""
-        return self._peak[1]
+        return self._peak_stress[1]
 
     def _locate_along_chain(self, beams: FloatArray, shares: FloatArray) -> FloatArray:
         """Return places on beams as lengths along the chain [m]."""

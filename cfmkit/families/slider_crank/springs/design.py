@@ -1,4 +1,4 @@
-"""From targets to springs, and to lengths where the design may choose them.
+"""Design of springs for a target torque or force, and of lengths where they are free; which others are as good.
 
 The effort is linear in the springs' rates: with the lengths given, the best rates are the solution of a linear
 programme or of a least-squares problem. Lengths are searched outside of that, on a grid

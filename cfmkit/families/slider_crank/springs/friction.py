@@ -1,11 +1,10 @@
 """Friction of pins and guide in a slider-crank with springs: the way in and the way out differ by it.
 
-Every pin takes a couple mu d/2 |R| against its rotation, R the force that passes through it; with massless
-links that is the same force in pivot, crank pin and slider pin. The guide takes what the slider presses
-across its way. With coupler and crank in balance about their pins, the force in the coupler is P0 + h P1,
-h the friction couple of one pin, and |P0 + h P1| = h/(mu d/2) is a quadratic in h with one positive root.
-Without one the mechanism holds itself: the line of force stays inside the friction circles of the pins, as it
-does next to the stretched position.
+Every pin takes a couple mu d/2 |R| against its rotation, R the force that passes through it; with massless links that
+is the same force in pivot, crank pin and slider pin. The guide takes what the slider presses across its way. With
+coupler and crank in balance about their pins, the force in the coupler is P0 + h P1, h the friction couple of one pin,
+and |P0 + h P1| = h/(mu d/2) is a quadratic in h with one positive root. Without one the mechanism holds itself: the
+line of force stays inside the friction circles of the pins, as it does next to the stretched position.
 
 Assumes: Coulomb friction, massless links, all pins alike, guide pressed in its middle.
 

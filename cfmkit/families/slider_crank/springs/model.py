@@ -1,4 +1,4 @@
-"""Analysis of slider-cranks with springs: torque over the crank angle, or force over the slider's travel.
+"""Analysis of slider-cranks with springs, one or rows: torque over angle or force over travel; slopes by the rates.
 
 The torque is the derivative of the energy by the crank angle [LH, eq. 10 and 12], the force that
 by the slider's travel: what the slider pushes back with while it is moved towards the pivot.

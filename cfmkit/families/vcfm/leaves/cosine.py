@@ -59,12 +59,12 @@ class CosineLeaf(LeafLaw):
     @cached_property
     def negative_stiffness(self) -> Any:
         """Size of the negative stiffness of one leaf [N/m]: of the buckled form, else of the steepest fall."""
-        if np.isfinite(self.linear[0]):
+        if np.isfinite(self.linear_range[0]):
             return self.critical_force / self.strip.reach
         return super().negative_stiffness
 
     @cached_property
-    def linear(self) -> tuple[Any, Any]:
+    def linear_range(self) -> tuple[Any, Any]:
         """Travels between which the arch is buckled and its force is linear, (from, to) [m]; NaN if it never is.
 
         The shortening under the buckling load is quadratic in the travel: these are the roots of that equation.

@@ -105,7 +105,7 @@ class HybridLeaf(LeafLaw):
         return self._steepest[0]
 
     @property
-    def linear(self) -> tuple[Any, Any]:
+    def linear_range(self) -> tuple[Any, Any]:
         """Range in which the negative stiffness is at least half of its largest, from and to [m]."""
         limits: tuple[Any, Any] = self._steepest[1]
         return limits

@@ -77,13 +77,13 @@ class LeafLaw(ABC):
         return falls if np.ndim(force) == 2 else falls.item()
 
     @property
-    def linear(self) -> tuple[Any, Any]:
+    def linear_range(self) -> tuple[Any, Any]:
         """Range of constant negative stiffness, because the leaf is buckled, from and to [m]; NaN: nowhere."""
         return np.nan, np.nan
 
     def is_buckled(self, travel: Any) -> Any:
         """Return whether the leaf is buckled."""
-        first, last = self.linear
+        first, last = self.linear_range
         return (travel >= first) & (travel <= last)
 
     @property

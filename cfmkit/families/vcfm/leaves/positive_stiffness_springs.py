@@ -277,16 +277,16 @@ class StraightSpring(LeafSpring):
 
     def force(self, compression: Any) -> FloatArray:
         """Return the force [N] at a compression [m]."""
-        unit, form = self._leaf(compression)
+        unit, form = self._leaf_state(compression)
         return np.asarray(-2.0 * self.share * unit * form.along)
 
     def stress(self, compression: Any) -> FloatArray:
         """Return the largest stress, bending and axial [Pa]."""
-        unit, form = self._leaf(compression)
+        unit, form = self._leaf_state(compression)
         bent = 0.5 * self.strip.youngs_modulus * self.strip.thickness * form.curvature / self.strip.length
         return np.asarray(bent + np.abs(4.0 * form.z * unit) / self.strip.area)
 
-    def _leaf(self, compression: Any) -> tuple[Any, Any]:
+    def _leaf_state(self, compression: Any) -> tuple[Any, Any]:
         strip = self.strip
         # a leaf that leaves the flat pose: the S form's travel runs away from it
         travel = -np.asarray(compression, dtype=float) / strip.length
@@ -365,7 +365,7 @@ FOLDED_SPRING = SpringKind(
     lambda strip, _keys, share: Folded(strip, share),
     is_inclined=False,
     proposal=ProposedStructure(
-        "folded spring", "2 Vs, folded spring", 1, lambda _leaf: {"structure": "folded", "angle": 0.0}
+        "folded spring", "2 Vs, folded spring", 1, lambda _leaf_state: {"structure": "folded", "angle": 0.0}
     ),
     drawing_note="one half of the eight folded beams is drawn: make it twice",
 )

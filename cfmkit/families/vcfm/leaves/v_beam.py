@@ -180,7 +180,7 @@ class VBeam(LeafLaw):
         return np.asarray(critical_force(self.strip) * drop / np.hypot(self.strip.reach, drop), dtype=float)
 
     @cached_property
-    def linear(self) -> tuple[Any, Any]:
+    def linear_range(self) -> tuple[Any, Any]:
         """Range in which the leaf is buckled, from and to [m]: where the two laws cross; NaN where it never is."""
         first, last = onset_and_exit(self.strip)
         span = last - first
