@@ -183,9 +183,9 @@ class _VibratingNetwork:
         self.rule = rule
         self.bubbles = shape_functions(self.order + 1, rule.places)[0][:, 2:]
         self.forces = legendre.legvander(2 * rule.places - 1, self.order)[:, 1:]
-        elements, own = len(fine.elements.length), 4 * self.order
-        self.size = fine.size + elements * own
-        inner = fine.size + np.arange(elements * own).reshape(elements, 2, 2, self.order)
+        elements, inner_count = len(fine.elements.length), 4 * self.order
+        self.size = fine.size + elements * inner_count
+        inner = fine.size + np.arange(elements * inner_count).reshape(elements, 2, 2, self.order)
         self.positions, self.varying = inner[:, 0], inner[:, 1]  # (e, axis, order) unknowns: bubbles; forces
 
     def assemble_matrices(self, z: FloatArray, drive: float) -> _Matrices:
@@ -193,7 +193,7 @@ class _VibratingNetwork:
         stiffness = np.zeros((self.size, self.size))
         stiffness[: self.fine.size, : self.fine.size] = energy.hessian(self.fine, z, drive)
         self._vary(stiffness, z, drive)
-        columns = [self._spread(*given) for given in self._iterate_masses(z)]
+        columns = [self._spread(*mass) for mass in self._iterate_masses(z)]
         for name, (weight, inertia) in self.masses.nodes.items():
             moves, unknowns = self._node(z, name)
             size = np.array([weight, weight, inertia / self.fine.scales.length**2])
@@ -226,10 +226,10 @@ class _VibratingNetwork:
                 np.add.at(stiffness, (rotations[k][:, None], rows), turning.T)
                 inside = self.positions[k, axis]
                 stiffness[rows, inside] = stiffness[inside, rows] = couple
-                for other in (0, 1):
-                    mean, share = e.unknowns[k, other - 2], weight * soft[axis][other][k]
+                for column_axis in (0, 1):
+                    mean, share = e.unknowns[k, column_axis - 2], weight * soft[axis][column_axis][k]
                     stiffness[rows, mean] = stiffness[mean, rows] = -(self.forces.T @ share)
-                    stiffness[np.ix_(rows, self.varying[k, other])] = -(self.forces.T * share) @ self.forces
+                    stiffness[np.ix_(rows, self.varying[k, column_axis])] = -(self.forces.T * share) @ self.forces
 
     def _iterate_masses(self, z: FloatArray) -> Iterator[tuple[Any, FloatArray, FloatArray]]:
         """Yield unknowns, what they move the points of beams by, and masses; and the same of sections' rotations."""
@@ -251,18 +251,18 @@ class _VibratingNetwork:
 
     def _node(self, z: FloatArray, name: str) -> tuple[FloatArray, Any]:
         """Return the motion of a node (3, 4) by its unknowns, and their numbers."""
-        here = poses(self.fine.attachments, z, [self.fine.nodes[name]])
+        pose = poses(self.fine.attachments, z, [self.fine.nodes[name]])
         moves = np.zeros((3, 4))
-        moves[:2, :3], moves[2, 3] = here.jacobian[0], 1.0
-        return moves, here.unknowns[0]
+        moves[:2, :3], moves[2, 3] = pose.jacobian[0], 1.0
+        return moves, pose.unknowns[0]
 
     def row_of(self, z: FloatArray, name: str, direction: float | None) -> FloatArray:
         """Return what the unknowns count for in a node's motion along a direction, or in its rotation, (size,)."""
         moves, unknowns = self._node(z, name)
         row = moves[2] if direction is None else np.cos(direction) * moves[0] + np.sin(direction) * moves[1]
-        found = np.zeros(self.size)
-        np.add.at(found, unknowns, row)
-        return found
+        combination = np.zeros(self.size)
+        np.add.at(combination, unknowns, row)
+        return combination
 
 
 def _choose_unknowns(
@@ -270,11 +270,11 @@ def _choose_unknowns(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the matrices of the unknowns that move while the drive is held, or free; a row that is held as a force."""
     driven = np.empty(0, int) if is_held else np.flatnonzero(fine.rate)
-    own = np.concatenate([fine.free, driven, np.arange(fine.size, len(matrices.root))])
-    stiffness, root = matrices.stiffness[np.ix_(own, own)], matrices.root[own]
+    moving = np.concatenate([fine.free, driven, np.arange(fine.size, len(matrices.root))])
+    stiffness, root = matrices.stiffness[np.ix_(moving, moving)], matrices.root[moving]
     if row is None or not is_held:
         return stiffness, root
-    tied = np.append(row[own], 0.0)
+    tied = np.append(row[moving], 0.0)
     stiffness, root = np.pad(stiffness, (0, 1)), np.pad(root, ((0, 1), (0, 0)))
     stiffness[-1], stiffness[:, -1] = tied, tied
     return stiffness, root
@@ -282,33 +282,33 @@ def _choose_unknowns(
 
 def _squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[FloatArray, bool, bool]:
     """Return the lowest squares of frequencies, nan where it is unstable; whether it flutters, and diverges."""
-    found = np.full(count, np.nan)
+    lowest_squares = np.full(count, np.nan)
     shift = len(root) / max(float((root**2).sum()), np.finfo(float).tiny)  # EI / (mass length^3) or so
     symmetric = np.abs(stiffness - stiffness.T).max() <= np.finfo(float).eps * np.abs(stiffness).max()
     try:
         flexible = root.T @ np.linalg.solve(stiffness + shift * root @ root.T, root)
     except np.linalg.LinAlgError:
-        return found, False, not symmetric
+        return lowest_squares, False, not symmetric
     if symmetric:
         inverse = np.linalg.eigvalsh(0.5 * (flexible + flexible.T))
         largest = float(np.abs(inverse).max(initial=0.0))
         lowest = inverse[inverse > np.finfo(float).eps * largest][::-1][:count]
         squares = 1 / lowest - shift
         if inverse[0] < -FLEXIBILITY_RTOL * largest or (squares < -INSTABILITY_RTOL * shift).any():
-            return found, False, False
-        found[: len(squares)] = np.where(squares < ZERO_FREQUENCY_RTOL * shift, 0.0, squares)
-        return found, False, False
+            return lowest_squares, False, False
+        lowest_squares[: len(squares)] = np.where(squares < ZERO_FREQUENCY_RTOL * shift, 0.0, squares)
+        return lowest_squares, False, False
     return _with_turning(np.linalg.eigvals(flexible), shift, count)
 
 
 def _with_turning(inverse: Any, shift: float, count: int) -> tuple[FloatArray, bool, bool]:
     """Return the same under loads that turn with their node."""
-    found = np.full(count, np.nan)
+    lowest_squares = np.full(count, np.nan)
     lowest = inverse[np.argsort(-np.abs(inverse))][: N_RESOLVED * (count + 1)]
     squares = 1.0 / lowest[np.abs(lowest) > np.finfo(float).eps * np.abs(lowest[0])] - shift
     complex_ones = np.abs(squares.imag) > COMPLEX_SHARE * np.abs(squares)
     swings, falls = bool(complex_ones.any()), bool((squares.real[~complex_ones] <= 0.0).any())
     if not (swings or falls):
         real = np.sort(squares.real)[:count]
-        found[: len(real)] = real
-    return found, swings, falls
+        lowest_squares[: len(real)] = real
+    return lowest_squares, swings, falls

@@ -171,8 +171,8 @@ def _is_beside_kink(piece: PieceOfPath, condition: Condition, at: PathEquilibriu
     mesh, z, beam = piece.whole.mesh, piece.whole.values(at.x, at.drive), condition.item.beam
     section = mesh.fits.network.beams[beam].section
     places = [float(z[contact.slide]) for contact in mesh.contacts if contact.number == condition.number]
-    near = KINK_REACH * section.thinnest / mesh.fits[beam].length
-    return section.shear and any(abs(place - parameter) < near for place in places)
+    distance = KINK_REACH * section.thinnest / mesh.fits[beam].length
+    return section.shear and any(abs(place - parameter) < distance for place in places)
 
 
 def _is_parallel(piece: PieceOfPath, condition: Condition, at: PathEquilibrium) -> bool:
@@ -287,7 +287,7 @@ def _locate_zero(piece: PieceOfPath, step: StepBetween, row: int) -> PathEquilib
 def row_rate(piece: PieceOfPath, at: PathEquilibrium, row: int) -> float:
     """Return how a row of `PieceOfPath.values` changes with the drive at an equilibrium."""
     step = RATE_STEP / max(1.0, float(np.abs(at.rate).max(initial=0.0)))
-    sides = [at._replace(x=at.x + way * at.rate, drive=at.drive + way) for way in (step, -step)]
+    sides = [at._replace(x=at.x + change * at.rate, drive=at.drive + change) for change in (step, -step)]
     ahead, behind = (piece.row_value(side, row) for side in sides)
     return (ahead - behind) / (2 * step)
 

@@ -272,8 +272,8 @@ class SideGaps:
     def find_kinks(self, lines: ElementLines) -> FloatArray:
         """Return how steeply the gap falls from contacts at both ends of elements in n states, (n, m, 2)."""
         numbers, sides = lines.elements, self.mesh.side_contacts
-        own: list[Any] = [contact for contact in sides if contact.item.name == self.item.name]
-        pressed = [contact.element for contact in own if contact.item.beam == self.item.beam]
+        contacts: list[Any] = [contact for contact in sides if contact.item.name == self.item.name]
+        pressed = [contact.element for contact in contacts if contact.item.beam == self.item.beam]
         gap, slope, _ = self._measure_line(lines, np.array([0.0, 1.0]))
         at_pad = np.isin(numbers, self.touched)[:, None] & (np.abs(gap) < BESIDE_CONTACT)
         ends = np.stack([np.isin(numbers - 1, pressed), np.isin(numbers, pressed)], axis=1) | at_pad
@@ -336,10 +336,10 @@ class SideGaps:
         sections = [mesh.fits.network.beams[beam].section for beam in beams]
         if any(section.shear or isinstance(section.thickness, Taper) for section in sections):
             return None
-        half, own, partner = half_thickness_of(mesh, item.beam), len(self.elements), self.partner_elements
-        elements = np.zeros((own + len(partner), 2))
-        elements[:own, 0], elements[:own, 1], elements[own:, 0] = self.elements, self.slack, partner
-        numbers = np.array([[0, own, half, mesh.scales.length, 0, *counts, *circle, own, len(partner)]], float)
+        half, count, partner = half_thickness_of(mesh, item.beam), len(self.elements), self.partner_elements
+        elements = np.zeros((count + len(partner), 2))
+        elements[:count, 0], elements[:count, 1], elements[count:, 0] = self.elements, self.slack, partner
+        numbers = np.array([[0, count, half, mesh.scales.length, 0, *counts, *circle, count, len(partner)]], float)
         return SideData(elements, numbers, edge)
 
     @cached_property

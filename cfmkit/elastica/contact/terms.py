@@ -41,10 +41,10 @@ def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> MeasuredGap:
         hessian = np.zeros((3, 3), jacobian.dtype)
     else:
         assert isinstance(item, NodeOnObstacle)
-        found = item.outline.distance(at.place[0] * length)
-        normal, value = found.normal, (found.value - item.radius) / length
+        nearest = item.outline.distance(at.place[0] * length)
+        normal, value = nearest.normal, (nearest.value - item.radius) / length
         across = np.array([normal[1], -normal[0]]) @ jacobian
-        hessian = found.curvature * length * np.outer(across, across)
+        hessian = nearest.curvature * length * np.outer(across, across)
     hessian[2, 2] -= normal @ arm
     return MeasuredGap(value, at.unknowns[0, :3], normal @ jacobian, hessian)
 
@@ -75,8 +75,8 @@ def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | Non
         value, bend = along @ (place - _place_at_rest(mesh, contact)), np.zeros((2, 2))
     else:
         assert isinstance(item, NodeOnObstacle)
-        way, round_length = item.outline.way_along(place * length, item.radius), item.outline.round_length(item.radius)
-        value, along, bend = way.value / length, way.gradient, way.hessian * length
+        slip, round_length = item.outline.way_along(place * length, item.radius), item.outline.round_length(item.radius)
+        value, along, bend = slip.value / length, slip.gradient, slip.hessian * length
         if near is not None and np.isfinite(round_length):
             value = value - np.rint((np.real(value) - near) * length / round_length) * round_length / length
         radius = item.radius / length
@@ -132,18 +132,18 @@ def contact_contribution(mesh: Discretisation, contact: ContactAt, z: Any) -> Co
     With friction it has no functional where it slips: its matrix is not symmetric. Flag and anchor of a state keep the
     values that they have.
     """
-    gap, force, own = measure(mesh, contact, z), z[contact.unknown], contact.own_unknowns
+    gap, force, extra = measure(mesh, contact, z), z[contact.unknown], contact.own_unknowns
     motions, slip = gap.unknowns, None
     if contact.rub >= 0:
         state = friction_of(contact, z)
         slip = slip_way(mesh, contact, z, state.anchor)
         motions = np.union1d(gap.unknowns, slip.unknowns)
-    unknowns, count, size = np.append(motions, own), len(motions), len(motions) + len(own)
+    unknowns, count, size = np.append(motions, extra), len(motions), len(motions) + len(extra)
     kind = np.result_type(gap.value, gap.gradient, gap.hessian, z.dtype)
     gradient, hessian = np.zeros(size, kind), np.zeros((size, size), kind)
     hessian[range(count, size), range(count, size)] = -1.0
     if not is_closed(contact, z, gap.value):
-        forces = list(own[:2])
+        forces = list(extra[:2])
         gradient[count : count + len(forces)] = -z[forces]
         return Contribution(0.0 * force, unknowns, gradient, hessian)
     soft, pressing = compliance(mesh, contact), np.searchsorted(motions, gap.unknowns)

@@ -73,8 +73,8 @@ def curling_share(z: Any) -> tuple[Any, Any, Any]:
     [1.0, 0.994488, 0.02]
     """
     small = np.real(z) < 1.0
-    near, far = _sum_series(np.where(small, z, 0.0)), _closed_form(np.where(small, 1.0, z))
-    g, first, second = (np.where(small, *pair) for pair in zip(near, far, strict=True))
+    series, far = _sum_series(np.where(small, z, 0.0)), _closed_form(np.where(small, 1.0, z))
+    g, first, second = (np.where(small, *pair) for pair in zip(series, far, strict=True))
     return g, first, second
 
 
@@ -101,10 +101,10 @@ def _closed_form(z: Any) -> tuple[Any, Any, Any]:
 
 def _quotient(top: list[float], below: list[float]) -> tuple[float, ...]:
     """Return the power series of a quotient of two."""
-    found: list[float] = []
+    quotient: list[float] = []
     for k, value in enumerate(top):
-        found.append((value - sum(found[j] * below[k - j] for j in range(k))) / below[0])
-    return tuple(found)
+        quotient.append((value - sum(quotient[j] * below[k - j] for j in range(k))) / below[0])
+    return tuple(quotient)
 
 
 SERIES_COEFFICIENTS = _quotient(

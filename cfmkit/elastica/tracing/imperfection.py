@@ -69,9 +69,9 @@ def _where(drive: Drive, buckling: Buckling) -> str:
     if what:
         return f"under {100 * event.drive:.4g} % of the {what}"
     place = event.drive * problem.mesh.scales.drive
-    mesh, near = problem.mesh, event.near
-    if near is not None and mesh.rate.any() and abs(place) < NO_DRIVE * float(np.abs(drive.points).max()):
-        residual = energy.gradient(mesh, problem.values(near.x, near.drive), near.drive)
+    mesh, equilibrium = problem.mesh, event.near
+    if equilibrium is not None and mesh.rate.any() and abs(place) < NO_DRIVE * float(np.abs(drive.points).max()):
+        residual = energy.gradient(mesh, problem.values(equilibrium.x, equilibrium.drive), equilibrium.drive)
         force = float(residual @ mesh.rate) * mesh.scales.moment / mesh.scales.drive
         return f"under {abs(force):.4g} {'N' if isinstance(drive, Displacement) else 'N m'}"
     return f"at {place:.6g}"
