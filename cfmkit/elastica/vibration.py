@@ -110,9 +110,9 @@ def frequencies(
     Raises InputError if a beam has no density, a mass is at no node, the count is not positive, the unknowns are too
     many, or there are contacts.
     """
-    _check(path, masses, count)
+    _check_arguments(path, masses, count)
     chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
-    fine = raise_degree(path.mesh, _degree(path.mesh, count))
+    fine = raise_degree(path.mesh, _degree_of_rotations(path.mesh, count))
     system = _VibratingNetwork(path, fine, masses)
     by_load = isinstance(path.load_case, Loading)
     held, free = (np.full((len(chosen), count), np.nan) for _ in range(2))
@@ -123,7 +123,7 @@ def frequencies(
         matrices = system.assemble_matrices(z, float(path.at.drive[point]))
         row = system.row_of(z, *hold) if hold is not None and by_load else None
         (squares, *still), (others, *loose) = (
-            _squares(*_choose_unknowns(fine, matrices, is_held, row), count) for is_held in (True, False)
+            _lowest_squares(*_choose_unknowns(fine, matrices, is_held, row), count) for is_held in (True, False)
         )
         held[k], free[k] = unit * np.sqrt(squares), unit * np.sqrt(others)
         grows[:, k] = loose if by_load else still
@@ -131,7 +131,7 @@ def frequencies(
     return Frequencies(read_only(chosen, np.int64), read_only(held), read_only(free), flutters, diverges)
 
 
-def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
+def _check_arguments(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
     if count < 1:
         raise InputError(f"at least one frequency must be requested, got {count}")
     if path.network.contacts:
@@ -141,8 +141,8 @@ def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
     for name in masses.nodes:
         if name not in path.network.nodes:
             raise InputError(f"a mass is given for {name!r}, which is not a node")
-    elements, degree = len(path.mesh.elements.length), _degree(path.mesh, count)
-    size = path.mesh.size + elements * (degree - path.mesh.degree + 4 * _order(path.mesh, degree))
+    elements, degree = len(path.mesh.elements.length), _degree_of_rotations(path.mesh, count)
+    size = path.mesh.size + elements * (degree - path.mesh.degree + 4 * _order_of_inner_forces(path.mesh, degree))
     if size > MAX_UNKNOWNS:
         raise InputError(
             f"natural frequencies need {size} unknowns, more than {MAX_UNKNOWNS}: the beams have too many windings "
@@ -150,13 +150,13 @@ def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
         )
 
 
-def _degree(mesh: Discretisation, count: int) -> int:
+def _degree_of_rotations(mesh: Discretisation, count: int) -> int:
     """Return the degree of the rotations: modes of a beam are spread over its elements."""
     wanted = DEGREE_OF_FIRST + int(DEGREE_PER_MODE * count / _elements_a_beam(mesh))
     return max(mesh.degree, min(MAX_DEGREE, max(wanted, mesh.degree + DEGREES_BESIDE_STATICS)))
 
 
-def _order(mesh: Discretisation, degree: int) -> int:
+def _order_of_inner_forces(mesh: Discretisation, degree: int) -> int:
     """Return the order of forces and, by one more, positions: as smooth as sines of the rotation."""
     return degree - 1 if _elements_a_beam(mesh) < LONG_CHAIN else min(degree - 1, ORDER_IN_CHAIN)
 
@@ -178,7 +178,7 @@ class _VibratingNetwork:
 
     def __init__(self, path: EquilibriumPath, fine: Discretisation, masses: NetworkMasses) -> None:
         self.network, self.fine, self.masses = path.network, fine, masses
-        self.order = _order(fine, fine.degree)
+        self.order = _order_of_inner_forces(fine, fine.degree)
         rule = basis(fine.degree)
         self.rule = rule
         self.bubbles = shape_functions(self.order + 1, rule.places)[0][:, 2:]
@@ -192,21 +192,21 @@ class _VibratingNetwork:
         """Return the matrices about a pose."""
         stiffness = np.zeros((self.size, self.size))
         stiffness[: self.fine.size, : self.fine.size] = energy.hessian(self.fine, z, drive)
-        self._vary(stiffness, z, drive)
-        columns = [self._spread(*mass) for mass in self._iterate_masses(z)]
+        self._add_inner_forces(stiffness, z, drive)
+        columns = [self._root_columns(*mass) for mass in self._iterate_masses(z)]
         for name, (weight, inertia) in self.masses.nodes.items():
-            moves, unknowns = self._node(z, name)
+            moves, unknowns = self._node_motion(z, name)
             size = np.array([weight, weight, inertia / self.fine.scales.length**2])
-            columns.append(self._spread(unknowns, moves, size))
+            columns.append(self._root_columns(unknowns, moves, size))
         return _Matrices(stiffness, np.hstack(columns))
 
-    def _spread(self, unknowns: Any, moves: FloatArray, masses: FloatArray) -> FloatArray:
+    def _root_columns(self, unknowns: Any, moves: FloatArray, masses: FloatArray) -> FloatArray:
         """Return columns of the root, (size, m), of points that some unknowns move by moves (m, unknowns)."""
         column = np.zeros((self.size, len(moves)))
         np.add.at(column, unknowns, moves.T * np.sqrt(masses))
         return column
 
-    def _vary(self, stiffness: FloatArray, z: FloatArray, drive: float) -> None:
+    def _add_inner_forces(self, stiffness: FloatArray, z: FloatArray, drive: float) -> None:
         """Add what forces that vary along elements do, and what positions inside do to them."""
         e, at = self.fine.elements, energy.fields(self.fine, z, drive)
         softer, order = e.axial - e.shear, self.order
@@ -249,7 +249,7 @@ class _VibratingNetwork:
             if section.shear:  # slenderness at which inertia of sections counts is that at which shear does
                 yield rotations[k], self.rule.values, density * (thickness / fine.scales.length) ** 2 / 12
 
-    def _node(self, z: FloatArray, name: str) -> tuple[FloatArray, Any]:
+    def _node_motion(self, z: FloatArray, name: str) -> tuple[FloatArray, Any]:
         """Return the motion of a node (3, 4) by its unknowns, and their numbers."""
         pose = poses(self.fine.attachments, z, [self.fine.nodes[name]])
         moves = np.zeros((3, 4))
@@ -257,8 +257,8 @@ class _VibratingNetwork:
         return moves, pose.unknowns[0]
 
     def row_of(self, z: FloatArray, name: str, direction: float | None) -> FloatArray:
-        """Return what the unknowns count for in a node's motion along a direction, or in its rotation, (size,)."""
-        moves, unknowns = self._node(z, name)
+        """Return the row (size,) that gives a node's motion along a direction, or its rotation, from all unknowns."""
+        moves, unknowns = self._node_motion(z, name)
         row = moves[2] if direction is None else np.cos(direction) * moves[0] + np.sin(direction) * moves[1]
         combination = np.zeros(self.size)
         np.add.at(combination, unknowns, row)
@@ -280,7 +280,7 @@ def _choose_unknowns(
     return stiffness, root
 
 
-def _squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[FloatArray, bool, bool]:
+def _lowest_squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[FloatArray, bool, bool]:
     """Return the lowest squares of frequencies, nan where it is unstable; whether it flutters, and diverges."""
     lowest_squares = np.full(count, np.nan)
     shift = len(root) / max(float((root**2).sum()), np.finfo(float).tiny)  # EI / (mass length^3) or so
@@ -298,11 +298,11 @@ def _squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[Float
             return lowest_squares, False, False
         lowest_squares[: len(squares)] = np.where(squares < ZERO_FREQUENCY_RTOL * shift, 0.0, squares)
         return lowest_squares, False, False
-    return _with_turning(np.linalg.eigvals(flexible), shift, count)
+    return _lowest_squares_when_turning(np.linalg.eigvals(flexible), shift, count)
 
 
-def _with_turning(inverse: Any, shift: float, count: int) -> tuple[FloatArray, bool, bool]:
-    """Return the same under loads that turn with their node."""
+def _lowest_squares_when_turning(inverse: Any, shift: float, count: int) -> tuple[FloatArray, bool, bool]:
+    """Return squares of frequencies, flutter and divergence under loads that turn with their node."""
     lowest_squares = np.full(count, np.nan)
     lowest = inverse[np.argsort(-np.abs(inverse))][: N_RESOLVED * (count + 1)]
     squares = 1.0 / lowest[np.abs(lowest) > np.finfo(float).eps * np.abs(lowest[0])] - shift

@@ -80,7 +80,7 @@ def _is_beside_change(piece: PieceOfPath, row: int, rows: list[int]) -> bool:
 
 
 def _touch_alike(item: BeamSide, neighbour: BeamSide) -> bool:
-    """Return True if two contacts are one, or of the same parts of the mechanism."""
+    """Return True if two contacts are the same, or of the same two parts of the mechanism."""
     return item is neighbour or (not isinstance(item, BeamOnObstacle) and item.name == neighbour.name)
 
 

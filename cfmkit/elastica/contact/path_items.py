@@ -86,7 +86,7 @@ def join_pieces(
     """Return one network of elements for all pieces, and the states on it, (n, size)."""
     slots: list[_Slot] = []
     for piece in pieces:
-        slots = _common(slots, _slots_of(piece.mesh))
+        slots = _shortest_common_sequence(slots, _slots_of(piece.mesh))
     if not slots:
         return pieces[0].mesh, np.concatenate([piece.z for piece in pieces])
     ends = np.cumsum([0, *(len(piece.drive) for piece in pieces)]).tolist()
@@ -128,7 +128,7 @@ def _slots_of(mesh: Discretisation) -> list[_Slot]:
     return slots
 
 
-def _common(first: list[_Slot], second: list[_Slot]) -> list[_Slot]:
+def _shortest_common_sequence(first: list[_Slot], second: list[_Slot]) -> list[_Slot]:
     """Return the shortest sequence that has both sequences in it."""
     best: dict[tuple[int, int], list[_Slot]] = {}
     for i in range(len(first), -1, -1):

@@ -160,7 +160,7 @@ def _rows_at(degree: int, places: FloatArray) -> _RowsAtPlaces:
 
 @lru_cache(maxsize=64)
 def find_line_tables(degree: int) -> LineTables:
-    """Return what compiled code needs to follow lines."""
+    """Return the tables of shape functions with which compiled code follows lines."""
     fractions = _even_angles()
     at, rule = _rows_at(degree, fractions), basis(degree)
     parts = fractions, rule.weights, at.values.T, at.integrals.T, at.interpolation.T, _series_matrix(degree)
@@ -190,7 +190,7 @@ def join_sides(sides: Sequence[SideData]) -> SideData:
 def search_sides(
     mesh: Discretisation, sides: SideData, z: FloatArray, stage: LoadStage, watch: bool = False
 ) -> FloatArray | None:
-    """Return what compiled code finds of the gaps of sides in n states, (n, sides, 5); None without it."""
+    """Return the least gaps of sides in n states by compiled code, (n, sides, 5); None without it."""
     if not len(z):
         return None
     rows: FloatArray | None = equations(mesh).search_sides(z, stage.rows(), sides, find_line_tables(mesh.degree), watch)
@@ -258,7 +258,7 @@ class SideGaps:
         return gap, slope, seen
 
     def _measure_line(self, lines: ElementLines, fractions: FloatArray) -> MeasuredGaps:
-        """Return the same with the kinks of beams that shear."""
+        """Return gaps and slopes at fractions of elements, the kinks of beams that shear included."""
         seen = lines.evaluate(fractions)
         value, normal = self.distance(seen.place, lines.z, lines.stage)
         if line_leaves_normal(self.section):

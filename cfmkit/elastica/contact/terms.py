@@ -36,7 +36,7 @@ def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> MeasuredGap:
         return MeasuredGap(item.gap - item.sense * z[turn], np.array([turn]), np.array([-item.sense]), np.zeros((1, 1)))
     arm, jacobian = at.arm[0], at.jacobian[0]
     if isinstance(item, Stop):
-        normal = -_direction(item)
+        normal = -_unit_direction(item)
         value = item.gap / length + normal @ (at.place[0] - _place_at_rest(mesh, contact))
         hessian = np.zeros((3, 3), jacobian.dtype)
     else:
@@ -56,7 +56,7 @@ def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
         return item.gap - item.sense * z[:, mesh.attachments.unknowns[contact.place, 3]]
     place = poses(mesh.attachments, z, [contact.place]).place[:, 0]
     if isinstance(item, Stop):
-        return item.gap / length - (place - _place_at_rest(mesh, contact)) @ _direction(item)
+        return item.gap / length - (place - _place_at_rest(mesh, contact)) @ _unit_direction(item)
     assert isinstance(item, NodeOnObstacle)
     return (item.outline.distance(place * length).value - item.radius) / length
 
@@ -70,7 +70,7 @@ def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | Non
     at = poses(mesh.attachments, z, [contact.place])
     place, jacobian, radius = at.place[0], at.jacobian[0], 0.0
     if isinstance(item, Stop):
-        normal = -_direction(item)
+        normal = -_unit_direction(item)
         along = np.array([normal[1], -normal[0]])
         value, bend = along @ (place - _place_at_rest(mesh, contact)), np.zeros((2, 2))
     else:
@@ -165,7 +165,7 @@ def contact_contribution(mesh: Discretisation, contact: ContactAt, z: Any) -> Co
     return Contribution(0.5 * soft * force**2, unknowns, gradient, hessian)
 
 
-def _direction(stop: Stop) -> Any:
+def _unit_direction(stop: Stop) -> Any:
     assert stop.direction is not None
     return np.array([np.cos(stop.direction), np.sin(stop.direction)])
 

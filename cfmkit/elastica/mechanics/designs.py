@@ -65,7 +65,7 @@ def set_up(
 
 
 def make_up(network: Network) -> Any:
-    """Return what networks of one topology share: nodes, beams, joints, supports, links, and what acts on them."""
+    """Return the make-up of a network: names and kinds of its nodes, beams, joints, supports, links, springs, loads."""
     nodes = [
         (name, node.support.along, node.support.across, node.support.rotation) for name, node in network.nodes.items()
     ]

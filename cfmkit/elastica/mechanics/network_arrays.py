@@ -44,7 +44,7 @@ def fill_arrays(
     fits: Sequence[BeamFits],  # of their beams
     driven: DrivenNode | None,  # of all of them
 ) -> NetworkArrays:
-    """Return what is different in networks of one topology."""
+    """Return the arrays of d networks of one topology in which they differ."""
     n, length, bundle, numbers = numbering, scales.length, fits[0].bundle, [fit.number for fit in fits]
     tables = element_tables(fits, scales, n.topology.degree, n.row, cuts)
     spots = bundle.spots[numbers]
@@ -61,7 +61,7 @@ def fill_arrays(
     tables["line"], tables["gap"] = _line_loads(n, scales, pairs), np.zeros((len(pairs), len(n.row), 2))
     raw = [beam.closure == "raw" for beam in pairs[0][0].beams.values()]
     if any(raw):
-        tables["gap"] = _gaps(n, tables, places, np.array(raw)[n.row] & (cuts[:, 1] == 1.0))
+        tables["gap"] = _prestress_gaps(n, tables, places, np.array(raw)[n.row] & (cuts[:, 1] == 1.0))
     return NetworkArrays(tables, places, held)
 
 
@@ -105,7 +105,7 @@ def _line_loads(n: Numbering, scales: MechanicsUnits, pairs: Sequence[Loaded]) -
     return total
 
 
-def _gaps(n: Numbering, tables: dict[str, Any], places: dict[str, Any], last: Any) -> Any:
+def _prestress_gaps(n: Numbering, tables: dict[str, Any], places: dict[str, Any], last: Any) -> Any:
     """Return by how much the last elements of beams that are forced into place miss their nodes, (d, e, 2)."""
     place = places["origin"] + places["arm"]
     span = place[:, n.ends[:, 1]] - place[:, n.ends[:, 0]]
